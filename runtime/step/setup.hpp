@@ -65,4 +65,7 @@ struct Setup {
   std::uint64_t seed = 1;
 };
 
+/// Throws std::invalid_argument with the name of the wall or stage, the value and its limit when the setup makes no sense.
+void validate(const Setup& setup);
+
 }  // namespace talus
