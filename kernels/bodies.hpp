@@ -11,7 +11,8 @@ namespace talus {
 
 /// What the sweeps read and write of one sphere: one cache line.
 /// A sphere of radius R turns as w = R omega [m/s], so that no radius and no tangent frame is needed at a contact
-/// (docs/theory.md, "Spheres"): the velocity of the surface at the contact point is u + w x n on both sides.
+/// (docs/theory.md, "Spheres"): with n pointing to it from the other body, the surface at the contact point moves with u - w x n; the other
+/// body's with u + w x n.
 struct alignas(64) Velocity {
   double u[3]{};           ///< velocity of the centre [m/s]
   double w[3]{};           ///< R omega [m/s]

@@ -1,0 +1,167 @@
+#include "kernels/contacts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+namespace talus {
+
+namespace {
+
+struct Found {
+  Vec3 normal;
+  double bias;
+  std::int32_t candidate;
+};
+
+/// Bias of a contact, or false when it constrains nothing in this step.
+bool constrain(const NarrowPhase& in, double gap, double v_n, double slow, double& bias) {
+  if (gap >= in.alert && gap >= -2 * in.time_step * v_n) return false;
+  bias = std::max(gap, 0.0) / in.time_step;
+  if (in.restitution > 0 && v_n < -slow) {
+    if (gap > 0) return false;
+    bias = in.restitution * v_n;
+  }
+  return true;
+}
+
+void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
+                   std::vector<Found>& found) {
+  const std::size_t grains = candidates.grain_pairs.size();
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]), end = static_cast<std::size_t>(chunks.begin[chunk + 1]);
+  const double slow = 2 * in.time_step * in.gravity.norm();
+  const auto u = [&](std::size_t s) { return Eigen::Map<const Vec3>(in.velocity[s].u); };
+  if (chunks.wall[chunk] < 0) {
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto i = static_cast<std::size_t>(candidates.grain_pairs[k].first);
+      const auto j = static_cast<std::size_t>(candidates.grain_pairs[k].second);
+      const Vec3 d = in.x[i] - in.x[j];
+      const double distance = d.norm();
+      const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
+      double bias;
+      if (constrain(in, distance - in.radius[i] - in.radius[j], normal.dot(u(i) - u(j)), slow, bias))
+        found.push_back({normal, bias, static_cast<std::int32_t>(k)});
+    }
+    return;
+  }
+  const Wall& wall = in.walls[static_cast<std::size_t>(chunks.wall[chunk])];
+  const Vec3 moving = wall.velocity - in.time_step * in.gravity;
+  for (std::size_t k = begin; k < end; ++k) {
+    const auto i = static_cast<std::size_t>(candidates.wall_pairs[k - grains].body);
+    const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
+    double bias;
+    if (constrain(in, gap, wall.normal.dot(u(i) - moving), slow, bias))
+      found.push_back({wall.normal, bias, static_cast<std::int32_t>(k)});
+  }
+}
+
+constexpr int batch_width = 8;
+constexpr int batches_at_most = 64;
+
+/// Deals the contacts to batches of 8 without a common grain, first fit, with one bit per batch and grain; what fits in none of 64 batches
+/// (a large grain among small ones) follows in its own order. Returns places in `found`.
+void order_in_batches(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found, std::vector<std::int32_t>& order) {
+  const auto bodies = static_cast<std::size_t>(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
+  const bool wall = chunks.wall[chunk] >= 0;
+  std::vector<std::uint64_t> in_batch(bodies, 0);
+  std::array<std::array<std::int32_t, batch_width>, batches_at_most> batch;
+  std::array<int, batches_at_most> filled{};
+  std::uint64_t open = ~std::uint64_t{0};
+  std::vector<std::int32_t> late;
+  for (std::size_t f = 0; f < found.size(); ++f) {
+    const auto k = static_cast<std::size_t>(found[f].candidate);
+    std::uint64_t& mask_i = in_batch[chunks.local[2 * k]];
+    std::uint64_t& mask_j = in_batch[wall ? chunks.local[2 * k] : chunks.local[2 * k + 1]];
+    const std::uint64_t room = open & ~(mask_i | mask_j);
+    if (room == 0) {
+      late.push_back(static_cast<std::int32_t>(f));
+      continue;
+    }
+    const auto b = static_cast<std::size_t>(std::countr_zero(room));
+    const std::uint64_t bit = std::uint64_t{1} << b;
+    mask_i |= bit;
+    mask_j |= bit;
+    batch[b][static_cast<std::size_t>(filled[b]++)] = static_cast<std::int32_t>(f);
+    if (filled[b] == batch_width) open &= ~bit;
+  }
+  for (std::size_t b = 0; b < batches_at_most; ++b)
+    order.insert(order.end(), batch[b].begin(), batch[b].begin() + filled[b]);
+  order.insert(order.end(), late.begin(), late.end());
+}
+
+}  // namespace
+
+void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction) {
+  const std::size_t n = candidates.size();
+  for (auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias}) values->resize(n);
+  for (auto* values : {&contacts.rx, &contacts.ry, &contacts.rz}) {
+    values->resize(friction ? n : 0);
+    if (!friction) values->shrink_to_fit();
+  }
+  contacts.rn.resize(friction ? 0 : n);
+  if (friction) contacts.rn.shrink_to_fit();
+  for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
+  contacts.candidate.resize(n);
+  contacts.count.assign(chunks.size(), 0);
+}
+
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+  std::vector<Found> found;
+  found.reserve(static_cast<std::size_t>(chunks.begin[chunk + 1] - chunks.begin[chunk]));
+  find_contacts(in, candidates, chunks, chunk, found);
+  std::vector<std::int32_t> order;
+  order.reserve(found.size());
+  order_in_batches(chunks, chunk, found, order);
+
+  const std::size_t grains = candidates.grain_pairs.size();
+  const bool friction = candidates.components == 3;
+  auto at = static_cast<std::size_t>(chunks.begin[chunk]);
+  for (std::int32_t f : order) {
+    const Found& contact = found[static_cast<std::size_t>(f)];
+    const auto k = static_cast<std::size_t>(contact.candidate);
+    contacts.nx[at] = contact.normal[0];
+    contacts.ny[at] = contact.normal[1];
+    contacts.nz[at] = contact.normal[2];
+    contacts.bias[at] = contact.bias;
+    if (friction) {
+      contacts.rx[at] = candidates.impulse[3 * k];
+      contacts.ry[at] = candidates.impulse[3 * k + 1];
+      contacts.rz[at] = candidates.impulse[3 * k + 2];
+    } else {
+      contacts.rn[at] = candidates.impulse[k];
+    }
+    contacts.first[at] = k < grains ? candidates.grain_pairs[k].first : candidates.wall_pairs[k - grains].body;
+    contacts.second[at] = k < grains ? candidates.grain_pairs[k].second : -1;
+    contacts.candidate[at] = contact.candidate;
+    ++at;
+  }
+  contacts.count[chunk] = static_cast<std::int32_t>(order.size());
+}
+
+void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, Candidates& candidates) {
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]), room = static_cast<std::size_t>(chunks.begin[chunk + 1]);
+  const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  const auto components = static_cast<std::size_t>(candidates.components);
+  std::fill(candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components * begin),
+            candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components * room), 0.0);
+  for (std::size_t a = begin; a < end; ++a) {
+    const auto k = static_cast<std::size_t>(contacts.candidate[a]);
+    if (components == 3) {
+      candidates.impulse[3 * k] = contacts.rx[a];
+      candidates.impulse[3 * k + 1] = contacts.ry[a];
+      candidates.impulse[3 * k + 2] = contacts.rz[a];
+    } else {
+      candidates.impulse[k] = contacts.rn[a];
+    }
+  }
+}
+
+std::size_t memory_used(const Contacts& contacts) {
+  std::size_t bytes = 0;
+  for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx, &contacts.ry, &contacts.rz, &contacts.rn})
+    bytes += values->capacity() * sizeof(double);
+  return bytes + (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() + contacts.count.capacity()) * 4;
+}
+
+}  // namespace talus

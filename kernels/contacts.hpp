@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies.hpp"
+#include "kernels/chunks.hpp"
+#include "kernels/walls.hpp"
+
+namespace talus {
+
+/// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c], chunks.begin[c] + count[c]),
+/// in batches of 8 that share no grain where the chunk allows it, so that neighbours in the sweep do not wait for one another.
+struct Contacts {
+  std::vector<double> nx, ny, nz;   ///< normal, unit, from the second body (or the wall) to the first
+  std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
+  std::vector<double> rx, ry, rz;   ///< impulse on the first body [N s]; empty without friction
+  std::vector<double> rn;           ///< normal impulse [N s]; empty with friction
+  std::vector<Slot> first, second;  ///< second is -1 at a wall
+  std::vector<std::int32_t> candidate;
+  std::vector<std::int32_t> count;  ///< per chunk
+};
+
+/// Room for the contacts of `chunks`; `friction` decides which impulses exist.
+void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
+
+/// What the narrow phase looks at; x at the middle of the step (theta = 1/2), velocities those of its beginning.
+struct NarrowPhase {
+  std::span<const Vec3> x;             ///< [m]
+  std::span<const double> radius;      ///< [m]
+  std::span<const Velocity> velocity;  ///< V-
+  std::span<const Wall> walls;         ///< points at the middle of the step
+  double time_step;                    ///< h [s]
+  double alert;                        ///< [m]
+  double restitution;                  ///< e in [0, 1]
+  Vec3 gravity;                        ///< [m/s^2]
+};
+
+/// Finds the contacts of one chunk and starts them from the candidates' impulses.
+/// A candidate is a contact when gap < alert, or when it would close within two steps at its speed. Bias (docs/theory.md, "Gap term and
+/// restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once
+/// g <= 0, and no constraint before. Coincident centres get the normal +z.
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk, Contacts& contacts);
+
+/// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.
+void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, Candidates& candidates);
+
+std::size_t memory_used(const Contacts& contacts);
+
+}  // namespace talus

@@ -1,0 +1,240 @@
+#include "kernels/sweep.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace talus {
+
+namespace {
+
+struct V3 {
+  double x, y, z;
+};
+inline V3 operator+(V3 a, V3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline V3 operator-(V3 a, V3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline V3 operator*(double s, V3 a) { return {s * a.x, s * a.y, s * a.z}; }
+inline double dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline V3 cross(V3 a, V3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+inline V3 load(const double* p) { return {p[0], p[1], p[2]}; }
+inline void add_to(double* p, V3 a) {
+  p[0] += a.x;
+  p[1] += a.y;
+  p[2] += a.z;
+}
+
+inline V3 normal_of(const Contacts& c, std::size_t k) { return {c.nx[k], c.ny[k], c.nz[k]}; }
+
+template <bool Friction>
+inline V3 impulse_of(const Contacts& c, std::size_t k, V3 n) {
+  if constexpr (Friction)
+    return {c.rx[k], c.ry[k], c.rz[k]};
+  else
+    return c.rn[k] * n;
+}
+
+/// Relative velocity of two grains at their contact.
+template <bool Friction>
+inline V3 relative(const Velocity& a, const Velocity& b, V3 n) {
+  const V3 du = load(a.u) - load(b.u);
+  if constexpr (Friction) return du - cross(load(a.w) + load(b.w), n);
+  return du;
+}
+
+template <bool Friction>
+inline V3 relative(const Velocity& a, const WallCopy& wall, V3 n) {
+  const V3 du = load(a.u) - load(wall.velocity);
+  if constexpr (Friction) return du - cross(load(a.w), n);
+  return du;
+}
+
+/// Adds an impulse dr on the first body, -dr on the second.
+template <bool Friction>
+inline void push(Velocity& a, Velocity& b, V3 n, V3 dr) {
+  add_to(a.u, a.inv_mass * dr);
+  add_to(b.u, -b.inv_mass * dr);
+  if constexpr (Friction) {
+    const V3 turn = cross(n, dr);
+    add_to(a.w, -a.spin_mobility * turn);
+    add_to(b.w, -b.spin_mobility * turn);
+  }
+}
+
+template <bool Friction>
+inline void push(Velocity& a, WallCopy& wall, V3 n, V3 dr) {
+  add_to(a.u, a.inv_mass * dr);
+  add_to(wall.velocity, -wall.inv_mass * dot(n, dr) * n);  // a wall moves along its normal only
+  if constexpr (Friction) add_to(a.w, -a.spin_mobility * cross(n, dr));
+}
+
+/// Closed form of Signorini-Coulomb with a diagonal W: the new impulse.
+template <bool Friction>
+inline V3 solve_law(V3 r, V3 v, V3 n, double bias, double w_nn, double w_tt, double mu) {
+  const double r_n = dot(r, n), v_n = dot(v, n);
+  const double r_n_new = std::max(0.0, r_n - (v_n + bias) / w_nn);
+  if constexpr (!Friction) {
+    return r_n_new * n;
+  } else {
+    const double limit = mu * r_n_new;
+    const V3 t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
+    const double t2 = dot(t, t);
+    const double scale = t2 > limit * limit ? limit / std::sqrt(t2) : 1.0;
+    return r_n_new * n + scale * t;
+  }
+}
+
+template <bool Friction>
+inline void store_impulse(Contacts& c, std::size_t k, V3 r, V3 n) {
+  if constexpr (Friction) {
+    c.rx[k] = r.x;
+    c.ry[k] = r.y;
+    c.rz[k] = r.z;
+  } else {
+    c.rn[k] = dot(r, n);
+  }
+}
+
+/// Projection of z on the Coulomb cone about n.
+inline V3 project_on_cone(V3 z, V3 n, double mu) {
+  const double z_n = dot(z, n);
+  const V3 t = z - z_n * n;
+  const double length = std::sqrt(dot(t, t));
+  if (length <= mu * z_n) return z;
+  if (mu * length <= -z_n) return {0, 0, 0};
+  const double r_n = (z_n + mu * length) / (1 + mu * mu);
+  return r_n * n + (mu * r_n / length) * t;
+}
+
+template <bool Friction>
+inline void add_error(ErrorSums& sums, V3 r, V3 v, V3 n, double bias, double w_nn, double mu) {
+  const double v_n = dot(v, n) + bias;
+  double e = 0;
+  V3 v_biased = v + bias * n;
+  if constexpr (Friction) {
+    const V3 v_t = v - dot(v, n) * n;
+    const V3 v_hat = v_biased + mu * std::sqrt(dot(v_t, v_t)) * n;
+    const V3 miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
+    e = w_nn * std::sqrt(dot(miss, miss));
+  } else {
+    const double r_n = dot(r, n);
+    e = w_nn * std::abs(r_n - std::max(0.0, r_n - v_n / w_nn));
+    v_biased = v_n * n;
+  }
+  const double r_n = dot(r, n);
+  sums.residual2 += e * e;
+  sums.residual_max = std::max(sums.residual_max, e);
+  sums.impulse2 += dot(r, r) * w_nn * w_nn;
+  if (r_n > 0 || v_n < 0) sums.velocity2 += dot(v_biased, v_biased);
+  ++sums.contacts;
+  if (r_n > 0) ++sums.active;
+}
+
+}  // namespace
+
+template <bool Friction>
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) {
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
+    Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
+    const V3 n = normal_of(contacts, k);
+    const V3 r = impulse_of<Friction>(contacts, k, n);
+    const double w_nn = a.inv_mass + b.inv_mass;
+    const double w_tt = w_nn + a.spin_mobility + b.spin_mobility;
+    const V3 r_new = solve_law<Friction>(r, relative<Friction>(a, b, n), n, contacts.bias[k], w_nn, w_tt, mu);
+    push<Friction>(a, b, n, r_new - r);
+    store_impulse<Friction>(contacts, k, r_new, n);
+  }
+}
+
+template <bool Friction>
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu, WallCopy& wall) {
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
+    const V3 n = normal_of(contacts, k);
+    const V3 r = impulse_of<Friction>(contacts, k, n);
+    const V3 r_new = solve_law<Friction>(r, relative<Friction>(a, wall, n), n, contacts.bias[k], a.inv_mass + wall.inv_mass,
+                                         a.inv_mass + a.spin_mobility, mu);
+    push<Friction>(a, wall, n, r_new - r);
+    store_impulse<Friction>(contacts, k, r_new, n);
+  }
+}
+
+template <bool Friction>
+void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) {
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const V3 n = normal_of(contacts, k);
+    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], velocity[static_cast<std::size_t>(contacts.second[k])],
+                   n, impulse_of<Friction>(contacts, k, n));
+  }
+}
+
+template <bool Friction>
+void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity, WallCopy& wall) {
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const V3 n = normal_of(contacts, k);
+    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], wall, n, impulse_of<Friction>(contacts, k, n));
+  }
+}
+
+template <bool Friction>
+ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu) {
+  ErrorSums sums;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
+    const Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
+    const V3 n = normal_of(contacts, k);
+    add_error<Friction>(sums, impulse_of<Friction>(contacts, k, n), relative<Friction>(a, b, n), n, contacts.bias[k],
+                        a.inv_mass + b.inv_mass, mu);
+  }
+  return sums;
+}
+
+template <bool Friction>
+ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu,
+                     const WallCopy& wall, double wall_inv_mass) {
+  ErrorSums sums;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
+    const V3 n = normal_of(contacts, k);
+    const V3 r = impulse_of<Friction>(contacts, k, n);
+    add_error<Friction>(sums, r, relative<Friction>(a, wall, n), n, contacts.bias[k], a.inv_mass + wall_inv_mass, mu);
+    add_to(sums.wall_impulse, r);
+  }
+  return sums;
+}
+
+void ErrorSums::add(const ErrorSums& other) {
+  residual2 += other.residual2;
+  residual_max = std::max(residual_max, other.residual_max);
+  impulse2 += other.impulse2;
+  velocity2 += other.velocity2;
+  for (int c = 0; c < 3; ++c) wall_impulse[c] += other.wall_impulse[c];
+  contacts += other.contacts;
+  active += other.active;
+}
+
+void glue_copies(std::span<WallCopy* const> copies) {
+  if (copies.empty()) return;
+  V3 sum{0, 0, 0};
+  for (const WallCopy* copy : copies) sum = sum + load(copy->velocity);
+  const V3 mean = (1 / static_cast<double>(copies.size())) * sum;
+  for (WallCopy* copy : copies) {
+    copy->velocity[0] = mean.x;
+    copy->velocity[1] = mean.y;
+    copy->velocity[2] = mean.z;
+  }
+}
+
+template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double);
+template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double);
+template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
+template void sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
+template void accumulate_grains<true>(const Contacts&, ContactRange, std::span<Velocity>);
+template void accumulate_grains<false>(const Contacts&, ContactRange, std::span<Velocity>);
+template void accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);
+template void accumulate_wall<false>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);
+template ErrorSums error_grains<true>(const Contacts&, ContactRange, std::span<const Velocity>, double);
+template ErrorSums error_grains<false>(const Contacts&, ContactRange, std::span<const Velocity>, double);
+template ErrorSums error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>, double, const WallCopy&, double);
+template ErrorSums error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>, double, const WallCopy&, double);
+
+}  // namespace talus
