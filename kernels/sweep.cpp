@@ -212,15 +212,16 @@ void ErrorSums::add(const ErrorSums& other) {
   active += other.active;
 }
 
-void glue_copies(std::span<WallCopy* const> copies) {
-  if (copies.empty()) return;
+void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which) {
+  if (which.empty()) return;
   V3 sum{0, 0, 0};
-  for (const WallCopy* copy : copies) sum = sum + load(copy->velocity);
-  const V3 mean = (1 / static_cast<double>(copies.size())) * sum;
-  for (WallCopy* copy : copies) {
-    copy->velocity[0] = mean.x;
-    copy->velocity[1] = mean.y;
-    copy->velocity[2] = mean.z;
+  for (std::int32_t k : which) sum = sum + load(copies[static_cast<std::size_t>(k)].velocity);
+  const V3 mean = (1 / static_cast<double>(which.size())) * sum;
+  for (std::int32_t k : which) {
+    double* velocity = copies[static_cast<std::size_t>(k)].velocity;
+    velocity[0] = mean.x;
+    velocity[1] = mean.y;
+    velocity[2] = mean.z;
   }
 }
 

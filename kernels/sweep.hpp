@@ -60,7 +60,7 @@ template <bool Friction>
 ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu,
                      const WallCopy& wall, double wall_inv_mass);
 
-/// Gives every copy of a wall the mean velocity of all: momentum of the wall is kept, as the copies have equal masses. In order of the copies.
-void glue_copies(std::span<WallCopy* const> copies);
+/// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies have equal masses. Summed in order.
+void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which);
 
 }  // namespace talus
