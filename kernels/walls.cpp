@@ -1,5 +1,6 @@
 #include "kernels/walls.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -37,19 +38,14 @@ double face_area(const std::vector<Wall>& walls, std::size_t index) {
   return area;
 }
 
-double box_volume(const std::vector<Wall>& walls) {
-  for (std::size_t k = 0; k < walls.size(); ++k) {
-    const double depth = opposite_distance(walls, k);
-    if (depth < 0) continue;
-    std::vector<Wall> faces = walls;
-    faces[k].area = 0;
-    try {
-      return depth * face_area(faces, k);
-    } catch (const std::invalid_argument&) {
-      return 0;
-    }
-  }
-  return 0;
+Vec3 box_lengths(const std::vector<Wall>& walls) {
+  Vec3 lengths = Vec3::Zero();
+  for (std::size_t k = 0; k < walls.size(); ++k)
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      if (walls[k].normal[axis] > 1 - 1e-12) lengths[axis] = std::max(0.0, opposite_distance(walls, k));
+  return lengths;
 }
+
+double box_volume(const std::vector<Wall>& walls) { return box_lengths(walls).prod(); }
 
 }  // namespace talus

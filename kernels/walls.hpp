@@ -43,4 +43,7 @@ double face_area(const std::vector<Wall>& walls, std::size_t index);
 /// Volume between the three pairs of opposite axis-aligned walls [m^3]; 0 when the walls do not close a box.
 double box_volume(const std::vector<Wall>& walls);
 
+/// Distances between opposite walls along x, y, z [m]; 0 along an axis without a pair of walls.
+Vec3 box_lengths(const std::vector<Wall>& walls);
+
 }  // namespace talus

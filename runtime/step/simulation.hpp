@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "runtime/graph/executor.hpp"
-#include "runtime/graph/graph.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/iteration.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/step/step_graph.hpp"
 
 namespace talus {
 
@@ -22,13 +22,6 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where a step's time went [s], summed over its tasks' threads' wall clock.
-struct StepTimes {
-  double detection = 0;  ///< predict, broad and narrow phase, chunks
-  double iteration = 0;
-  double rest = 0;
-};
-
 /// A simulation on one process: stages of time steps, each step one graph of tasks (docs/theory.md, "One time step").
 ///
 ///   Executor executor({.threads = 2});
@@ -36,11 +29,10 @@ struct StepTimes {
 ///   while (!simulation.finished()) {
 ///     const StepReport& report = simulation.step();
 ///     if (wanted(report.step)) executor.submit_background("output", [frame = simulation.frame()] { write(frame); });
+///     simulation.begin_next_stage();
 ///   }
 ///
-/// The graph of a step, its tasks cut into lanes that depend on the number of bodies alone, never on threads:
-///   loads -> predict[lane] -> broad: cells -> pairs[lane] -> chunks -> narrow[lane] -> plan -> iterate (team) -> finish[lane] -> report
-/// `broad` tasks return at once while every grain is within its margin. Results do not depend on the number of threads.
+/// Results do not depend on the number of threads (step_graph.hpp).
 class Simulation {
  public:
   /// Throws std::invalid_argument when the setup makes no sense. Bodies are sorted in Morton order. The executor must outlive the simulation.
@@ -49,6 +41,9 @@ class Simulation {
 
   /// Does one time step. Throws RunawayError, or graph::TaskError when a task failed. Not to be called when finished.
   const StepReport& step();
+
+  /// After a step, and after its results were read: goes to the next stage when this one has ended (true), or finishes.
+  bool begin_next_stage();
 
   bool finished() const;
   /// Part of the current stage that is done, in [0, 1], by its nearest end condition.
@@ -62,7 +57,9 @@ class Simulation {
   const StepParameters& parameters() const;
   const std::vector<Iteration::Check>& error_history() const;
   const StepReport& report() const;
-  const StepTimes& times() const;
+  /// What the last step's tasks summed up: sums over bodies and contacts, times of the parts.
+  const StepSums& sums() const;
+  const graph::Graph& step_graph() const;
 
   /// Walls after the last step: positions, velocities, forces.
   std::vector<WallReport> walls() const;

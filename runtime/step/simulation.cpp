@@ -1,0 +1,324 @@
+#include "runtime/step/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+namespace talus {
+
+namespace {
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+bool pushed(const Wall& wall) { return wall.load.drive == WallDrive::pressure || wall.load.drive == WallDrive::force; }
+
+/// Kinetic energy of the walls [J] with the given velocities.
+double energy_of(const Wall& wall, const Vec3& velocity) { return pushed(wall) ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0; }
+
+std::string describe(const Bodies& bodies, Slot slot) {
+  const auto s = static_cast<std::size_t>(slot);
+  const Velocity& v = bodies.velocity[s];
+  const Vec3& x = bodies.x[s];
+  return fmt::format("body {}: x = ({}, {}, {}) m, radius = {} m, u = ({}, {}, {}) m/s, R omega = ({}, {}, {}) m/s",
+                     static_cast<std::int64_t>(bodies.id[s]), x[0], x[1], x[2], bodies.radius[s], v.u[0], v.u[1], v.u[2], v.w[0],
+                     v.w[1], v.w[2]);
+}
+
+}  // namespace
+
+struct Simulation::Implementation {
+  Implementation(Setup given, Bodies bodies, graph::Executor& executor)
+      : setup(std::move(given)), state(start(setup, std::move(bodies))), graph(state, parameters, setup.solver, executor) {
+    const Bodies& grains = state.bodies;
+    for (double r : grains.radius) {
+      smallest = std::min(smallest, r);
+      mean_diameter += 2 * r / static_cast<double>(grains.size());
+    }
+    for (const Velocity& v : grains.velocity) total_mass += 1 / v.inv_mass;
+    volume = total_volume(grains);
+    const double unit = grains.size() > 0 ? smallest : 1;
+    parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
+    parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
+    begin_stage();
+  }
+
+  static StepState start(const Setup& setup, Bodies bodies) {
+    validate(setup);
+    StepState state;
+    state.bodies = std::move(bodies);
+    reorder(state.bodies, morton_order(state.bodies));
+    if (!setup.rotation)
+      for (Velocity& v : state.bodies.velocity) {
+        v.spin_mobility = 0;
+        std::fill(std::begin(v.w), std::end(v.w), 0.0);
+      }
+    if (setup.orientation && state.bodies.orientation.empty()) state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});
+    state.walls = setup.walls;
+    state.wall_states.resize(state.walls.size());
+    state.free.u.resize(state.bodies.size());
+    return state;
+  }
+
+  void begin_stage() {
+    const Stage& stage = setup.stages[stage_index];
+    for (const auto& [name, load] : stage.loads)
+      for (Wall& wall : state.walls)
+        if (wall.name == name) wall.load = load;
+    for (Wall& wall : state.walls) {
+      if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
+      if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
+      if (pushed(wall)) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+      if (wall.load.drive == WallDrive::pressure) face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
+    }
+    parameters.time_step = stage.time_step;
+    parameters.gravity = stage.gravity;
+    parameters.law = stage.law;
+    parameters.friction = stage.law.mu_grains > 0 || stage.law.mu_walls > 0;
+    state.free.w.resize(parameters.friction && setup.rotation ? state.bodies.size() : 0);
+    if (state.candidates_valid) {  // later stages: the sample has flowed, sort it again
+      const std::vector<Slot> order = morton_order(state.bodies);
+      std::vector<Slot> place(order.size());
+      for (std::size_t k = 0; k < order.size(); ++k) place[static_cast<std::size_t>(order[k])] = static_cast<Slot>(k);
+      reorder(state.bodies, order);
+      renumber(state.candidates, place);
+      state.candidates_valid = false;
+    }
+    stage_steps = 0;
+    lengths_at_start = box_lengths(state.walls);
+  }
+
+  /// Loads of the walls for the step: applied forces and free velocities.
+  void load_walls() {
+    for (std::size_t w = 0; w < state.walls.size(); ++w) {
+      const Wall& wall = state.walls[w];
+      WallState& wall_state = state.wall_states[w];
+      wall_state.applied = wall.load.drive == WallDrive::pressure ? wall.load.pressure * face_area(state.walls, w) : wall.load.force;
+      wall_state.free_velocity =
+          wall.velocity + parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
+    }
+  }
+
+  void check_for_runaway(double wall_energy_free) const {
+    const MotionSums& motion = graph.sums().motion;
+    const std::int64_t step = report.step + 1;
+    if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) || std::isnan(graph.iteration().result().error_rms))
+      throw RunawayError(fmt::format("step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping grains",
+                                     step, setup.stages[stage_index].name, describe(state.bodies, std::max(motion.fastest, 0))));
+    double fastest_wall2 = 0;
+    for (const Wall& wall : state.walls) fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
+    const double energy = motion.energy.translation + motion.energy.rotation;
+    const double supplied = motion.energy_free + wall_energy_free + total_mass * fastest_wall2;
+    if (energy > 100 * supplied && energy > 0)
+      throw RunawayError(fmt::format("step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. Reduce the time "
+                                     "step or raise solver.max_iterations",
+                                     step, setup.stages[stage_index].name, energy, supplied, describe(state.bodies, motion.fastest)));
+  }
+
+  void write_report(double elapsed) {
+    const StepSums& sums = graph.sums();
+    const IterationResult& result = graph.iteration().result();
+    const double impulse_unit = std::max(sums.motion.impulse_scale, std::numeric_limits<double>::min());
+    Vec3 from_walls = Vec3::Zero();
+    for (const WallState& wall : state.wall_states) from_walls += wall.impulse;
+    const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
+    ++stage_steps;
+    ++report.step;
+    report.time += parameters.time_step;
+    report.candidates = static_cast<std::int64_t>(state.candidates.size());
+    report.contacts = result.contacts;
+    report.active = result.active;
+    report.iterations = result.iterations;
+    report.error_rms = result.error_rms;
+    report.error_max = result.error_max;
+    report.balance = std::max(result.drift, defect);
+    report.penetration_mean =
+        sums.contacts.overlapping > 0 ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / smallest : 0;
+    report.penetration_max = sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / smallest : 0;
+    report.kinetic_translation = sums.motion.energy.translation;
+    report.kinetic_rotation = sums.motion.energy.rotation;
+    const double box = box_volume(state.walls);
+    report.solid_fraction = box > 0 ? volume / box : 0;
+    report.wall_s = elapsed;
+    report.converged = result.converged && defect <= setup.solver.balance_tolerance;
+  }
+
+  /// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x grain diameter.
+  double unrest() const {
+    const double h = parameters.time_step;
+    double load = total_mass * parameters.gravity.norm(), net = 0;
+    for (std::size_t w = 0; w < state.walls.size(); ++w) {
+      const double applied = state.wall_states[w].applied;
+      if (applied == 0) continue;
+      load += std::abs(applied);
+      net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) / std::abs(applied));
+    }
+    const double energy = report.kinetic_translation + report.kinetic_rotation;
+    if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
+    const Vec3 gained = graph.sums().motion.impulse / h + total_mass * parameters.gravity;
+    return std::max({net, gained.norm() / load, energy / (load * mean_diameter)});
+  }
+
+  double strain(int axis) const {
+    const Vec3 lengths = box_lengths(state.walls);
+    return lengths_at_start[axis] > 0 && lengths[axis] > 0 ? std::log(lengths[axis] / lengths_at_start[axis]) : 0;
+  }
+
+  /// Part of the stage done by its nearest end condition; >= 1 when it has ended.
+  double done() const {
+    const StageEnd& end = setup.stages[stage_index].end;
+    double fraction = 0;
+    if (end.steps) fraction = std::max(fraction, *end.steps > 0 ? static_cast<double>(stage_steps) / static_cast<double>(*end.steps) : 1.0);
+    if (end.time) {
+      // Half a step of slack: the sum of many steps is not the product.
+      const double steps = *end.time / parameters.time_step;
+      fraction = std::max(fraction, static_cast<double>(stage_steps) >= steps - 0.5 ? 1.0 : static_cast<double>(stage_steps) / steps);
+    }
+    if (stage_steps == 0) return fraction;
+    if (end.strain) fraction = std::max(fraction, std::abs(strain(end.strain_axis)) / *end.strain);
+    if (end.equilibrium && unrest() <= *end.equilibrium) fraction = 1;
+    return fraction;
+  }
+
+  void pass_ended_stages() {
+    while (!over && done() >= 1) {
+      if (stage_index + 1 == setup.stages.size())
+        over = true;
+      else {
+        ++stage_index;
+        begin_stage();
+      }
+    }
+  }
+
+  Setup setup;
+  StepState state;
+  StepParameters parameters;
+  StepGraph graph;
+  StepReport report;
+  std::size_t stage_index = 0;
+  std::int64_t stage_steps = 0;
+  bool over = false;
+  Vec3 lengths_at_start = Vec3::Zero();
+  double smallest = std::numeric_limits<double>::infinity();
+  double mean_diameter = 0;
+  double total_mass = 0;
+  double volume = 0;
+};
+
+Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
+    : impl_(std::make_unique<Implementation>(std::move(setup), std::move(bodies), executor)) {
+  impl_->pass_ended_stages();
+}
+
+Simulation::~Simulation() = default;
+
+const StepReport& Simulation::step() {
+  const double start = now();
+  impl_->load_walls();
+  double wall_energy_free = 0;
+  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w)
+    wall_energy_free += energy_of(impl_->state.walls[w], impl_->state.wall_states[w].free_velocity);
+  impl_->graph.run();
+  impl_->check_for_runaway(wall_energy_free);
+  impl_->write_report(now() - start);
+  return impl_->report;
+}
+
+bool Simulation::begin_next_stage() {
+  const std::size_t before = impl_->stage_index;
+  impl_->pass_ended_stages();
+  return impl_->stage_index != before;
+}
+
+bool Simulation::finished() const { return impl_->over; }
+double Simulation::stage_fraction() const { return std::min(1.0, impl_->done()); }
+const Stage& Simulation::stage() const { return impl_->setup.stages[impl_->stage_index]; }
+std::size_t Simulation::stage_index() const { return impl_->stage_index; }
+std::int64_t Simulation::steps_of_stage() const { return impl_->stage_steps; }
+const Setup& Simulation::setup() const { return impl_->setup; }
+const StepState& Simulation::state() const { return impl_->state; }
+const StepParameters& Simulation::parameters() const { return impl_->parameters; }
+const std::vector<Iteration::Check>& Simulation::error_history() const { return impl_->graph.iteration().history(); }
+const StepReport& Simulation::report() const { return impl_->report; }
+const StepSums& Simulation::sums() const { return impl_->graph.sums(); }
+const graph::Graph& Simulation::step_graph() const { return impl_->graph.graph(); }
+
+std::vector<WallReport> Simulation::walls() const {
+  std::vector<WallReport> reports;
+  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w) {
+    const Wall& wall = impl_->state.walls[w];
+    reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
+                       impl_->state.wall_states[w].impulse / impl_->parameters.time_step});
+  }
+  return reports;
+}
+
+std::optional<TriaxialReport> Simulation::triaxial() const {
+  const double box = box_volume(impl_->state.walls);
+  if (!(box > 0)) return std::nullopt;
+  TriaxialReport out;
+  out.step = impl_->report.step;
+  out.time = impl_->report.time;
+  out.stage = stage().name;
+  out.solid_fraction = impl_->report.solid_fraction;
+  const Eigen::Matrix3d stress = impl_->graph.sums().contacts.moment / (box * impl_->parameters.time_step);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    out.strain[a] = impl_->strain(axis);
+    out.strain_volume += out.strain[a];
+    out.stress[a] = stress(axis, axis);
+    out.p += out.stress[a] / 3;
+  }
+  const auto axial = static_cast<std::size_t>(stage().end.strain_axis);
+  const std::size_t first = (axial + 1) % 3, second = (axial + 2) % 3;
+  out.strain_shear = out.strain[axial] - 0.5 * (out.strain[first] + out.strain[second]);
+  out.q = out.stress[axial] - 0.5 * (out.stress[first] + out.stress[second]);
+  out.q_over_p = out.p > 0 ? out.q / out.p : 0;
+  out.coordination = coordination(impl_->state.contacts, impl_->state.chunks, impl_->state.bodies.size(),
+                                  impl_->parameters.friction ? 2 : 4);
+  return out;
+}
+
+Frame Simulation::frame(bool contacts) const {
+  const StepState& state = impl_->state;
+  const Bodies& bodies = state.bodies;
+  Frame frame;
+  frame.step = impl_->report.step;
+  frame.time = impl_->report.time;
+  frame.stage = stage().name;
+  for (std::size_t s = 0; s < bodies.size(); ++s) {
+    frame.id.push_back(static_cast<std::int64_t>(bodies.id[s]));
+    frame.u.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].u));
+    if (impl_->setup.rotation) frame.omega.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].w) / bodies.radius[s]);
+  }
+  frame.x = bodies.x;
+  frame.radius = bodies.radius;
+  frame.orientation = bodies.orientation;
+  frame.walls = walls();
+  if (!contacts) return frame;
+  for (std::size_t c = 0; c < state.chunks.size() && frame.step > 0; ++c) {
+    const auto begin = static_cast<std::size_t>(state.chunks.begin[c]);
+    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(state.contacts.count[c]); ++k) {
+      const Vec3 normal = contact_normal(state.contacts, k), impulse = contact_impulse(state.contacts, k);
+      if (impulse.dot(normal) <= 0) continue;
+      const auto i = static_cast<std::size_t>(state.contacts.first[k]);
+      const Slot second = state.contacts.second[k];
+      const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
+      const double gap = second >= 0 ? (bodies.x[i] - bodies.x[static_cast<std::size_t>(second)]).norm() - bodies.radius[i] -
+                                           bodies.radius[static_cast<std::size_t>(second)]
+                                     : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
+      frame.contact_bodies.push_back({frame.id[i], second >= 0 ? frame.id[static_cast<std::size_t>(second)]
+                                                               : -1 - static_cast<std::int64_t>(wall)});
+      frame.contact_normal.push_back(normal);
+      frame.contact_point.push_back(bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * normal);
+      frame.contact_gap.push_back(gap);
+      frame.contact_force.push_back(impulse / impl_->parameters.time_step);
+    }
+  }
+  return frame;
+}
+
+}  // namespace talus

@@ -1,0 +1,67 @@
+#include "runtime/step/step_graph.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace talus {
+
+namespace {
+
+/// Enough lanes for any node to share, few enough that a task stays coarse.
+std::uint32_t lanes_for(std::size_t bodies) { return static_cast<std::uint32_t>(std::clamp<std::size_t>(bodies / 512, 1, 64)); }
+
+}  // namespace
+
+StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings, graph::Executor& executor)
+    : state_(state),
+      parameters_(parameters),
+      settings_(settings),
+      executor_(executor),
+      lanes_(lanes_for(state.bodies.size())),
+      iteration_(state, parameters, settings),
+      left_(lanes_),
+      pairs_(lanes_),
+      motion_(lanes_),
+      contact_sums_(lanes_) {
+  build();
+}
+
+void StepGraph::build() {
+  using graph::read;
+  using graph::write;
+  const auto bodies = graph_.data("bodies", lanes_);
+  const auto cells = graph_.data("cells");
+  const auto pairs = graph_.data("pairs", lanes_);
+  const auto chunks = graph_.data("chunks");
+  const auto contacts = graph_.data("contacts", lanes_);
+  const auto loop = graph_.data("loop");
+  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
+    graph_.task(fmt::format("predict[{}]", lane), {write(bodies[lane])}, [this, lane] { predict_lane(lane); });
+  graph_.task("cells", {read(bodies), write(cells)}, [this] { make_cells(); });
+  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
+    graph_.task(fmt::format("pairs[{}]", lane), {read(cells), write(pairs[lane])}, [this, lane] { find_lane_pairs(lane); });
+  graph_.task("chunks", {read(cells), read(pairs), write(chunks)}, [this] { make_chunks(); });
+  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
+    graph_.task(fmt::format("narrow[{}]", lane), {read(chunks), read(bodies), write(contacts[lane])}, [this, lane] { narrow_lane(lane); });
+  graph_.task("plan", {read(contacts), write(loop)}, [this] { plan_iteration(); });
+  graph_.team("iterate", {write(loop), write(bodies), write(contacts)},
+              [this](graph::Worker& worker) { graph::run_epochs(epochs_, worker, iteration_); });
+  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
+    graph_.task(fmt::format("finish[{}]", lane), {read(loop), write(bodies[lane])}, [this, lane] { finish_lane(lane); });
+  const auto walls = graph_.data("walls");
+  graph_.task("walls", {read(loop), write(walls)}, [this] { finish_walls(); });
+  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
+    graph_.task(fmt::format("measure[{}]", lane), {read(bodies), read(walls), write(contacts[lane])},
+                [this, lane] { measure_lane(lane); });
+  graph_.task("sum", {read(bodies), read(contacts)}, [this] { sum_up(); });
+}
+
+void StepGraph::run() {
+  sums_ = {};
+  started_ = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  executor_.run(graph_);
+}
+
+}  // namespace talus
