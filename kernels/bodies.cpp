@@ -72,7 +72,8 @@ std::vector<Slot> morton_order(const Bodies& bodies) {
   std::vector<std::uint64_t> key(n);
   for (std::size_t k = 0; k < n; ++k) {
     const Vec3 s = (bodies.x[k] - low) * scale;
-    key[k] = morton_key(static_cast<std::uint32_t>(s[0]), static_cast<std::uint32_t>(s[1]), static_cast<std::uint32_t>(s[2]));
+    key[k] = morton_key(static_cast<std::uint32_t>(s[0]), static_cast<std::uint32_t>(s[1]),
+                        static_cast<std::uint32_t>(s[2]));
   }
   std::sort(order.begin(), order.end(), [&](Slot a, Slot b) {
     const auto ka = static_cast<std::size_t>(a), kb = static_cast<std::size_t>(b);

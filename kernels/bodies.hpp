@@ -10,9 +10,9 @@
 namespace talus {
 
 /// What the sweeps read and write of one sphere: one cache line.
-/// A sphere of radius R turns as w = R omega [m/s], so that no radius and no tangent frame is needed at a contact
-/// (docs/theory.md, "Spheres"): with n pointing to it from the other body, the surface at the contact point moves with u - w x n; the other
-/// body's with u + w x n.
+/// A sphere of radius R turns as w = R omega [m/s], so that no radius and no tangent frame is needed at a
+/// contact (docs/theory.md, "Spheres"): with n pointing to it from the other body, the surface at the contact
+/// point moves with u - w x n; the other body's with u + w x n.
 struct alignas(64) Velocity {
   double u[3]{};           ///< velocity of the centre [m/s]
   double w[3]{};           ///< R omega [m/s]
@@ -21,27 +21,31 @@ struct alignas(64) Velocity {
 };
 static_assert(sizeof(Velocity) == 64);
 
-/// The spheres of this process, one entry per slot. All arrays have the same length, except `orientation`, which is empty
-/// unless the scene asks for orientations.
+/// The spheres of this process, one entry per slot. All arrays have the same length, except `orientation`,
+/// which is empty unless the scene asks for orientations.
 struct Bodies {
   std::vector<BodyId> id;
-  std::vector<Vec3> x;                              ///< centre [m]
-  std::vector<double> radius;                       ///< [m]
-  std::vector<Velocity> velocity;                   ///< V, end of the last step or iterate of this one
-  std::vector<std::array<double, 4>> orientation;   ///< unit quaternion (w, x, y, z) or empty
+  std::vector<Vec3> x;                             ///< centre [m]
+  std::vector<double> radius;                      ///< [m]
+  std::vector<Velocity> velocity;                  ///< V, end of the last step or iterate of this one
+  std::vector<std::array<double, 4>> orientation;  ///< unit quaternion (w, x, y, z) or empty
 
   std::size_t size() const { return id.size(); }
-  double mass(std::size_t slot) const { return velocity[slot].inv_mass > 0 ? 1 / velocity[slot].inv_mass : 0; }
+  double mass(std::size_t slot) const {
+    return velocity[slot].inv_mass > 0 ? 1 / velocity[slot].inv_mass : 0;
+  }
 };
 
-/// Appends a solid sphere at rest. radius > 0 [m], density > 0 [kg/m^3]; with `turns` false its spin mobility is 0.
-void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density, bool turns = true);
+/// Appends a solid sphere at rest. radius > 0 [m], density > 0 [kg/m^3]; with `turns` false its spin mobility
+/// is 0.
+void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density,
+                bool turns = true);
 
 /// Volume of the spheres [m^3], summed in slot order.
 double total_volume(const Bodies& bodies);
 
-/// Translational and rotational kinetic energy [J], summed in slot order. For a solid sphere I = 2/5 m R^2, so
-/// 1/2 I omega^2 = 1/2 w^2 / (R^2/I).
+/// Translational and rotational kinetic energy [J], summed in slot order. For a solid sphere I = 2/5 m R^2,
+/// so 1/2 I omega^2 = 1/2 w^2 / (R^2/I).
 struct KineticEnergy {
   double translation{};
   double rotation{};
@@ -57,8 +61,8 @@ std::vector<Slot> morton_order(const Bodies& bodies);
 /// Bytes held by the arrays.
 std::size_t memory_used(const Bodies& bodies);
 
-/// 64-bit hash of the exact bits of (id, x, radius, u, w, orientation) of every body, taken in order of id: equal if and only if
-/// (up to hash collisions) the states are equal bit for bit.
+/// 64-bit hash of the exact bits of (id, x, radius, u, w, orientation) of every body, taken in order of id:
+/// equal if and only if (up to hash collisions) the states are equal bit for bit.
 std::uint64_t digest(const Bodies& bodies);
 
 }  // namespace talus

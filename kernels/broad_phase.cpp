@@ -16,12 +16,14 @@ constexpr double largest_coordinate = (1 << 19) - 1;
 
 using Coordinates = std::array<std::int32_t, 3>;
 
-/// Cell of a point in a level. Far coordinates are clamped into the last cell, which keeps neighbours neighbours.
+/// Cell of a point in a level. Far coordinates are clamped into the last cell, which keeps neighbours
+/// neighbours.
 Coordinates cell_of(const Vec3& x, const Vec3& origin, double size) {
   Coordinates c;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
-    c[k] = static_cast<std::int32_t>(std::min(std::floor((x[axis] - origin[axis]) / size), largest_coordinate));
+    c[k] =
+        static_cast<std::int32_t>(std::min(std::floor((x[axis] - origin[axis]) / size), largest_coordinate));
   }
   return c;
 }
@@ -52,9 +54,19 @@ bool inside(const Coordinates& c) {
 }
 
 /// The 13 neighbours that stand after the centre in lexicographic order.
-constexpr std::array<std::array<int, 3>, 13> half_neighbours = {{{0, 0, 1},  {0, 1, -1}, {0, 1, 0},  {0, 1, 1},   {1, -1, -1},
-                                                                 {1, -1, 0}, {1, -1, 1}, {1, 0, -1}, {1, 0, 0},   {1, 0, 1},
-                                                                 {1, 1, -1}, {1, 1, 0},  {1, 1, 1}}};
+constexpr std::array<std::array<int, 3>, 13> half_neighbours = {{{0, 0, 1},
+                                                                 {0, 1, -1},
+                                                                 {0, 1, 0},
+                                                                 {0, 1, 1},
+                                                                 {1, -1, -1},
+                                                                 {1, -1, 0},
+                                                                 {1, -1, 1},
+                                                                 {1, 0, -1},
+                                                                 {1, 0, 0},
+                                                                 {1, 0, 1},
+                                                                 {1, 1, -1},
+                                                                 {1, 1, 0},
+                                                                 {1, 1, 1}}};
 
 }  // namespace
 
@@ -72,11 +84,13 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
     smallest = std::min(smallest, reach[k]);
     largest = std::max(largest, reach[k]);
   }
-  // The coarsest level is fitted to the largest body; even samples then have one level and cells that are not too large.
+  // The coarsest level is fitted to the largest body; even samples then have one level and cells that are not
+  // too large.
   const int levels = std::min(32, 1 + static_cast<int>(std::floor(std::log2(largest / smallest))));
   grid.cell_size.resize(static_cast<std::size_t>(levels));
   for (int level = 0; level < levels; ++level)
-    grid.cell_size[static_cast<std::size_t>(level)] = 2 * largest * std::exp2(level - levels + 1) * (1 + 1e-12);
+    grid.cell_size[static_cast<std::size_t>(level)] =
+        2 * largest * std::exp2(level - levels + 1) * (1 + 1e-12);
 
   struct Entry {
     std::uint64_t key;
@@ -108,15 +122,17 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   return grid;
 }
 
-void find_pairs(const CellGrid& grid, std::span<const Vec3> x, std::span<const double> reach, std::size_t begin,
-                std::size_t end, std::vector<GrainPair>& pairs) {
+void find_pairs(const CellGrid& grid, std::span<const Vec3> x, std::span<const double> reach,
+                std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs) {
   const auto test = [&](Slot a, Slot b) {
     const auto i = static_cast<std::size_t>(a), j = static_cast<std::size_t>(b);
     const double distance = reach[i] + reach[j];
-    if ((x[i] - x[j]).squaredNorm() < distance * distance) pairs.push_back(a < b ? GrainPair{a, b} : GrainPair{b, a});
+    if ((x[i] - x[j]).squaredNorm() < distance * distance)
+      pairs.push_back(a < b ? GrainPair{a, b} : GrainPair{b, a});
   };
   const auto slots_of = [&](const CellGrid::Cell& cell) {
-    return std::span(grid.slots).subspan(static_cast<std::size_t>(cell.begin), static_cast<std::size_t>(cell.end - cell.begin));
+    return std::span(grid.slots)
+        .subspan(static_cast<std::size_t>(cell.begin), static_cast<std::size_t>(cell.end - cell.begin));
   };
   for (std::size_t c = begin; c < end; ++c) {
     const auto here = slots_of(grid.cells[c]);
@@ -135,9 +151,11 @@ void find_pairs(const CellGrid& grid, std::span<const Vec3> x, std::span<const d
     }
     for (std::uint64_t coarse = level + 1; coarse < grid.cell_size.size(); ++coarse) {
       for (Slot a : here) {
-        const Coordinates centre = cell_of(x[static_cast<std::size_t>(a)], grid.origin, grid.cell_size[coarse]);
+        const Coordinates centre =
+            cell_of(x[static_cast<std::size_t>(a)], grid.origin, grid.cell_size[coarse]);
         for (int code = 0; code < 27; ++code) {
-          const Coordinates near = {centre[0] + code / 9 - 1, centre[1] + code / 3 % 3 - 1, centre[2] + code % 3 - 1};
+          const Coordinates near = {centre[0] + code / 9 - 1, centre[1] + code / 3 % 3 - 1,
+                                    centre[2] + code % 3 - 1};
           if (!inside(near)) continue;
           const CellGrid::Cell* cell = find_cell(grid, cell_key(coarse, near));
           if (cell == nullptr) continue;

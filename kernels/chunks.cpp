@@ -7,7 +7,9 @@ namespace talus {
 
 namespace {
 
-std::size_t index(std::int32_t k) { return static_cast<std::size_t>(k); }
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
 
 void place_boundaries(const Candidates& candidates, int target, Chunks& chunks) {
   const auto grains = static_cast<std::int32_t>(candidates.grain_pairs.size());
@@ -16,7 +18,8 @@ void place_boundaries(const Candidates& candidates, int target, Chunks& chunks) 
     // Pieces of equal length: a short last piece would be a poor task.
     const std::int32_t pieces = (to - from + target - 1) / target;
     for (std::int32_t k = 0; k < pieces; ++k) {
-      chunks.begin.push_back(from + static_cast<std::int32_t>(static_cast<std::int64_t>(to - from) * k / pieces));
+      chunks.begin.push_back(from +
+                             static_cast<std::int32_t>(static_cast<std::int64_t>(to - from) * k / pieces));
       chunks.wall.push_back(wall);
     }
   };
@@ -153,7 +156,9 @@ void merge_walk(const std::vector<Pair>& old, const std::vector<Pair>& fresh, Le
 bool before(const GrainPair& a, const GrainPair& b) {
   return a.first != b.first ? a.first < b.first : a.second < b.second;
 }
-bool before(const WallPair& a, const WallPair& b) { return a.wall != b.wall ? a.wall < b.wall : a.body < b.body; }
+bool before(const WallPair& a, const WallPair& b) {
+  return a.wall != b.wall ? a.wall < b.wall : a.body < b.body;
+}
 
 }  // namespace
 
@@ -199,8 +204,9 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
   std::vector<std::size_t> order(candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto split = order.begin() + static_cast<std::ptrdiff_t>(grains);
-  std::sort(order.begin(), split,
-            [&](std::size_t a, std::size_t b) { return before(candidates.grain_pairs[a], candidates.grain_pairs[b]); });
+  std::sort(order.begin(), split, [&](std::size_t a, std::size_t b) {
+    return before(candidates.grain_pairs[a], candidates.grain_pairs[b]);
+  });
   std::sort(split, order.end(), [&](std::size_t a, std::size_t b) {
     return before(candidates.wall_pairs[a - grains], candidates.wall_pairs[b - grains]);
   });
@@ -214,20 +220,22 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
       sorted.grain_pairs.push_back(candidates.grain_pairs[k]);
     else
       sorted.wall_pairs.push_back(candidates.wall_pairs[k - grains]);
-    for (std::size_t c = 0; c < components; ++c) sorted.impulse.push_back(candidates.impulse[components * k + c]);
+    for (std::size_t c = 0; c < components; ++c)
+      sorted.impulse.push_back(candidates.impulse[components * k + c]);
   }
   candidates = std::move(sorted);
 }
 
 std::size_t memory_used(const Candidates& candidates) {
-  return candidates.grain_pairs.capacity() * sizeof(GrainPair) + candidates.wall_pairs.capacity() * sizeof(WallPair) +
-         candidates.impulse.capacity() * sizeof(double);
+  return candidates.grain_pairs.capacity() * sizeof(GrainPair) +
+         candidates.wall_pairs.capacity() * sizeof(WallPair) + candidates.impulse.capacity() * sizeof(double);
 }
 
 std::size_t memory_used(const Chunks& chunks) {
-  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.colour.capacity() + chunks.body_begin.capacity() +
-          chunks.bodies.capacity() + chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
-          chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
+  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.colour.capacity() +
+          chunks.body_begin.capacity() + chunks.bodies.capacity() + chunks.owned_begin.capacity() +
+          chunks.owned.capacity() + chunks.untouched.capacity() + chunks.conflict_begin.capacity() +
+          chunks.conflicts.capacity()) *
              4 +
          chunks.local.capacity() * 2;
 }

@@ -17,7 +17,7 @@ struct Found {
 
 /// Bias of a contact, or false when it constrains nothing in this step.
 bool constrain(const NarrowPhase& in, double gap, double v_n, double slow, double& bias) {
-  if (gap >= in.alert && gap >= -2 * in.time_step * v_n) return false;
+  if (gap >= in.alert && gap >= -in.time_step * v_n) return false;
   bias = std::max(gap, 0.0) / in.time_step;
   if (in.restitution > 0 && v_n < -slow) {
     if (gap > 0) return false;
@@ -26,10 +26,11 @@ bool constrain(const NarrowPhase& in, double gap, double v_n, double slow, doubl
   return true;
 }
 
-void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
-                   std::vector<Found>& found) {
+void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                   std::size_t chunk, std::vector<Found>& found) {
   const std::size_t grains = candidates.grain_pairs.size();
-  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]), end = static_cast<std::size_t>(chunks.begin[chunk + 1]);
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]),
+             end = static_cast<std::size_t>(chunks.begin[chunk + 1]);
   const double slow = 2 * in.time_step * in.gravity.norm();
   const auto u = [&](std::size_t s) { return Eigen::Map<const Vec3>(in.velocity[s].u); };
   if (chunks.wall[chunk] < 0) {
@@ -59,9 +60,11 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
 constexpr int batch_width = 8;
 constexpr int batches_at_most = 64;
 
-/// Deals the contacts to batches of 8 without a common grain, first fit, with one bit per batch and grain; what fits in none of 64 batches
-/// (a large grain among small ones) follows in its own order. Returns places in `found`.
-void order_in_batches(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found, std::vector<std::int32_t>& order) {
+/// Deals the contacts to batches of 8 without a common grain, first fit, with one bit per batch and grain;
+/// what fits in none of 64 batches (a large grain among small ones) follows in its own order. Returns places
+/// in `found`.
+void order_in_batches(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found,
+                      std::vector<std::int32_t>& order) {
   const auto bodies = static_cast<std::size_t>(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
   const bool wall = chunks.wall[chunk] >= 0;
   std::vector<std::uint64_t> in_batch(bodies, 0);
@@ -106,7 +109,8 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   contacts.count.assign(chunks.size(), 0);
 }
 
-void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                  std::size_t chunk, Contacts& contacts) {
   std::vector<Found> found;
   found.reserve(static_cast<std::size_t>(chunks.begin[chunk + 1] - chunks.begin[chunk]));
   find_contacts(in, candidates, chunks, chunk, found);
@@ -131,7 +135,8 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
     } else {
       contacts.rn[at] = candidates.impulse[k];
     }
-    contacts.first[at] = k < grains ? candidates.grain_pairs[k].first : candidates.wall_pairs[k - grains].body;
+    contacts.first[at] =
+        k < grains ? candidates.grain_pairs[k].first : candidates.wall_pairs[k - grains].body;
     contacts.second[at] = k < grains ? candidates.grain_pairs[k].second : -1;
     contacts.candidate[at] = contact.candidate;
     ++at;
@@ -139,8 +144,10 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
   contacts.count[chunk] = static_cast<std::int32_t>(order.size());
 }
 
-void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, Candidates& candidates) {
-  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]), room = static_cast<std::size_t>(chunks.begin[chunk + 1]);
+void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                    Candidates& candidates) {
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]),
+             room = static_cast<std::size_t>(chunks.begin[chunk + 1]);
   const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
   const auto components = static_cast<std::size_t>(candidates.components);
   std::fill(candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components * begin),
@@ -159,9 +166,12 @@ void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t 
 
 std::size_t memory_used(const Contacts& contacts) {
   std::size_t bytes = 0;
-  for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx, &contacts.ry, &contacts.rz, &contacts.rn})
+  for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
+                             &contacts.ry, &contacts.rz, &contacts.rn})
     bytes += values->capacity() * sizeof(double);
-  return bytes + (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() + contacts.count.capacity()) * 4;
+  return bytes + (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
+                  contacts.count.capacity()) *
+                     4;
 }
 
 }  // namespace talus

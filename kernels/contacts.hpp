@@ -10,8 +10,9 @@
 
 namespace talus {
 
-/// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c], chunks.begin[c] + count[c]),
-/// in batches of 8 that share no grain where the chunk allows it, so that neighbours in the sweep do not wait for one another.
+/// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
+/// chunks.begin[c] + count[c]), in batches of 8 that share no grain where the chunk allows it, so that
+/// neighbours in the sweep do not wait for one another.
 struct Contacts {
   std::vector<double> nx, ny, nz;   ///< normal, unit, from the second body (or the wall) to the first
   std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
@@ -25,7 +26,8 @@ struct Contacts {
 /// Room for the contacts of `chunks`; `friction` decides which impulses exist.
 void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
 
-/// What the narrow phase looks at; x at the middle of the step (theta = 1/2), velocities those of its beginning.
+/// What the narrow phase looks at; x at the middle of the step (theta = 1/2), velocities those of its
+/// beginning.
 struct NarrowPhase {
   std::span<const Vec3> x;             ///< [m]
   std::span<const double> radius;      ///< [m]
@@ -38,13 +40,16 @@ struct NarrowPhase {
 };
 
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.
-/// A candidate is a contact when gap < alert, or when it would close within two steps at its speed. Bias (docs/theory.md, "Gap term and
-/// restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once
-/// g <= 0, and no constraint before. Coincident centres get the normal +z.
-void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk, Contacts& contacts);
+/// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
+/// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
+/// approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once g <= 0, and no constraint before.
+/// Coincident centres get the normal +z.
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                  std::size_t chunk, Contacts& contacts);
 
 /// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.
-void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, Candidates& candidates);
+void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                    Candidates& candidates);
 
 std::size_t memory_used(const Contacts& contacts);
 

@@ -12,15 +12,18 @@ void ContactSums::add(const ContactSums& other) {
   normal_impulse += other.normal_impulse;
 }
 
-Vec3 contact_normal(const Contacts& contacts, std::size_t k) { return {contacts.nx[k], contacts.ny[k], contacts.nz[k]}; }
+Vec3 contact_normal(const Contacts& contacts, std::size_t k) {
+  return {contacts.nx[k], contacts.ny[k], contacts.nz[k]};
+}
 
 Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
   if (contacts.rn.empty()) return {contacts.rx[k], contacts.ry[k], contacts.rz[k]};
   return contacts.rn[k] * contact_normal(contacts, k);
 }
 
-ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, std::span<const Vec3> x,
-                             std::span<const double> radius, std::span<const Wall> walls) {
+ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                             std::span<const Vec3> x, std::span<const double> radius,
+                             std::span<const Wall> walls) {
   ContactSums sums;
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
   for (std::size_t k = begin; k < begin + static_cast<std::size_t>(contacts.count[chunk]); ++k) {

@@ -10,25 +10,29 @@ namespace talus {
 
 /// Sums over the contacts of some chunks at the end of the step; add them in a fixed order only.
 struct ContactSums {
-  std::int64_t overlapping = 0;           ///< contacts with gap < 0
-  double penetration = 0;                 ///< sum of -gap over them [m]
-  double penetration_max = 0;             ///< [m]
-  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  ///< sum of r (x) l [N s m], l the branch vector: h V times the Love-Weber stress
-  double normal_impulse = 0;              ///< sum of r_n [N s]
+  std::int64_t overlapping = 0;                      ///< contacts with gap < 0
+  double penetration = 0;                            ///< sum of -gap over them [m]
+  double penetration_max = 0;                        ///< [m]
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  ///< sum of r (x) l [N s m], l the branch vector: h V
+                                                     ///< times the Love-Weber stress
+  double normal_impulse = 0;                         ///< sum of r_n [N s]
 
   void add(const ContactSums& other);
 };
 
-/// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the plane to the centre.
-ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, std::span<const Vec3> x,
-                             std::span<const double> radius, std::span<const Wall> walls);
+/// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the
+/// plane to the centre.
+ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                             std::span<const Vec3> x, std::span<const double> radius,
+                             std::span<const Wall> walls);
 
 /// Impulse on the first body [N s] and its normal, whatever the storage.
 Vec3 contact_impulse(const Contacts& contacts, std::size_t k);
 Vec3 contact_normal(const Contacts& contacts, std::size_t k);
 
-/// Mean number of active contacts of the grains that are no rattlers. A grain with fewer than `rattler_below` active contacts is a rattler: 4
-/// without friction, 2 with it (a frictionless grain cannot be held by three).
+/// Mean number of active contacts of the grains that are no rattlers. A grain with fewer than `rattler_below`
+/// active contacts is a rattler: 4 without friction, 2 with it (a frictionless grain cannot be held by
+/// three).
 double coordination(const Contacts& contacts, const Chunks& chunks, std::size_t bodies, int rattler_below);
 
 }  // namespace talus

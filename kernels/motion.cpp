@@ -6,11 +6,13 @@
 namespace talus {
 
 namespace {
-double square(const double (&v)[3]) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+double square(const double (&v)[3]) {
+  return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
 }  // namespace
 
-void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step, const Vec3& gravity,
-             FreeVelocity& free) {
+void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
+             const Vec3& gravity, FreeVelocity& free) {
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Velocity& v = velocity[s];
     for (std::size_t c = 0; c < 3; ++c) {
@@ -42,7 +44,8 @@ void MotionSums::add(const MotionSums& other) {
   }
 }
 
-MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step, const FreeVelocity& free) {
+MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
+                  const FreeVelocity& free) {
   MotionSums sums;
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Velocity& v = velocity[s];
@@ -55,9 +58,11 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> 
     if (v.spin_mobility > 0) {
       const double spin = 0.5 * square(v.w) / v.spin_mobility;
       sums.energy.rotation += spin;
-      sums.energy_free +=
-          free.w.empty() ? spin
-                         : 0.5 * (free.w[s][0] * free.w[s][0] + free.w[s][1] * free.w[s][1] + free.w[s][2] * free.w[s][2]) / v.spin_mobility;
+      sums.energy_free += free.w.empty() ? spin
+                                         : 0.5 *
+                                               (free.w[s][0] * free.w[s][0] + free.w[s][1] * free.w[s][1] +
+                                                free.w[s][2] * free.w[s][2]) /
+                                               v.spin_mobility;
     }
     sums.impulse += gained;
     sums.impulse_scale += gained.norm();
@@ -89,12 +94,16 @@ void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::sp
   }
 }
 
-double contact_margin(double speed, double time_step, double alert) { return std::max(0.5 * alert, 2 * time_step * speed); }
+double contact_margin(double speed, double time_step, double alert) {
+  return std::max(0.5 * alert, time_step * speed);
+}
 
-bool left_margin(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity, std::span<const double> radius,
-                 std::span<const Vec3> x_then, std::span<const double> reach_then, double time_step, double alert) {
+bool left_margin(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
+                 std::span<const double> radius, std::span<const Vec3> x_then,
+                 std::span<const double> reach_then, double time_step, double alert) {
   for (std::size_t s = range.begin; s < range.end; ++s) {
-    const double need = radius[s] + contact_margin(std::sqrt(square(velocity[s].u)), time_step, alert) + (x[s] - x_then[s]).norm();
+    const double need = radius[s] + contact_margin(std::sqrt(square(velocity[s].u)), time_step, alert) +
+                        (x[s] - x_then[s]).norm();
     if (!(need <= reach_then[s])) return true;
   }
   return false;

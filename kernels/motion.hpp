@@ -13,46 +13,49 @@ struct SlotRange {
   std::size_t end;
 };
 
-/// Free velocity: what a grain would have at the end of the step without contacts, V- + h g. Only what a scene needs: `w` is empty without
-/// friction or rotation, where the sweeps do not touch it.
+/// Free velocity: what a grain would have at the end of the step without contacts, V- + h g. Only what a
+/// scene needs: `w` is empty without friction or rotation, where the sweeps do not touch it.
 struct FreeVelocity {
   std::vector<std::array<double, 3>> u;  ///< [m/s]
   std::vector<std::array<double, 3>> w;  ///< [m/s]
 };
 
 /// First half of Moreau's theta-scheme (theta = 1/2): x += h/2 u-, free velocity = V- + h g.
-void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step, const Vec3& gravity,
-             FreeVelocity& free);
+void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
+             const Vec3& gravity, FreeVelocity& free);
 
 /// V = free velocity for the given grains.
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity);
 
 /// Sums over grains; add them in a fixed order only.
 struct MotionSums {
-  KineticEnergy energy;        ///< at the end of the step [J]
-  double energy_free = 0;      ///< translational and rotational, of the free velocity [J]
-  Vec3 impulse = Vec3::Zero(); ///< sum of m (u - u_free) [N s]: what the contacts gave to the sample
-  double impulse_scale = 0;    ///< sum of m |u - u_free| [N s]
-  double speed2_max = 0;       ///< [m^2/s^2]; NaN if any velocity is
+  KineticEnergy energy;         ///< at the end of the step [J]
+  double energy_free = 0;       ///< translational and rotational, of the free velocity [J]
+  Vec3 impulse = Vec3::Zero();  ///< sum of m (u - u_free) [N s]: what the contacts gave to the sample
+  double impulse_scale = 0;     ///< sum of m |u - u_free| [N s]
+  double speed2_max = 0;        ///< [m^2/s^2]; NaN if any velocity is
   Slot fastest = -1;
 
   void add(const MotionSums& other);
 };
 
 /// Second half: x += h/2 u, with the sums.
-MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step, const FreeVelocity& free);
+MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
+                  const FreeVelocity& free);
 
 /// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
 void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
           std::span<const double> radius, double time_step);
 
 /// How far a grain may travel before the candidates must be found anew; reach = radius + margin.
-/// margin = skin/2 + max(alert/2, 2 h |u|): a pair becomes a contact when its gap is below the alert distance or closes within two steps, and
-/// either grain may then have used up half the skin.
+/// margin = skin/2 + max(alert/2, h |u|): a pair becomes a contact when its gap is below the alert distance
+/// or closes within a step at its speed, and either grain may then have used up half the skin.
 double contact_margin(double speed, double time_step, double alert);
 
-/// True when a grain of the range, now at x, has used up its margin of the last broad phase (x_then, reach_then).
-bool left_margin(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity, std::span<const double> radius,
-                 std::span<const Vec3> x_then, std::span<const double> reach_then, double time_step, double alert);
+/// True when a grain of the range, now at x, has used up its margin of the last broad phase (x_then,
+/// reach_then).
+bool left_margin(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
+                 std::span<const double> radius, std::span<const Vec3> x_then,
+                 std::span<const double> reach_then, double time_step, double alert);
 
 }  // namespace talus

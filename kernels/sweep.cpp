@@ -10,19 +10,33 @@ namespace {
 struct V3 {
   double x, y, z;
 };
-inline V3 operator+(V3 a, V3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline V3 operator-(V3 a, V3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline V3 operator*(double s, V3 a) { return {s * a.x, s * a.y, s * a.z}; }
-inline double dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline V3 cross(V3 a, V3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-inline V3 load(const double* p) { return {p[0], p[1], p[2]}; }
+inline V3 operator+(V3 a, V3 b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+inline V3 operator-(V3 a, V3 b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+inline V3 operator*(double s, V3 a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+inline double dot(V3 a, V3 b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+inline V3 cross(V3 a, V3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline V3 load(const double* p) {
+  return {p[0], p[1], p[2]};
+}
 inline void add_to(double* p, V3 a) {
   p[0] += a.x;
   p[1] += a.y;
   p[2] += a.z;
 }
 
-inline V3 normal_of(const Contacts& c, std::size_t k) { return {c.nx[k], c.ny[k], c.nz[k]}; }
+inline V3 normal_of(const Contacts& c, std::size_t k) {
+  return {c.nx[k], c.ny[k], c.nz[k]};
+}
 
 template <bool Friction>
 inline V3 impulse_of(const Contacts& c, std::size_t k, V3 n) {
@@ -146,13 +160,14 @@ void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> ve
 }
 
 template <bool Friction>
-void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu, WallCopy& wall) {
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const V3 n = normal_of(contacts, k);
     const V3 r = impulse_of<Friction>(contacts, k, n);
-    const V3 r_new = solve_law<Friction>(r, relative<Friction>(a, wall, n), n, contacts.bias[k], a.inv_mass + wall.inv_mass,
-                                         a.inv_mass + a.spin_mobility, mu);
+    const V3 r_new = solve_law<Friction>(r, relative<Friction>(a, wall, n), n, contacts.bias[k],
+                                         a.inv_mass + wall.inv_mass, a.inv_mass + a.spin_mobility, mu);
     push<Friction>(a, wall, n, r_new - r);
     store_impulse<Friction>(contacts, k, r_new, n);
   }
@@ -162,41 +177,46 @@ template <bool Friction>
 void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const V3 n = normal_of(contacts, k);
-    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], velocity[static_cast<std::size_t>(contacts.second[k])],
-                   n, impulse_of<Friction>(contacts, k, n));
+    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])],
+                   velocity[static_cast<std::size_t>(contacts.second[k])], n,
+                   impulse_of<Friction>(contacts, k, n));
   }
 }
 
 template <bool Friction>
-void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity, WallCopy& wall) {
+void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                     WallCopy& wall) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const V3 n = normal_of(contacts, k);
-    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], wall, n, impulse_of<Friction>(contacts, k, n));
+    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], wall, n,
+                   impulse_of<Friction>(contacts, k, n));
   }
 }
 
 template <bool Friction>
-ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu) {
+ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                       double mu) {
   ErrorSums sums;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
     const V3 n = normal_of(contacts, k);
-    add_error<Friction>(sums, impulse_of<Friction>(contacts, k, n), relative<Friction>(a, b, n), n, contacts.bias[k],
-                        a.inv_mass + b.inv_mass, mu);
+    add_error<Friction>(sums, impulse_of<Friction>(contacts, k, n), relative<Friction>(a, b, n), n,
+                        contacts.bias[k], a.inv_mass + b.inv_mass, mu);
   }
   return sums;
 }
 
 template <bool Friction>
-ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu,
-                     const WallCopy& wall, double wall_inv_mass) {
+ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                     double mu, const WallCopy& wall, double wall_inv_mass) {
   ErrorSums sums;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const V3 n = normal_of(contacts, k);
     const V3 r = impulse_of<Friction>(contacts, k, n);
-    add_error<Friction>(sums, r, relative<Friction>(a, wall, n), n, contacts.bias[k], a.inv_mass + wall_inv_mass, mu);
+    add_error<Friction>(sums, r, relative<Friction>(a, wall, n), n, contacts.bias[k],
+                        a.inv_mass + wall_inv_mass, mu);
     add_to(sums.wall_impulse, r);
   }
   return sums;
@@ -235,7 +255,9 @@ template void accumulate_wall<true>(const Contacts&, ContactRange, std::span<Vel
 template void accumulate_wall<false>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);
 template ErrorSums error_grains<true>(const Contacts&, ContactRange, std::span<const Velocity>, double);
 template ErrorSums error_grains<false>(const Contacts&, ContactRange, std::span<const Velocity>, double);
-template ErrorSums error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>, double, const WallCopy&, double);
-template ErrorSums error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>, double, const WallCopy&, double);
+template ErrorSums error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>, double,
+                                    const WallCopy&, double);
+template ErrorSums error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>, double,
+                                     const WallCopy&, double);
 
 }  // namespace talus

@@ -8,8 +8,9 @@
 
 namespace talus {
 
-/// A chunk's own instance of a wall. A wall of finite mass M touched by k chunks is split into k copies of mass M/k, glued after each sweep
-/// (glue_copies): gluing inside one subdomain, so that a whole face of the sample is no chain of conflicts.
+/// A chunk's own instance of a wall. A wall of finite mass M touched by k chunks is split into k copies of
+/// mass M/k, glued after each sweep (glue_copies): gluing inside one subdomain, so that a whole face of the
+/// sample is no chain of conflicts.
 struct WallCopy {
   double velocity[3]{};  ///< [m/s]
   double inv_mass{};     ///< k/M along the normal [1/kg]; 0 for a wall that is driven
@@ -21,46 +22,53 @@ struct ContactRange {
   std::size_t end;
 };
 
-/// One pass of nonlinear Gauss-Seidel over grain-grain contacts (design.md §4; Jean 1999, closed form for spheres):
+/// One pass of nonlinear Gauss-Seidel over grain-grain contacts (design.md §4; Jean 1999, closed form for
+/// spheres):
 ///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
 ///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
-/// `Friction` false: only r_n exists and only u is read and written. Per contact: reads 2 body records (128 bytes) and 56 bytes of contact, writes
-/// 128 + 24; about 117 flop, 2 divisions and, when sliding, 1 square root.
+/// `Friction` false: only r_n exists and only u is read and written. Per contact: reads 2 body records (128
+/// bytes) and 56 bytes of contact, writes 128 + 24; about 117 flop, 2 divisions and, when sliding, 1 square
+/// root.
 template <bool Friction>
 void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu);
 
 /// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i.
 template <bool Friction>
-void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu, WallCopy& wall);
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall);
 
-/// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from r.
+/// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
+/// r.
 template <bool Friction>
 void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity);
 template <bool Friction>
-void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity, WallCopy& wall);
+void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                     WallCopy& wall);
 
 /// Sums of the certificate over some contacts. Add them in a fixed order only.
 struct ErrorSums {
-  double residual2 = 0;     ///< sum of e^2 [m^2/s^2]
-  double residual_max = 0;  ///< max of e [m/s]
-  double impulse2 = 0;      ///< sum of (|r|/rho)^2 [m^2/s^2]
-  double velocity2 = 0;     ///< sum of |v + b n|^2 over contacts that carry or close [m^2/s^2]
-  double wall_impulse[3]{}; ///< sum of r at a wall, on the grains [N s]
+  double residual2 = 0;      ///< sum of e^2 [m^2/s^2]
+  double residual_max = 0;   ///< max of e [m/s]
+  double impulse2 = 0;       ///< sum of (|r|/rho)^2 [m^2/s^2]
+  double velocity2 = 0;      ///< sum of |v + b n|^2 over contacts that carry or close [m^2/s^2]
+  double wall_impulse[3]{};  ///< sum of r at a wall, on the grains [N s]
   std::int64_t contacts = 0;
   std::int64_t active = 0;  ///< r_n > 0
 
   void add(const ErrorSums& other);
 };
 
-/// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and rho = 1/W_nn [m/s]
-/// (design.md §4). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
+/// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and rho
+/// = 1/W_nn [m/s] (design.md §4). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
 template <bool Friction>
-ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu);
+ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                       double mu);
 template <bool Friction>
-ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity, double mu,
-                     const WallCopy& wall, double wall_inv_mass);
+ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                     double mu, const WallCopy& wall, double wall_inv_mass);
 
-/// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies have equal masses. Summed in order.
+/// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies
+/// have equal masses. Summed in order.
 void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which);
 
 }  // namespace talus

@@ -33,8 +33,9 @@ double face_area(const std::vector<Wall>& walls, std::size_t index) {
     ++pairs;
   }
   if (pairs != 2)
-    throw std::invalid_argument("wall '" + wall.name +
-                                "': no two pairs of opposite walls at right angles to it bound its face; give its area [m^2]");
+    throw std::invalid_argument(
+        "wall '" + wall.name +
+        "': no two pairs of opposite walls at right angles to it bound its face; give its area [m^2]");
   return area;
 }
 
@@ -46,6 +47,8 @@ Vec3 box_lengths(const std::vector<Wall>& walls) {
   return lengths;
 }
 
-double box_volume(const std::vector<Wall>& walls) { return box_lengths(walls).prod(); }
+double box_volume(const std::vector<Wall>& walls) {
+  return box_lengths(walls).prod();
+}
 
 }  // namespace talus

@@ -28,16 +28,17 @@ struct WallLoad {
 /// A pressed wall has one degree of freedom, its displacement along `normal`; walls never turn.
 struct Wall {
   std::string name;
-  Vec3 point = Vec3::Zero();        ///< a point of the plane [m]
-  Vec3 normal = Vec3::UnitZ();      ///< unit, into the grains
-  double area = 0;                  ///< [m^2] the pressure acts on; 0: the current face of the box of walls
-  WallLoad load;                    ///< in force now
-  Vec3 velocity = Vec3::Zero();     ///< [m/s] now
+  Vec3 point = Vec3::Zero();     ///< a point of the plane [m]
+  Vec3 normal = Vec3::UnitZ();   ///< unit, into the grains
+  double area = 0;               ///< [m^2] the pressure acts on; 0: the current face of the box of walls
+  WallLoad load;                 ///< in force now
+  Vec3 velocity = Vec3::Zero();  ///< [m/s] now
   double inv_mass() const { return load.mass > 0 ? 1 / load.mass : 0; }
 };
 
-/// Area of the face of wall `index` [m^2]: its own `area` if positive, else the product of the distances between the two pairs of
-/// opposite walls whose normals are orthogonal to it. Throws std::invalid_argument naming the wall when there are no such pairs.
+/// Area of the face of wall `index` [m^2]: its own `area` if positive, else the product of the distances
+/// between the two pairs of opposite walls whose normals are orthogonal to it. Throws std::invalid_argument
+/// naming the wall when there are no such pairs.
 double face_area(const std::vector<Wall>& walls, std::size_t index);
 
 /// Volume between the three pairs of opposite axis-aligned walls [m^3]; 0 when the walls do not close a box.

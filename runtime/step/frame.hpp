@@ -13,44 +13,46 @@ namespace talus {
 
 /// The certificate of one step (docs/formats.md, steps.csv).
 struct StepReport {
-  std::int64_t step = 0;      ///< number of steps done, from 1
-  double time = 0;            ///< [s] at the end of the step
+  std::int64_t step = 0;  ///< number of steps done, from 1
+  double time = 0;        ///< [s] at the end of the step
   std::int64_t candidates = 0;
-  std::int64_t contacts = 0;  ///< gap below the alert distance
-  std::int64_t active = 0;    ///< normal impulse > 0
-  int iterations = 0;         ///< sweeps
+  std::int64_t contacts = 0;            ///< gap below the alert distance
+  std::int64_t active = 0;              ///< normal impulse > 0
+  int iterations = 0;                   ///< sweeps
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale
-  double balance = 0;         ///< drift of the wall forces, or momentum defect of the sample, whichever is larger
-  double jump = 0;            ///< interface jump (several subdomains)
-  double penetration_mean = 0, penetration_max = 0;   ///< over smallest radius, at the end of the step
+  double balance = 0;  ///< drift of the wall forces, or momentum defect of the sample, whichever is larger
+  double jump = 0;     ///< interface jump (several subdomains)
+  double penetration_mean = 0, penetration_max = 0;      ///< over smallest radius, at the end of the step
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
-  double solid_fraction = 0;  ///< 0 when the walls do not close a box
+  double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   std::int64_t migrants = 0;
-  double imbalance = 1;       ///< largest over mean work of the subdomains
-  double wall_s = 0;          ///< elapsed time of the step [s]
+  double imbalance = 1;  ///< largest over mean work of the subdomains
+  double wall_s = 0;     ///< elapsed time of the step [s]
   bool converged = false;
 };
 
 /// One row of walls.csv.
 struct WallReport {
   std::string name;
-  double position = 0;           ///< normal . point [m]
-  double velocity = 0;           ///< along the normal [m/s]
-  Vec3 force = Vec3::Zero();     ///< of the wall on the grains, mean over the step [N]
+  double position = 0;        ///< normal . point [m]
+  double velocity = 0;        ///< along the normal [m/s]
+  Vec3 force = Vec3::Zero();  ///< of the wall on the grains, mean over the step [N]
 };
 
-/// One row of triaxial.csv; compression is positive for stresses, strains (28)-(30) are negative in compression as in the paper.
+/// One row of triaxial.csv; compression is positive for stresses, strains (28)-(30) are negative in
+/// compression as in the paper.
 struct TriaxialReport {
   std::int64_t step = 0;
   double time = 0;
   std::string stage;
-  std::array<double, 3> strain{};   ///< (28) along x, y, z since the beginning of the stage
-  double strain_volume = 0;         ///< (29)
-  double strain_shear = 0;          ///< (30): eps_h - eps_l along the axis of the stage, mean of both lateral ones
+  std::array<double, 3> strain{};  ///< (28) along x, y, z since the beginning of the stage
+  double strain_volume = 0;        ///< (29)
+  double strain_shear = 0;  ///< (30): eps_h - eps_l along the axis of the stage, mean of both lateral ones
   double solid_fraction = 0;
-  std::array<double, 3> stress{};   ///< [Pa] diagonal of the Love-Weber stress
+  std::array<double, 3> stress{};     ///< [Pa] diagonal of the Love-Weber stress
   double p = 0, q = 0, q_over_p = 0;  ///< p = mean stress; q = axial minus mean lateral [Pa]
-  double coordination = 0;          ///< 2 x active grain-grain contacts (+ walls) per grain with contacts, rattlers left out
+  double coordination =
+      0;  ///< 2 x active grain-grain contacts (+ walls) per grain with contacts, rattlers left out
 };
 
 /// State at an output time. Vectors named first are per body, those after `contact` per active contact.
@@ -59,16 +61,16 @@ struct Frame {
   double time = 0;
   std::string stage;
   std::vector<std::int64_t> id;
-  std::vector<Vec3> x;        ///< [m]
-  std::vector<double> radius; ///< [m]
-  std::vector<Vec3> u;        ///< [m/s]
-  std::vector<Vec3> omega;    ///< [rad/s]; empty without rotation
-  std::vector<std::array<double, 4>> orientation;  ///< empty unless asked for
+  std::vector<Vec3> x;                                      ///< [m]
+  std::vector<double> radius;                               ///< [m]
+  std::vector<Vec3> u;                                      ///< [m/s]
+  std::vector<Vec3> omega;                                  ///< [rad/s]; empty without rotation
+  std::vector<std::array<double, 4>> orientation;           ///< empty unless asked for
   std::vector<std::array<std::int64_t, 2>> contact_bodies;  ///< ids; second is -(1 + wall index) at a wall
-  std::vector<Vec3> contact_point;   ///< [m]
-  std::vector<Vec3> contact_normal;  ///< unit, from the second body to the first
-  std::vector<double> contact_gap;   ///< [m] at the detection pose
-  std::vector<Vec3> contact_force;   ///< on the first body, mean over the step [N]
+  std::vector<Vec3> contact_point;                          ///< [m]
+  std::vector<Vec3> contact_normal;                         ///< unit, from the second body to the first
+  std::vector<double> contact_gap;                          ///< [m] at the detection pose
+  std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
 };
 

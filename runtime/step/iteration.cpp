@@ -6,7 +6,8 @@
 namespace talus {
 
 std::size_t memory_used(const StepState& state) {
-  return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) + memory_used(state.contacts) +
+  return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) +
+         memory_used(state.contacts) +
          (state.free.u.capacity() + state.free.w.capacity()) * sizeof(std::array<double, 3>) +
          state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
          state.copies.capacity() * sizeof(WallCopy);
@@ -24,7 +25,8 @@ void Iteration::begin() {
   state_.copies.assign(chunks.size(), {});
   for (std::size_t c = 0; c < chunks.size(); ++c)
     if (chunks.wall[c] >= 0 && state_.contacts.count[c] > 0)
-      state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(static_cast<std::int32_t>(c));
+      state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
+          static_cast<std::int32_t>(c));
   glued_.clear();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const auto& copies = state_.wall_states[w].copies;
@@ -52,8 +54,9 @@ void Iteration::chunk(std::size_t c, Work work) {
   switch (work) {
     case Work::accumulate: {
       const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-      reset_to_free(std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned), state_.free,
-                    velocity);
+      reset_to_free(
+          std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
+          state_.free, velocity);
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
@@ -64,9 +67,10 @@ void Iteration::chunk(std::size_t c, Work work) {
       break;
     }
     case Work::measure:
-      sums_[c] = at_wall ? error_wall<Friction>(contacts, range, velocity, mu, copy,
-                                                state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass())
-                         : error_grains<Friction>(contacts, range, velocity, mu);
+      sums_[c] = at_wall
+                     ? error_wall<Friction>(contacts, range, velocity, mu, copy,
+                                            state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass())
+                     : error_grains<Friction>(contacts, range, velocity, mu);
       break;
     case Work::sweep:
       if (at_wall)
@@ -94,7 +98,8 @@ void Iteration::node(std::uint32_t node, int epoch) {
 double Iteration::impulse_scale() const {
   double scale = 0;
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
-    scale = std::max({scale, impulses_.back()[w].norm(), parameters_.time_step * state_.wall_states[w].applied});
+    scale =
+        std::max({scale, impulses_.back()[w].norm(), parameters_.time_step * state_.wall_states[w].applied});
   return scale;
 }
 
@@ -102,7 +107,8 @@ double Iteration::drift() const {
   const double scale = impulse_scale();
   if (scale == 0) return 0;
   std::size_t half = 0;
-  while (half + 1 < history_.size() && 2 * history_[half + 1].iterations <= history_.back().iterations) ++half;
+  while (half + 1 < history_.size() && 2 * history_[half + 1].iterations <= history_.back().iterations)
+    ++half;
   double change = 0;
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     change = std::max(change, (impulses_.back()[w] - impulses_[half][w]).norm());
@@ -115,7 +121,8 @@ bool Iteration::decide(int epoch) {
   for (std::size_t c = 0; c < sums_.size(); ++c) {
     total.add(sums_[c]);
     if (state_.chunks.wall[c] >= 0)
-      impulses[static_cast<std::size_t>(state_.chunks.wall[c])] += Eigen::Map<const Vec3>(sums_[c].wall_impulse);
+      impulses[static_cast<std::size_t>(state_.chunks.wall[c])] +=
+          Eigen::Map<const Vec3>(sums_[c].wall_impulse);
   }
   for (std::size_t w = 0; w < impulses.size(); ++w) state_.wall_states[w].impulse = impulses[w];
   impulses_.push_back(std::move(impulses));
@@ -131,11 +138,13 @@ bool Iteration::decide(int epoch) {
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
-  result_.converged = judged && result_.error_rms <= settings_.tolerance &&
-                      result_.drift <= settings_.balance_tolerance;
+  result_.converged =
+      judged && result_.error_rms <= settings_.tolerance && result_.drift <= settings_.balance_tolerance;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
-  if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations) return false;
-  const int sweeps = std::min(std::max(settings_.check_every, result_.iterations / 4), settings_.max_iterations - result_.iterations);
+  if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations)
+    return false;
+  const int sweeps = std::min(std::max(settings_.check_every, result_.iterations / 4),
+                              settings_.max_iterations - result_.iterations);
   result_.iterations += sweeps;
   segment_ = epoch + 1 + sweeps;
   return true;

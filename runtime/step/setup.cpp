@@ -21,19 +21,24 @@ void validate_load(const std::string& where, const WallLoad& load) {
 
 void validate(const Setup& setup) {
   for (const Wall& wall : setup.walls) {
-    require(std::abs(wall.normal.norm() - 1) < 1e-9, fmt::format("wall '{}': normal must be a unit vector", wall.name));
+    require(std::abs(wall.normal.norm() - 1) < 1e-9,
+            fmt::format("wall '{}': normal must be a unit vector", wall.name));
     validate_load(fmt::format("wall '{}'", wall.name), wall.load);
   }
   require(!setup.stages.empty(), "at least one stage is needed");
   for (const Stage& stage : setup.stages) {
-    require(stage.time_step > 0, fmt::format("stage '{}': time_step must be > 0 s, got {}", stage.name, stage.time_step));
-    require(stage.law.mu_grains >= 0 && stage.law.mu_walls >= 0, fmt::format("stage '{}': friction must be >= 0", stage.name));
-    require(stage.law.restitution >= 0 && stage.law.restitution <= 1,
-            fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, stage.law.restitution));
+    require(stage.time_step > 0,
+            fmt::format("stage '{}': time_step must be > 0 s, got {}", stage.name, stage.time_step));
+    require(stage.law.mu_grains >= 0 && stage.law.mu_walls >= 0,
+            fmt::format("stage '{}': friction must be >= 0", stage.name));
+    require(
+        stage.law.restitution >= 0 && stage.law.restitution <= 1,
+        fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, stage.law.restitution));
     require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
     for (const auto& [name, load] : stage.loads) {
-      const bool known = std::any_of(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
+      const bool known =
+          std::any_of(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
       require(known, fmt::format("stage '{}': no wall is named '{}'", stage.name, name));
       validate_load(fmt::format("stage '{}', wall '{}'", stage.name, name), load);
     }

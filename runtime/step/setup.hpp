@@ -23,20 +23,21 @@ struct ContactLaw {
 /// When a stage ends: at the first of the conditions given. At least one is given.
 struct StageEnd {
   std::optional<std::int64_t> steps;
-  std::optional<double> time;         ///< [s] of the stage
-  std::optional<double> strain;       ///< |axial strain| (28) since the beginning of the stage, along strain_axis
-  int strain_axis = 2;                ///< 0, 1, 2 = x, y, z
-  std::optional<double> equilibrium;  ///< bound on both |net force| / applied force of every pressed wall and kinetic / (p V) or
-                                      ///< kinetic / (m g d) energy ratio; checked at the end of every step
+  std::optional<double> time;    ///< [s] of the stage
+  std::optional<double> strain;  ///< |axial strain| (28) since the beginning of the stage, along strain_axis
+  int strain_axis = 2;           ///< 0, 1, 2 = x, y, z
+  std::optional<double>
+      equilibrium;  ///< bound on both |net force| / applied force of every pressed wall and kinetic / (p V)
+                    ///< or kinetic / (m g d) energy ratio; checked at the end of every step
 };
 
 /// One stage: a time interval with its own loads.
 struct Stage {
   std::string name;
-  double time_step = 0;                                   ///< h [s] > 0
-  Vec3 gravity = Vec3::Zero();                            ///< [m/s^2]
+  double time_step = 0;         ///< h [s] > 0
+  Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
   ContactLaw law;
-  std::vector<std::pair<std::string, WallLoad>> loads;    ///< walls whose load changes when the stage begins
+  std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
   StageEnd end;
 };
 
@@ -46,11 +47,13 @@ struct DetectionSettings {
 };
 
 struct SolverSettings {
-  double tolerance = 1e-3;          ///< on error_rms: natural map, relative (docs/theory.md, "Error")
-  double balance_tolerance = 1e-2;  ///< on balance: drift of the wall forces over the second half of the iterations
-  int max_iterations = 2000;        ///< sweeps per step, >= 1
-  int check_every = 10;             ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
-  bool warm_start = true;           ///< begin from the impulses of the last step
+  double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
+  double balance_tolerance =
+      1e-2;                   ///< on balance: drift of the wall forces over the second half of the iterations
+  int max_iterations = 2000;  ///< sweeps per step, >= 1
+  int check_every =
+      10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
+  bool warm_start = true;  ///< begin from the impulses of the last step
 };
 
 /// A simulation, apart from its grains.
@@ -59,13 +62,14 @@ struct Setup {
   std::vector<Stage> stages;
   DetectionSettings detection;
   SolverSettings solver;
-  bool rotation = true;       ///< false: grains slide and do not turn
-  bool orientation = false;   ///< true: integrate and write orientations
+  bool rotation = true;            ///< false: grains slide and do not turn
+  bool orientation = false;        ///< true: integrate and write orientations
   bool allow_unconverged = false;  ///< true: steps over tolerance do not change the exit code
   std::uint64_t seed = 1;
 };
 
-/// Throws std::invalid_argument with the name of the wall or stage, the value and its limit when the setup makes no sense.
+/// Throws std::invalid_argument with the name of the wall or stage, the value and its limit when the setup
+/// makes no sense.
 void validate(const Setup& setup);
 
 }  // namespace talus

@@ -11,27 +11,36 @@ namespace talus {
 
 namespace {
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
-bool pushed(const Wall& wall) { return wall.load.drive == WallDrive::pressure || wall.load.drive == WallDrive::force; }
+bool pushed(const Wall& wall) {
+  return wall.load.drive == WallDrive::pressure || wall.load.drive == WallDrive::force;
+}
 
 /// Kinetic energy of the walls [J] with the given velocities.
-double energy_of(const Wall& wall, const Vec3& velocity) { return pushed(wall) ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0; }
+double energy_of(const Wall& wall, const Vec3& velocity) {
+  return pushed(wall) ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0;
+}
 
 std::string describe(const Bodies& bodies, Slot slot) {
   const auto s = static_cast<std::size_t>(slot);
   const Velocity& v = bodies.velocity[s];
   const Vec3& x = bodies.x[s];
-  return fmt::format("body {}: x = ({}, {}, {}) m, radius = {} m, u = ({}, {}, {}) m/s, R omega = ({}, {}, {}) m/s",
-                     static_cast<std::int64_t>(bodies.id[s]), x[0], x[1], x[2], bodies.radius[s], v.u[0], v.u[1], v.u[2], v.w[0],
-                     v.w[1], v.w[2]);
+  return fmt::format(
+      "body {}: x = ({}, {}, {}) m, radius = {} m, u = ({}, {}, {}) m/s, R omega = ({}, {}, {}) m/s",
+      static_cast<std::int64_t>(bodies.id[s]), x[0], x[1], x[2], bodies.radius[s], v.u[0], v.u[1], v.u[2],
+      v.w[0], v.w[1], v.w[2]);
 }
 
 }  // namespace
 
 struct Simulation::Implementation {
   Implementation(Setup given, Bodies bodies, graph::Executor& executor)
-      : setup(std::move(given)), state(start(setup, std::move(bodies))), graph(state, parameters, setup.solver, executor) {
+      : setup(std::move(given)),
+        state(start(setup, std::move(bodies))),
+        graph(state, parameters, setup.solver, executor) {
     const Bodies& grains = state.bodies;
     for (double r : grains.radius) {
       smallest = std::min(smallest, r);
@@ -55,7 +64,8 @@ struct Simulation::Implementation {
         v.spin_mobility = 0;
         std::fill(std::begin(v.w), std::end(v.w), 0.0);
       }
-    if (setup.orientation && state.bodies.orientation.empty()) state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});
+    if (setup.orientation && state.bodies.orientation.empty())
+      state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});
     state.walls = setup.walls;
     state.wall_states.resize(state.walls.size());
     state.free.u.resize(state.bodies.size());
@@ -71,7 +81,8 @@ struct Simulation::Implementation {
       if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
       if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
       if (pushed(wall)) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
-      if (wall.load.drive == WallDrive::pressure) face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
+      if (wall.load.drive == WallDrive::pressure)
+        face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
     }
     parameters.time_step = stage.time_step;
     parameters.gravity = stage.gravity;
@@ -81,7 +92,8 @@ struct Simulation::Implementation {
     if (state.candidates_valid) {  // later stages: the sample has flowed, sort it again
       const std::vector<Slot> order = morton_order(state.bodies);
       std::vector<Slot> place(order.size());
-      for (std::size_t k = 0; k < order.size(); ++k) place[static_cast<std::size_t>(order[k])] = static_cast<Slot>(k);
+      for (std::size_t k = 0; k < order.size(); ++k)
+        place[static_cast<std::size_t>(order[k])] = static_cast<Slot>(k);
       reorder(state.bodies, order);
       renumber(state.candidates, place);
       state.candidates_valid = false;
@@ -95,7 +107,9 @@ struct Simulation::Implementation {
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const Wall& wall = state.walls[w];
       WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.load.drive == WallDrive::pressure ? wall.load.pressure * face_area(state.walls, w) : wall.load.force;
+      wall_state.applied = wall.load.drive == WallDrive::pressure
+                               ? wall.load.pressure * face_area(state.walls, w)
+                               : wall.load.force;
       wall_state.free_velocity =
           wall.velocity + parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
     }
@@ -104,17 +118,23 @@ struct Simulation::Implementation {
   void check_for_runaway(double wall_energy_free) const {
     const MotionSums& motion = graph.sums().motion;
     const std::int64_t step = report.step + 1;
-    if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) || std::isnan(graph.iteration().result().error_rms))
-      throw RunawayError(fmt::format("step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping grains",
-                                     step, setup.stages[stage_index].name, describe(state.bodies, std::max(motion.fastest, 0))));
+    if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) ||
+        std::isnan(graph.iteration().result().error_rms))
+      throw RunawayError(fmt::format(
+          "step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping "
+          "grains",
+          step, setup.stages[stage_index].name, describe(state.bodies, std::max(motion.fastest, 0))));
     double fastest_wall2 = 0;
-    for (const Wall& wall : state.walls) fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
+    for (const Wall& wall : state.walls)
+      fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
     const double energy = motion.energy.translation + motion.energy.rotation;
     const double supplied = motion.energy_free + wall_energy_free + total_mass * fastest_wall2;
     if (energy > 100 * supplied && energy > 0)
-      throw RunawayError(fmt::format("step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. Reduce the time "
-                                     "step or raise solver.max_iterations",
-                                     step, setup.stages[stage_index].name, energy, supplied, describe(state.bodies, motion.fastest)));
+      throw RunawayError(fmt::format(
+          "step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. "
+          "Reduce the time "
+          "step or raise solver.max_iterations",
+          step, setup.stages[stage_index].name, energy, supplied, describe(state.bodies, motion.fastest)));
   }
 
   void write_report(double elapsed) {
@@ -135,7 +155,9 @@ struct Simulation::Implementation {
     report.error_max = result.error_max;
     report.balance = std::max(result.drift, defect);
     report.penetration_mean =
-        sums.contacts.overlapping > 0 ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / smallest : 0;
+        sums.contacts.overlapping > 0
+            ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / smallest
+            : 0;
     report.penetration_max = sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / smallest : 0;
     report.kinetic_translation = sums.motion.energy.translation;
     report.kinetic_rotation = sums.motion.energy.rotation;
@@ -145,7 +167,8 @@ struct Simulation::Implementation {
     report.converged = result.converged && defect <= setup.solver.balance_tolerance;
   }
 
-  /// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x grain diameter.
+  /// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x
+  /// grain diameter.
   double unrest() const {
     const double h = parameters.time_step;
     double load = total_mass * parameters.gravity.norm(), net = 0;
@@ -153,7 +176,8 @@ struct Simulation::Implementation {
       const double applied = state.wall_states[w].applied;
       if (applied == 0) continue;
       load += std::abs(applied);
-      net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) / std::abs(applied));
+      net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
+                              std::abs(applied));
     }
     const double energy = report.kinetic_translation + report.kinetic_rotation;
     if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
@@ -163,18 +187,24 @@ struct Simulation::Implementation {
 
   double strain(int axis) const {
     const Vec3 lengths = box_lengths(state.walls);
-    return lengths_at_start[axis] > 0 && lengths[axis] > 0 ? std::log(lengths[axis] / lengths_at_start[axis]) : 0;
+    return lengths_at_start[axis] > 0 && lengths[axis] > 0 ? std::log(lengths[axis] / lengths_at_start[axis])
+                                                           : 0;
   }
 
   /// Part of the stage done by its nearest end condition; >= 1 when it has ended.
   double done() const {
     const StageEnd& end = setup.stages[stage_index].end;
     double fraction = 0;
-    if (end.steps) fraction = std::max(fraction, *end.steps > 0 ? static_cast<double>(stage_steps) / static_cast<double>(*end.steps) : 1.0);
+    if (end.steps)
+      fraction =
+          std::max(fraction,
+                   *end.steps > 0 ? static_cast<double>(stage_steps) / static_cast<double>(*end.steps) : 1.0);
     if (end.time) {
       // Half a step of slack: the sum of many steps is not the product.
       const double steps = *end.time / parameters.time_step;
-      fraction = std::max(fraction, static_cast<double>(stage_steps) >= steps - 0.5 ? 1.0 : static_cast<double>(stage_steps) / steps);
+      fraction = std::max(fraction, static_cast<double>(stage_steps) >= steps - 0.5
+                                        ? 1.0
+                                        : static_cast<double>(stage_steps) / steps);
     }
     if (stage_steps == 0) return fraction;
     if (end.strain) fraction = std::max(fraction, std::abs(strain(end.strain_axis)) / *end.strain);
@@ -233,18 +263,42 @@ bool Simulation::begin_next_stage() {
   return impl_->stage_index != before;
 }
 
-bool Simulation::finished() const { return impl_->over; }
-double Simulation::stage_fraction() const { return std::min(1.0, impl_->done()); }
-const Stage& Simulation::stage() const { return impl_->setup.stages[impl_->stage_index]; }
-std::size_t Simulation::stage_index() const { return impl_->stage_index; }
-std::int64_t Simulation::steps_of_stage() const { return impl_->stage_steps; }
-const Setup& Simulation::setup() const { return impl_->setup; }
-const StepState& Simulation::state() const { return impl_->state; }
-const StepParameters& Simulation::parameters() const { return impl_->parameters; }
-const std::vector<Iteration::Check>& Simulation::error_history() const { return impl_->graph.iteration().history(); }
-const StepReport& Simulation::report() const { return impl_->report; }
-const StepSums& Simulation::sums() const { return impl_->graph.sums(); }
-const graph::Graph& Simulation::step_graph() const { return impl_->graph.graph(); }
+bool Simulation::finished() const {
+  return impl_->over;
+}
+double Simulation::stage_fraction() const {
+  return std::min(1.0, impl_->done());
+}
+const Stage& Simulation::stage() const {
+  return impl_->setup.stages[impl_->stage_index];
+}
+std::size_t Simulation::stage_index() const {
+  return impl_->stage_index;
+}
+std::int64_t Simulation::steps_of_stage() const {
+  return impl_->stage_steps;
+}
+const Setup& Simulation::setup() const {
+  return impl_->setup;
+}
+const StepState& Simulation::state() const {
+  return impl_->state;
+}
+const StepParameters& Simulation::parameters() const {
+  return impl_->parameters;
+}
+const std::vector<Iteration::Check>& Simulation::error_history() const {
+  return impl_->graph.iteration().history();
+}
+const StepReport& Simulation::report() const {
+  return impl_->report;
+}
+const StepSums& Simulation::sums() const {
+  return impl_->graph.sums();
+}
+const graph::Graph& Simulation::step_graph() const {
+  return impl_->graph.graph();
+}
 
 std::vector<WallReport> Simulation::walls() const {
   std::vector<WallReport> reports;
@@ -292,7 +346,8 @@ Frame Simulation::frame(bool contacts) const {
   for (std::size_t s = 0; s < bodies.size(); ++s) {
     frame.id.push_back(static_cast<std::int64_t>(bodies.id[s]));
     frame.u.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].u));
-    if (impl_->setup.rotation) frame.omega.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].w) / bodies.radius[s]);
+    if (impl_->setup.rotation)
+      frame.omega.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].w) / bodies.radius[s]);
   }
   frame.x = bodies.x;
   frame.radius = bodies.radius;
@@ -307,9 +362,10 @@ Frame Simulation::frame(bool contacts) const {
       const auto i = static_cast<std::size_t>(state.contacts.first[k]);
       const Slot second = state.contacts.second[k];
       const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
-      const double gap = second >= 0 ? (bodies.x[i] - bodies.x[static_cast<std::size_t>(second)]).norm() - bodies.radius[i] -
-                                           bodies.radius[static_cast<std::size_t>(second)]
-                                     : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
+      const double gap = second >= 0 ? (bodies.x[i] - bodies.x[static_cast<std::size_t>(second)]).norm() -
+                                           bodies.radius[i] - bodies.radius[static_cast<std::size_t>(second)]
+                                     : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) -
+                                           bodies.radius[i];
       frame.contact_bodies.push_back({frame.id[i], second >= 0 ? frame.id[static_cast<std::size_t>(second)]
                                                                : -1 - static_cast<std::int64_t>(wall)});
       frame.contact_normal.push_back(normal);

@@ -22,27 +22,31 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A simulation on one process: stages of time steps, each step one graph of tasks (docs/theory.md, "One time step").
+/// A simulation on one process: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
+/// step").
 ///
 ///   Executor executor({.threads = 2});
 ///   Simulation simulation(setup, std::move(bodies), executor);
 ///   while (!simulation.finished()) {
 ///     const StepReport& report = simulation.step();
-///     if (wanted(report.step)) executor.submit_background("output", [frame = simulation.frame()] { write(frame); });
-///     simulation.begin_next_stage();
+///     if (wanted(report.step)) executor.submit_background("output", [frame = simulation.frame()] {
+///     write(frame); }); simulation.begin_next_stage();
 ///   }
 ///
 /// Results do not depend on the number of threads (step_graph.hpp).
 class Simulation {
  public:
-  /// Throws std::invalid_argument when the setup makes no sense. Bodies are sorted in Morton order. The executor must outlive the simulation.
+  /// Throws std::invalid_argument when the setup makes no sense. Bodies are sorted in Morton order. The
+  /// executor must outlive the simulation.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
   ~Simulation();
 
-  /// Does one time step. Throws RunawayError, or graph::TaskError when a task failed. Not to be called when finished.
+  /// Does one time step. Throws RunawayError, or graph::TaskError when a task failed. Not to be called when
+  /// finished.
   const StepReport& step();
 
-  /// After a step, and after its results were read: goes to the next stage when this one has ended (true), or finishes.
+  /// After a step, and after its results were read: goes to the next stage when this one has ended (true), or
+  /// finishes.
   bool begin_next_stage();
 
   bool finished() const;

@@ -16,12 +16,13 @@ namespace talus {
 
 /// What the current stage prescribes; constant during a step.
 struct StepParameters {
-  double time_step = 0;   ///< h [s]
+  double time_step = 0;  ///< h [s]
   Vec3 gravity = Vec3::Zero();
   ContactLaw law;
-  bool friction = false;  ///< any friction coefficient > 0: impulses have three components and grains may turn
-  double alert = 0;       ///< [m]
-  double skin = 0;        ///< [m]
+  bool friction =
+      false;         ///< any friction coefficient > 0: impulses have three components and grains may turn
+  double alert = 0;  ///< [m]
+  double skin = 0;   ///< [m]
 };
 
 /// One wall during a step.
@@ -34,18 +35,18 @@ struct WallState {
 
 /// All that a step reads and writes. Sizes: n bodies, c candidates, k chunks.
 struct StepState {
-  Bodies bodies;                      ///< n
+  Bodies bodies;  ///< n
   std::vector<Wall> walls;
-  std::vector<WallState> wall_states; ///< like walls
-  FreeVelocity free;                  ///< n, or empty parts
-  std::vector<Vec3> x_then;           ///< n: centres at the last broad phase [m]
-  std::vector<double> reach_then;     ///< n: reach at the last broad phase [m]
-  std::vector<Vec3> wall_then;        ///< points of the walls at the last broad phase [m]
-  Candidates candidates;              ///< c
-  Chunks chunks;                      ///< k
-  Contacts contacts;                  ///< c rooms
-  std::vector<WallCopy> copies;       ///< k; used by chunks at walls
-  bool candidates_valid = false;      ///< false: the next step begins with a broad phase
+  std::vector<WallState> wall_states;  ///< like walls
+  FreeVelocity free;                   ///< n, or empty parts
+  std::vector<Vec3> x_then;            ///< n: centres at the last broad phase [m]
+  std::vector<double> reach_then;      ///< n: reach at the last broad phase [m]
+  std::vector<Vec3> wall_then;         ///< points of the walls at the last broad phase [m]
+  Candidates candidates;               ///< c
+  Chunks chunks;                       ///< k
+  Contacts contacts;                   ///< c rooms
+  std::vector<WallCopy> copies;        ///< k; used by chunks at walls
+  bool candidates_valid = false;       ///< false: the next step begins with a broad phase
 };
 
 std::size_t memory_used(const StepState& state);

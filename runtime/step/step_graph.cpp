@@ -10,11 +10,14 @@ namespace talus {
 namespace {
 
 /// Enough lanes for any node to share, few enough that a task stays coarse.
-std::uint32_t lanes_for(std::size_t bodies) { return static_cast<std::uint32_t>(std::clamp<std::size_t>(bodies / 512, 1, 64)); }
+std::uint32_t lanes_for(std::size_t bodies) {
+  return static_cast<std::uint32_t>(std::clamp<std::size_t>(bodies / 512, 1, 64));
+}
 
 }  // namespace
 
-StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings, graph::Executor& executor)
+StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+                     graph::Executor& executor)
     : state_(state),
       parameters_(parameters),
       settings_(settings),
@@ -38,18 +41,22 @@ void StepGraph::build() {
   const auto contacts = graph_.data("contacts", lanes_);
   const auto loop = graph_.data("loop");
   for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("predict[{}]", lane), {write(bodies[lane])}, [this, lane] { predict_lane(lane); });
+    graph_.task(fmt::format("predict[{}]", lane), {write(bodies[lane])},
+                [this, lane] { predict_lane(lane); });
   graph_.task("cells", {read(bodies), write(cells)}, [this] { make_cells(); });
   for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("pairs[{}]", lane), {read(cells), write(pairs[lane])}, [this, lane] { find_lane_pairs(lane); });
+    graph_.task(fmt::format("pairs[{}]", lane), {read(cells), write(pairs[lane])},
+                [this, lane] { find_lane_pairs(lane); });
   graph_.task("chunks", {read(cells), read(pairs), write(chunks)}, [this] { make_chunks(); });
   for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("narrow[{}]", lane), {read(chunks), read(bodies), write(contacts[lane])}, [this, lane] { narrow_lane(lane); });
+    graph_.task(fmt::format("narrow[{}]", lane), {read(chunks), read(bodies), write(contacts[lane])},
+                [this, lane] { narrow_lane(lane); });
   graph_.task("plan", {read(contacts), write(loop)}, [this] { plan_iteration(); });
   graph_.team("iterate", {write(loop), write(bodies), write(contacts)},
               [this](graph::Worker& worker) { graph::run_epochs(epochs_, worker, iteration_); });
   for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("finish[{}]", lane), {read(loop), write(bodies[lane])}, [this, lane] { finish_lane(lane); });
+    graph_.task(fmt::format("finish[{}]", lane), {read(loop), write(bodies[lane])},
+                [this, lane] { finish_lane(lane); });
   const auto walls = graph_.data("walls");
   graph_.task("walls", {read(loop), write(walls)}, [this] { finish_walls(); });
   for (std::uint32_t lane = 0; lane < lanes_; ++lane)

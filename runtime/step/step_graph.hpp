@@ -28,15 +28,18 @@ struct StepSums {
 
 /// The task graph of a time step, built once and run every step:
 ///
-///   predict[lane] -> cells -> pairs[lane] -> chunks -> narrow[lane] -> plan -> iterate (team) -> finish[lane], walls -> measure[lane] -> sum
+///   predict[lane] -> cells -> pairs[lane] -> chunks -> narrow[lane] -> plan -> iterate (team) ->
+///   finish[lane], walls -> measure[lane] -> sum
 ///
-/// A lane is a fixed share of the bodies, the cells or the chunks; their number depends on the number of bodies only, so that sums are the same for any
-/// number of threads. cells, pairs and chunks return at once while every grain and wall is within its margin of the last broad phase. Each task
-/// declares what it reads and writes; the order above follows from that.
+/// A lane is a fixed share of the bodies, the cells or the chunks; their number depends on the number of
+/// bodies only, so that sums are the same for any number of threads. cells, pairs and chunks return at once
+/// while every grain and wall is within its margin of the last broad phase. Each task declares what it reads
+/// and writes; the order above follows from that.
 class StepGraph {
  public:
   /// Keeps references.
-  StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings, graph::Executor& executor);
+  StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+            graph::Executor& executor);
 
   /// One step: poses, velocities, walls, impulses of `state` go from the beginning to the end of the step.
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
@@ -71,12 +74,12 @@ class StepGraph {
   graph::Graph graph_;
   Iteration iteration_;
   graph::EpochGraph epochs_;
-  std::vector<std::int32_t> planned_walls_;  ///< glued walls that epochs_ was built for
-  bool planned_ = false;                     ///< false: the chunks are new
+  std::vector<std::int32_t> planned_walls_;            ///< glued walls that epochs_ was built for
+  bool planned_ = false;                               ///< false: the chunks are new
   double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at the seams of the step [s]
   CellGrid cells_;
-  std::vector<double> wall_margin_;          ///< at the last broad phase [m]
-  std::vector<char> left_;                   ///< per lane: a grain left its margin
+  std::vector<double> wall_margin_;  ///< at the last broad phase [m]
+  std::vector<char> left_;           ///< per lane: a grain left its margin
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
   std::vector<ContactSums> contact_sums_;

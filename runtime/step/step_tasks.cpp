@@ -11,15 +11,22 @@ namespace talus {
 
 namespace {
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
-/// A few hundred candidates a chunk; fewer in small samples, where colours would otherwise be too thin for threads.
-int chunk_target(std::size_t candidates) { return static_cast<int>(std::clamp<std::size_t>(candidates / 128, 48, 384)); }
+/// A few hundred candidates a chunk; fewer in small samples, where colours would otherwise be too thin for
+/// threads.
+int chunk_target(std::size_t candidates) {
+  return static_cast<int>(std::clamp<std::size_t>(candidates / 128, 48, 384));
+}
 
-double speed(const Velocity& v) { return std::sqrt(v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2]); }
+double speed(const Velocity& v) {
+  return std::sqrt(v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2]);
+}
 
-std::vector<WallPair> find_wall_pairs(const Bodies& bodies, const std::vector<Wall>& walls, std::span<const double> reach,
-                                      std::span<const double> margin) {
+std::vector<WallPair> find_wall_pairs(const Bodies& bodies, const std::vector<Wall>& walls,
+                                      std::span<const double> reach, std::span<const double> margin) {
   std::vector<WallPair> pairs;
   for (std::size_t w = 0; w < walls.size(); ++w)
     for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -40,15 +47,18 @@ void StepGraph::predict_lane(std::uint32_t lane) {
   const double h = parameters_.time_step;
   predict(range, bodies.x, bodies.velocity, h, parameters_.gravity, state_.free);
   if (!bodies.orientation.empty()) turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
-  left_[lane] = state_.candidates_valid && left_margin(range, bodies.x, bodies.velocity, bodies.radius, state_.x_then,
-                                                       state_.reach_then, h, parameters_.alert);
+  left_[lane] =
+      state_.candidates_valid && left_margin(range, bodies.x, bodies.velocity, bodies.radius, state_.x_then,
+                                             state_.reach_then, h, parameters_.alert);
 }
 
 bool StepGraph::walls_left_margin() const {
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const Wall& wall = state_.walls[w];
     const double moved = std::abs(wall.normal.dot(wall.point - state_.wall_then[w]));
-    if (contact_margin(wall.velocity.norm(), parameters_.time_step, parameters_.alert) + moved > wall_margin_[w]) return true;
+    if (contact_margin(wall.velocity.norm(), parameters_.time_step, parameters_.alert) + moved >
+        wall_margin_[w])
+      return true;
   }
   return false;
 }
@@ -64,7 +74,8 @@ void StepGraph::make_cells() {
   state_.reach_then.resize(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   for (std::size_t s = 0; s < bodies.size(); ++s)
-    state_.reach_then[s] = bodies.radius[s] + half_skin + contact_margin(speed(bodies.velocity[s]), h, parameters_.alert);
+    state_.reach_then[s] =
+        bodies.radius[s] + half_skin + contact_margin(speed(bodies.velocity[s]), h, parameters_.alert);
   state_.wall_then.clear();
   wall_margin_.clear();
   for (const Wall& wall : state_.walls) {
@@ -102,8 +113,11 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
   if (!settings_.warm_start) {
     const auto components = static_cast<std::size_t>(state_.candidates.components);
     const SlotRange own = share(state_.chunks.size(), lane);
-    std::fill(state_.candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.begin],
-              state_.candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.end], 0.0);
+    std::fill(state_.candidates.impulse.begin() +
+                  static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.begin],
+              state_.candidates.impulse.begin() +
+                  static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.end],
+              0.0);
   }
   const NarrowPhase in{bodies.x,
                        bodies.radius,
@@ -114,7 +128,8 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
                        parameters_.law.restitution,
                        parameters_.gravity};
   const SlotRange range = share(state_.chunks.size(), lane);
-  for (std::size_t c = range.begin; c < range.end; ++c) narrow_chunk(in, state_.candidates, state_.chunks, c, state_.contacts);
+  for (std::size_t c = range.begin; c < range.end; ++c)
+    narrow_chunk(in, state_.candidates, state_.chunks, c, state_.contacts);
 }
 
 void StepGraph::plan_iteration() {
@@ -124,7 +139,8 @@ void StepGraph::plan_iteration() {
   iterating_ = now();
 }
 
-/// Chunks as they conflict, and behind them one node per glued wall that conflicts with its copies and has a colour of its own, the last.
+/// Chunks as they conflict, and behind them one node per glued wall that conflicts with its copies and has a
+/// colour of its own, the last.
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const std::size_t count = chunks.size();
@@ -135,7 +151,8 @@ void StepGraph::plan_epochs() {
     for (std::size_t c = 0; c < count; ++c)
       if (chunks.wall[c] == planned_walls_[g]) glue_of[c].push_back(static_cast<std::uint32_t>(count + g));
 
-  std::vector<std::uint32_t> colour(nodes, static_cast<std::uint32_t>(chunks.colours)), offset(1, 0), neighbour;
+  std::vector<std::uint32_t> colour(nodes, static_cast<std::uint32_t>(chunks.colours)), offset(1, 0),
+      neighbour;
   for (std::size_t c = 0; c < count; ++c) {
     colour[c] = static_cast<std::uint32_t>(chunks.colour[c]);
     neighbour.insert(neighbour.end(), chunks.conflicts.begin() + chunks.conflict_begin[c],
@@ -149,12 +166,17 @@ void StepGraph::plan_epochs() {
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
   }
 
-  // Bodies stand in Morton order, so the first body of a chunk says where it lies; walls' chunks go to whoever sweeps the grains beside them.
+  // Bodies stand in Morton order, so the first body of a chunk says where it lies; walls' chunks go to
+  // whoever sweeps the grains beside them.
   std::vector<std::uint32_t> order(count), weight(count), owner_in_order(count), owner(nodes, 0);
   std::iota(order.begin(), order.end(), 0u);
-  const auto place = [&](std::uint32_t c) { return chunks.bodies[static_cast<std::size_t>(chunks.body_begin[c])]; };
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
-  for (std::size_t k = 0; k < count; ++k) weight[k] = 1 + static_cast<std::uint32_t>(state_.contacts.count[order[k]]);
+  const auto place = [&](std::uint32_t c) {
+    return chunks.bodies[static_cast<std::size_t>(chunks.body_begin[c])];
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
+  for (std::size_t k = 0; k < count; ++k)
+    weight[k] = 1 + static_cast<std::uint32_t>(state_.contacts.count[order[k]]);
   graph::assign_owners(weight, executor_.threads(), owner_in_order);
   for (std::size_t k = 0; k < count; ++k) owner[order[k]] = owner_in_order[k];
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
@@ -165,7 +187,8 @@ void StepGraph::finish_lane(std::uint32_t lane) {
   Bodies& bodies = state_.bodies;
   const SlotRange range = share(bodies.size(), lane);
   motion_[lane] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free);
-  if (!bodies.orientation.empty()) turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
+  if (!bodies.orientation.empty())
+    turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
 }
 
 void StepGraph::finish_walls() {
@@ -174,7 +197,8 @@ void StepGraph::finish_walls() {
     const WallState& wall = state_.wall_states[w];
     Vec3 velocity = wall.free_velocity;
     if (!wall.copies.empty())
-      velocity = Eigen::Map<const Vec3>(state_.copies[static_cast<std::size_t>(wall.copies.front())].velocity);
+      velocity =
+          Eigen::Map<const Vec3>(state_.copies[static_cast<std::size_t>(wall.copies.front())].velocity);
     state_.walls[w].velocity = velocity;
     state_.walls[w].point += 0.5 * parameters_.time_step * velocity;
   }
@@ -185,8 +209,8 @@ void StepGraph::measure_lane(std::uint32_t lane) {
   contact_sums_[lane] = {};
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
-    contact_sums_[lane].add(
-        measure_contacts(state_.contacts, state_.chunks, c, state_.bodies.x, state_.bodies.radius, state_.walls));
+    contact_sums_[lane].add(measure_contacts(state_.contacts, state_.chunks, c, state_.bodies.x,
+                                             state_.bodies.radius, state_.walls));
   }
 }
 
