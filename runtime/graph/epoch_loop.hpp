@@ -1,0 +1,139 @@
+#pragma once
+
+/// Runs the loop that an EpochGraph plans. A program gives the work:
+///
+///     struct Sweep {
+///       void node(std::uint32_t chunk, int epoch);   // one node; runs beside nodes it does not conflict
+///       with bool gate(int epoch);                        // does anybody decide after this epoch? bool
+///       decide(int epoch);                      // all nodes have finished the epoch, nothing else runs;
+///       false ends the loop
+///     };
+///     graph.build(conflicts, owner, executor.threads());
+///     step.team("iterate", accesses, [&](Worker& me) { run_epochs(graph, me, sweep); });
+///
+/// Epochs count from 0 in every call. The loop ends only in decide(), so some gate must be true sooner or
+/// later. gate(epoch) is asked by every thread at the beginning of its epoch and must be the same on all: it
+/// may depend on the epoch and on what decide() wrote. Between gates there is no barrier: threads are in
+/// different epochs, as far apart as conflicts allow.
+
+#include <concepts>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "runtime/graph/epoch_graph.hpp"
+
+namespace talus::graph {
+
+template <class Program>
+concept EpochProgram = requires(Program& program, std::uint32_t node, int epoch) {
+  program.node(node, epoch);
+  { program.gate(epoch) } -> std::convertible_to<bool>;
+  { program.decide(epoch) } -> std::convertible_to<bool>;
+};
+
+/// The loop on one thread: the plain loop over epochs and nodes. The graph was built for one thread.
+template <class Program>
+void run_epochs(EpochGraph& graph, Program& program) {
+  static_assert(EpochProgram<Program>);
+  if (graph.threads() != 1)
+    throw std::invalid_argument("an epoch loop planned for " + std::to_string(graph.threads()) +
+                                " threads is run by one");
+  const std::span<const std::uint32_t> nodes = graph.walk(0);
+  for (int epoch = 0;; ++epoch) {
+    const bool gated = program.gate(epoch);
+    for (const std::uint32_t node : nodes) program.node(node, epoch);
+    if (gated && !program.decide(epoch)) return;
+  }
+}
+
+/// One thread's part of the loop; to be called by all threads of the team, with the same graph and program.
+/// True when decide() ended the loop, false when the thread left because a task of the run has failed
+/// elsewhere. What the program throws passes through; whoever catches it raises the stop flag of the workers
+/// (Executor does), and every other thread leaves. decide() is always called by thread 0. Cost on x86: a node
+/// without waits about 1 ns; a wait for a counter that another core has just written 50-100 ns. Throws
+/// std::invalid_argument when the team is not the one the graph was built for, std::logic_error when the
+/// graph was left by a failure and not reset.
+template <class Program>
+bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
+  static_assert(EpochProgram<Program>);
+  if (me.threads() != graph.threads())
+    throw std::invalid_argument("an epoch loop planned for " + std::to_string(graph.threads()) +
+                                " threads is run by " + std::to_string(me.threads()));
+  if (graph.threads() == 1) {
+    run_epochs(graph, program);
+    return true;
+  }
+
+  /// What this thread knows of another one.
+  struct Peer {
+    const std::atomic<std::int64_t>* finished;
+    std::int64_t stride;
+    std::int64_t seen;  ///< last value read; spares a look at a line that its owner keeps writing
+  };
+  std::vector<Peer> peers;
+  for (int thread = 0; thread < graph.threads(); ++thread)
+    peers.push_back({&graph.counters_[static_cast<std::size_t>(thread)].finished, graph.stride(thread), 0});
+  const auto reached = [&me](Peer& peer, std::int64_t needed) {
+    return peer.seen >= needed || me.wait([&] {
+      peer.seen = peer.finished->load(std::memory_order_acquire);
+      return peer.seen >= needed;
+    });
+  };
+
+  const auto self = static_cast<std::size_t>(me.thread());
+  EpochGraph::Counter& mine = graph.counters_[self];
+  if (mine.walking)
+    throw std::logic_error("an epoch graph whose last run failed is run again without EpochGraph::reset");
+  mine.walking = true;
+  const std::int64_t stride = peers[self].stride;
+  const auto steps =
+      std::span(graph.steps_)
+          .subspan(graph.first_step_[self], graph.first_step_[self + 1] - graph.first_step_[self]);
+  const EpochGraph::Wait* const first_wait = graph.waits_.data() + graph.first_wait_[self];
+
+  for (int epoch = 0;; ++epoch) {
+    if (me.stopped()) return false;
+    // Asked before the epoch ends: once it has, thread 0 may be inside decide() and change the answer.
+    const bool gated = program.gate(epoch);
+    const std::int64_t now = mine.past_epochs + epoch;
+    std::int64_t finished = now * stride;
+    const EpochGraph::Wait* wait = first_wait;
+    for (const EpochGraph::Step& step : steps) {
+      for (const EpochGraph::Wait* const end = wait + step.waits; wait != end; ++wait) {
+        Peer& peer = peers[wait->thread];
+        if (!reached(peer, now * peer.stride + wait->place)) return false;
+      }
+      me.delay();
+      program.node(step.node, epoch);
+      ++finished;
+      if (step.published) mine.finished.store(finished, std::memory_order_release);
+    }
+    if (!gated) continue;
+
+    mine.finished.store((now + 1) * stride, std::memory_order_release);
+    std::atomic<std::int64_t>& decision = graph.decision_.value;
+    bool goes_on = false;
+    if (self == 0) {
+      for (Peer& peer : peers)
+        if (!reached(peer, (now + 1) * peer.stride)) return false;
+      me.delay();
+      goes_on = program.decide(epoch);
+      decision.store(2 * (now + 1) + (goes_on ? 0 : 1), std::memory_order_release);
+    } else {
+      std::int64_t decided = 0;
+      if (!me.wait([&] { return (decided = decision.load(std::memory_order_acquire)) >= 2 * (now + 1); }))
+        return false;
+      goes_on =
+          decided % 2 == 0;  // of this very epoch: thread 0 cannot pass the next gate without this thread
+    }
+    if (!goes_on) {
+      mine.past_epochs = now + 1;
+      mine.walking = false;
+      return true;
+    }
+  }
+}
+
+}  // namespace talus::graph
