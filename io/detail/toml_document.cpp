@@ -1,0 +1,162 @@
+#include "io/detail/toml_document.hpp"
+
+#include <charconv>
+#include <optional>
+#include <sstream>
+
+#include "io/detail/spelling.hpp"
+#include "io/scene_error.hpp"
+
+namespace talus::io::detail {
+
+namespace {
+
+/// One override, taken apart: "stage[0].time_step=1e-4" -> {"stage", "0", "time_step"} and the text of the
+/// value.
+struct Override {
+  std::string source;  ///< what an error names
+  std::vector<std::string> path;
+  std::string value;
+
+  [[noreturn]] void fail(const std::string& message) const { throw SceneError(source, 0, "", message); }
+};
+
+Override take_apart(const std::string& text) {
+  Override result{"--set " + text, {}, {}};
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) result.fail("an override reads KEY=VALUE, e.g. solver.tolerance=1e-4");
+  result.value = text.substr(equals + 1);
+  std::string segment;
+  const auto close_segment = [&] {
+    if (segment.empty()) result.fail("a part of the key is empty");
+    result.path.push_back(std::exchange(segment, {}));
+  };
+  bool after_bracket = false;
+  for (const char c : text.substr(0, equals)) {
+    if (c == ' ' || c == '"') continue;
+    if (c == ']') {
+      close_segment();
+      after_bracket = true;
+    } else if (c == '.' || c == '[') {
+      if (!after_bracket) close_segment();
+      after_bracket = false;
+    } else {
+      segment += c;
+    }
+  }
+  if (!after_bracket) close_segment();
+  return result;
+}
+
+/// Parses "value = TEXT" so that the nodes carry the override as their source; empty when TEXT is not one
+/// TOML value.
+std::optional<toml::table> parse_value(const std::string& text, const std::string& source) {
+  try {
+    toml::table parsed = toml::parse("value = " + text, source);
+    if (parsed.size() == 1) return parsed;
+  } catch (const toml::parse_error&) {  // not TOML: the caller takes it as a text
+  }
+  return std::nullopt;
+}
+
+/// Puts the one value of `parsed` at `key` of `table` and returns it there. Moving a node keeps its source.
+toml::node& insert(toml::table& table, const std::string& key, toml::table&& parsed) {
+  parsed.get("value")->visit([&](auto& node) { table.insert_or_assign(key, std::move(node)); });
+  return *table.get(key);
+}
+
+std::string name_of(const toml::node& element) {
+  const toml::table* table = element.as_table();
+  if (!table) return "";
+  for (const char* key : {"name", "wall"})
+    if (const auto name = (*table)[key].value<std::string>()) return *name;
+  return "";
+}
+
+/// Place in `array` of the element with this number or name.
+std::optional<std::size_t> find_element(const toml::array& array, const std::string& segment) {
+  for (std::size_t k = 0; k < array.size(); ++k)
+    if (name_of(array[k]) == segment) return k;
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(segment.data(), segment.data() + segment.size(), index);
+  if (error == std::errc{} && end == segment.data() + segment.size() && index < array.size()) return index;
+  return std::nullopt;
+}
+
+toml::node& element_of(toml::array& array, const std::string& segment, const Override& override) {
+  if (const auto index = find_element(array, segment)) return array[*index];
+  std::vector<std::string> names;
+  for (const toml::node& element : array)
+    names.push_back(fmt::format("{} '{}'", names.size(), name_of(element)));
+  override.fail(fmt::format("no element '{}'; there are: {}", segment, listed(names)));
+}
+
+/// The node one segment further, made as a table when there is none. A wall that the scene does not list may
+/// be one that `box = true` makes: it gets an entry of its own.
+toml::node& descend(toml::node& at, const std::string& segment, bool in_root, const Override& override) {
+  if (toml::array* array = at.as_array()) {
+    const bool list_of_walls = in_root && override.path.front() == "wall";
+    if (list_of_walls && !find_element(*array, segment)) {
+      toml::table entry = *parse_value("{name = " + quoted(segment) + "}", override.source);
+      array->push_back(std::move(*entry["value"].as_table()));
+      return array->back();
+    }
+    return element_of(*array, segment, override);
+  }
+  toml::table* table = at.as_table();
+  if (!table)
+    override.fail(fmt::format("'{}' stands under a key that holds a {}", segment,
+                              at.is_string() ? "text" : "single value"));
+  if (toml::node* next = table->get(segment)) return *next;
+  const bool array = in_root && segment == "wall";
+  return insert(*table, segment, *parse_value(array ? "[]" : "{}", override.source));
+}
+
+void apply(toml::table& root, const Override& override) {
+  toml::node* at = &root;
+  for (std::size_t k = 0; k + 1 < override.path.size(); ++k)
+    at = &descend(*at, override.path[k], k <= 1, override);
+  std::optional<toml::table> parsed = parse_value(override.value, override.source);
+  if (!parsed) parsed = parse_value(quoted(override.value), override.source);
+  const std::string& last = override.path.back();
+  if (toml::array* array = at->as_array()) {
+    element_of(*array, last, override);
+    parsed->get("value")->visit([&](auto& node) {
+      array->replace(array->begin() + static_cast<std::ptrdiff_t>(*find_element(*array, last)),
+                     std::move(node));
+    });
+  } else if (toml::table* table = at->as_table()) {
+    insert(*table, last, std::move(*parsed));
+  } else {
+    override.fail(fmt::format("'{}' stands under a key that holds a single value", last));
+  }
+}
+
+}  // namespace
+
+toml::table parse_document(const std::string& text, const std::string& file,
+                           const std::vector<std::string>& overrides) {
+  try {
+    toml::table root = toml::parse(text, file);
+    for (const std::string& override : overrides) apply(root, take_apart(override));
+    return root;
+  } catch (const toml::parse_error& error) {
+    throw SceneError(file, static_cast<int>(error.source().begin.line), "",
+                     "not TOML: " + std::string(error.description()));
+  }
+}
+
+void fail_at(const toml::node& at, const std::string& key, const std::string& message) {
+  const toml::source_region& source = at.source();
+  const std::string file = source.path ? *source.path : "scene";
+  const bool from_override = file.starts_with("--set ");
+  throw SceneError(file, from_override ? 0 : static_cast<int>(source.begin.line), key, message);
+}
+
+std::string quoted(const std::string& text) {
+  std::ostringstream out;
+  out << toml::value<std::string>(text);
+  return out.str();
+}
+
+}  // namespace talus::io::detail
