@@ -1,1 +1,54 @@
-int main() { return 0; }
+#include <CLI/CLI.hpp>
+
+#include "apps/exit_codes.hpp"
+#include "apps/plan.hpp"
+#include "apps/run.hpp"
+#include "apps/solve.hpp"
+#include "io/scene.hpp"
+#include "io/version.hpp"
+
+#include <cstdio>
+
+int main(int argc, char** argv) {
+  using namespace talus;
+  CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
+  app.set_version_flag("--version", "talus " + io::version());
+  app.require_subcommand(1);
+
+  RunOptions run;
+  run.command_line.assign(argv, argv + argc);
+  CLI::App* run_app = app.add_subcommand("run", "simulate a scene and write its results");
+  run_app->add_option("scene", run.scene, "scene file (docs/scenes.md)")->required();
+  run_app->add_option("--out", run.out, "directory of the results [the scene's output.directory]");
+  run_app->add_flag("--force", run.force, "replace earlier results in the directory");
+  run_app->add_option("--steps", run.steps, "stop after so many time steps");
+  run_app->add_option("--threads", run.threads, "threads [one per core]")->check(CLI::PositiveNumber);
+  run_app->add_option("--set", run.overrides, "override a key of the scene: a.b=c")->allow_extra_args(false);
+  run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
+
+  PlanOptions plan;
+  CLI::App* plan_app = app.add_subcommand("plan", "say what a scene needs and what is left out");
+  plan_app->add_option("scene", plan.scene, "scene file")->required();
+  plan_app->add_option("--threads", plan.threads, "threads [one per core]")->check(CLI::PositiveNumber);
+  plan_app->add_option("--set", plan.overrides, "override a key of the scene: a.b=c")->allow_extra_args(false);
+
+  SolveOptions solve;
+  CLI::App* solve_app = app.add_subcommand("solve", "solve a contact problem of an FCLIB file");
+  solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->required();
+  solve_app->add_option("--tol", solve.tol, "tolerance on the error of fc3d_compute_error")->capture_default_str()->check(CLI::PositiveNumber);
+  solve_app->add_option("--max-seconds", solve.max_seconds, "give up after so many seconds")->capture_default_str()->check(CLI::PositiveNumber);
+  solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file");
+
+  CLI::App* reference_app = app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? exit_done : exit_bad_input;
+  }
+  if (*run_app) return run_command(run);
+  if (*plan_app) return plan_command(plan);
+  if (*solve_app) return solve_command(solve);
+  if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
+  return exit_done;
+}

@@ -1,0 +1,245 @@
+#include "apps/run.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+
+#include "apps/exit_codes.hpp"
+#include "apps/sample_builder.hpp"
+#include "io/error.hpp"
+#include "io/progress.hpp"
+#include "io/recorder.hpp"
+#include "io/run_json.hpp"
+#include "io/scene.hpp"
+#include "runtime/step/simulation.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Set by SIGINT and SIGTERM: the run ends after the step it is in, with all its files whole.
+std::atomic<int> stop_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+extern "C" void request_stop(int signal) { stop_signal.store(signal); }
+
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// When the next frame is due.
+class FrameClock {
+ public:
+  explicit FrameClock(const io::OutputSpec& output) : output_(output) {}
+
+  bool due(const StepReport& report) {
+    bool now = false;
+    if (output_.every_steps) now |= report.step % *output_.every_steps == 0;
+    if (output_.every) {
+      const auto passed = static_cast<std::int64_t>(report.time / *output_.every * (1 + 1e-12));
+      now |= passed > passed_;
+      passed_ = passed;
+    }
+    return now;
+  }
+
+ private:
+  const io::OutputSpec& output_;
+  std::int64_t passed_ = 0;
+};
+
+/// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go in batches, since a row is less work
+/// than handing it over.
+class RecorderFeed {
+ public:
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder) : executor_(executor), recorder_(recorder) {}
+
+  void row(const Simulation& simulation) {
+    rows_.push_back({simulation.report(), simulation.walls(), simulation.triaxial()});
+    if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
+  }
+
+  void frame(Frame&& frame) {
+    flush();
+    executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable { recorder_.record_frame(std::move(moved)); });
+  }
+
+  void flush() {
+    since_ = {};
+    if (rows_.empty()) return;
+    executor_.submit_background("output of steps", [this, rows = std::move(rows_)] {
+      for (const Row& row : rows) recorder_.record_step(row.step, row.walls, row.triaxial);
+    });
+    rows_.clear();
+  }
+
+ private:
+  struct Row {
+    StepReport step;
+    std::vector<WallReport> walls;
+    std::optional<TriaxialReport> triaxial;
+  };
+  graph::Executor& executor_;
+  io::Recorder& recorder_;
+  std::vector<Row> rows_;
+  Stopwatch since_;
+};
+
+struct Tally {
+  std::int64_t unconverged = 0;
+  std::int64_t iterations = 0;
+  double worst_error = 0;
+  std::int64_t worst_step = 0;
+  double worst_balance = 0;
+
+  void add(const StepReport& report) {
+    iterations += report.iterations;
+    if (!report.converged) ++unconverged;
+    if (report.error_rms > worst_error) {
+      worst_error = report.error_rms;
+      worst_step = report.step;
+    }
+    worst_balance = std::max(worst_balance, report.balance);
+  }
+};
+
+void print_start(const io::Scene& scene, const Bodies& bodies, int threads) {
+  fmt::print(stderr, "talus: {}, {} grains, {} walls, {} stage{}\n", scene.name, bodies.size(), scene.setup.walls.size(),
+             scene.setup.stages.size(), scene.setup.stages.size() == 1 ? "" : "s");
+  fmt::print(stderr, "talus: 1 rank, {} thread{}, {} core{} for this process\n", threads, threads == 1 ? "" : "s", omp_get_num_procs(),
+             omp_get_num_procs() == 1 ? "" : "s");
+  if (threads > omp_get_num_procs())
+    fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
+}
+
+/// Runs the steps; returns what ended them: nothing, or the reason why the run is not whole.
+std::string advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output, RecorderFeed& feed, Tally& tally) {
+  io::Progress progress;
+  FrameClock clock(output);
+  if (output.stage_frames) feed.frame(simulation.frame(output.contacts));
+  while (!simulation.finished()) {
+    const StepReport& report = simulation.step();
+    tally.add(report);
+    feed.row(simulation);
+    const bool stage_ends = simulation.stage_fraction() >= 1;
+    const bool last = options.steps && report.step >= *options.steps;
+    if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) feed.frame(simulation.frame(output.contacts));
+    progress.update(report, simulation.stage().name, simulation.stage_fraction());
+    if (const int signal = stop_signal.load(); signal != 0) {
+      progress.finish();
+      return fmt::format("stopped by signal {} after step {}", signal, report.step);
+    }
+    if (last) break;
+    simulation.begin_next_stage();
+  }
+  progress.finish();
+  return {};
+}
+
+int run_scene(const RunOptions& options, io::Scene& scene, Bodies bodies) {
+  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  const std::string directory = options.out.empty() ? scene.output.directory : options.out;
+  std::vector<std::string> wall_names;
+  for (const Wall& wall : scene.setup.walls) wall_names.push_back(wall.name);
+
+  io::Provenance provenance = io::collect_provenance(options.command_line, threads);
+  provenance.seed = scene.setup.seed;
+  provenance.scene_file = scene.source_file;
+  io::Recorder recorder(directory, {.force = options.force,
+                                    .fields = scene.output.fields,
+                                    .contacts = scene.output.contacts,
+                                    .pictures = scene.output.pictures},
+                        wall_names, provenance, io::resolved_scene(scene));
+  graph::Executor executor({.threads = threads});
+  Simulation simulation(scene.setup, std::move(bodies), executor);
+  Stopwatch watch;
+  Tally tally;
+  io::Summary summary;
+  RecorderFeed feed(executor, recorder);
+  int code = exit_done;
+  try {
+    summary.reason = advance(simulation, options, scene.output, feed, tally);
+    if (!summary.reason.empty()) code = exit_failure;
+  } catch (const std::exception& error) {
+    summary.reason = error.what();
+    code = exit_failure;
+  }
+  try {
+    feed.flush();
+    executor.drain();
+  } catch (const std::exception& error) {
+    summary.reason = error.what();
+    code = exit_failure;
+  }
+  if (code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged) code = exit_tolerance_missed;
+
+  const StepReport& report = simulation.report();
+  summary.status = code == exit_failure ? "failed" : "done";
+  summary.exit_code = code;
+  summary.steps = report.step;
+  summary.time = report.time;
+  summary.digest = digest(simulation.state().bodies);
+  summary.iterations = tally.iterations;
+  summary.unconverged_steps = tally.unconverged;
+  summary.worst_error = tally.worst_error;
+  summary.worst_error_step = tally.worst_step;
+  summary.worst_balance = tally.worst_balance;
+  summary.wall_s = watch.seconds();
+  summary.bytes = memory_used(simulation.state());
+  recorder.finish(summary);
+
+  if (!summary.reason.empty()) fmt::print(stderr, "talus: error: {}\n", summary.reason);
+  fmt::print(stderr, "talus: {} steps, {:.6g} s simulated in {:.1f} s, {} sweeps\n", report.step, report.time, summary.wall_s, tally.iterations);
+  if (tally.unconverged > 0)
+    fmt::print(stderr,
+               "talus: {} of {} steps missed the tolerance (worst error {:.2e} at step {}, worst balance {:.2e}); see `converged` in "
+               "steps.csv. Raise solver.max_iterations, reduce time_step, or allow it with solver.allow_unconverged = true\n",
+               tally.unconverged, report.step, tally.worst_error, tally.worst_step, tally.worst_balance);
+  fmt::print(stderr, "talus: results in {}\n", directory);
+  return code;
+}
+
+}  // namespace
+
+int run_command(const RunOptions& options) {
+  io::Scene scene;
+  Bodies bodies;
+  try {
+    if (options.threads < 0) throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+    if (options.steps && *options.steps < 1) throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    scene = io::load_scene(options.scene, options.overrides);
+    bodies = build_sample(scene);
+    io::place_walls(scene, bodies);
+    if (options.dry_run) {
+      fmt::print("{}", io::resolved_scene(scene));
+      fmt::print(stderr, "talus: {}: {} grains, {} walls, {} stages; the scene is sound, nothing was written (--dry-run)\n", options.scene,
+                 bodies.size(), scene.setup.walls.size(), scene.setup.stages.size());
+      return exit_done;
+    }
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
+  print_start(scene, bodies, options.threads > 0 ? options.threads : omp_get_num_procs());
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  try {
+    return run_scene(options, scene, std::move(bodies));
+  } catch (const io::DirectoryError& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_failure;
+  }
+}
+
+}  // namespace talus
