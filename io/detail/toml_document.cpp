@@ -1,9 +1,10 @@
 #include "io/detail/toml_document.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <optional>
-#include <sstream>
 
+#include "io/detail/scene_keys.hpp"
 #include "io/detail/spelling.hpp"
 #include "io/scene_error.hpp"
 
@@ -91,31 +92,33 @@ toml::node& element_of(toml::array& array, const std::string& segment, const Ove
   override.fail(fmt::format("no element '{}'; there are: {}", segment, listed(names)));
 }
 
-/// The node one segment further, made as a table when there is none. A wall that the scene does not list may
-/// be one that `box = true` makes: it gets an entry of its own.
-toml::node& descend(toml::node& at, const std::string& segment, bool in_root, const Override& override) {
-  if (toml::array* array = at.as_array()) {
-    const bool list_of_walls = in_root && override.path.front() == "wall";
-    if (list_of_walls && !find_element(*array, segment)) {
-      toml::table entry = *parse_value("{name = " + quoted(segment) + "}", override.source);
-      array->push_back(std::move(*entry["value"].as_table()));
-      return array->back();
-    }
-    return element_of(*array, segment, override);
-  }
+/// The node one segment further, made as a table when there is none.
+toml::node& descend(toml::node& at, const std::string& segment, const Override& override) {
+  if (toml::array* array = at.as_array()) return element_of(*array, segment, override);
   toml::table* table = at.as_table();
-  if (!table)
-    override.fail(fmt::format("'{}' stands under a key that holds a {}", segment,
-                              at.is_string() ? "text" : "single value"));
+  if (!table) override.fail(fmt::format("'{}' stands under a key that holds a single value", segment));
   if (toml::node* next = table->get(segment)) return *next;
-  const bool array = in_root && segment == "wall";
-  return insert(*table, segment, *parse_value(array ? "[]" : "{}", override.source));
+  return insert(*table, segment, *parse_value("{}", override.source));
+}
+
+/// A wall that `box = true` makes and the scene does not list gets an entry of its own, for the override to
+/// change.
+void list_wall_of_box(toml::table& root, const Override& override) {
+  const auto& path = override.path;
+  const bool of_box = root["box"].value<bool>() == true && path.size() > 2 && path[0] == "wall" &&
+                      std::find(sides().begin(), sides().end(), path[1]) != sides().end();
+  if (!of_box) return;
+  if (!root.get("wall")) insert(root, "wall", *parse_value("[]", override.source));
+  toml::array* walls = root["wall"].as_array();
+  if (!walls || find_element(*walls, path[1])) return;
+  toml::table entry = *parse_value("{name = " + quoted(path[1]) + "}", override.source);
+  walls->push_back(std::move(*entry["value"].as_table()));
 }
 
 void apply(toml::table& root, const Override& override) {
+  list_wall_of_box(root, override);
   toml::node* at = &root;
-  for (std::size_t k = 0; k + 1 < override.path.size(); ++k)
-    at = &descend(*at, override.path[k], k <= 1, override);
+  for (std::size_t k = 0; k + 1 < override.path.size(); ++k) at = &descend(*at, override.path[k], override);
   std::optional<toml::table> parsed = parse_value(override.value, override.source);
   if (!parsed) parsed = parse_value(quoted(override.value), override.source);
   const std::string& last = override.path.back();
@@ -153,10 +156,19 @@ void fail_at(const toml::node& at, const std::string& key, const std::string& me
   throw SceneError(file, from_override ? 0 : static_cast<int>(source.begin.line), key, message);
 }
 
+// Not toml++'s writer: version 3.3 writes a text that holds ''' and a line break as a literal string, which
+// does not read back.
 std::string quoted(const std::string& text) {
-  std::ostringstream out;
-  out << toml::value<std::string>(text);
-  return out.str();
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      out += {'\\', c};
+    else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+      out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
+    else
+      out += c;
+  }
+  return out + '"';
 }
 
 }  // namespace talus::io::detail
