@@ -30,16 +30,22 @@ int main(int argc, char** argv) {
   CLI::App* plan_app = app.add_subcommand("plan", "say what a scene needs and what is left out");
   plan_app->add_option("scene", plan.scene, "scene file")->required();
   plan_app->add_option("--threads", plan.threads, "threads [one per core]")->check(CLI::PositiveNumber);
-  plan_app->add_option("--set", plan.overrides, "override a key of the scene: a.b=c")->allow_extra_args(false);
+  plan_app->add_option("--set", plan.overrides, "override a key of the scene: a.b=c")
+      ->allow_extra_args(false);
 
   SolveOptions solve;
   CLI::App* solve_app = app.add_subcommand("solve", "solve a contact problem of an FCLIB file");
   solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->required();
-  solve_app->add_option("--tol", solve.tol, "tolerance on the error of fc3d_compute_error")->capture_default_str()->check(CLI::PositiveNumber);
-  solve_app->add_option("--max-seconds", solve.max_seconds, "give up after so many seconds")->capture_default_str()->check(CLI::PositiveNumber);
+  solve_app->add_option("--tol", solve.tol, "tolerance on the error of fc3d_compute_error")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  solve_app->add_option("--max-seconds", solve.max_seconds, "give up after so many seconds")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file");
 
-  CLI::App* reference_app = app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
+  CLI::App* reference_app =
+      app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
 
   try {
     app.parse(argc, argv);

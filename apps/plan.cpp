@@ -14,26 +14,40 @@ namespace talus {
 
 namespace {
 
-void line(const char* what, bool in, const std::string& why) { fmt::print("  {:<24}{:<5}{}\n", what, in ? "in" : "out", why); }
+void line(const char* what, bool in, const std::string& why) {
+  fmt::print("  {:<24}{:<5}{}\n", what, in ? "in" : "out", why);
+}
 
 void print_needs(const Simulation& simulation, const io::Scene& scene, int threads) {
   const StepParameters& parameters = simulation.parameters();
   const StepState& state = simulation.state();
-  const auto pushed = [](const WallLoad& load) { return load.drive == WallDrive::pressure || load.drive == WallDrive::force; };
-  const auto driven = std::count_if(state.walls.begin(), state.walls.end(), [](const Wall& w) { return w.load.drive == WallDrive::velocity; });
-  const auto pressed = std::count_if(state.walls.begin(), state.walls.end(), [&](const Wall& w) { return pushed(w.load); });
+  const auto pushed = [](const WallLoad& load) {
+    return load.drive == WallDrive::pressure || load.drive == WallDrive::force;
+  };
+  const auto driven = std::count_if(state.walls.begin(), state.walls.end(),
+                                    [](const Wall& w) { return w.load.drive == WallDrive::velocity; });
+  const auto pressed =
+      std::count_if(state.walls.begin(), state.walls.end(), [&](const Wall& w) { return pushed(w.load); });
   line("tangential impulses", parameters.friction,
-       parameters.friction ? "friction coefficients above 0" : "no friction: one impulse component per contact, no tangential work");
+       parameters.friction ? "friction coefficients above 0"
+                           : "no friction: one impulse component per contact, no tangential work");
   const bool turning = parameters.friction && scene.setup.rotation;
   line("rotation in the sweeps", turning,
-       turning ? "tangential impulses turn the grains" : parameters.friction ? "rotation = false" : "nothing turns grains without friction");
+       turning               ? "tangential impulses turn the grains"
+       : parameters.friction ? "rotation = false"
+                             : "nothing turns grains without friction");
   line("free angular velocities", !state.free.w.empty(), "24 bytes per grain");
-  line("orientations", !state.bodies.orientation.empty(), state.bodies.orientation.empty() ? "spheres need none; not asked for" : "asked for: 32 bytes per grain");
+  line("orientations", !state.bodies.orientation.empty(),
+       state.bodies.orientation.empty() ? "spheres need none; not asked for"
+                                        : "asked for: 32 bytes per grain");
   line("gravity", parameters.gravity.norm() > 0, fmt::format("{:g} m/s^2", parameters.gravity.norm()));
   line("restitution", parameters.law.restitution > 0, fmt::format("e = {:g}", parameters.law.restitution));
-  line("moving walls", driven + pressed > 0, fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
-  line("gluing of wall copies", pressed > 0, pressed > 0 ? "one task per pushed wall that several chunks touch" : "no wall of finite mass");
-  line("chunk dependencies", threads > 1, threads > 1 ? "between chunks of different threads only" : "one thread: chunks are swept in order");
+  line("moving walls", driven + pressed > 0,
+       fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
+  line("gluing of wall copies", pressed > 0,
+       pressed > 0 ? "one task per pushed wall that several chunks touch" : "no wall of finite mass");
+  line("chunk dependencies", threads > 1,
+       threads > 1 ? "between chunks of different threads only" : "one thread: chunks are swept in order");
   line("subdomains", false, "one: no interface, no gluing of grains, no messages");
   line("MPI", false, "one rank: no MPI call");
   line("trace", false, "not asked for: no field allocated");
@@ -44,15 +58,19 @@ void print_costs(const Simulation& simulation) {
   const auto bodies = static_cast<double>(std::max<std::size_t>(state.bodies.size(), 1));
   const auto candidates = static_cast<double>(std::max<std::size_t>(state.candidates.size(), 1));
   const auto contacts = static_cast<double>(std::max<std::int64_t>(simulation.report().contacts, 1));
-  const double of_bodies = static_cast<double>(memory_used(state.bodies) + state.free.u.capacity() * 24 + state.free.w.capacity() * 24 +
-                                               state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * 8);
+  const double of_bodies = static_cast<double>(
+      memory_used(state.bodies) + state.free.u.capacity() * 24 + state.free.w.capacity() * 24 +
+      state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * 8);
   const double of_contacts = static_cast<double>(memory_used(state)) - of_bodies;
-  fmt::print("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(), state.candidates.size(),
-             simulation.report().contacts, state.chunks.size(), state.chunks.colours);
-  fmt::print("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.1f} MB in all\n", of_bodies / bodies,
-             of_contacts / candidates, of_contacts / contacts, static_cast<double>(memory_used(state)) / 1e6);
-  fmt::print("  {} tasks per sweep ({:.4f} per contact), {} tasks per step outside the sweeps\n", state.chunks.size(),
-             static_cast<double>(state.chunks.size()) / contacts, simulation.step_graph().size() - 1);
+  fmt::print("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(),
+             state.candidates.size(), simulation.report().contacts, state.chunks.size(),
+             state.chunks.colours);
+  fmt::print("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.1f} MB in all\n",
+             of_bodies / bodies, of_contacts / candidates, of_contacts / contacts,
+             static_cast<double>(memory_used(state)) / 1e6);
+  fmt::print("  {} tasks per sweep ({:.4f} per contact), {} tasks per step outside the sweeps\n",
+             state.chunks.size(), static_cast<double>(state.chunks.size()) / contacts,
+             simulation.step_graph().size() - 1);
 }
 
 }  // namespace
@@ -66,14 +84,16 @@ int plan_command(const PlanOptions& options) {
     const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
     graph::Executor executor({.threads = threads});
     for (std::size_t k = 0; k < scene.setup.stages.size(); ++k) {
-      Setup setup = scene.setup;  // each stage by itself, from the initial state: stages differ in what they need
+      Setup setup =
+          scene.setup;  // each stage by itself, from the initial state: stages differ in what they need
       for (std::size_t earlier = 0; earlier < k; ++earlier)
         for (const auto& [name, load] : scene.setup.stages[earlier].loads)
           for (Wall& wall : setup.walls)
             if (wall.name == name) wall.load = load;
       setup.stages = {scene.setup.stages[k]};
       Simulation simulation(setup, bodies, executor);
-      fmt::print("{}stage '{}', {} thread{}\n", k == 0 ? "" : "\n", scene.setup.stages[k].name, threads, threads == 1 ? "" : "s");
+      fmt::print("{}stage '{}', {} thread{}\n", k == 0 ? "" : "\n", scene.setup.stages[k].name, threads,
+                 threads == 1 ? "" : "s");
       if (!simulation.finished()) simulation.step();
       print_needs(simulation, scene, threads);
       print_costs(simulation);

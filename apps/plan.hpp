@@ -11,8 +11,8 @@ struct PlanOptions {
   std::vector<std::string> overrides;
 };
 
-/// `talus plan`: builds the sample, finds its contacts, and prints what the scene needs, what was left out, and bytes and tasks. Nothing is
-/// written. Returns an ExitCode.
+/// `talus plan`: builds the sample, finds its contacts, and prints what the scene needs, what was left out,
+/// and bytes and tasks. Nothing is written. Returns an ExitCode.
 int plan_command(const PlanOptions& options);
 
 }  // namespace talus

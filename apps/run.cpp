@@ -25,11 +25,15 @@ namespace {
 std::atomic<int> stop_signal{0};
 static_assert(std::atomic<int>::is_always_lock_free);
 
-extern "C" void request_stop(int signal) { stop_signal.store(signal); }
+extern "C" void request_stop(int signal) {
+  stop_signal.store(signal);
+}
 
 class Stopwatch {
  public:
-  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
 
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
@@ -56,11 +60,12 @@ class FrameClock {
   std::int64_t passed_ = 0;
 };
 
-/// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go in batches, since a row is less work
-/// than handing it over.
+/// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go
+/// in batches, since a row is less work than handing it over.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder) : executor_(executor), recorder_(recorder) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder)
+      : executor_(executor), recorder_(recorder) {}
 
   void row(const Simulation& simulation) {
     rows_.push_back({simulation.report(), simulation.walls(), simulation.triaxial()});
@@ -69,7 +74,9 @@ class RecorderFeed {
 
   void frame(Frame&& frame) {
     flush();
-    executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable { recorder_.record_frame(std::move(moved)); });
+    executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
+      recorder_.record_frame(std::move(moved));
+    });
   }
 
   void flush() {
@@ -112,16 +119,17 @@ struct Tally {
 };
 
 void print_start(const io::Scene& scene, const Bodies& bodies, int threads) {
-  fmt::print(stderr, "talus: {}, {} grains, {} walls, {} stage{}\n", scene.name, bodies.size(), scene.setup.walls.size(),
-             scene.setup.stages.size(), scene.setup.stages.size() == 1 ? "" : "s");
-  fmt::print(stderr, "talus: 1 rank, {} thread{}, {} core{} for this process\n", threads, threads == 1 ? "" : "s", omp_get_num_procs(),
-             omp_get_num_procs() == 1 ? "" : "s");
+  fmt::print(stderr, "talus: {}, {} grains, {} walls, {} stage{}\n", scene.name, bodies.size(),
+             scene.setup.walls.size(), scene.setup.stages.size(), scene.setup.stages.size() == 1 ? "" : "s");
+  fmt::print(stderr, "talus: 1 rank, {} thread{}, {} core{} for this process\n", threads,
+             threads == 1 ? "" : "s", omp_get_num_procs(), omp_get_num_procs() == 1 ? "" : "s");
   if (threads > omp_get_num_procs())
     fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
 }
 
 /// Runs the steps; returns what ended them: nothing, or the reason why the run is not whole.
-std::string advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output, RecorderFeed& feed, Tally& tally) {
+std::string advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
+                    RecorderFeed& feed, Tally& tally) {
   io::Progress progress;
   FrameClock clock(output);
   if (output.stage_frames) feed.frame(simulation.frame(output.contacts));
@@ -131,7 +139,8 @@ std::string advance(Simulation& simulation, const RunOptions& options, const io:
     feed.row(simulation);
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
-    if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) feed.frame(simulation.frame(output.contacts));
+    if (clock.due(report) || ((stage_ends || last) && output.stage_frames))
+      feed.frame(simulation.frame(output.contacts));
     progress.update(report, simulation.stage().name, simulation.stage_fraction());
     if (const int signal = stop_signal.load(); signal != 0) {
       progress.finish();
@@ -153,10 +162,11 @@ int run_scene(const RunOptions& options, io::Scene& scene, Bodies bodies) {
   io::Provenance provenance = io::collect_provenance(options.command_line, threads);
   provenance.seed = scene.setup.seed;
   provenance.scene_file = scene.source_file;
-  io::Recorder recorder(directory, {.force = options.force,
-                                    .fields = scene.output.fields,
-                                    .contacts = scene.output.contacts,
-                                    .pictures = scene.output.pictures},
+  io::Recorder recorder(directory,
+                        {.force = options.force,
+                         .fields = scene.output.fields,
+                         .contacts = scene.output.contacts,
+                         .pictures = scene.output.pictures},
                         wall_names, provenance, io::resolved_scene(scene));
   graph::Executor executor({.threads = threads});
   Simulation simulation(scene.setup, std::move(bodies), executor);
@@ -179,7 +189,8 @@ int run_scene(const RunOptions& options, io::Scene& scene, Bodies bodies) {
     summary.reason = error.what();
     code = exit_failure;
   }
-  if (code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged) code = exit_tolerance_missed;
+  if (code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
+    code = exit_tolerance_missed;
 
   const StepReport& report = simulation.report();
   summary.status = code == exit_failure ? "failed" : "done";
@@ -197,11 +208,14 @@ int run_scene(const RunOptions& options, io::Scene& scene, Bodies bodies) {
   recorder.finish(summary);
 
   if (!summary.reason.empty()) fmt::print(stderr, "talus: error: {}\n", summary.reason);
-  fmt::print(stderr, "talus: {} steps, {:.6g} s simulated in {:.1f} s, {} sweeps\n", report.step, report.time, summary.wall_s, tally.iterations);
+  fmt::print(stderr, "talus: {} steps, {:.6g} s simulated in {:.1f} s, {} sweeps\n", report.step, report.time,
+             summary.wall_s, tally.iterations);
   if (tally.unconverged > 0)
     fmt::print(stderr,
-               "talus: {} of {} steps missed the tolerance (worst error {:.2e} at step {}, worst balance {:.2e}); see `converged` in "
-               "steps.csv. Raise solver.max_iterations, reduce time_step, or allow it with solver.allow_unconverged = true\n",
+               "talus: {} of {} steps missed the tolerance (worst error {:.2e} at step {}, worst balance "
+               "{:.2e}); see `converged` in "
+               "steps.csv. Raise solver.max_iterations, reduce time_step, or allow it with allow_unconverged "
+               "= true\n",
                tally.unconverged, report.step, tally.worst_error, tally.worst_step, tally.worst_balance);
   fmt::print(stderr, "talus: results in {}\n", directory);
   return code;
@@ -213,15 +227,19 @@ int run_command(const RunOptions& options) {
   io::Scene scene;
   Bodies bodies;
   try {
-    if (options.threads < 0) throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
-    if (options.steps && *options.steps < 1) throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    if (options.threads < 0)
+      throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+    if (options.steps && *options.steps < 1)
+      throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     scene = io::load_scene(options.scene, options.overrides);
     bodies = build_sample(scene);
     io::place_walls(scene, bodies);
     if (options.dry_run) {
       fmt::print("{}", io::resolved_scene(scene));
-      fmt::print(stderr, "talus: {}: {} grains, {} walls, {} stages; the scene is sound, nothing was written (--dry-run)\n", options.scene,
-                 bodies.size(), scene.setup.walls.size(), scene.setup.stages.size());
+      fmt::print(
+          stderr,
+          "talus: {}: {} grains, {} walls, {} stages; the scene is sound, nothing was written (--dry-run)\n",
+          options.scene, bodies.size(), scene.setup.walls.size(), scene.setup.stages.size());
       return exit_done;
     }
   } catch (const std::exception& error) {

@@ -8,14 +8,14 @@
 namespace talus {
 
 struct RunOptions {
-  std::string scene;                    ///< path of the scene file
-  std::string out;                      ///< directory of the results; empty: the scene's
-  bool force = false;                   ///< replace earlier results in `out`
-  std::optional<std::int64_t> steps;    ///< stop after so many steps
-  int threads = 0;                      ///< 0: one per core this process may use
-  std::vector<std::string> overrides;   ///< "a.b=c"
-  bool dry_run = false;                 ///< read, build, place and check; write nothing
-  std::vector<std::string> command_line;///< for run.json
+  std::string scene;                      ///< path of the scene file
+  std::string out;                        ///< directory of the results; empty: the scene's
+  bool force = false;                     ///< replace earlier results in `out`
+  std::optional<std::int64_t> steps;      ///< stop after so many steps
+  int threads = 0;                        ///< 0: one per core this process may use
+  std::vector<std::string> overrides;     ///< "a.b=c"
+  bool dry_run = false;                   ///< read, build, place and check; write nothing
+  std::vector<std::string> command_line;  ///< for run.json
 };
 
 /// `talus run`: from a scene file to a directory of results. Prints to stderr; returns an ExitCode.

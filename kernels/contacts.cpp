@@ -18,7 +18,7 @@ struct Found {
 /// Bias of a contact, or false when it constrains nothing in this step.
 bool constrain(const NarrowPhase& in, double gap, double v_n, double slow, double& bias) {
   if (gap >= in.alert && gap >= -in.time_step * v_n) return false;
-  bias = std::max(gap, 0.0) / in.time_step;
+  bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
   if (in.restitution > 0 && v_n < -slow) {
     if (gap > 0) return false;
     bias = in.restitution * v_n;

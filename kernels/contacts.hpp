@@ -36,6 +36,7 @@ struct NarrowPhase {
   double time_step;                    ///< h [s]
   double alert;                        ///< [m]
   double restitution;                  ///< e in [0, 1]
+  double overlap_correction;           ///< in [0, 1]
   Vec3 gravity;                        ///< [m/s^2]
 };
 
@@ -43,7 +44,8 @@ struct NarrowPhase {
 /// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
 /// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
 /// approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once g <= 0, and no constraint before.
-/// Coincident centres get the normal +z.
+/// A resting overlap is undone at the rate of b = overlap_correction x g/h. Coincident centres get the normal
+/// +z.
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, Contacts& contacts);
 

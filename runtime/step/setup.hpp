@@ -54,6 +54,8 @@ struct SolverSettings {
   int check_every =
       10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
   bool warm_start = true;  ///< begin from the impulses of the last step
+  double overlap_correction =
+      0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
 };
 
 /// A simulation, apart from its grains.
