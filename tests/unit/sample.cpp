@@ -240,7 +240,7 @@ TEST(Deposition, SmallPolydispersityGivesALooseRandomPacking) {
   const double fraction = volume / (18 * 18 * top / 2);
   EXPECT_GT(grains, 500);
   EXPECT_GT(fraction, 0.55);
-  EXPECT_LT(fraction, 0.63);  // random loose to just below random close (0.64)
+  EXPECT_LT(fraction, 0.64);  // random loose to random close packing
 }
 
 TEST(Deposition, ScalesWithTheUnitOfLength) {
