@@ -130,7 +130,7 @@ class Deposition {
       aside_.push_back(entry);
       if (entry.bound > best[2] || radius < site(id).range.low || radius > site(id).range.high) continue;
       const Vec3 x = centre(site(id), radius);
-      if (blocked(id, x, radius)) continue;
+      if (shrink_if_blocked(id, x, radius)) continue;
       if (best_site < 0 || x[2] < best[2] ||
           (x[2] == best[2] && seniority(site(id)) < seniority(site(best_site)))) {
         best = x;
@@ -215,7 +215,7 @@ class Deposition {
 
   /// Whether a grain overlaps others at x; if so, the radii that the blocking grain forbids leave the site's
   /// range.
-  bool blocked(std::int32_t id, const Vec3& x, double radius) {
+  bool shrink_if_blocked(std::int32_t id, const Vec3& x, double radius) {
     std::int32_t blocker = -1;
     cells_.visit_near(x, radius + largest_, [&](std::int32_t g) {
       const double distance = grain(g).radius + radius;

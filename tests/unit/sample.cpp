@@ -240,7 +240,26 @@ TEST(Deposition, SmallPolydispersityGivesALooseRandomPacking) {
   const double fraction = volume / (18 * 18 * top / 2);
   EXPECT_GT(grains, 500);
   EXPECT_GT(fraction, 0.55);
-  EXPECT_LT(fraction, 0.63);  // random loose to just below random close (0.64)
+  EXPECT_LT(fraction, 0.64);  // random loose to random close packing
+}
+
+TEST(Deposition, SmallPolydispersityBreaksTheCrystalOfEqualRadii) {
+  // A square lattice face shows as neighbours at sqrt(2) diameters; a random packing has next to nothing
+  // special there.
+  const auto share_at_sqrt2 = [](double ratio) {
+    const auto radii = uniform_radii(3000, ratio);
+    const auto x = deposit(radii, 24, 24);
+    int at = 0, around = 0;
+    for (std::size_t k = 0; k < x.size(); ++k)
+      for (std::size_t j = 0; j < k; ++j) {
+        const double distance = (x[k] - x[j]).norm() / (radii[k] + radii[j]);
+        at += distance > 1.39 && distance < 1.44;
+        around += distance > 1.29 && distance < 1.54;
+      }
+    return static_cast<double>(at) / around;
+  };
+  EXPECT_GT(share_at_sqrt2(1), 0.9);
+  EXPECT_LT(share_at_sqrt2(1.05), 0.25);  // an even spread gives 0.2
 }
 
 TEST(Deposition, ScalesWithTheUnitOfLength) {

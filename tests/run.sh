@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Every test: installs what is missing, checks the format of the sources, builds preset `ci` (warnings are errors), runs ctest.
+# Further arguments go to ctest, e.g. -L unit. With TALUS_SANITIZERS=1 the unit tests run again under the address and
+# undefined-behaviour sanitizers. Exit code 0 only if all of it passed.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+source apps/setup.sh
+status=0
+
+# An archive without .git holds sources only; `safe.directory`: a container may not own the checkout.
+sources() {
+  git -c safe.directory="$PWD" ls-files -z -- '*.cpp' '*.hpp' 2>/dev/null ||
+    find kernels partition runtime io apps tests \( -name '*.cpp' -o -name '*.hpp' \) -print0 2>/dev/null
+}
+if sources | xargs -0 --no-run-if-empty clang-format --dry-run -Werror; then
+  echo "format: clean"
+else
+  echo "format: run clang-format -i on the files above" >&2
+  status=1
+fi
+
+cmake --preset ci
+cmake --build --preset ci
+ctest --preset ci -j2 "$@" || status=$?
+
+if [ "${TALUS_SANITIZERS:-0}" = 1 ]; then
+  cmake --preset asan
+  cmake --build --preset asan
+  ctest --preset asan -j2 -L unit || status=$?
+fi
+exit "$status"
