@@ -47,8 +47,10 @@ struct Place {
 template <class Number>
 Number number(std::string_view field, std::string_view column, const Place& place) {
   Number value{};
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc{} || end != field.data() + field.size())
+  const char* const first = field.data() + (field.starts_with('+') ? 1 : 0);  // from_chars takes no plus sign
+  const char* const last = field.data() + field.size();
+  const auto [end, error] = std::from_chars(first, last, value);
+  if (error != std::errc{} || end != last)
     place.fail(column,
                fmt::format("'{}' is not {}", field, std::is_integral_v<Number> ? "an integer" : "a number"));
   if constexpr (std::is_floating_point_v<Number>)

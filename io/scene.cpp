@@ -1,6 +1,7 @@
 #include "io/scene.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -27,6 +28,7 @@ class SceneReader {
   Scene read() && {
     read_table(root_, "", keys_.top, {"material", "sample", "wall", "stage", "detection", "solver", "output"},
                scene_);
+    if (root_.get("name")) check_name(root_, "", scene_.name);
     read_table(table_at(root_, "material"), "material", keys_.material, {}, scene_);
     read_sample();
     read_walls();
@@ -54,6 +56,16 @@ class SceneReader {
     return *node->as_table();
   }
   static bool required_keys(const std::string& name) { return name == "material" || name == "sample"; }
+
+  /// Names of walls and stages stand in columns of CSV files, in paths and in overrides.
+  static void check_name(const toml::table& table, const std::string& path, const std::string& name) {
+    const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
+      return std::isalnum(c) || c == '+' || c == '-' || c == '_';
+    });
+    if (name.empty() || !plain)
+      fail_at(*table.get("name"), joined(path, "name"),
+              fmt::format("must be made of letters, digits, +, - and _, got '{}'", name));
+  }
 
   /// The elements of an array of tables; none when it is left out.
   static std::vector<const toml::table*> tables_at(const toml::table& parent, const std::string& name,
@@ -139,7 +151,7 @@ class SceneReader {
     if (table.get("position") && table.get("point"))
       fail_at(*table.get("point"), path + ".point", "give position or point, not both");
     read_table(table, path, keys_.wall, {}, wall);
-    if (wall.name.empty()) fail_at(*table.get("name"), path + ".name", "must not be empty");
+    check_name(table, path, wall.name);
     if (wall.normal.norm() == 0)
       fail_at(table, path + ".side",
               fmt::format("wall '{}' needs a side or a normal that is not zero", wall.name));
@@ -176,6 +188,7 @@ class SceneReader {
       Stage stage = scene_.common;
       stage.name = fmt::format("stage-{}", index + 1);
       read_table(*table, path, keys_.stage, {"end", "load"}, stage);
+      if (table->get("name")) check_name(*table, path, stage.name);
       for (const Stage& earlier : scene_.setup.stages)
         if (earlier.name == stage.name)
           fail_at(*table, path + ".name", fmt::format("another stage is named '{}' already", stage.name));

@@ -33,6 +33,7 @@ inline constexpr Range any{};
 inline constexpr Range positive{.low = 0, .without_low = true};
 inline constexpr Range not_negative{.low = 0};
 inline constexpr Range at_least_one{.low = 1};
+inline constexpr Range countable{.low = 1, .high = 2147483647};  ///< what fits a Slot or an int
 inline constexpr Range zero_to_one{.low = 0, .high = 1};
 
 template <class T>

@@ -110,7 +110,7 @@ Section<SampleSpec> sample_keys() {
           choice<SampleSpec>("kind", {"deposition", "lattice", "bodies"}, "Way of making the sample.",
                              &SampleSpec::kind)
               .need(),
-          key<SampleSpec>("count", "", at_least_one, "Number of grains. A lattice may give `cells` instead.",
+          key<SampleSpec>("count", "", countable, "Number of grains. A lattice may give `cells` instead.",
                           &SampleSpec::count)
               .only(not_bodies, made)
               .blank_when_zero()
@@ -121,8 +121,8 @@ Section<SampleSpec> sample_keys() {
               .only(not_bodies, made)
               .blank_when_zero()
               .or_else("none"),
-          key<SampleSpec>("cells", "", at_least_one,
-                          "Grains along x, y and z, instead of `count` and `base`.", &SampleSpec::cells)
+          key<SampleSpec>("cells", "", countable, "Grains along x, y and z, instead of `count` and `base`.",
+                          &SampleSpec::cells)
               .only("kind = lattice", lattice)
               .blank_when_zero()
               .or_else("none"),
@@ -324,9 +324,9 @@ Section<SolverSettings> solver_keys() {
                   "balance_tolerance", "", positive,
                   "Bound on the relative drift of the wall forces and on the momentum defect (balance).",
                   &SolverSettings::balance_tolerance),
-              key<SolverSettings>("max_iterations", "", {.low = 1, .high = 2147483647},
-                                  "Sweeps per step, at most.", &SolverSettings::max_iterations),
-              key<SolverSettings>("check_every", "", {.low = 1, .high = 2147483647},
+              key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
+                                  &SolverSettings::max_iterations),
+              key<SolverSettings>("check_every", "", countable,
                                   "Sweeps between the first checks of the error; later checks are rarer.",
                                   &SolverSettings::check_every),
               key<SolverSettings>("warm_start", "", any, "Begin from the impulses of the last step.",

@@ -72,7 +72,7 @@ inline std::string expected_text(const KeyText& key) {
 /// "> 0", ">= 1", "0 to 1"; "" when every finite number will do.
 inline std::string range_text(const Range& range) {
   if (std::isinf(range.low)) return "";
-  if (range.high < 2147483647) return fmt::format("{} to {}", range.low, range.high);
+  if (std::isfinite(range.high)) return fmt::format("{} to {}", range.low, range.high);
   return fmt::format("{} {}", range.without_low ? ">" : ">=", range.low);
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -245,6 +244,13 @@ TEST(SceneErrors, WallsMustNotCrossOverlapOrShareAName) {
                       "needs a point");
 }
 
+TEST(SceneErrors, NamesFitCsvColumnsAndOverrides) {
+  expect_refused(replaced(scene_with(), "\"small\"", "\"../small\""), "../small", "name", "letters, digits");
+  expect_refused(replaced(scene_with(), "\"press\"", "\"a, b\""), "a, b", "stage[0].name", "letters, digits");
+  expect_refused(scene_with("#wall", "[[wall]]\nname = \"\"\nside = \"x-\""), "name = \"\"", "wall[1].name",
+                 "letters, digits");
+}
+
 TEST(SceneErrors, PressureNeedsAFace) {
   expect_refused(replaced(scene_with(), "box = true", ""), "[[wall]]", "wall", "give its area");
 }
@@ -432,65 +438,6 @@ TEST(Spelling, CountsInsertionsReplacementsAndSwaps) {
   EXPECT_EQ(detail::edit_distance("firction", "friction"), 1u);
   EXPECT_EQ(detail::edit_distance("", "abc"), 3u);
   EXPECT_EQ(detail::nearest("zzzz", {"friction", "density"}), "");
-}
-
-// --- Bodies from CSV
-// ---------------------------------------------------------------------------------------------------------
-
-/// A CSV file that lives as long as the test that made it.
-class CsvBodies : public ::testing::Test {
- protected:
-  std::string write(const std::string& text) {
-    path_ = ::testing::TempDir() + "talus_bodies_" +
-            ::testing::UnitTest::GetInstance()->current_test_info()->name() + ".csv";
-    std::ofstream(path_) << text;
-    return path_;
-  }
-  void TearDown() override { std::filesystem::remove(path_); }
-
-  void expect_refused(const std::string& text, int line, const std::string& column, const std::string& said) {
-    const std::string path = write(text);
-    try {
-      read_bodies(path, 1);
-      ADD_FAILURE() << "accepted: " << text;
-    } catch (const SceneError& error) {
-      EXPECT_EQ(error.file(), path);
-      EXPECT_EQ(error.line(), line) << error.what();
-      EXPECT_EQ(error.key(), column);
-      EXPECT_NE(std::string(error.what()).find(said), std::string::npos) << error.what();
-    }
-  }
-
- private:
-  std::string path_;
-};
-
-TEST_F(CsvBodies, AngularVelocityBecomesSurfaceVelocity) {
-  const std::string path =
-      write("id,x,y,z,radius,vx,vy,vz,wx,wy,wz\r\n# a comment\n\n7, 1,2,3,0.5,4,5,6,7,8,9\r\n");
-  const Bodies bodies = read_bodies(path, 1000);
-  ASSERT_EQ(bodies.size(), 1u);
-  EXPECT_EQ(bodies.id[0], BodyId{7});
-  EXPECT_EQ(bodies.x[0], Vec3(1, 2, 3));
-  EXPECT_EQ(bodies.velocity[0].u[1], 5);
-  EXPECT_EQ(bodies.velocity[0].w[2], 4.5);
-  EXPECT_EQ(read_bodies(path, 1000, false).velocity[0].w[2], 0);
-}
-
-TEST_F(CsvBodies, MistakesAreFoundWithLineAndColumn) {
-  expect_refused("id,x,y,z,radius\n1,0,0,0,1\n2,0,0,0,-1\n", 3, "radius", "must be > 0 m, got -1");
-  expect_refused("id,x,y,z,radius\n1,0,0,zero,1\n", 2, "z", "'zero' is not a number");
-  expect_refused("id,x,y,z,radius\n1,nan,0,0,1\n", 2, "x", "must be finite");
-  expect_refused("id,x,y,z,radius\n1.5,0,0,0,1\n", 2, "id", "'1.5' is not an integer");
-  expect_refused("id,x,y,z,radius\n1,0,0,0\n", 2, "", "5 fields expected as in the header, got 4");
-  expect_refused("id,x,y,z,radius\n1,0,0,0,1,2\n", 2, "", "5 fields expected");
-  expect_refused("id,x,y,z,radius\n1,0,0,0,1\n1,0,0,2,1\n", 3, "id", "1 stands already on line 2");
-  expect_refused("x,y,z,r\n0,0,0,1\n", 1, "", "the first line must be");
-  expect_refused("id,x,y,z,radius\n", 1, "", "no bodies");
-}
-
-TEST(Csv, MissingFileIsNamed) {
-  EXPECT_THROW(read_bodies("no/such/file.csv", 1), SceneError);
 }
 
 }  // namespace
