@@ -331,10 +331,11 @@ Section<SolverSettings> solver_keys() {
                                   &SolverSettings::check_every),
               key<SolverSettings>("warm_start", "", any, "Begin from the impulses of the last step.",
                                   &SolverSettings::warm_start),
-              key<SolverSettings>("overlap_correction", "", {.low = 0, .high = 1},
-                                  "Part of an overlap that a step undoes. 0: overlaps stay, and what the tolerance "
-                                  "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
-                                  &SolverSettings::overlap_correction),
+              key<SolverSettings>(
+                  "overlap_correction", "", {.low = 0, .high = 1},
+                  "Part of an overlap that a step undoes. 0: overlaps stay, and what the tolerance "
+                  "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
+                  &SolverSettings::overlap_correction),
           }};
 }
 
