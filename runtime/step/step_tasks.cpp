@@ -18,7 +18,7 @@ double now() {
 /// A few hundred candidates a chunk; fewer in small samples, where colours would otherwise be too thin for
 /// threads.
 int chunk_target(std::size_t candidates) {
-  return static_cast<int>(std::clamp<std::size_t>(candidates / 128, 48, 384));
+  return static_cast<int>(std::clamp<std::size_t>(candidates / 64, 48, 320));
 }
 
 double speed(const Velocity& v) {
