@@ -2,16 +2,16 @@
 /// a barrier per colour. The graph is that of a grid of chunks, each in conflict with its 26 neighbours, in 8
 /// colours by parity; threads own slabs.
 ///
-///     bench_task_cost [repeats, default 15]
+///     bench_task_cost [repeats, default 51]
 ///
 /// Times are medians over the repeats, methods taken in turn so that a disturbance of the machine meets all
 /// of them, and the best beside, because another process on a core stretches medians of methods that wait.
 /// Every run checks that each chunk was run once per epoch, in an order that conflicts allow.
 
 #include <fmt/format.h>
-#include <omp.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
@@ -88,84 +88,129 @@ struct Case {
   int epochs;
 };
 
-using Method = std::function<void(const Case&, std::vector<Chunk>&)>;
+using Clock = std::chrono::steady_clock;
 
-void plain_loop(const Case& c, std::vector<Chunk>& chunks) {
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Runs all epochs and returns the seconds they took, from a moment when all threads were awake.
+using Method = std::function<double(const Case&, std::vector<Chunk>&)>;
+
+double plain_loop(const Case& c, std::vector<Chunk>& chunks) {
+  const auto begin = Clock::now();
   for (int epoch = 0; epoch < c.epochs; ++epoch)
     for (const auto& nodes : c.grid.by_colour)
       for (const std::uint32_t node : nodes) work(chunks[node], c.links);
+  return seconds_since(begin);
+}
+
+void plan(EpochGraph& loop, const Grid& grid, int threads) {
+  std::vector<std::uint32_t> owner(grid.colour.size());
+  talus::graph::assign_owners(std::vector<std::uint32_t>(owner.size(), 1), threads, owner);
+  loop.build(grid.view(), owner, threads);
 }
 
 Method epoch_loop(int gate_every) {
   return [gate_every](const Case& c, std::vector<Chunk>& chunks) {
-    // Planned in every run, as in every step of a simulation: the plan is part of the cost.
-    std::vector<std::uint32_t> owner(c.grid.colour.size());
-    talus::graph::assign_owners(std::vector<std::uint32_t>(owner.size(), 1), c.threads, owner);
     EpochGraph loop;
-    loop.build(c.grid.view(), owner, c.threads);
+    plan(loop, c.grid, c.threads);
     Sweep sweep{chunks, c.links, c.epochs, gate_every};
+    std::atomic<int> awake = 0;
+    double elapsed = 0;
     Graph graph;
-    graph.team("sweep", {}, [&](Worker& me) { run_epochs(loop, me, sweep); });
+    graph.team("sweep", {}, [&](Worker& me) {
+      ++awake;
+      me.wait([&] { return awake == me.threads(); });
+      const auto begin = Clock::now();
+      run_epochs(loop, me, sweep);
+      if (me.thread() == 0) elapsed = seconds_since(begin);
+    });
     Executor({.threads = c.threads}).run(graph);
+    return elapsed;
   };
 }
 
-void barrier_per_colour(const Case& c, std::vector<Chunk>& chunks) {
+double barrier_per_colour(const Case& c, std::vector<Chunk>& chunks) {
+  double elapsed = 0;
 #pragma omp parallel num_threads(c.threads)
-  for (int epoch = 0; epoch < c.epochs; ++epoch)
-    for (const auto& nodes : c.grid.by_colour) {
+  {
+#pragma omp barrier
+    const auto begin = Clock::now();
+    for (int epoch = 0; epoch < c.epochs; ++epoch)
+      for (const auto& nodes : c.grid.by_colour) {
 #pragma omp for schedule(static)
-      for (std::size_t i = 0; i < nodes.size(); ++i) work(chunks[nodes[i]], c.links);
+        for (std::size_t i = 0; i < nodes.size(); ++i) work(chunks[nodes[i]], c.links);
+      }
+#pragma omp master
+    elapsed = seconds_since(begin);
+  }
+  return elapsed;
+}
+
+/// One dependence per task, on its own last run, and a taskwait per colour: the cheapest correct use of
+/// tasks.
+double tasks_by_colour(const Case& c, std::vector<Chunk>& chunks) {
+  Chunk* const data = chunks.data();
+  double elapsed = 0;
+#pragma omp parallel num_threads(c.threads)
+  {
+#pragma omp barrier
+#pragma omp single
+    {
+      const auto begin = Clock::now();
+      for (int epoch = 0; epoch < c.epochs; ++epoch)
+        for (const auto& nodes : c.grid.by_colour) {
+          for (const std::uint32_t node : nodes) {
+#pragma omp task firstprivate(node) depend(inout : data[node])
+            work(data[node], c.links);
+          }
+#pragma omp taskwait
+        }
+      elapsed = seconds_since(begin);
     }
+  }
+  return elapsed;
 }
 
 /// Within an epoch the order of the epoch loop, a barrier between epochs: libgomp's lists of readers grow
 /// without bound otherwise.
-void tasks_after_neighbours(const Case& c, std::vector<Chunk>& chunks) {
+double tasks_after_neighbours(const Case& c, std::vector<Chunk>& chunks) {
   Chunk* const data = chunks.data();
   const std::uint32_t* const neighbour = c.grid.neighbour.data();
+  double elapsed = 0;
 #pragma omp parallel num_threads(c.threads)
+  {
+#pragma omp barrier
 #pragma omp single
-  for (int epoch = 0; epoch < c.epochs; ++epoch) {
-    for (const auto& nodes : c.grid.by_colour)
-      for (const std::uint32_t node : nodes) {
-        const std::uint32_t first = c.grid.offset[node], last = c.grid.offset[node + 1];
+    {
+      const auto begin = Clock::now();
+      for (int epoch = 0; epoch < c.epochs; ++epoch) {
+        for (const auto& nodes : c.grid.by_colour)
+          for (const std::uint32_t node : nodes) {
+            const std::uint32_t first = c.grid.offset[node], last = c.grid.offset[node + 1];
 #pragma omp task firstprivate(node) depend(inout                                   \
                                            : data[node]) depend(iterator(i = first \
                                                                          : last),  \
                                                                 in                 \
                                                                 : data[neighbour[i]])
-        work(data[node], c.links);
-      }
+            work(data[node], c.links);
+          }
 #pragma omp taskwait
-  }
-}
-
-/// One dependence per task, on its own last run, and a taskwait per colour: the cheapest correct use of
-/// tasks.
-void tasks_by_colour(const Case& c, std::vector<Chunk>& chunks) {
-  Chunk* const data = chunks.data();
-#pragma omp parallel num_threads(c.threads)
-#pragma omp single
-  for (int epoch = 0; epoch < c.epochs; ++epoch)
-    for (const auto& nodes : c.grid.by_colour) {
-      for (const std::uint32_t node : nodes) {
-#pragma omp task firstprivate(node) depend(inout : data[node])
-        work(data[node], c.links);
       }
-#pragma omp taskwait
+      elapsed = seconds_since(begin);
     }
+  }
+  return elapsed;
 }
 
 double seconds(const Method& method, const Case& c, std::uint64_t expected) {
   std::vector<Chunk> chunks(c.grid.colour.size());
-  const auto begin = std::chrono::steady_clock::now();
-  method(c, chunks);
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  const double elapsed = method(c, chunks);
   for (const Chunk& chunk : chunks)
     if (chunk.epochs != c.epochs || chunk.state != expected)
       throw std::runtime_error("a chunk was not run once per epoch");
-  return elapsed.count();
+  return elapsed;
 }
 
 struct Row {
@@ -180,35 +225,55 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Median of the first row with 1 thread is the sequential time that efficiencies refer to.
+double best(const std::vector<double>& values) {
+  return *std::min_element(values.begin(), values.end());
+}
+
+/// What a task costs beyond its work: the time of all threads per task, less that of the plain loop when
+/// there is work. Efficiency: time of the plain loop over the time of all threads.
 void print_table(const Grid& grid, int links, int epochs, int repeats) {
   std::vector<Chunk> once(1);
   for (int i = 0; i < epochs; ++i) work(once[0], links);
   const std::uint64_t expected = once[0].state;
   const auto tasks = static_cast<double>(grid.colour.size()) * epochs;
-  double sequential = 0;
+  Row plain{"plain loop", plain_loop, {}};
   for (const int threads : {1, 2}) {
     std::vector<Row> rows;
-    if (threads == 1) rows.push_back({"plain loop", plain_loop, {}});
     rows.push_back({"epoch loop, one decision", epoch_loop(epochs), {}});
     rows.push_back({"epoch loop, decision every 10", epoch_loop(10), {}});
     rows.push_back({"omp for, barrier per colour", barrier_per_colour, {}});
     rows.push_back({"omp task, taskwait per colour", tasks_by_colour, {}});
     rows.push_back({"omp task, depend on neighbours", tasks_after_neighbours, {}});
     const Case c{grid, threads, links, epochs};
-    for (Row& row : rows) seconds(row.method, c, expected);
-    for (int repeat = 0; repeat < repeats; ++repeat)
+    for (int repeat = 0; repeat <= repeats; ++repeat) {
+      plain.times.push_back(seconds(plain.method, c, expected));
       for (Row& row : rows) row.times.push_back(seconds(row.method, c, expected));
-    if (threads == 1) sequential = median(rows.front().times);
+    }
+    if (threads == 1) rows.insert(rows.begin(), plain);
     for (const Row& row : rows) {
-      const double mid = median(row.times);
-      const double best = *std::min_element(row.times.begin(), row.times.end());
-      const double ideal = sequential / threads;
-      fmt::print("| {:6} | {:7} | {:30} | {:10.1f} | {:10.1f} | {:10.2f} | {:10.2f} |\n", grid.colour.size(),
-                 threads, row.name, (mid - (links > 0 ? ideal : 0)) / tasks * 1e9,
-                 (best - (links > 0 ? ideal : 0)) / tasks * 1e9, ideal / mid, ideal / best);
+      const auto cost = [&](double elapsed, double alone) {
+        return (threads * elapsed - (links > 0 ? alone : 0)) / tasks * 1e9;
+      };
+      const double alone = median(plain.times), alone_best = best(plain.times);
+      const double mid = median(row.times), low = best(row.times);
+      fmt::print("| {:6} | {:7} | {:30} | {:9.1f} | {:9.1f} | {:10.2f} | {:10.2f} |\n", grid.colour.size(),
+                 threads, row.name, cost(mid, alone), cost(low, alone_best), alone / (threads * mid),
+                 alone_best / (threads * low));
     }
   }
+}
+
+void print_plan(const Grid& grid, int threads, int repeats) {
+  EpochGraph loop;
+  std::vector<double> times;
+  for (int repeat = 0; repeat <= repeats; ++repeat) {
+    const auto begin = Clock::now();
+    plan(loop, grid, threads);
+    times.push_back(seconds_since(begin));
+  }
+  fmt::print("plan of {} chunks, {} conflicts, {} threads: {:.1f} us, {} waits per epoch, {} bytes\n",
+             grid.colour.size(), grid.neighbour.size() / 2, threads, median(times) * 1e6, loop.wait_count(),
+             loop.memory_used());
 }
 
 /// Plain tasks of the executor: rebuilt and run, each with two accesses.
@@ -219,7 +284,7 @@ void print_executor(int repeats) {
     Graph graph;
     std::vector<double> times;
     for (int repeat = 0; repeat <= repeats; ++repeat) {
-      const auto begin = std::chrono::steady_clock::now();
+      const auto begin = Clock::now();
       graph.clear();
       const auto source = graph.data("source");
       const Handles part = graph.data("part", parts);
@@ -227,8 +292,7 @@ void print_executor(int repeats) {
       for (std::uint32_t i = 0; i < parts; ++i)
         graph.task("part", {talus::graph::read(source), talus::graph::write(part[i])}, [] {});
       executor.run(graph);
-      const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
-      times.push_back(elapsed.count());
+      times.push_back(seconds_since(begin));
     }
     fmt::print("graph of {} coarse tasks, rebuilt and run, {} threads: {:.0f} ns per task\n", parts + 1,
                threads, median(times) / (parts + 1) * 1e9);
@@ -238,18 +302,20 @@ void print_executor(int repeats) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int repeats = argc > 1 ? std::max(1, std::atoi(argv[1])) : 15;
+  const int repeats = argc > 1 ? std::max(1, std::atoi(argv[1])) : 51;
+  // Runs of about a millisecond: shorter than a slice of the operating system, so that many of them see no
+  // other process.
   for (const int links : {0, 3000}) {
-    fmt::print("\n{}; medians of {} repeats\n", links == 0 ? "Empty chunks" : "Chunks of about 3 us",
-               repeats);
+    fmt::print("\n{}; {} repeats\n", links == 0 ? "Empty chunks" : "Chunks of about 3 us", repeats);
     fmt::print(
-        "| chunks | threads | method                         | ns / task  | best       | efficiency | best   "
-        "    |\n");
+        "| chunks | threads | method                         | ns / task | best      | efficiency | best     "
+        "  |\n");
     fmt::print(
-        "| -----: | ------: | ------------------------------ | ---------: | ---------: | ---------: | "
+        "| -----: | ------: | ------------------------------ | --------: | --------: | ---------: | "
         "---------: |\n");
-    for (const int n : {4, 6}) print_table(make_grid(n), links, links == 0 ? 300 : 40, repeats);
+    for (const int n : {4, 6}) print_table(make_grid(n), links, links == 0 ? 100 : 4, repeats);
   }
   fmt::print("\n");
+  for (const int threads : {1, 2, 8}) print_plan(make_grid(6), threads, repeats);
   print_executor(repeats);
 }
