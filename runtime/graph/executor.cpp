@@ -21,6 +21,15 @@ std::uint32_t pop(std::vector<std::uint32_t>& heap) {
   return task;
 }
 
+/// The lock is held for a few hundred ns at most: to sleep for it would cost far more than to wait.
+void lock_soon(std::unique_lock<std::mutex>& lock) {
+  for (int attempt = 0; attempt < 200; ++attempt) {
+    if (lock.try_lock()) return;
+    pause();
+  }
+  lock.lock();
+}
+
 ExecutorOptions checked(const ExecutorOptions& options) {
   if (options.threads < 1)
     throw std::invalid_argument("an executor needs at least 1 thread, not " +
@@ -115,7 +124,8 @@ void Executor::prepare(const Graph& graph) {
 
 void Executor::serve(const Graph& graph, int thread) noexcept {
   Worker worker(thread, options_.threads, stop_, options_.delay_seed);
-  std::unique_lock lock(mutex_);
+  std::unique_lock lock(mutex_, std::defer_lock);
+  lock_soon(lock);
   while (!stop_.raised() && ended_ < graph.size()) {
     const std::uint32_t next = take(thread);
     if (next == none) {
@@ -135,7 +145,7 @@ void Executor::serve(const Graph& graph, int thread) noexcept {
       stop_.raise();  // at once: others may be waiting for this thread in the same team
       failure = std::current_exception();
     }
-    lock.lock();
+    lock_soon(lock);
     if (failure)
       record_failure(next, std::move(failure));
     else
@@ -197,7 +207,7 @@ void Executor::await_change(std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   for (int i = 0; i < spins && !changed(); ++i) pause();
   for (int i = 0; i < yields && !changed(); ++i) std::this_thread::yield();
-  lock.lock();
+  lock_soon(lock);
   changed_.wait(lock, changed);
 }
 
