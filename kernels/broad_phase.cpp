@@ -11,21 +11,37 @@ namespace talus {
 
 namespace {
 
-constexpr int level_shift = 58;  // above 3 x 19 bits of Morton key
-constexpr double largest_coordinate = (1 << 19) - 1;
+constexpr int level_shift = 58;               // above 3 x 19 bits of Morton key
+constexpr std::int32_t half_cells = 1 << 18;  // cells on each side of the origin, per axis
+/// Cells are wider than the widest pair by more than the rounding of a quotient up to half_cells, so that a
+/// pair is never two cells apart.
+constexpr double rounding_margin = 1 + 1e-9;
 
 using Coordinates = std::array<std::int32_t, 3>;
 
-/// Cell of a point in a level. Far coordinates are clamped into the last cell, which keeps neighbours
-/// neighbours.
+/// Cell of a point in a level, in 0 .. 2 half_cells - 1. Far coordinates are clamped into the outermost cell,
+/// which keeps neighbours neighbours.
 Coordinates cell_of(const Vec3& x, const Vec3& origin, double size) {
   Coordinates c;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
-    c[k] =
-        static_cast<std::int32_t>(std::min(std::floor((x[axis] - origin[axis]) / size), largest_coordinate));
+    const double cell = std::floor((x[axis] - origin[axis]) / size);
+    c[k] = half_cells + static_cast<std::int32_t>(std::clamp<double>(cell, -half_cells, half_cells - 1));
   }
   return c;
+}
+
+/// Medians of the coordinates: a few bodies that fly far away must not push all others into one clamped cell.
+Vec3 median(std::span<const Vec3> x) {
+  std::vector<double> values(x.size());
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+  Vec3 result;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::transform(x.begin(), x.end(), values.begin(), [axis](const Vec3& p) { return p[axis]; });
+    std::nth_element(values.begin(), middle, values.end());
+    result[axis] = *middle;
+  }
+  return result;
 }
 
 std::uint64_t cell_key(std::uint64_t level, const Coordinates& c) {
@@ -49,7 +65,7 @@ const CellGrid::Cell* find_cell(const CellGrid& grid, std::uint64_t key) {
 
 bool inside(const Coordinates& c) {
   for (std::int32_t k : c)
-    if (k < 0 || k > static_cast<std::int32_t>(largest_coordinate)) return false;
+    if (k < 0 || k >= 2 * half_cells) return false;
   return true;
 }
 
@@ -78,11 +94,10 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
     return grid;
   }
   double smallest = reach[0], largest = reach[0];
-  grid.origin = x[0];
-  for (std::size_t k = 0; k < n; ++k) {
-    grid.origin = grid.origin.cwiseMin(x[k]);
-    smallest = std::min(smallest, reach[k]);
-    largest = std::max(largest, reach[k]);
+  grid.origin = median(x);
+  for (double r : reach) {
+    smallest = std::min(smallest, r);
+    largest = std::max(largest, r);
   }
   // The coarsest level is fitted to the largest body; even samples then have one level and cells that are not
   // too large.
@@ -90,7 +105,7 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   grid.cell_size.resize(static_cast<std::size_t>(levels));
   for (int level = 0; level < levels; ++level)
     grid.cell_size[static_cast<std::size_t>(level)] =
-        2 * largest * std::exp2(level - levels + 1) * (1 + 1e-12);
+        2 * largest * std::exp2(level - levels + 1) * rounding_margin;
 
   struct Entry {
     std::uint64_t key;

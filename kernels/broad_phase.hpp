@@ -24,7 +24,7 @@ struct CellGrid {
     std::int32_t begin;  ///< into `slots`
     std::int32_t end;
   };
-  Vec3 origin = Vec3::Zero();       ///< lower corner of the centres [m]
+  Vec3 origin = Vec3::Zero();       ///< medians of the centres [m]
   std::vector<double> cell_size;    ///< per level [m], doubling
   std::vector<Slot> slots;          ///< all bodies, sorted by (level, cell, slot)
   std::vector<Cell> cells;          ///< non-empty cells in order of key; sorted like `slots`

@@ -15,9 +15,11 @@ struct Found {
   std::int32_t candidate;
 };
 
-/// Bias of a contact, or false when it constrains nothing in this step.
-bool constrain(const NarrowPhase& in, double gap, double v_n, double slow, double& bias) {
-  if (gap >= in.alert && gap >= -in.time_step * v_n) return false;
+/// Bias of a contact, or false when it constrains nothing in this step. v_n is of the beginning of the step:
+/// Moreau's law on any other (that of the fall within the step, say) would give energy at each bounce.
+/// `falling` is what gravity adds to it within the step.
+bool constrain(const NarrowPhase& in, double gap, double v_n, double falling, double slow, double& bias) {
+  if (gap >= in.alert && gap >= -in.time_step * (v_n + falling)) return false;
   bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
   if (in.restitution > 0 && v_n < -slow) {
     if (gap > 0) return false;
@@ -41,18 +43,18 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
       const double distance = d.norm();
       const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
       double bias;
-      if (constrain(in, distance - in.radius[i] - in.radius[j], normal.dot(u(i) - u(j)), slow, bias))
+      if (constrain(in, distance - in.radius[i] - in.radius[j], normal.dot(u(i) - u(j)), 0, slow, bias))
         found.push_back({normal, bias, static_cast<std::int32_t>(k)});
     }
     return;
   }
   const Wall& wall = in.walls[static_cast<std::size_t>(chunks.wall[chunk])];
-  const Vec3 moving = wall.velocity - in.time_step * in.gravity;
+  const double falling = in.time_step * wall.normal.dot(in.gravity);
   for (std::size_t k = begin; k < end; ++k) {
     const auto i = static_cast<std::size_t>(candidates.wall_pairs[k - grains].body);
     const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
     double bias;
-    if (constrain(in, gap, wall.normal.dot(u(i) - moving), slow, bias))
+    if (constrain(in, gap, wall.normal.dot(u(i) - wall.velocity), falling, slow, bias))
       found.push_back({wall.normal, bias, static_cast<std::int32_t>(k)});
   }
 }

@@ -64,6 +64,7 @@ class StepGraph {
   void measure_lane(std::uint32_t lane);
   void sum_up();
   SlotRange share(std::size_t count, std::uint32_t lane) const;
+  double margin_of(const Wall& wall) const;
   bool walls_left_margin() const;
 
   StepState& state_;

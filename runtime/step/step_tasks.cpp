@@ -52,13 +52,18 @@ void StepGraph::predict_lane(std::uint32_t lane) {
                                              state_.reach_then, h, parameters_.alert);
 }
 
+/// How near a grain can come to a wall for what the grain's own margin does not count: the wall's way, and
+/// what gravity adds to the grain's speed within a step.
+double StepGraph::margin_of(const Wall& wall) const {
+  const double h = parameters_.time_step;
+  return contact_margin(wall.velocity.norm(), h, parameters_.alert) + h * h * parameters_.gravity.norm();
+}
+
 bool StepGraph::walls_left_margin() const {
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const Wall& wall = state_.walls[w];
     const double moved = std::abs(wall.normal.dot(wall.point - state_.wall_then[w]));
-    if (contact_margin(wall.velocity.norm(), parameters_.time_step, parameters_.alert) + moved >
-        wall_margin_[w])
-      return true;
+    if (margin_of(wall) + moved > wall_margin_[w]) return true;
   }
   return false;
 }
@@ -80,7 +85,7 @@ void StepGraph::make_cells() {
   wall_margin_.clear();
   for (const Wall& wall : state_.walls) {
     state_.wall_then.push_back(wall.point);
-    wall_margin_.push_back(half_skin + contact_margin(wall.velocity.norm(), h, parameters_.alert));
+    wall_margin_.push_back(half_skin + margin_of(wall));
   }
   cells_ = build_cells(state_.x_then, state_.reach_then);
 }
