@@ -15,10 +15,18 @@ namespace {
 constexpr std::size_t flush_bytes = 32 * 1024;
 constexpr std::chrono::milliseconds flush_interval{500};
 
-void put(std::string& text, double value) { fmt::format_to(std::back_inserter(text), "{}", value); }
-void put(std::string& text, std::int64_t value) { fmt::format_to(std::back_inserter(text), "{}", value); }
-void put(std::string& text, int value) { put(text, std::int64_t{value}); }
-void put(std::string& text, bool value) { text += value ? '1' : '0'; }
+void put(std::string& text, double value) {
+  fmt::format_to(std::back_inserter(text), "{}", value);
+}
+void put(std::string& text, std::int64_t value) {
+  fmt::format_to(std::back_inserter(text), "{}", value);
+}
+void put(std::string& text, int value) {
+  put(text, std::int64_t{value});
+}
+void put(std::string& text, bool value) {
+  text += value ? '1' : '0';
+}
 void put(std::string& text, const std::string& value) {
   if (value.find_first_of(",\"\r\n") == std::string::npos) {
     text += value;
@@ -32,7 +40,8 @@ void put(std::string& text, const std::string& value) {
   text += '"';
 }
 
-/// One column: its name and how a row's value is written. The tables below drive both the header and the rows.
+/// One column: its name and how a row's value is written. The tables below drive both the header and the
+/// rows.
 template <class Row>
 struct Column {
   std::string_view name;
@@ -117,9 +126,15 @@ void append_line(std::string& text, std::span<const Column<Row>> columns, const 
 
 }  // namespace
 
-std::string steps_csv_header() { return header_line<StepReport>(steps_columns); }
-std::string walls_csv_header() { return header_line<WallRow>(walls_columns); }
-std::string triaxial_csv_header() { return header_line<TriaxialReport>(triaxial_columns); }
+std::string steps_csv_header() {
+  return header_line<StepReport>(steps_columns);
+}
+std::string walls_csv_header() {
+  return header_line<WallRow>(walls_columns);
+}
+std::string triaxial_csv_header() {
+  return header_line<TriaxialReport>(triaxial_columns);
+}
 
 void append_steps_row(std::string& text, const StepReport& report) {
   append_line<StepReport>(text, steps_columns, report);
@@ -147,7 +162,8 @@ CsvFile::~CsvFile() {
 }
 
 void CsvFile::commit() {
-  if (pending_.size() >= flush_bytes || std::chrono::steady_clock::now() - last_flush_ >= flush_interval) flush();
+  if (pending_.size() >= flush_bytes || std::chrono::steady_clock::now() - last_flush_ >= flush_interval)
+    flush();
 }
 
 void CsvFile::flush() {

@@ -17,15 +17,16 @@ std::string steps_csv_header();
 std::string walls_csv_header();
 std::string triaxial_csv_header();
 
-/// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true and false are 1
-/// and 0; names are quoted only where they must be (RFC 4180).
+/// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true
+/// and false are 1 and 0; names are quoted only where they must be (RFC 4180).
 void append_steps_row(std::string& text, const StepReport& report);
 void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall);
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
 
 /// A file that grows by whole lines.
-/// Lines are handed to the system when half a second or 32 KiB have gathered, always up to the end of a line, so that a
-/// killed run leaves a table that can be read, at most half a second short. A call costs no system call otherwise.
+/// Lines are handed to the system when half a second or 32 KiB have gathered, always up to the end of a line,
+/// so that a killed run leaves a table that can be read, at most half a second short. A call costs no system
+/// call otherwise.
 class CsvFile {
  public:
   /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.

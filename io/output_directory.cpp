@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view unfinished = ".part";
 
 constexpr std::array<std::string_view, 11> fixed_names{
-    "run.json",   "scene.resolved.toml", "steps.csv",    "walls.csv",  "triaxial.csv",      "results.h5",
+    "run.json",   "scene.resolved.toml", "steps.csv",         "walls.csv",    "triaxial.csv", "results.h5",
     "fields.pvd", "fields/grains.pvd",   "fields/forces.pvd", "triaxial.svg", "forces.svg"};
 
 /// prefix, six digits or more, suffix
@@ -63,9 +63,10 @@ void prepare_output_directory(const fs::path& directory, bool force) {
     }
     if (fs::exists(directory) && !fs::is_empty(directory)) {
       if (!force) {
-        throw FileError(directory.string(),
-                        "exists and is not empty; choose another directory with --out, or replace the results in "
-                        "it with --force");
+        throw FileError(
+            directory.string(),
+            "exists and is not empty; choose another directory with --out, or replace the results in "
+            "it with --force");
       }
       for (const fs::path& relative : former_outputs(directory)) fs::remove(directory / relative);
     }

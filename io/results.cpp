@@ -20,13 +20,15 @@ constexpr std::int64_t format_version = 1;
 
 static_assert(sizeof(Vec3) == 3 * sizeof(double), "a vector of Vec3 is written as an n x 3 array");
 
-std::string frame_name(std::size_t index) { return fmt::format("{:06}", index); }
+std::string frame_name(std::size_t index) {
+  return fmt::format("{:06}", index);
+}
 
 Hdf5Object file_access(const std::string& file) {
   Hdf5Object access = hold(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, file, "preparing HDF5");
   demand(H5Pset_file_locking(access.id(), false, true), file, "preparing HDF5");
-  // Metadata leave the cache when the file is closed and not before, so that a kill while the arrays of a frame are being
-  // written finds the directory of the file as it was.
+  // Metadata leave the cache when the file is closed and not before, so that a kill while the arrays of a
+  // frame are being written finds the directory of the file as it was.
   H5AC_cache_config_t cache{};
   cache.version = H5AC__CURR_CACHE_CONFIG_VERSION;
   demand(H5Pget_mdc_config(access.id(), &cache), file, "preparing HDF5");
@@ -48,7 +50,8 @@ void write_attribute(Place place, const char* name, hid_t file_type, hid_t memor
   const std::string action = fmt::format("writing attribute '{}'", name);
   const Hdf5Object space = hold(H5Screate(H5S_SCALAR), H5Sclose, place.file, action);
   const Hdf5Object attribute =
-      hold(H5Acreate2(place.group, name, file_type, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose, place.file, action);
+      hold(H5Acreate2(place.group, name, file_type, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+           place.file, action);
   demand(H5Awrite(attribute.id(), memory_type, value), place.file, action);
 }
 
@@ -70,8 +73,12 @@ struct ElementTypes {
   hid_t file;
   hid_t memory;
 };
-ElementTypes element_types(const double*) { return {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}; }
-ElementTypes element_types(const std::int64_t*) { return {H5T_STD_I64LE, H5T_NATIVE_INT64}; }
+ElementTypes element_types(const double*) {
+  return {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE};
+}
+ElementTypes element_types(const std::int64_t*) {
+  return {H5T_STD_I64LE, H5T_NATIVE_INT64};
+}
 
 /// Writes rows x columns numbers; one column makes a one-dimensional dataset.
 template <class T>
@@ -83,8 +90,8 @@ void write_array(Place place, const char* name, const char* units, const T* valu
       hold(H5Screate_simple(columns == 1 ? 1 : 2, extent, nullptr), H5Sclose, place.file, action);
   const ElementTypes types = element_types(values);
   const Hdf5Object dataset =
-      hold(H5Dcreate2(place.group, name, types.file, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose,
-           place.file, action);
+      hold(H5Dcreate2(place.group, name, types.file, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+           H5Dclose, place.file, action);
   if (rows > 0) {
     demand(H5Dwrite(dataset.id(), types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), place.file, action);
   }
@@ -102,14 +109,15 @@ void write_array(Place place, const char* name, const char* units, const std::ve
 }
 
 template <class T, std::size_t N>
-void write_array(Place place, const char* name, const char* units, const std::vector<std::array<T, N>>& values) {
-  write_array(place, name, units, values.empty() ? static_cast<const T*>(nullptr) : values[0].data(), values.size(),
-              N);
+void write_array(Place place, const char* name, const char* units,
+                 const std::vector<std::array<T, N>>& values) {
+  write_array(place, name, units, values.empty() ? static_cast<const T*>(nullptr) : values[0].data(),
+              values.size(), N);
 }
 
 Hdf5Object create_group(Place place, const std::string& name) {
-  return hold(H5Gcreate2(place.group, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose, place.file,
-              fmt::format("creating group '{}'", name));
+  return hold(H5Gcreate2(place.group, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose,
+              place.file, fmt::format("creating group '{}'", name));
 }
 
 void write_bodies(Place place, const Frame& frame) {
@@ -148,12 +156,13 @@ void write_names(Place place, const char* name, const std::vector<std::string>& 
   const hsize_t extent = values.size();
   const Hdf5Object space = hold(H5Screate_simple(1, &extent, nullptr), H5Sclose, place.file, action);
   const Hdf5Object dataset =
-      hold(H5Dcreate2(place.group, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose,
-           place.file, action);
+      hold(H5Dcreate2(place.group, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+           H5Dclose, place.file, action);
   std::vector<const char*> texts;
   for (const std::string& value : values) texts.push_back(value.c_str());
   if (!texts.empty()) {
-    demand(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), place.file, action);
+    demand(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), place.file,
+           action);
   }
 }
 
@@ -188,8 +197,8 @@ ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vecto
     : path_(path.string()), wall_names_(wall_names) {
   const detail::QuietHdf5 quiet;
   const Hdf5Object access = file_access(path_);
-  Hdf5Object file =
-      hold(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose, path_, "creating the file");
+  Hdf5Object file = hold(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose, path_,
+                         "creating the file");
   {
     const Place root{file.id(), path_};
     write_attribute(root, "format", std::string("talus-results"));
@@ -213,7 +222,8 @@ void ResultsWriter::append(const Frame& frame) {
   }
   const detail::QuietHdf5 quiet;
   const Hdf5Object access = file_access(path_);
-  Hdf5Object file = hold(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path_, "opening the file");
+  Hdf5Object file =
+      hold(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path_, "opening the file");
   {
     // Nameless until it is complete: what stops half way leaves no half frame behind.
     const Hdf5Object group =
@@ -226,7 +236,8 @@ void ResultsWriter::append(const Frame& frame) {
     write_contacts({create_group(place, "contacts").id(), path_}, frame);
     write_walls({create_group(place, "walls").id(), path_}, frame);
     const std::string name = "/frames/" + frame_name(frames_);
-    demand(H5Olink(group.id(), file.id(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), path_, "naming frame " + name);
+    demand(H5Olink(group.id(), file.id(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), path_,
+           "naming frame " + name);
   }
   close_file(file, path_);
   ++frames_;

@@ -4,12 +4,12 @@
 ///
 ///   /walls/name                  names, in the order of the setup
 ///   /frames/000000               attributes step, time, stage
-///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3], omega [n,3] and orientation [n,4] where computed
-///   /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force [m,3]
-///   /frames/000000/walls         position [w], velocity [w], force [w,3]
+///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3], omega [n,3] and orientation [n,4]
+///   where computed /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force
+///   [m,3] /frames/000000/walls         position [w], velocity [w], force [w,3]
 ///
-/// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain: the low bits of
-/// doubles do not compress, and a plain array can be read by anything.
+/// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain: the
+/// low bits of doubles do not compress, and a plain array can be read by anything.
 ///
 /// HDF5 is not built for threads: one thread of the process at a time, for writer and readers alike.
 
@@ -22,20 +22,21 @@
 
 namespace talus::io {
 
-/// Throws std::invalid_argument naming the array whose length does not fit the others; `omega` and `orientation` may be empty.
+/// Throws std::invalid_argument naming the array whose length does not fit the others; `omega` and
+/// `orientation` may be empty.
 void validate(const Frame& frame);
 
 /// Writes results.h5 frame by frame.
-/// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame gets its name
-/// last, when all of it is there: after a kill the file holds the frames before, unless the kill hit the few milliseconds in
-/// which the file's directory is written.
+/// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame
+/// gets its name last, when all of it is there: after a kill the file holds the frames before, unless the
+/// kill hit the few milliseconds in which the file's directory is written.
 class ResultsWriter {
  public:
   /// Replaces a file of that name. Throws FileError.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names);
 
-  /// Appends a frame; frame.walls are those of the constructor, in the same order. Throws FileError; std::invalid_argument
-  /// when the arrays do not fit together.
+  /// Appends a frame; frame.walls are those of the constructor, in the same order. Throws FileError;
+  /// std::invalid_argument when the arrays do not fit together.
   void append(const Frame& frame);
 
   std::size_t frames_written() const { return frames_; }

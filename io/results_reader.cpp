@@ -16,7 +16,8 @@ using detail::hold;
 Hdf5Object open_results(const std::string& path) {
   const Hdf5Object access = hold(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path, "preparing HDF5");
   demand(H5Pset_file_locking(access.id(), false, true), path, "preparing HDF5");
-  Hdf5Object file = hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening as HDF5");
+  Hdf5Object file =
+      hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening as HDF5");
   if (H5Lexists(file.id(), "frames", H5P_DEFAULT) <= 0) {
     throw FileError(path, "has no group /frames; it is not a results.h5 of talus");
   }
@@ -35,7 +36,8 @@ std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& pat
   hsize_t extent[2] = {0, 1};
   const int dimensions = H5Sget_simple_extent_ndims(space.id());
   if (dimensions != (columns == 1 ? 1 : 2)) {
-    throw FileError(path, fmt::format("{} has {} dimensions, expected {}", name, dimensions, columns == 1 ? 1 : 2));
+    throw FileError(path,
+                    fmt::format("{} has {} dimensions, expected {}", name, dimensions, columns == 1 ? 1 : 2));
   }
   demand(H5Sget_simple_extent_dims(space.id(), extent, nullptr), path, "reading the shape of " + name);
   if (extent[1] != columns) {
@@ -50,10 +52,12 @@ constexpr std::size_t numbers_in = sizeof(T) / 8;
 /// Entries of `name` below the frame `prefix`, each made of doubles or 64-bit integers.
 template <class T>
 std::vector<T> read_array(hid_t file, const std::string& path, const std::string& name, hid_t type) {
-  const Hdf5Object dataset = hold(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose, path, "opening " + name);
+  const Hdf5Object dataset =
+      hold(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose, path, "opening " + name);
   std::vector<T> values(row_count(dataset.id(), numbers_in<T>, path, name));
   if (!values.empty()) {
-    demand(H5Dread(dataset.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), path, "reading " + name);
+    demand(H5Dread(dataset.id(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), path,
+           "reading " + name);
   }
   return values;
 }
@@ -79,11 +83,13 @@ std::vector<std::string> take_texts(std::vector<char*>& texts) {
 }
 
 std::vector<std::string> read_names(hid_t file, const std::string& path, const std::string& name) {
-  const Hdf5Object dataset = hold(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose, path, "opening " + name);
+  const Hdf5Object dataset =
+      hold(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose, path, "opening " + name);
   const Hdf5Object type = detail::text_type(path);
   std::vector<char*> texts(row_count(dataset.id(), 1, path, name));
   if (!texts.empty()) {
-    demand(H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), path, "reading " + name);
+    demand(H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), path,
+           "reading " + name);
   }
   return take_texts(texts);
 }
@@ -110,7 +116,8 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   if (index >= count) throw FileError(name, fmt::format("has no frame {}; it holds {}", index, count));
 
   const std::string prefix = fmt::format("/frames/{:06}", index);
-  const Hdf5Object group = hold(H5Gopen2(file.id(), prefix.c_str(), H5P_DEFAULT), H5Gclose, name, "opening " + prefix);
+  const Hdf5Object group =
+      hold(H5Gopen2(file.id(), prefix.c_str(), H5P_DEFAULT), H5Gclose, name, "opening " + prefix);
   Frame frame;
   read_attribute(group.id(), name, "step", H5T_NATIVE_INT64, &frame.step);
   read_attribute(group.id(), name, "time", H5T_NATIVE_DOUBLE, &frame.time);
@@ -123,7 +130,8 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   frame.x = read_doubles<Vec3>(h, name, "bodies/x");
   frame.radius = read_doubles<double>(h, name, "bodies/radius");
   frame.u = read_doubles<Vec3>(h, name, "bodies/u");
-  if (H5Lexists(h, "bodies/omega", H5P_DEFAULT) > 0) frame.omega = read_doubles<Vec3>(h, name, "bodies/omega");
+  if (H5Lexists(h, "bodies/omega", H5P_DEFAULT) > 0)
+    frame.omega = read_doubles<Vec3>(h, name, "bodies/omega");
   if (H5Lexists(h, "bodies/orientation", H5P_DEFAULT) > 0) {
     frame.orientation = read_doubles<std::array<double, 4>>(h, name, "bodies/orientation");
   }

@@ -49,7 +49,8 @@ Provenance collect_provenance() {
   p.cores_allowed = allowed_cores();
   p.omp_proc_bind = environment("OMP_PROC_BIND");
   p.omp_places = environment("OMP_PLACES");
-  p.date_utc = fmt::format("{:%FT%TZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+  p.date_utc = fmt::format(
+      "{:%FT%TZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
   return p;
 }
 
@@ -92,7 +93,8 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"bodies", s.bodies},
       {"frames", s.frames},
   };
-  // Names of files and hosts may be anything: bytes that are not UTF-8 are replaced, not a reason to lose the run.
+  // Names of files and hosts may be anything: bytes that are not UTF-8 are replaced, not a reason to lose the
+  // run.
   return root.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
 }
 

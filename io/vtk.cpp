@@ -38,8 +38,9 @@ void append_array(std::string& text, std::string_view type, std::string_view nam
   std::string bytes(sizeof(length) + length, '\0');
   std::memcpy(bytes.data(), &length, sizeof(length));
   if (length > 0) std::memcpy(bytes.data() + sizeof(length), values.data(), length);
-  fmt::format_to(std::back_inserter(text), R"(<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="binary">)",
-                 type, name, components);
+  fmt::format_to(std::back_inserter(text),
+                 R"(<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="binary">)", type, name,
+                 components);
   append_base64(text, bytes);
   text += "</DataArray>\n";
 }
@@ -156,10 +157,11 @@ std::string forces_vtp(const Frame& frame) {
 
 std::string collection_pvd(const std::vector<FieldFile>& files) {
   std::string text =
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" "
+      "byte_order=\"LittleEndian\">\n<Collection>\n";
   for (const FieldFile& file : files) {
-    fmt::format_to(std::back_inserter(text), "<DataSet timestep=\"{}\" part=\"{}\" file=\"{}\"/>\n", file.time,
-                   file.part, file.path);
+    fmt::format_to(std::back_inserter(text), "<DataSet timestep=\"{}\" part=\"{}\" file=\"{}\"/>\n",
+                   file.time, file.part, file.path);
   }
   return text + "</Collection>\n</VTKFile>\n";
 }

@@ -16,7 +16,8 @@ BodyIndex::BodyIndex(std::span<const std::int64_t> id) {
 std::size_t BodyIndex::at(std::int64_t id) const {
   const auto found = std::ranges::lower_bound(places_, id, {}, &std::pair<std::int64_t, std::size_t>::first);
   if (found == places_.end() || found->first != id) {
-    throw std::invalid_argument(fmt::format("frame: a contact names body {}, which is not among its bodies", id));
+    throw std::invalid_argument(
+        fmt::format("frame: a contact names body {}, which is not among its bodies", id));
   }
   return found->second;
 }

@@ -20,6 +20,8 @@ class BodyIndex {
 };
 
 /// Index of the wall that a negative entry of Frame::contact_bodies stands for: -(1 + wall index).
-constexpr std::size_t wall_index(std::int64_t body) { return static_cast<std::size_t>(-(body + 1)); }
+constexpr std::size_t wall_index(std::int64_t body) {
+  return static_cast<std::size_t>(-(body + 1));
+}
 
 }  // namespace talus::io::detail

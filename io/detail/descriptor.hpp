@@ -9,8 +9,8 @@ namespace talus::io::detail {
 /// Text of errno.
 std::string last_error();
 
-/// A file descriptor that is open for writing and owned. Streams are not used for results because they forget why a
-/// write failed; here every failure is a FileError with the name of the file and the system's reason.
+/// A file descriptor that is open for writing and owned. Streams are not used for results because they forget
+/// why a write failed; here every failure is a FileError with the name of the file and the system's reason.
 class Descriptor {
  public:
   /// `flags` as for open(2). Throws FileError.

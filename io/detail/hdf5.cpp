@@ -28,7 +28,9 @@ QuietHdf5::QuietHdf5() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
-QuietHdf5::~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+QuietHdf5::~QuietHdf5() {
+  H5Eset_auto2(H5E_DEFAULT, function_, data_);
+}
 
 Hdf5Object hold(hid_t id, Hdf5Object::Close close, const std::string& file, const std::string& action) {
   if (id < 0) fail(file, action);

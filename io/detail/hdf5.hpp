@@ -13,7 +13,8 @@ namespace talus::io::detail {
 /// What HDF5 says about its last failure: the innermost description, or "unknown reason".
 std::string hdf5_reason();
 
-/// Keeps HDF5 from printing its error stack to the terminal while it lives; our exceptions say what is needed.
+/// Keeps HDF5 from printing its error stack to the terminal while it lives; our exceptions say what is
+/// needed.
 class QuietHdf5 {
  public:
   QuietHdf5();
@@ -31,7 +32,8 @@ class Hdf5Object {
  public:
   using Close = herr_t (*)(hid_t);
   Hdf5Object(hid_t id, Close close) : id_(id), close_(close) {}
-  Hdf5Object(Hdf5Object&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+  Hdf5Object(Hdf5Object&& other) noexcept
+      : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
   Hdf5Object& operator=(Hdf5Object&&) = delete;
   ~Hdf5Object() {
     if (id_ >= 0) close_(id_);
