@@ -1,0 +1,52 @@
+#pragma once
+
+/// The tables of a run: steps.csv, walls.csv, triaxial.csv (columns and units: docs/formats.md).
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "io/detail/descriptor.hpp"
+#include "runtime/step/frame.hpp"
+
+namespace talus::io {
+
+/// Header lines, with line end.
+std::string steps_csv_header();
+std::string walls_csv_header();
+std::string triaxial_csv_header();
+
+/// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true
+/// and false are 1 and 0; names are quoted only where they must be (RFC 4180).
+void append_steps_row(std::string& text, const StepReport& report);
+void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall);
+void append_triaxial_row(std::string& text, const TriaxialReport& report);
+
+/// A file that grows by whole lines.
+/// Lines are handed to the system when half a second or 32 KiB have gathered, always up to the end of a line,
+/// so that a killed run leaves a table that can be read, at most half a second short. A call costs no system
+/// call otherwise.
+class CsvFile {
+ public:
+  /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.
+  CsvFile(const std::filesystem::path& path, std::string_view header);
+  /// Writes what is left. A failure cannot be told from here: call close() to hear of it.
+  ~CsvFile();
+
+  /// Place to append whole lines; call commit() after them.
+  std::string& pending() { return pending_; }
+  /// Hands over the pending lines if it is time. Throws FileError.
+  void commit();
+  /// Hands over the pending lines. Throws FileError.
+  void flush();
+  /// Flushes and closes. Throws FileError.
+  void close();
+
+ private:
+  detail::Descriptor file_;
+  std::string pending_;
+  std::chrono::steady_clock::time_point last_flush_;
+};
+
+}  // namespace talus::io

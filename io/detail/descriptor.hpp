@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace talus::io::detail {
+
+/// Text of errno.
+std::string last_error();
+
+/// A file descriptor that is open for writing and owned. Streams are not used for results because they forget
+/// why a write failed; here every failure is a FileError with the name of the file and the system's reason.
+class Descriptor {
+ public:
+  /// `flags` as for open(2). Throws FileError.
+  Descriptor(const std::filesystem::path& path, int flags);
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor();
+
+  /// Writes everything, going on after short writes. Throws FileError.
+  void write(std::string_view bytes);
+
+  /// Closes and reports what the system kept for the end (quota, network file systems). Throws FileError.
+  void close();
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+};
+
+}  // namespace talus::io::detail

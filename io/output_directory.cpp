@@ -1,0 +1,105 @@
+#include "io/output_directory.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "io/detail/descriptor.hpp"
+#include "io/error.hpp"
+
+namespace talus::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view unfinished = ".part";
+
+constexpr std::array<std::string_view, 11> fixed_names{
+    "run.json",   "scene.resolved.toml", "steps.csv",         "walls.csv",    "triaxial.csv", "results.h5",
+    "fields.pvd", "fields/grains.pvd",   "fields/forces.pvd", "triaxial.svg", "forces.svg"};
+
+/// prefix, six digits or more, suffix
+bool is_numbered(std::string_view name, std::string_view prefix, std::string_view suffix) {
+  if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
+  if (name.size() < prefix.size() + suffix.size() + 6) return false;
+  const auto digits = name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
+  return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
+std::vector<fs::path> former_outputs(const fs::path& directory) {
+  std::vector<fs::path> found;
+  for (const fs::path& folder : {directory, directory / "fields"}) {
+    if (!fs::is_directory(folder)) continue;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (entry.is_symlink() || !entry.is_regular_file()) continue;
+      const fs::path relative = entry.path().lexically_relative(directory);
+      if (is_output_name(relative)) found.push_back(relative);
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+bool is_output_name(const fs::path& relative) {
+  const std::string text = relative.generic_string();
+  std::string_view name = text;
+  if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
+  return std::ranges::find(fixed_names, name) != fixed_names.end() ||
+         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp");
+}
+
+void prepare_output_directory(const fs::path& directory, bool force) {
+  try {
+    if (fs::exists(directory) && !fs::is_directory(directory)) {
+      throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
+    }
+    if (fs::exists(directory) && !fs::is_empty(directory)) {
+      if (!force) {
+        throw FileError(
+            directory.string(),
+            "exists and is not empty; choose another directory with --out, or replace the results in "
+            "it with --force");
+      }
+      for (const fs::path& relative : former_outputs(directory)) fs::remove(directory / relative);
+    }
+    fs::create_directories(directory);
+  } catch (const fs::filesystem_error& error) {
+    const fs::path& culprit = error.path1().empty() ? directory : error.path1();
+    throw FileError(culprit.string(), "cannot prepare the directory of the run: " + error.code().message());
+  }
+  // Asked before the run starts, not an hour later when the first file is written.
+  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
+    throw FileError(directory.string(), "cannot write into this directory: " + detail::last_error());
+  }
+}
+
+void write_whole(const fs::path& path, std::string_view content) {
+  fs::path temporary = path;
+  temporary += unfinished;
+  try {
+    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+    file.write(content);
+    file.close();
+  } catch (const FileError&) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw;
+  }
+  std::error_code error;
+  fs::rename(temporary, path, error);
+  if (error) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw FileError(path.string(), "cannot be replaced: " + error.message());
+  }
+}
+
+}  // namespace talus::io

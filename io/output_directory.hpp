@@ -1,0 +1,24 @@
+#pragma once
+
+/// The directory of a run: who may be overwritten, and how files appear in it.
+
+#include <filesystem>
+#include <string_view>
+
+namespace talus::io {
+
+/// Makes `directory` (and its parents) ready for a run.
+/// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
+/// only files that is_output_name() knows are removed; whatever else the user keeps there stays. Throws
+/// FileError naming the directory when it is refused, is not a directory, or cannot be created or written to.
+void prepare_output_directory(const std::filesystem::path& directory, bool force);
+
+/// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md), and
+/// for their unfinished forms, which end in ".part".
+bool is_output_name(const std::filesystem::path& relative);
+
+/// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
+/// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.
+void write_whole(const std::filesystem::path& path, std::string_view content);
+
+}  // namespace talus::io

@@ -1,0 +1,34 @@
+#pragma once
+
+/// Pictures of a run as SVG text, for those who want to see at once whether it makes sense.
+
+#include <span>
+#include <string>
+
+#include "kernels/walls.hpp"
+#include "runtime/step/frame.hpp"
+
+namespace talus::io {
+
+struct TriaxialPicture {
+  std::string stage;  ///< rows of other stages are left out; "" takes all rows
+  int axis = 2;       ///< axial direction: 0, 1, 2 = x, y, z
+};
+
+/// Two diagrams over a common axis, the axial strain in per cent, positive in compression: q/p, and the
+/// volume strain (29) in per cent, positive where the sample dilates. Rows with a value that is not finite
+/// are left out; without any row the picture says so.
+std::string draw_triaxial(std::span<const TriaxialReport> reports, const TriaxialPicture& options);
+
+struct ForcePicture {
+  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+};
+
+/// Grains whose centre lies in a slab about the middle of the sample, normal to y, seen along y, and the
+/// forces between them: a line between the centres (or to the contact point at a wall), as wide and as dark
+/// as its normal force is large. `walls` give the normals of frame.walls, in the same order; those parallel
+/// to y are drawn where they cut the picture. Throws std::invalid_argument when a contact names a body or
+/// wall that is not there.
+std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options);
+
+}  // namespace talus::io

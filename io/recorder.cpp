@@ -1,0 +1,130 @@
+#include "io/recorder.hpp"
+
+#include <fmt/format.h>
+
+#include <system_error>
+#include <utility>
+
+#include "io/error.hpp"
+#include "io/output_directory.hpp"
+#include "io/picture.hpp"
+
+namespace talus::io {
+namespace {
+
+std::vector<std::string> names_of(const std::vector<Wall>& walls) {
+  std::vector<std::string> names;
+  for (const Wall& wall : walls) names.push_back(wall.name);
+  return names;
+}
+
+void drop_contacts(Frame& frame) {
+  frame.contact_bodies.clear();
+  frame.contact_point.clear();
+  frame.contact_normal.clear();
+  frame.contact_gap.clear();
+  frame.contact_force.clear();
+}
+
+}  // namespace
+
+void ThinnedCurve::add(const TriaxialReport& report) {
+  if (newest_ && newest_->stage != report.stage) *this = ThinnedCurve(capacity_);
+  newest_ = report;
+  if (count_++ % stride_ != 0) return;
+  kept_.push_back(report);
+  if (kept_.size() < 2 * capacity_) return;
+  for (std::size_t k = 0; 2 * k < kept_.size(); ++k) kept_[k] = kept_[2 * k];
+  kept_.resize((kept_.size() + 1) / 2);
+  stride_ *= 2;
+}
+
+std::vector<TriaxialReport> ThinnedCurve::rows() const {
+  std::vector<TriaxialReport> rows = kept_;
+  if (newest_ && (rows.empty() || rows.back().step != newest_->step)) rows.push_back(*newest_);
+  return rows;
+}
+
+Recorder::Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
+                   const Provenance& provenance)
+    : directory_(directory),
+      options_(options),
+      walls_(setup.walls),
+      provenance_(provenance),
+      steps_(directory / "steps.csv", steps_csv_header()),
+      wall_rows_(directory / "walls.csv", walls_csv_header()) {
+  for (const Stage& stage : setup.stages) axis_of_stage_.emplace(stage.name, stage.end.strain_axis);
+  if (options_.frames) results_.emplace(directory_ / "results.h5", names_of(walls_));
+  if (options_.fields) {
+    std::error_code error;
+    std::filesystem::create_directories(directory_ / "fields", error);
+    if (error) throw FileError((directory_ / "fields").string(), "cannot be created: " + error.message());
+  }
+  write_run_json(directory_ / "run.json", provenance_, Summary{});
+}
+
+void Recorder::record_step(const StepReport& report, std::span<const WallReport> walls,
+                           const std::optional<TriaxialReport>& triaxial) {
+  append_steps_row(steps_.pending(), report);
+  steps_.commit();
+  for (const WallReport& wall : walls) append_walls_row(wall_rows_.pending(), report, wall);
+  wall_rows_.commit();
+  if (!triaxial) return;
+  if (!triaxial_) triaxial_.emplace(directory_ / "triaxial.csv", triaxial_csv_header());
+  append_triaxial_row(triaxial_->pending(), *triaxial);
+  triaxial_->commit();
+  if (options_.pictures) curve_.add(*triaxial);
+}
+
+void Recorder::record_frame(Frame&& frame) {
+  const Frame state = [&] {
+    Frame taken = std::move(frame);
+    if (!options_.contacts) drop_contacts(taken);
+    return taken;
+  }();
+  validate(state);
+  if (results_) results_->append(state);
+  if (options_.fields) write_fields(state);
+  if (options_.pictures && options_.contacts)
+    write_whole(directory_ / "forces.svg", draw_forces(state, walls_, {}));
+  draw_triaxial_picture();
+  ++frames_;
+}
+
+void Recorder::finish(Summary summary) {
+  steps_.close();
+  wall_rows_.close();
+  if (triaxial_) triaxial_->close();
+  draw_triaxial_picture();
+  summary.frames = frames_;
+  write_run_json(directory_ / "run.json", provenance_, summary);
+}
+
+void Recorder::write_fields(const Frame& frame) {
+  const std::string grains = fmt::format("grains_{:06}.vtp", frames_);
+  write_whole(directory_ / "fields" / grains, grains_vtp(frame));
+  grain_files_.push_back({frame.time, 0, grains});
+  write_whole(directory_ / "fields" / "grains.pvd", collection_pvd(grain_files_));
+  if (options_.contacts) {
+    const std::string forces = fmt::format("forces_{:06}.vtp", frames_);
+    write_whole(directory_ / "fields" / forces, forces_vtp(frame));
+    force_files_.push_back({frame.time, 0, forces});
+    write_whole(directory_ / "fields" / "forces.pvd", collection_pvd(force_files_));
+  }
+  std::vector<FieldFile> all;
+  for (const FieldFile& file : grain_files_) all.push_back({file.time, 0, "fields/" + file.path});
+  for (const FieldFile& file : force_files_) all.push_back({file.time, 1, "fields/" + file.path});
+  write_whole(directory_ / "fields.pvd", collection_pvd(all));
+}
+
+void Recorder::draw_triaxial_picture() const {
+  if (!options_.pictures || curve_.empty()) return;
+  const std::vector<TriaxialReport> rows = curve_.rows();
+  TriaxialPicture picture;
+  picture.stage = rows.back().stage;
+  if (const auto found = axis_of_stage_.find(picture.stage); found != axis_of_stage_.end())
+    picture.axis = found->second;
+  write_whole(directory_ / "triaxial.svg", draw_triaxial(rows, picture));
+}
+
+}  // namespace talus::io

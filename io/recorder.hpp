@@ -1,0 +1,93 @@
+#pragma once
+
+/// Everything that a run leaves behind, in one place (docs/formats.md has the list of files).
+///
+///     Recorder recorder(directory, options, setup, provenance);        // run.json says "running"
+///     recorder.record_step(report, wall_reports, triaxial);            // every step: a line in each table
+///     recorder.record_frame(std::move(frame));                         // now and then: results.h5, fields,
+///     pictures recorder.finish(summary);                                        // the last lines; run.json
+///     says what came of it
+///
+/// Not locked: calls come one after the other, from one thread at a time (the service lane of the graph runs
+/// beside the steps and is such a thread). HDF5 allows no other thread in it meanwhile.
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/csv_writer.hpp"
+#include "io/results.hpp"
+#include "io/run_json.hpp"
+#include "io/vtk.hpp"
+#include "runtime/step/frame.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus::io {
+
+struct RecorderOptions {
+  bool frames = true;    ///< results.h5
+  bool fields = true;    ///< fields/ and fields.pvd
+  bool contacts = true;  ///< false: the frames and fields hold no contacts
+  bool pictures = true;  ///< triaxial.svg, forces.svg; the latter needs contacts
+};
+
+/// At most 2 x `capacity` rows of one stage, evenly spread over it, however long it lasts: when full, every
+/// second row is dropped and only every second one is taken from then on. For drawing.
+class ThinnedCurve {
+ public:
+  explicit ThinnedCurve(std::size_t capacity = 1000) : capacity_(capacity) {}
+  /// A row of another stage than the last one begins a new curve.
+  void add(const TriaxialReport& report);
+  /// The rows kept, and the newest one in any case.
+  std::vector<TriaxialReport> rows() const;
+  bool empty() const { return !newest_; }
+
+ private:
+  std::size_t capacity_;
+  std::size_t stride_ = 1, count_ = 0;
+  std::vector<TriaxialReport> kept_;
+  std::optional<TriaxialReport> newest_;
+};
+
+/// Writes the files of a run. All functions throw FileError naming the file that could not be written.
+class Recorder {
+ public:
+  /// `directory` is prepared (prepare_output_directory). Walls, and the axis of each stage for the pictures,
+  /// are those of `setup`.
+  Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
+           const Provenance& provenance);
+
+  /// A line in steps.csv, one per wall in walls.csv, and one in triaxial.csv if there is a report; that file
+  /// appears with its first line.
+  void record_step(const StepReport& report, std::span<const WallReport> walls,
+                   const std::optional<TriaxialReport>& triaxial);
+
+  /// Writes a state and lets go of it. Throws std::invalid_argument when its arrays do not fit together.
+  void record_frame(Frame&& frame);
+
+  /// Completes the tables and pictures and writes run.json with the summary (`frames` is filled in here).
+  /// Call once; also when the run failed, so that run.json does not stay at "running".
+  void finish(Summary summary);
+
+ private:
+  void write_fields(const Frame& frame);
+  void draw_triaxial_picture() const;
+
+  std::filesystem::path directory_;
+  RecorderOptions options_;
+  std::vector<Wall> walls_;
+  std::map<std::string, int> axis_of_stage_;
+  Provenance provenance_;
+  CsvFile steps_;
+  CsvFile wall_rows_;
+  std::optional<CsvFile> triaxial_;
+  std::optional<ResultsWriter> results_;
+  std::vector<FieldFile> grain_files_, force_files_;  ///< paths relative to fields/
+  ThinnedCurve curve_;
+  std::size_t frames_ = 0;
+};
+
+}  // namespace talus::io

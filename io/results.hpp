@@ -1,0 +1,56 @@
+#pragma once
+
+/// results.h5: the state at every output time, in full precision (layout: docs/formats.md).
+///
+///   /walls/name                  names, in the order of the setup
+///   /frames/000000               attributes step, time, stage
+///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3], omega [n,3] and orientation [n,4]
+///   where computed /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force
+///   [m,3] /frames/000000/walls         position [w], velocity [w], force [w,3]
+///
+/// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain: the
+/// low bits of doubles do not compress, and a plain array can be read by anything.
+///
+/// HDF5 is not built for threads: one thread of the process at a time, for writer and readers alike.
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "runtime/step/frame.hpp"
+
+namespace talus::io {
+
+/// Throws std::invalid_argument naming the array whose length does not fit the others; `omega` and
+/// `orientation` may be empty.
+void validate(const Frame& frame);
+
+/// Writes results.h5 frame by frame.
+/// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame
+/// gets its name last, when all of it is there: after a kill the file holds the frames before, unless the
+/// kill hit the few milliseconds in which the file's directory is written.
+class ResultsWriter {
+ public:
+  /// Replaces a file of that name. Throws FileError.
+  ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names);
+
+  /// Appends a frame; frame.walls are those of the constructor, in the same order. Throws FileError;
+  /// std::invalid_argument when the arrays do not fit together.
+  void append(const Frame& frame);
+
+  std::size_t frames_written() const { return frames_; }
+
+ private:
+  std::string path_;
+  std::vector<std::string> wall_names_;
+  std::size_t frames_ = 0;
+};
+
+/// Number of frames in a results.h5. Throws FileError when it is none.
+std::size_t frame_count(const std::filesystem::path& path);
+
+/// Frame `index`, bit for bit as it was written. Throws FileError when there is no such frame.
+Frame read_frame(const std::filesystem::path& path, std::size_t index);
+
+}  // namespace talus::io

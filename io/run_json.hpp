@@ -1,0 +1,61 @@
+#pragma once
+
+/// run.json: where a run's numbers come from, and what came of it (keys: docs/formats.md).
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace talus::io {
+
+/// Everything that is needed to repeat a run, or to understand why a repetition differs.
+struct Provenance {
+  std::string version;     ///< release of Talus
+  std::string git_hash;    ///< commit that was built, "unknown" outside a git checkout
+  bool git_dirty = false;  ///< true: the sources had changes that are in no commit
+  std::string compiler;    ///< name and version
+  std::string flags;
+  std::string build_type;
+  std::string host;
+  int cores_online = 0;       ///< of the machine
+  int cores_allowed = 0;      ///< in the affinity mask of the process at its start
+  int threads = 0;            ///< that compute
+  std::string omp_proc_bind;  ///< environment variable, "" when unset
+  std::string omp_places;     ///< environment variable, "" when unset
+  std::string date_utc;       ///< start, ISO 8601, e.g. 2024-05-31T12:00:00Z
+  std::vector<std::string> command_line;
+  std::uint64_t seed = 0;
+  std::string scene_file;
+};
+
+/// What is known of the build and of the machine now. The fields from `threads` on that describe the run,
+/// apart from the environment and the date, are for the caller to fill. Call it before threads are pinned:
+/// they narrow the affinity mask.
+Provenance collect_provenance();
+
+/// What came of the run.
+struct Summary {
+  std::string status = "running";  ///< "running", "done", "failed" or "stopped"
+  std::string message;             ///< why it failed or stopped
+  int exit_code = 0;
+  std::int64_t steps = 0;
+  double time = 0;           ///< [s] simulated
+  std::uint64_t digest = 0;  ///< talus::digest of the final state; written as 16 hexadecimal digits
+  std::int64_t converged_steps = 0;
+  std::int64_t unconverged_steps = 0;
+  double worst_error_rms = 0;   ///< over all steps
+  double worst_balance = 0;     ///< over all steps
+  std::int64_t iterations = 0;  ///< over all steps
+  double wall_s = 0;            ///< elapsed [s]
+  std::size_t bodies = 0;
+  std::size_t frames = 0;  ///< output times
+};
+
+/// The text of run.json. The digest of a run that is still running is null.
+std::string run_json(const Provenance& provenance, const Summary& summary);
+
+/// Writes run.json whole (write_whole). Throws FileError.
+void write_run_json(const std::filesystem::path& path, const Provenance& provenance, const Summary& summary);
+
+}  // namespace talus::io

@@ -1,0 +1,34 @@
+#pragma once
+
+/// Files for ParaView: grains and the force network as VTK PolyData, and the collections that give them their
+/// time. Numbers are 32-bit floats, since they are for looking at; results.h5 has the exact ones.
+
+#include <string>
+#include <vector>
+
+#include "runtime/step/frame.hpp"
+
+namespace talus::io {
+
+/// Text of a .vtp file with one vertex per body; point data id, radius [m], velocity [m/s], and omega [rad/s]
+/// and orientation (w, x, y, z) where the frame has them. The frame's time is in the field data `TimeValue`.
+std::string grains_vtp(const Frame& frame);
+
+/// Text of a .vtp file with one line per active contact: between the centres of its grains, or from the
+/// centre to the contact point at a wall. Lines do not share points, so that a Tube filter can take its
+/// radius from the point data normal_force [N]; cell data force [N] on the first body, gap [m], wall (index
+/// of the wall, -1 between grains). Throws std::invalid_argument when a contact names a body that the frame
+/// does not hold.
+std::string forces_vtp(const Frame& frame);
+
+/// One file of a collection.
+struct FieldFile {
+  double time = 0;   ///< [s]
+  int part = 0;      ///< files of the same time differ by their part
+  std::string path;  ///< relative to the collection
+};
+
+/// Text of a .pvd file.
+std::string collection_pvd(const std::vector<FieldFile>& files);
+
+}  // namespace talus::io
