@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
+#include <memory>
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
 #include "io/error.hpp"
+#include "io/output_directory.hpp"
 #include "io/progress.hpp"
 #include "io/recorder.hpp"
 #include "io/run_json.hpp"
@@ -104,16 +106,12 @@ struct Tally {
   std::int64_t unconverged = 0;
   std::int64_t iterations = 0;
   double worst_error = 0;
-  std::int64_t worst_step = 0;
   double worst_balance = 0;
 
   void add(const StepReport& report) {
     iterations += report.iterations;
     if (!report.converged) ++unconverged;
-    if (report.error_rms > worst_error) {
-      worst_error = report.error_rms;
-      worst_step = report.step;
-    }
+    worst_error = std::max(worst_error, report.error_rms);
     worst_balance = std::max(worst_balance, report.balance);
   }
 };
@@ -127,10 +125,10 @@ void print_start(const io::Scene& scene, const Bodies& bodies, int threads) {
     fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
 }
 
-/// Runs the steps; returns what ended them: nothing, or the reason why the run is not whole.
-std::string advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-                    RecorderFeed& feed, Tally& tally) {
-  io::Progress progress;
+/// Runs the steps; returns the signal that stopped them, or 0.
+int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
+            RecorderFeed& feed, Tally& tally) {
+  io::Progress progress = io::progress_on_stderr();
   FrameClock clock(output);
   if (output.stage_frames) feed.frame(simulation.frame(output.contacts));
   while (!simulation.finished()) {
@@ -144,81 +142,101 @@ std::string advance(Simulation& simulation, const RunOptions& options, const io:
     progress.update(report, simulation.stage().name, simulation.stage_fraction());
     if (const int signal = stop_signal.load(); signal != 0) {
       progress.finish();
-      return fmt::format("stopped by signal {} after step {}", signal, report.step);
+      return signal;
     }
     if (last) break;
     simulation.begin_next_stage();
   }
   progress.finish();
-  return {};
+  return 0;
 }
 
-int run_scene(const RunOptions& options, io::Scene& scene, Bodies bodies) {
-  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
-  const std::string directory = options.out.empty() ? scene.output.directory : options.out;
-  std::vector<std::string> wall_names;
-  for (const Wall& wall : scene.setup.walls) wall_names.push_back(wall.name);
-
-  io::Provenance provenance = io::collect_provenance(options.command_line, threads);
-  provenance.seed = scene.setup.seed;
-  provenance.scene_file = scene.source_file;
-  io::Recorder recorder(directory,
-                        {.force = options.force,
-                         .fields = scene.output.fields,
-                         .contacts = scene.output.contacts,
-                         .pictures = scene.output.pictures},
-                        wall_names, provenance, io::resolved_scene(scene));
+/// Takes the run to its end, or to what breaks it off; the summary says which.
+io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
+                     io::Recorder& recorder) {
+  Stopwatch watch;
+  io::Summary summary;
+  summary.bodies = bodies.size();
+  summary.status = "done";
+  Tally tally;
+  const auto failed = [&summary](const std::exception& error) {
+    summary.status = "failed";
+    summary.message = error.what();
+    summary.exit_code = exit_failure;
+  };
   graph::Executor executor({.threads = threads});
   Simulation simulation(scene.setup, std::move(bodies), executor);
-  Stopwatch watch;
-  Tally tally;
-  io::Summary summary;
   RecorderFeed feed(executor, recorder);
-  int code = exit_done;
   try {
-    summary.reason = advance(simulation, options, scene.output, feed, tally);
-    if (!summary.reason.empty()) code = exit_failure;
+    if (const int signal = advance(simulation, options, scene.output, feed, tally); signal != 0) {
+      summary.status = "stopped";
+      summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
+      summary.exit_code = exit_failure;
+    }
   } catch (const std::exception& error) {
-    summary.reason = error.what();
-    code = exit_failure;
+    failed(error);
   }
   try {
     feed.flush();
     executor.drain();
   } catch (const std::exception& error) {
-    summary.reason = error.what();
-    code = exit_failure;
+    failed(error);
   }
-  if (code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
-    code = exit_tolerance_missed;
-
-  const StepReport& report = simulation.report();
-  summary.status = code == exit_failure ? "failed" : "done";
-  summary.exit_code = code;
-  summary.steps = report.step;
-  summary.time = report.time;
+  if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
+    summary.exit_code = exit_tolerance_missed;
+  summary.steps = simulation.report().step;
+  summary.time = simulation.report().time;
   summary.digest = digest(simulation.state().bodies);
   summary.iterations = tally.iterations;
   summary.unconverged_steps = tally.unconverged;
-  summary.worst_error = tally.worst_error;
-  summary.worst_error_step = tally.worst_step;
+  summary.converged_steps = summary.steps - tally.unconverged;
+  summary.worst_error_rms = tally.worst_error;
   summary.worst_balance = tally.worst_balance;
   summary.wall_s = watch.seconds();
-  summary.bytes = memory_used(simulation.state());
-  recorder.finish(summary);
+  return summary;
+}
 
-  if (!summary.reason.empty()) fmt::print(stderr, "talus: error: {}\n", summary.reason);
-  fmt::print(stderr, "talus: {} steps, {:.6g} s simulated in {:.1f} s, {} sweeps\n", report.step, report.time,
-             summary.wall_s, tally.iterations);
-  if (tally.unconverged > 0)
-    fmt::print(stderr,
-               "talus: {} of {} steps missed the tolerance (worst error {:.2e} at step {}, worst balance "
-               "{:.2e}); see `converged` in "
-               "steps.csv. Raise solver.max_iterations, reduce time_step, or allow it with allow_unconverged "
-               "= true\n",
-               tally.unconverged, report.step, tally.worst_error, tally.worst_step, tally.worst_balance);
+void print_end(const io::Summary& summary, const std::string& directory) {
+  if (!summary.message.empty())
+    fmt::print(stderr, "talus: {}: {}\n", summary.status == "failed" ? "error" : "stopped", summary.message);
+  fmt::print(stderr, "talus: {} steps, {:.6g} s simulated in {:.1f} s, {} sweeps, digest {:016x}\n",
+             summary.steps, summary.time, summary.wall_s, summary.iterations, summary.digest);
+  if (summary.unconverged_steps > 0)
+    fmt::print(
+        stderr,
+        "talus: {} of {} steps missed the tolerance (worst error {:.2e}, worst balance {:.2e}): `converged` "
+        "in steps.csv says which. "
+        "Raise solver.max_iterations, reduce time_step, or accept them with allow_unconverged = true\n",
+        summary.unconverged_steps, summary.steps, summary.worst_error_rms, summary.worst_balance);
   fmt::print(stderr, "talus: results in {}\n", directory);
-  return code;
+}
+
+int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies) {
+  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  const std::string directory = options.out.empty() ? scene.output.directory : options.out;
+  io::Provenance provenance = io::collect_provenance();
+  provenance.threads = threads;
+  provenance.command_line = options.command_line;
+  provenance.seed = scene.setup.seed;
+  provenance.scene_file = scene.source_file;
+  const io::RecorderOptions files{.frames = true,
+                                  .fields = scene.output.fields,
+                                  .contacts = scene.output.contacts,
+                                  .pictures = scene.output.pictures};
+  std::unique_ptr<io::Recorder> recorder;
+  try {
+    io::prepare_output_directory(directory, options.force);
+    recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
+    io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
+  } catch (const io::FileError& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
+  print_start(scene, bodies, threads);
+  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, *recorder);
+  recorder->finish(summary);
+  print_end(summary, directory);
+  return summary.exit_code;
 }
 
 }  // namespace
@@ -246,14 +264,10 @@ int run_command(const RunOptions& options) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   }
-  print_start(scene, bodies, options.threads > 0 ? options.threads : omp_get_num_procs());
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
     return run_scene(options, scene, std::move(bodies));
-  } catch (const io::DirectoryError& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
-    return exit_bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_failure;
