@@ -147,9 +147,9 @@ void draw_walls(Svg& svg, const View& view, const Frame& frame, std::span<const 
   }
 }
 
-/// Width of a line [px]: proportional to the force, five mean forces are as wide as a mean grain's radius.
+/// Width of a line [px]: proportional to the force, five mean forces are as wide as 0.6 mean radii.
 double line_width(double normal, const Slab& slab, const View& view) {
-  return std::clamp(normal / slab.mean_force, 0.0, 5.0) / 5 * slab.mean_radius * view.scale;
+  return std::clamp(normal / slab.mean_force, 0.0, 5.0) / 5 * 0.6 * slab.mean_radius * view.scale;
 }
 
 std::string_view line_colour(double normal, double mean) {

@@ -107,7 +107,8 @@ std::string draw_triaxial(std::span<const TriaxialReport> reports, const Triaxia
   svg.text(left, 54, rows.empty() ? "No data yet" : findings(rows), {13, style::soft_ink});
   const std::vector<double> strain_ticks = ticks_of(rows, &Row::strain, 8);
   draw_panel(svg, {80, 320, &Row::stress_ratio, "q / p  [1]", style::blue}, rows, strain_ticks);
-  draw_panel(svg, {350, 570, &Row::volume_strain, "volume strain  [%]", style::orange}, rows, strain_ticks);
+  draw_panel(svg, {350, 570, &Row::volume_strain, "volume strain, dilation +  [%]", style::orange}, rows,
+             strain_ticks);
   for (const double tick : strain_ticks) {
     svg.text(place(tick, strain_ticks, left, right), 590, tick_text(tick, strain_ticks[1] - strain_ticks[0]),
              {12, style::soft_ink, "middle"});
@@ -115,7 +116,6 @@ std::string draw_triaxial(std::span<const TriaxialReport> reports, const Triaxia
   svg.text((left + right) / 2, 616,
            fmt::format("axial strain along {}, compression positive  [%]", "xyz"[options.axis]),
            {13, style::ink, "middle", true});
-  svg.text(right, 366, "dilation upwards", {11, style::soft_ink, "end"});
   return svg.finish();
 }
 

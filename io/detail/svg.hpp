@@ -15,8 +15,8 @@ inline constexpr std::string_view soft_ink = "#66727f";
 inline constexpr std::string_view grid = "#e4e8ec";
 inline constexpr std::string_view blue = "#1d5fa8";
 inline constexpr std::string_view orange = "#c8511b";
-inline constexpr std::string_view grain_fill = "#eef1f4";
-inline constexpr std::string_view grain_edge = "#c3cbd3";
+inline constexpr std::string_view grain_fill = "#f1f4f7";
+inline constexpr std::string_view grain_edge = "#a9b4bf";
 }  // namespace style
 
 struct Stroke {

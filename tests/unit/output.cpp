@@ -1,10 +1,8 @@
 // The directory of a run, its tables, run.json, the progress line, and the recorder that ties them together.
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <bit>
-#include <csignal>
 #include <nlohmann/json.hpp>
 
 #include "io/csv_writer.hpp"
@@ -24,27 +22,6 @@ using namespace talus::test;
 void touch(const fs::path& path) {
   std::ofstream(path) << "mine";
 }
-
-/// While it lives, files of this process cannot grow beyond `bytes`: what a full disk or a quota looks like.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    ::getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit limit = before_;
-    limit.rlim_cur = bytes;
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-  ~FileSizeLimit() {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
 
 TEST(OutputDirectory, IsCreatedWithItsParents) {
   const ScratchDirectory scratch;

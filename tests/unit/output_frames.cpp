@@ -108,6 +108,27 @@ TEST(Results, RefuseAFrameWhoseArraysDoNotFit) {
   EXPECT_EQ(frame_count(scratch / "results.h5"), 0u);
 }
 
+TEST(Results, KeepTheFramesBeforeTheDiskWasFull) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  writer.append(three_grains());
+  Frame large = three_grains();
+  large.id.resize(100000);
+  large.x.resize(100000);
+  large.radius.resize(100000);
+  large.u.resize(100000);
+  large.omega.resize(100000);
+  std::string message;
+  {
+    const FileSizeLimit limit(100000);
+    message = message_of<FileError>([&] { writer.append(large); });
+  }
+  EXPECT_NE(message.find((scratch / "results.h5").string()), std::string::npos) << message;
+  EXPECT_EQ(writer.frames_written(), 1u);
+  ASSERT_EQ(frame_count(scratch / "results.h5"), 1u);
+  expect_same(read_frame(scratch / "results.h5", 0), three_grains());
+}
+
 TEST(Results, ErrorsNameTheFile) {
   const ScratchDirectory scratch;
   const auto names = [](const std::string& message, const fs::path& path) {
