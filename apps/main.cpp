@@ -3,6 +3,7 @@
 #include "apps/exit_codes.hpp"
 #include "apps/plan.hpp"
 #include "apps/run.hpp"
+#include "apps/solve.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
 
@@ -32,6 +33,17 @@ int main(int argc, char** argv) {
   plan_app->add_option("--set", plan.overrides, "override a key of the scene: a.b=c")
       ->allow_extra_args(false);
 
+  SolveOptions solve;
+  CLI::App* solve_app = app.add_subcommand("solve", "solve a contact problem of an FCLIB file");
+  solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->required();
+  solve_app->add_option("--tol", solve.tol, "tolerance on the error of fc3d_compute_error")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  solve_app->add_option("--max-seconds", solve.max_seconds, "give up after so many seconds")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file");
+
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
 
@@ -42,6 +54,7 @@ int main(int argc, char** argv) {
   }
   if (*run_app) return run_command(run);
   if (*plan_app) return plan_command(plan);
+  if (*solve_app) return solve_command(solve);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
 }

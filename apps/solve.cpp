@@ -12,7 +12,7 @@
 #include "io/fclib.hpp"
 #include "kernels/delassus.hpp"
 
-namespace talus::apps {
+namespace talus {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -76,4 +76,4 @@ int solve_command(const SolveOptions& options) {
   }
 }
 
-}  // namespace talus::apps
+}  // namespace talus

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-namespace talus::apps {
+namespace talus {
 
 /// `talus solve`: one FCLIB problem.
 struct SolveOptions {
@@ -17,4 +17,4 @@ struct SolveOptions {
 /// failure, 2 bad input, 3 tolerance missed (the answer is written all the same).
 int solve_command(const SolveOptions& options);
 
-}  // namespace talus::apps
+}  // namespace talus
