@@ -313,7 +313,7 @@ int main(int argc, char** argv) {
     fmt::print(
         "| -----: | ------: | ------------------------------ | --------: | --------: | ---------: | "
         "---------: |\n");
-    for (const int n : {4, 6}) print_table(make_grid(n), links, links == 0 ? 100 : 4, repeats);
+    for (const int n : {4, 6, 8}) print_table(make_grid(n), links, links == 0 ? 100 : 20, repeats);
   }
   fmt::print("\n");
   for (const int threads : {1, 2, 8}) print_plan(make_grid(6), threads, repeats);
