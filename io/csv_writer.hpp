@@ -24,9 +24,9 @@ void append_walls_row(std::string& text, const StepReport& report, const WallRep
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
 
 /// A file that grows by whole lines.
-/// Lines are handed to the system when half a second or 32 KiB have gathered, always up to the end of a line,
-/// so that a killed run leaves a table that can be read, at most half a second short. A call costs no system
-/// call otherwise.
+/// commit() hands lines to the system when half a second has passed since the last time, or 32 KiB have
+/// gathered, always up to the end of a line: a killed run leaves a table that lacks at most the lines of half
+/// a second (a kill in the middle of a write may cut one). A call costs no system call otherwise.
 class CsvFile {
  public:
   /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.

@@ -235,6 +235,9 @@ void ResultsWriter::append(const Frame& frame) {
     write_bodies({create_group(place, "bodies").id(), path_}, frame);
     write_contacts({create_group(place, "contacts").id(), path_}, frame);
     write_walls({create_group(place, "walls").id(), path_}, frame);
+    // All of it on its way to the disk before its name is, or a kill in between could leave a name of
+    // nothing.
+    demand(H5Fflush(file.id(), H5F_SCOPE_LOCAL), path_, "writing to disk");
     const std::string name = "/frames/" + frame_name(frames_);
     demand(H5Olink(group.id(), file.id(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT), path_,
            "naming frame " + name);
