@@ -59,10 +59,10 @@ struct DelassusError {
 DelassusError delassus_error(const DelassusProblem& problem, std::span<const double> r, std::span<double> u);
 
 struct NlgsOptions {
-  double tolerance = 1e-4;                   ///< on DelassusError::siconos; 0 runs until the limit
+  double tolerance = 1e-4;                   ///< on DelassusError::siconos; 0 runs until a limit
   std::int64_t max_iterations = 10'000'000;  ///< sweeps, > 0
-  std::function<bool()>
-      stop;  ///< asked at every check; true ends the solve. For time limits: kernels own no clock
+  /// Asked at every check; true ends the solve. For time limits: kernels own no clock.
+  std::function<bool()> stop = {};
 };
 
 struct NlgsCheck {
