@@ -109,6 +109,29 @@ TEST(Nlgs, FloorPulledAwayFasterThanFrictionHoldsSlidesUnderTheTower) {
   EXPECT_NEAR(u[22], 2.5, 1e-9);
 }
 
+TEST(Nlgs, MomentumAndDampingReachTheAnswerOfThePlainSweepInFarFewer) {
+  const Tower t = tower(40);
+  const auto p = assemble_delassus(t.entries, t.q, t.mu);
+  std::vector<double> plain(120, 0.0), fast(120, 0.0);
+  const auto slow_report = solve_nlgs(p, {.tolerance = 1e-10, .damping = 0, .momentum = 0}, plain);
+  const auto fast_report = solve_nlgs(p, {.tolerance = 1e-10}, fast);
+  EXPECT_TRUE(slow_report.converged && fast_report.converged);
+  EXPECT_LT(5 * fast_report.iterations, slow_report.iterations);
+  for (std::size_t c = 0; c < 40; ++c) EXPECT_NEAR(fast[3 * c], plain[3 * c], 1e-5);
+}
+
+TEST(Nlgs, GoesBackToItsBestAnswerWhenItStalls) {
+  // Contact 1 has no solution: the error cannot fall, and the sweeps after the best one must not lose it.
+  const std::vector<MatrixEntry> entries = {{0, 0, 1.0}, {1, 1, 1.0}, {2, 2, 1.0}, {0, 3, 0.1}};
+  const auto p =
+      assemble_delassus(entries, std::vector<double>{-1, 0, 0, -1, 0, 0}, std::vector<double>{0.3, 0.3});
+  std::vector<double> r(6, 0.0), u(6);
+  const auto report = solve_nlgs(p, {.tolerance = 1e-6, .max_iterations = 5000}, r);
+  EXPECT_FALSE(report.converged);
+  EXPECT_GE(report.rescues, 3);
+  EXPECT_EQ(delassus_error(p, r, u).siconos, report.error.siconos);
+}
+
 TEST(Nlgs, ReportsAMissedToleranceAndHandsBackItsBestAnswer) {
   const Tower t = tower(50);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
