@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -26,16 +27,79 @@ Vec3 velocity_from_others(const DelassusProblem& p, std::span<const double> r, s
   return u;
 }
 
+/// What of the blocks the damped law needs.
+struct DampedBlocks {
+  std::vector<LocalBlock> block;  ///< W_cc + hold I
+  std::vector<double> hold;       ///< damping D_c [1/kg]
+};
+
+/// D_c, trace(W_cc)/3 where that is positive.
+double mean_diagonal(const LocalBlock& block) {
+  return std::max(0.0, block.W.trace() / 3);
+}
+
+DampedBlocks damped_blocks(const DelassusProblem& p, double damping) {
+  DampedBlocks d;
+  d.block.reserve(p.contacts());
+  d.hold.reserve(p.contacts());
+  for (const LocalBlock& own : p.diagonal) {
+    d.hold.push_back(damping * mean_diagonal(own));
+    d.block.push_back(local_block(own.W + d.hold.back() * Mat3::Identity(), own.mu));
+  }
+  return d;
+}
+
 /// One sweep; returns the number of contacts whose law had no solution.
-std::int64_t sweep(const DelassusProblem& p, std::span<double> r) {
+std::int64_t sweep(const DelassusProblem& p, const DampedBlocks& damped, std::span<double> r) {
   std::int64_t failed = 0;
   for (std::size_t a = 0; a < p.contacts(); ++a) {
-    const LocalSolution s = solve_local(p.diagonal[a], velocity_from_others(p, r, a), at(r, a));
+    const Vec3 old = at(r, a);
+    const Vec3 q = velocity_from_others(p, r, a) - damped.hold[a] * old;
+    const LocalSolution s = solve_local(damped.block[a], q, old);
     put(r, a, s.r);
     failed += s.status == LocalStatus::failed;
   }
   return failed;
 }
+
+/// Nesterov's momentum for a fixed-point iteration, with its two reasons to begin anew.
+class Momentum {
+ public:
+  /// Forgets the past; no factor above `limit` from now on.
+  void restart(double limit) {
+    limit_ = limit;
+    t_ = 1;
+    last_step_ = std::numeric_limits<double>::infinity();
+  }
+
+  /// Turns `start` (where the sweep began) into the start of the next one. `r`: what the sweep made of it;
+  /// `previous`: the result of the sweep before, replaced by r. `weight`: D_c, one per contact.
+  void advance(std::span<const double> r, std::span<const double> weight, std::span<double> previous,
+               std::span<double> start) {
+    double turned_back = 0, step = 0;
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      const double back = start[k] - r[k];
+      turned_back += weight[k / 3] * back * (r[k] - previous[k]);
+      step += weight[k / 3] * back * back;
+    }
+    const double t = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
+    double factor = std::min(limit_, (t_ - 1) / t);
+    t_ = t;
+    if (turned_back > 0 || step > 2 * last_step_) {
+      factor = 0;
+      t_ = 1;
+    }
+    last_step_ = step;
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      start[k] = r[k] + factor * (r[k] - previous[k]);
+      previous[k] = r[k];
+    }
+  }
+
+ private:
+  double limit_ = 1, t_ = 1;
+  double last_step_ = std::numeric_limits<double>::infinity();  ///< squared
+};
 
 /// Sums of squares of the natural map and of the three vectors it is compared with.
 struct SquaredNorms {
@@ -127,26 +191,47 @@ DelassusError delassus_error(const DelassusProblem& problem, std::span<const dou
 }
 
 NlgsReport solve_nlgs(const DelassusProblem& problem, const NlgsOptions& options, std::span<double> r) {
-  std::vector<double> u(r.size()), best(r.begin(), r.end());
+  std::vector<double> u(r.size()), best(r.begin(), r.end()), start(best), previous(best), weight;
+  for (const LocalBlock& block : problem.diagonal) weight.push_back(mean_diagonal(block));
   NlgsReport report;
   report.error = delassus_error(problem, r, u);
   report.history.push_back({0, report.error});
   report.converged = report.error.siconos <= options.tolerance;
-  std::int64_t next_check = 1;
-  while (!report.converged && report.iterations < options.max_iterations) {
-    report.failed_contacts = sweep(problem, r);
-    ++report.iterations;
-    if (report.iterations < next_check && report.iterations < options.max_iterations) continue;
-    next_check = report.iterations + std::clamp<std::int64_t>(report.iterations / 10, 1, 50);
 
-    const DelassusError error = delassus_error(problem, r, u);
-    report.history.push_back({report.iterations, error});
-    if (error.siconos < report.error.siconos) {
-      report.error = error;
-      std::copy(r.begin(), r.end(), best.begin());
+  // The first sweep is not damped: contacts that do not touch each other are then solved at once.
+  DampedBlocks blocks{problem.diagonal, std::vector<double>(problem.contacts(), 0.0)};
+  Momentum momentum;
+  momentum.restart(options.momentum);
+  bool stopped = false;
+  std::int64_t next_check = 1, best_iteration = 0, phase_begin = 0;
+  while (!report.converged && !stopped && report.iterations < options.max_iterations) {
+    std::copy(start.begin(), start.end(), r.begin());
+    report.failed_contacts = sweep(problem, blocks, r);
+    if (++report.iterations == 1 && options.damping > 0) blocks = damped_blocks(problem, options.damping);
+    stopped = options.stop && options.stop();
+
+    if (report.iterations >= next_check || report.iterations == options.max_iterations || stopped) {
+      next_check = report.iterations + std::clamp<std::int64_t>(report.iterations / 10, 1, 50);
+      const DelassusError error = delassus_error(problem, r, u);
+      report.history.push_back({report.iterations, error});
+      if (error.siconos < report.error.siconos) {
+        report.error = error;
+        best_iteration = report.iterations;
+        std::copy(r.begin(), r.end(), best.begin());
+      }
+      report.converged = error.siconos <= options.tolerance;
     }
-    report.converged = error.siconos <= options.tolerance;
-    if (options.stop && options.stop()) break;
+
+    if (report.iterations - std::max(best_iteration, phase_begin) >
+        std::max<std::int64_t>(1000, best_iteration)) {
+      constexpr double limits[] = {1, 0.9, 0};
+      momentum.restart(std::min(options.momentum, limits[++report.rescues % 3]));
+      phase_begin = report.iterations;
+      start = best;
+      previous = best;
+    } else {
+      momentum.advance(r, weight, previous, start);
+    }
   }
   std::copy(best.begin(), best.end(), r.begin());
   return report;
