@@ -112,8 +112,8 @@ inline V3 project_on_cone(V3 z, V3 n, double mu) {
   const double z_n = dot(z, n);
   const V3 t = z - z_n * n;
   const double length = std::sqrt(dot(t, t));
+  if (mu * length <= -z_n) return {0, 0, 0};  // first: with mu = 0 = length the other one would hold, too
   if (length <= mu * z_n) return z;
-  if (mu * length <= -z_n) return {0, 0, 0};
   const double r_n = (z_n + mu * length) / (1 + mu * mu);
   return r_n * n + (mu * r_n / length) * t;
 }
