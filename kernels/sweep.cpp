@@ -80,11 +80,17 @@ inline void push(Velocity& a, WallCopy& wall, V3 n, V3 dr) {
   if constexpr (Friction) add_to(a.w, -a.spin_mobility * cross(n, dr));
 }
 
+/// max(0, value) without a branch: which contacts are open is hard to predict, and std::max on constants is
+/// compiled to a jump.
+inline double positive_part(double value) {
+  return value > 0.0 ? value : 0.0;
+}
+
 /// Closed form of Signorini-Coulomb with a diagonal W: the new impulse.
 template <bool Friction>
 inline V3 solve_law(V3 r, V3 v, V3 n, double bias, double w_nn, double w_tt, double mu) {
   const double r_n = dot(r, n), v_n = dot(v, n);
-  const double r_n_new = std::max(0.0, r_n - (v_n + bias) / w_nn);
+  const double r_n_new = positive_part(r_n - (v_n + bias) / w_nn);
   if constexpr (!Friction) {
     return r_n_new * n;
   } else {

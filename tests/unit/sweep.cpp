@@ -280,7 +280,7 @@ double natural_map(const Vec3& r, const Vec3& v, const Vec3& n, double bias, dou
     nearest = on_edge;
     distance = (z - on_edge).norm();
   }
-  if (z_t.norm() <= mu * z.dot(n)) nearest = z;
+  if (z.dot(n) >= 0 && z_t.norm() <= mu * z.dot(n)) nearest = z;
   return w_nn * (r - nearest).norm();
 }
 
@@ -313,6 +313,17 @@ TEST(NaturalMap, IsZeroAtTheExactSolution) {
     const ErrorSums sums = error_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
     EXPECT_LE(sums.residual_max, 200 * eps * (1 + one.velocity[0].inv_mass + one.velocity[1].inv_mass));
   }
+}
+
+// A ball that leaves a smooth wall straight up, in a scene where grains rub: mu = 0 and nothing tangential.
+TEST(NaturalMap, IsZeroForAnOpenContactWithoutFrictionOrTangentialVelocity) {
+  Random random(1);
+  OneContact one(random, true);
+  one.contacts.nx = one.contacts.ny = one.contacts.rx = one.contacts.ry = one.contacts.rz = {0};
+  one.contacts.nz = {1};
+  one.velocity[0] = {{0, 0, 3}, {0, 0, 0}, 1, 2.5};
+  one.contacts.bias = {0};
+  EXPECT_EQ(error_wall<true>(one.contacts, {0, 1}, one.velocity, 0, {}, 0).residual_max, 0);
 }
 
 TEST(NaturalMap, FallsByOrdersOfMagnitudeAsAPackingIsSwept) {
