@@ -101,7 +101,8 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   }
   // The coarsest level is fitted to the largest body; even samples then have one level and cells that are not
   // too large.
-  const int levels = std::min(32, 1 + static_cast<int>(std::floor(std::log2(largest / smallest))));
+  // In floating point up to the bound: a reach may be infinite in a step that ends as a runaway.
+  const int levels = 1 + static_cast<int>(std::min(31.0, std::floor(std::log2(largest / smallest))));
   grid.cell_size.resize(static_cast<std::size_t>(levels));
   for (int level = 0; level < levels; ++level)
     grid.cell_size[static_cast<std::size_t>(level)] =

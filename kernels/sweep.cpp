@@ -80,11 +80,25 @@ inline void push(Velocity& a, WallCopy& wall, V3 n, V3 dr) {
   if constexpr (Friction) add_to(a.w, -a.spin_mobility * cross(n, dr));
 }
 
+/// max(0, value) without a jump, as nobody can predict which contacts are open; a NaN stays one.
+inline double positive_part(double value) {
+  return 0.5 * (value + std::abs(value));
+}
+
+/// Asks for the bodies of a contact two batches ahead: they are scattered, so that the processor does not see
+/// them coming, and with 200,000 grains they stand beyond its second cache.
+inline void prefetch_bodies(const Contacts& c, std::size_t k, std::size_t end,
+                            std::span<const Velocity> velocity) {
+  const std::size_t ahead = std::min(k + 16, end - 1);
+  __builtin_prefetch(&velocity[static_cast<std::size_t>(c.first[ahead])], 1);
+  __builtin_prefetch(&velocity[static_cast<std::size_t>(c.second[ahead])], 1);
+}
+
 /// Closed form of Signorini-Coulomb with a diagonal W: the new impulse.
 template <bool Friction>
 inline V3 solve_law(V3 r, V3 v, V3 n, double bias, double w_nn, double w_tt, double mu) {
   const double r_n = dot(r, n), v_n = dot(v, n);
-  const double r_n_new = std::max(0.0, r_n - (v_n + bias) / w_nn);
+  const double r_n_new = positive_part(r_n - (v_n + bias) / w_nn);
   if constexpr (!Friction) {
     return r_n_new * n;
   } else {
@@ -112,8 +126,8 @@ inline V3 project_on_cone(V3 z, V3 n, double mu) {
   const double z_n = dot(z, n);
   const V3 t = z - z_n * n;
   const double length = std::sqrt(dot(t, t));
+  if (mu * length <= -z_n) return {0, 0, 0};  // first: with mu = 0 = length the other one would hold, too
   if (length <= mu * z_n) return z;
-  if (mu * length <= -z_n) return {0, 0, 0};
   const double r_n = (z_n + mu * length) / (1 + mu * mu);
   return r_n * n + (mu * r_n / length) * t;
 }
@@ -147,6 +161,7 @@ inline void add_error(ErrorSums& sums, V3 r, V3 v, V3 n, double bias, double w_n
 template <bool Friction>
 void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
+    prefetch_bodies(contacts, k, range.end, velocity);
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
     const V3 n = normal_of(contacts, k);
@@ -176,6 +191,7 @@ void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velo
 template <bool Friction>
 void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
+    prefetch_bodies(contacts, k, range.end, velocity);
     const V3 n = normal_of(contacts, k);
     push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])],
                    velocity[static_cast<std::size_t>(contacts.second[k])], n,

@@ -1,0 +1,185 @@
+#include "kernels/broad_phase.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/motion.hpp"
+#include "tests/unit/dense_sample.hpp"
+
+namespace talus {
+namespace {
+
+using test::pairs_by_brute_force;
+using test::Random;
+using test::uniform;
+using test::uniform_vector;
+
+/// All pairs, from cells dealt to three parts of unequal size, as threads would.
+std::vector<GrainPair> pairs_from_cells(std::span<const Vec3> x, std::span<const double> reach) {
+  const CellGrid grid = build_cells(x, reach);
+  const std::size_t n = grid.cells.size();
+  std::vector<std::vector<GrainPair>> parts(3);
+  find_pairs(grid, x, reach, 0, n / 7, parts[1]);
+  find_pairs(grid, x, reach, n / 7, n / 2, parts[2]);
+  find_pairs(grid, x, reach, n / 2, n, parts[0]);
+  return sort_pairs(parts, x.size());
+}
+
+/// Equal lists: none is missing, none comes twice, the order is that of (first, second).
+void expect_all_pairs(const std::vector<Vec3>& x, const std::vector<double>& reach) {
+  const std::vector<GrainPair> expected = pairs_by_brute_force(x, reach);
+  const std::vector<GrainPair> found = pairs_from_cells(x, reach);
+  EXPECT_EQ(found.size(), expected.size());
+  EXPECT_TRUE(found == expected);
+}
+
+struct Cloud {
+  std::vector<Vec3> x;
+  std::vector<double> reach;
+};
+
+/// Radii between 1 and `ratio`, as many small ones as volume would have it; room for some thousand pairs.
+Cloud polydisperse_cloud(std::size_t count, double ratio, std::uint64_t seed) {
+  Random random(seed);
+  Cloud cloud;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double r = k % 50 == 0 ? uniform(random, 0.3, 1.0) * ratio : uniform(random, 1, 1.5);
+    cloud.reach.push_back(r);
+    cloud.x.push_back(uniform_vector(random, -4 * ratio, 4 * ratio));
+    // Every third body sits on the surface of the last large one, where cells of different levels meet.
+    if (k % 3 == 1)
+      cloud.x.back() = cloud.x[k / 50 * 50] + uniform_vector(random, -1, 1).normalized() *
+                                                  (cloud.reach[k / 50 * 50] + r + uniform(random, -0.5, 0.5));
+  }
+  return cloud;
+}
+
+TEST(BroadPhase, FindsEveryPairOfAUniformCloudOnce) {
+  for (std::uint64_t seed : {1, 2, 3}) {
+    Random random(seed);
+    Cloud cloud;
+    for (int k = 0; k < 1500; ++k) {
+      cloud.x.push_back(uniform_vector(random, -12, 9));
+      cloud.reach.push_back(uniform(random, 0.5, 0.9));
+    }
+    expect_all_pairs(cloud.x, cloud.reach);
+  }
+}
+
+TEST(BroadPhase, FindsEveryPairOfADensePacking) {
+  const Bodies bodies = test::jittered_lattice(11, 5);
+  std::vector<double> reach = bodies.radius;
+  for (double& r : reach) r += 0.05;
+  EXPECT_GT(pairs_by_brute_force(bodies.x, reach).size(), 2 * bodies.size());
+  expect_all_pairs(bodies.x, reach);
+}
+
+TEST(BroadPhase, FindsEveryPairBetweenRadiiOneToAHundredAndToAThousand) {
+  for (double ratio : {2.0, 3.99, 100.0, 1000.0}) {
+    const Cloud cloud = polydisperse_cloud(1500, ratio, 17);
+    EXPECT_GT(pairs_by_brute_force(cloud.x, cloud.reach).size(), 300u) << "ratio " << ratio;
+    expect_all_pairs(cloud.x, cloud.reach);
+  }
+}
+
+// Equal spheres at exactly the size of a cell, 2e5 cells from the origin: the quotient's rounding decides
+// between cells k and k + 2.
+TEST(BroadPhase, LosesNoPairToRoundingOnAnExactLattice) {
+  for (double spacing : {0.1, 1.0 / 3, 0.7, 0.3}) {
+    std::vector<Vec3> x;
+    for (int k = 0; k < 2000; ++k)
+      x.push_back(spacing * Vec3(k % 10 + (k < 1100 ? 0 : 210000), k / 10 % 10,
+                                 k / 100 % 10 - (k < 1100 ? 0 : 250000)));
+    const std::vector<double> reach(x.size(), 0.5 * spacing * (1 + 1e-11));
+    expect_all_pairs(x, reach);
+  }
+}
+
+TEST(BroadPhase, AllBodiesInOnePointArePairsOfEachOther) {
+  const std::vector<Vec3> x(60, Vec3(1, -2, 3));
+  const std::vector<double> reach(60, 0.25);
+  const auto found = pairs_from_cells(x, reach);
+  EXPECT_EQ(found.size(), 60u * 59u / 2);
+  expect_all_pairs(x, reach);
+}
+
+TEST(BroadPhase, OneBodyAndNoBodyHaveNoPairs) {
+  EXPECT_TRUE(pairs_from_cells({}, {}).empty());
+  EXPECT_TRUE(pairs_from_cells(std::vector<Vec3>{{1, 2, 3}}, std::vector<double>{1.0}).empty());
+}
+
+TEST(BroadPhase, BodiesThatFlewABillionMetresAwayDisturbNobody) {
+  Bodies bodies = test::jittered_lattice(8, 9);
+  std::vector<double> reach = bodies.radius;
+  for (double& r : reach) r += 0.05;
+  const CellGrid before = build_cells(bodies.x, reach);
+  Random random(3);
+  for (const Vec3& away : {Vec3(-1e9, 0, 0), Vec3(0, -1e9, 1e9), Vec3(1e9, 1e9, 1e9), Vec3(-1e9, -1e9, -1e9)})
+    for (int k = 0; k < 4; ++k) {
+      bodies.x.push_back(away + uniform_vector(random, -1, 1));
+      reach.push_back(0.7);
+    }
+  expect_all_pairs(bodies.x, reach);
+  // The others keep cells of their own: detection does not fall back to comparing all with all.
+  EXPECT_GE(build_cells(bodies.x, reach).cells.size(), before.cells.size() / 2);
+}
+
+TEST(BroadPhase, NoPairMeansMoreThanCellsCanCount) {
+  std::vector<Vec3> x;
+  for (int k = 0; k < 40; ++k) x.push_back(std::pow(10.0, k % 20) * Vec3(k % 2 ? 1 : -1, 0.5, -0.1));
+  expect_all_pairs(x, std::vector<double>(x.size(), 1.0));
+}
+
+/// Grains that jostle at random: what the step does, in small. At each step every pair that the narrow phase
+/// would take for a contact must stand among the candidates.
+TEST(Candidates, HoldEveryContactUntilTheMarginIsUsedUp) {
+  constexpr double h = 1e-2, alert = 0.03, skin = 0.12;
+  for (std::uint64_t seed : {1, 2}) {
+    Random random(seed);
+    Bodies bodies = test::jittered_lattice(6, seed, 0);
+    const std::size_t n = bodies.size();
+    std::vector<Vec3> x_then;
+    std::vector<double> reach_then(n);
+    std::vector<GrainPair> candidates;
+    const auto velocity = [&](std::size_t s) { return Eigen::Map<Vec3>(bodies.velocity[s].u); };
+    const auto move = [&] {
+      for (std::size_t s = 0; s < n; ++s) bodies.x[s] += 0.5 * h * velocity(s);
+    };
+    int searches = 0, steps = 400;
+    for (int step = 0; step < steps; ++step) {
+      for (std::size_t s = 0; s < n; ++s) velocity(s) = 0.9 * velocity(s) + uniform_vector(random, -0.1, 0.1);
+      if (step % 90 == 89) velocity(static_cast<std::size_t>(step) % n) *= 40;  // one shoots off
+      move();
+      if (step == 0 ||
+          left_margin({0, n}, bodies.x, bodies.velocity, bodies.radius, x_then, reach_then, h, alert)) {
+        ++searches;
+        x_then = bodies.x;
+        for (std::size_t s = 0; s < n; ++s)
+          reach_then[s] = bodies.radius[s] + 0.5 * skin + contact_margin(velocity(s).norm(), h, alert);
+        candidates = pairs_from_cells(x_then, reach_then);
+      }
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = i + 1; j < n; ++j) {
+          const Vec3 d = bodies.x[i] - bodies.x[j];
+          const double gap = d.norm() - bodies.radius[i] - bodies.radius[j];
+          const double v_n = d.normalized().dot(velocity(i) - velocity(j));
+          if (gap >= alert && gap >= -h * v_n) continue;
+          const GrainPair pair{static_cast<Slot>(i), static_cast<Slot>(j)};
+          ASSERT_TRUE(std::binary_search(candidates.begin(), candidates.end(), pair,
+                                         [](const GrainPair& a, const GrainPair& b) {
+                                           return a.first != b.first ? a.first < b.first
+                                                                     : a.second < b.second;
+                                         }))
+              << "step " << step << ": pair " << i << ", " << j << " with gap " << gap;
+        }
+      move();
+    }
+    EXPECT_GT(searches, 5);
+    EXPECT_LT(searches, steps / 3) << "candidates are to be kept for many steps";
+  }
+}
+
+}  // namespace
+}  // namespace talus

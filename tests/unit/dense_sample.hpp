@@ -1,0 +1,124 @@
+#pragma once
+
+/// Samples that the kernels' tests share: grains close enough to touch, and the arrays of one step around
+/// them.
+
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kernels/bodies.hpp"
+#include "kernels/broad_phase.hpp"
+#include "kernels/chunks.hpp"
+#include "kernels/contacts.hpp"
+#include "kernels/sweep.hpp"
+#include "kernels/walls.hpp"
+
+namespace talus::test {
+
+using Random = std::mt19937_64;
+
+inline double uniform(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+inline Vec3 uniform_vector(Random& random, double low, double high) {
+  const double x = uniform(random, low, high), y = uniform(random, low, high);
+  return {x, y, uniform(random, low, high)};
+}
+
+/// edge^3 spheres of radius 0.45-0.6 m near the points of a cubic lattice of spacing 1 m: about six contacts
+/// each, some of them deep. Speeds up to `speed` [m/s], radii and masses all different. Morton order.
+inline Bodies jittered_lattice(int edge, std::uint64_t seed, double speed = 1) {
+  Random random(seed);
+  Bodies bodies;
+  for (int k = 0; k < edge * edge * edge; ++k) {
+    const Vec3 site(k % edge, k / edge % edge, k / (edge * edge));
+    add_sphere(bodies, BodyId{k}, site + uniform_vector(random, -0.08, 0.08), uniform(random, 0.45, 0.6),
+               uniform(random, 1000, 3000));
+    for (double& u : bodies.velocity.back().u) u = uniform(random, -speed, speed);
+    for (double& w : bodies.velocity.back().w) w = uniform(random, -speed, speed);
+  }
+  reorder(bodies, morton_order(bodies));
+  return bodies;
+}
+
+/// The six walls of the box [low, high]^3, fixed: x-, x+, y-, y+, z-, z+.
+inline std::vector<Wall> box_of_walls(double low, double high) {
+  std::vector<Wall> walls;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {1.0, -1.0}) {
+      Wall wall;
+      wall.name = std::string(1, "xyz"[axis]) + (side > 0 ? "-" : "+");
+      wall.normal = side * Vec3::Unit(axis);
+      wall.point = Vec3::Unit(axis) * (side > 0 ? low : high);
+      walls.push_back(wall);
+    }
+  return walls;
+}
+
+/// Every pair with |x_i - x_j| < reach_i + reach_j, by looking at all of them; in order of (first, second).
+inline std::vector<GrainPair> pairs_by_brute_force(std::span<const Vec3> x, std::span<const double> reach) {
+  std::vector<GrainPair> pairs;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t j = i + 1; j < x.size(); ++j) {
+      const double distance = reach[i] + reach[j];
+      if ((x[i] - x[j]).squaredNorm() < distance * distance)
+        pairs.push_back({static_cast<Slot>(i), static_cast<Slot>(j)});
+    }
+  return pairs;
+}
+
+inline Candidates find_candidates(const Bodies& bodies, const std::vector<Wall>& walls, double margin,
+                                  bool friction) {
+  std::vector<double> reach = bodies.radius;
+  for (double& r : reach) r += margin;
+  const CellGrid grid = build_cells(bodies.x, reach);
+  std::vector<std::vector<GrainPair>> parts(1);
+  find_pairs(grid, bodies.x, reach, 0, grid.cells.size(), parts[0]);
+  Candidates candidates;
+  candidates.components = friction ? 3 : 1;
+  candidates.grain_pairs = sort_pairs(parts, bodies.size());
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    for (std::size_t s = 0; s < bodies.size(); ++s)
+      if (walls[w].normal.dot(bodies.x[s] - walls[w].point) < reach[s] + margin)
+        candidates.wall_pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
+  candidates.impulse.assign(candidates.size() * static_cast<std::size_t>(candidates.components), 0.0);
+  return candidates;
+}
+
+/// All that a sweep needs.
+struct Sample {
+  Bodies bodies;
+  std::vector<Wall> walls;
+  Candidates candidates;
+  Chunks chunks;
+  Contacts contacts;
+
+  ContactRange range(std::size_t chunk) const {
+    const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
+    return {begin, begin + static_cast<std::size_t>(contacts.count[chunk])};
+  }
+};
+
+/// Narrow phase over all chunks with h = 1 ms and the given alert distance; biases as IQS gives them.
+inline void find_contacts(Sample& sample, double alert) {
+  allocate(sample.contacts, sample.candidates, sample.chunks, sample.candidates.components == 3);
+  const NarrowPhase in{
+      sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, 0,
+      Vec3::Zero()};
+  for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+    narrow_chunk(in, sample.candidates, sample.chunks, c, sample.contacts);
+}
+
+inline Sample dense_sample(int edge, std::uint64_t seed, bool friction, bool with_walls, int chunk_target) {
+  Sample sample;
+  sample.bodies = jittered_lattice(edge, seed);
+  if (with_walls) sample.walls = box_of_walls(-0.5, edge - 0.5);
+  sample.candidates = find_candidates(sample.bodies, sample.walls, 0.1, friction);
+  sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), chunk_target);
+  find_contacts(sample, 0.1);
+  return sample;
+}
+
+}  // namespace talus::test

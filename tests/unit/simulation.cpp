@@ -1,0 +1,344 @@
+#include "runtime/step/simulation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "tests/unit/dense_sample.hpp"
+
+namespace talus {
+namespace {
+
+using test::Random;
+using test::uniform;
+
+// Inside a TEST, Setup is a private name of GoogleTest: there it is spelled talus::Setup.
+
+constexpr double radius = 0.01, density = 2600;
+
+/// edge_x x edge_y x edge_z spheres of 8-10 mm on a cubic lattice of 21 mm in a box, ids in lattice order.
+Bodies loose_sample(int edge_x, int edge_y, int edge_z, std::uint64_t seed) {
+  Random random(seed);
+  Bodies bodies;
+  for (int k = 0; k < edge_x * edge_y * edge_z; ++k) {
+    const Vec3 site(k % edge_x + 0.5, k / edge_x % edge_y + 0.5, k / (edge_x * edge_y) + 0.5);
+    add_sphere(bodies, BodyId{k}, 2.1 * radius * site + test::uniform_vector(random, -0.04, 0.04) * radius,
+               radius * uniform(random, 0.8, 1), density);
+  }
+  return bodies;
+}
+
+std::vector<Wall> box(double x, double y, double z) {
+  std::vector<Wall> walls = test::box_of_walls(0, 0);
+  walls[1].point = Vec3(x, 0, 0);
+  walls[3].point = Vec3(0, y, 0);
+  walls[5].point = Vec3(0, 0, z);
+  return walls;
+}
+
+WallLoad pressed(double pressure) {
+  WallLoad load;
+  load.drive = WallDrive::pressure;
+  load.pressure = pressure;
+  load.mass = 1;
+  return load;
+}
+
+Stage stage(std::string name, std::int64_t steps) {
+  Stage stage;
+  stage.name = std::move(name);
+  stage.time_step = 1e-3;
+  stage.end.steps = steps;
+  return stage;
+}
+
+/// 576 grains between three fixed and three pressed walls: squeezed without friction, held with it, then
+/// sheared by the top wall; few iterations, so that the bits also are those of an unfinished solution.
+Setup press_and_shear() {
+  talus::Setup setup;
+  setup.walls = box(8 * 2.1 * radius, 8 * 2.1 * radius, 9 * 2.1 * radius);
+  Stage squeeze = stage("squeeze", 25), hold = stage("hold", 10), shear = stage("shear", 10);
+  for (const char* name : {"x+", "y+", "z+"}) squeeze.loads.push_back({name, pressed(2e4)});
+  hold.law = {0.35, 0.2, 0};
+  hold.gravity = Vec3(0, 0, -9.81);
+  shear.law = {0.35, 0, 0};
+  WallLoad down;
+  down.drive = WallDrive::velocity;
+  down.velocity = Vec3(0, 0, -0.3);
+  shear.loads.push_back({"z+", down});
+  setup.stages = {squeeze, hold, shear};
+  setup.solver.max_iterations = 60;
+  return setup;
+}
+
+/// What a run leaves, to the bit.
+struct Outcome {
+  std::uint64_t state = 0;                 ///< of the last step
+  std::vector<std::uint64_t> certificate;  ///< error, wall force and iterations of every step
+  int broad_phases = 0;
+  std::int64_t contacts = 0;
+  bool operator==(const Outcome&) const = default;
+};
+
+Outcome run(const Setup& setup, Bodies bodies, graph::ExecutorOptions options) {
+  graph::Executor executor(options);
+  Simulation simulation(setup, std::move(bodies), executor);
+  Outcome outcome;
+  while (!simulation.finished()) {
+    const StepReport& report = simulation.step();
+    for (double value : {report.error_rms, report.error_max, report.balance, report.kinetic_translation,
+                         report.kinetic_rotation, report.penetration_mean, report.penetration_max,
+                         static_cast<double>(report.iterations), static_cast<double>(report.active)})
+      outcome.certificate.push_back(std::bit_cast<std::uint64_t>(value));
+    for (const WallReport& wall : simulation.walls())
+      for (double value : {wall.position, wall.velocity, wall.force[0], wall.force[1], wall.force[2]})
+        outcome.certificate.push_back(std::bit_cast<std::uint64_t>(value));
+    if (const auto triaxial = simulation.triaxial())
+      for (double stress : triaxial->stress)
+        outcome.certificate.push_back(std::bit_cast<std::uint64_t>(stress));
+    outcome.broad_phases += simulation.sums().broad_phase;
+    outcome.contacts = report.contacts;
+    simulation.begin_next_stage();
+  }
+  outcome.state = digest(simulation.state().bodies);
+  return outcome;
+}
+
+TEST(Simulation, HasTheSameBitsWithAnyNumberOfThreads) {
+  const talus::Setup setup = press_and_shear();
+  const Outcome one = run(setup, loose_sample(8, 8, 9, 1), {.threads = 1});
+  EXPECT_GT(one.broad_phases, 4) << "candidates are to change within the run";
+  EXPECT_GT(one.contacts, 800) << "the sample is to be dense in the end";
+  for (int threads : {2, 3, 4, 8})
+    EXPECT_TRUE(run(setup, loose_sample(8, 8, 9, 1), {.threads = threads}) == one) << threads << " threads";
+}
+
+TEST(Simulation, HasTheSameBitsWhenTasksAreDelayedAtRandom) {
+  talus::Setup setup = press_and_shear();
+  setup.solver.max_iterations = 12;
+  setup.stages[0].end.steps = 16;
+  setup.stages[1].end.steps = 4;
+  setup.stages[2].end.steps = 4;
+  const Outcome one = run(setup, loose_sample(8, 8, 9, 2), {.threads = 1});
+  for (std::uint64_t seed : {1, 2, 3})
+    EXPECT_TRUE(run(setup, loose_sample(8, 8, 9, 2),
+                    {.threads = 2 + static_cast<int>(seed % 2), .delay_seed = seed}) == one)
+        << "seed " << seed;
+}
+
+TEST(Simulation, DoesNotDependOnTheOrderInWhichBodiesAreGiven) {
+  const talus::Setup setup = press_and_shear();
+  Bodies shuffled = loose_sample(8, 8, 9, 3);
+  std::vector<Slot> order(shuffled.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = static_cast<Slot>(order.size() - 1 - k);
+  reorder(shuffled, order);
+  EXPECT_EQ(run(setup, shuffled, {}).state, run(setup, loose_sample(8, 8, 9, 3), {}).state);
+}
+
+// ---- stages
+
+Setup falling(std::int64_t steps) {
+  talus::Setup setup;
+  setup.stages = {stage("fall", steps)};
+  setup.stages[0].gravity = Vec3(0, 0, -10);
+  return setup;
+}
+
+TEST(Simulation, OfNoBodiesRunsItsSteps) {
+  graph::Executor executor({.threads = 2});
+  talus::Setup setup = falling(3);
+  setup.walls = box(1, 1, 1);
+  Simulation simulation(setup, {}, executor);
+  while (!simulation.finished()) {
+    EXPECT_TRUE(simulation.step().converged);
+    simulation.begin_next_stage();
+  }
+  EXPECT_EQ(simulation.report().step, 3);
+  EXPECT_EQ(simulation.report().contacts, 0);
+}
+
+// theta = 1/2 integrates constant acceleration exactly.
+TEST(Simulation, OfOneFreeBodyIsTheParabola) {
+  graph::Executor executor({});
+  Bodies bodies;
+  add_sphere(bodies, BodyId{4}, Vec3(0, 0, 5), radius, density);
+  bodies.velocity[0].u[0] = 2;
+  Simulation simulation(falling(100), bodies, executor);
+  while (!simulation.finished()) {
+    simulation.step();
+    simulation.begin_next_stage();
+  }
+  EXPECT_NEAR(simulation.state().bodies.x[0][0], 0.2, 1e-13);
+  EXPECT_NEAR(simulation.state().bodies.x[0][2], 5 - 0.5 * 10 * 0.01, 1e-13);
+}
+
+TEST(Simulation, OfAPerfectlyElasticBallKeepsItsEnergy) {
+  graph::Executor executor({});
+  talus::Setup setup = falling(20000);
+  setup.walls.resize(1);
+  setup.walls[0].name = "floor";
+  setup.stages[0].law.restitution = 1;
+  Bodies bodies;
+  add_sphere(bodies, BodyId{0}, Vec3(0, 0, 1 + radius), radius, density);
+  const double mass = bodies.mass(0);
+  Simulation simulation(setup, bodies, executor);
+  int bounces = 0;
+  while (!simulation.finished()) {
+    bounces += simulation.step().active > 0;
+    simulation.begin_next_stage();
+    const Bodies& now = simulation.state().bodies;
+    const double energy = kinetic_energy(now.velocity).translation + mass * 10 * (now.x[0][2] - radius);
+    ASSERT_NEAR(energy, mass * 10, 1e-9 * mass * 10) << "step " << simulation.report().step;
+  }
+  EXPECT_GT(bounces, 15);
+}
+
+TEST(Stages, EndByStepsByTimeAndByStrain) {
+  graph::Executor executor({});
+  talus::Setup setup;
+  setup.walls = box(1, 1, 1);
+  Stage by_steps = stage("steps", 7), by_time = stage("time", 0), by_strain = stage("strain", 1000);
+  by_time.end = {};
+  by_time.end.time = 0.013;
+  by_strain.end.strain = 0.05;
+  by_strain.end.strain_axis = 1;
+  WallLoad squeeze;
+  squeeze.drive = WallDrive::velocity;
+  squeeze.velocity = Vec3(0, -2, 0);
+  by_strain.loads = {{"y+", squeeze}};
+  setup.stages = {by_steps, by_time, by_strain, stage("nothing", 0), stage("last", 2)};
+  Simulation simulation(setup, {}, executor);
+  std::vector<std::int64_t> steps(setup.stages.size(), 0);
+  int begun = 0;
+  while (!simulation.finished()) {
+    ++steps[simulation.stage_index()];
+    simulation.step();
+    begun += simulation.begin_next_stage();
+  }
+  // ln(1 - 0.002 k) <= -0.05 first holds for k = 25.
+  EXPECT_EQ(steps, (std::vector<std::int64_t>{7, 13, 25, 0, 2}));
+  EXPECT_EQ(begun, 3) << "the empty stage is passed over";
+  EXPECT_NEAR(simulation.report().time, 47e-3, 1e-12);
+}
+
+TEST(Stages, EndAtEquilibriumOnceThePileRests) {
+  graph::Executor executor({});
+  talus::Setup setup = falling(5000);
+  setup.walls = box(2.1 * radius, 2.1 * radius, 1);
+  setup.stages[0].end.equilibrium = 1e-6;
+  setup.solver.tolerance = 1e-6;
+  setup.solver.balance_tolerance = 1e-6;
+  Simulation simulation(setup, loose_sample(1, 1, 4, 1), executor);
+  while (!simulation.finished()) {
+    simulation.step();
+    simulation.begin_next_stage();
+  }
+  EXPECT_GT(simulation.report().step, 5);
+  EXPECT_LT(simulation.report().step, 5000);
+  double weight = 0;
+  for (std::size_t s = 0; s < 4; ++s) weight += 10 * simulation.state().bodies.mass(s);
+  EXPECT_NEAR(simulation.walls()[4].force[2], weight, 1e-5 * weight);
+}
+
+// ---- certificate
+
+TEST(Certificate, MarksAStepThatMissesItsTolerance) {
+  for (int iterations : {1, 5000}) {
+    graph::Executor executor({});
+    talus::Setup setup = press_and_shear();
+    setup.stages.resize(1);
+    setup.stages[0].end.steps = 30;
+    setup.solver.max_iterations = iterations;
+    Simulation simulation(setup, loose_sample(4, 4, 4, 1), executor);
+    while (!simulation.finished()) {
+      simulation.step();
+      simulation.begin_next_stage();
+    }
+    const StepReport& report = simulation.report();
+    ASSERT_GT(report.active, 50);
+    EXPECT_EQ(report.converged, iterations > 1);
+    EXPECT_LE(report.iterations, iterations);
+    EXPECT_EQ(report.error_rms <= setup.solver.tolerance && report.balance <= setup.solver.balance_tolerance,
+              report.converged);
+  }
+}
+
+TEST(Certificate, OfAStepWithoutContactsIsConverged) {
+  graph::Executor executor({});
+  Simulation simulation(falling(1), loose_sample(3, 3, 3, 1), executor);
+  EXPECT_TRUE(simulation.step().converged);
+  EXPECT_EQ(simulation.report().active, 0);
+}
+
+TEST(Simulation, WithoutFrictionHasNoTangentialArrays) {
+  for (double mu : {0.0, 0.3}) {
+    graph::Executor executor({});
+    talus::Setup setup = falling(2);
+    setup.walls = box(0.09, 0.09, 0.09);
+    setup.stages[0].law.mu_grains = mu;
+    Simulation simulation(setup, loose_sample(4, 4, 4, 1), executor);
+    simulation.step();
+    const StepState& state = simulation.state();
+    EXPECT_EQ(state.contacts.rx.empty(), mu == 0);
+    EXPECT_EQ(state.contacts.ry.empty(), mu == 0);
+    EXPECT_EQ(state.contacts.rz.empty(), mu == 0);
+    EXPECT_EQ(state.contacts.rn.empty(), mu > 0);
+    EXPECT_EQ(state.free.w.empty(), mu == 0);
+    EXPECT_EQ(state.candidates.components, mu > 0 ? 3 : 1);
+    EXPECT_TRUE(state.bodies.orientation.empty());
+  }
+}
+
+// ---- runaway
+
+std::string runaway_message(const Setup& setup, Bodies bodies, int threads) {
+  graph::Executor executor({.threads = threads});
+  Simulation simulation(setup, std::move(bodies), executor);
+  try {
+    while (!simulation.finished()) {
+      simulation.step();
+      simulation.begin_next_stage();
+    }
+  } catch (const RunawayError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Runaway, OfANanStopsWithItsStepStageAndBody) {
+  for (double bad : {std::numeric_limits<double>::quiet_NaN(), 1e200})
+    for (int threads : {1, 2}) {
+      Bodies bodies = loose_sample(4, 4, 4, 1);
+      bodies.velocity[37].u[1] = bad;
+      const std::string message = runaway_message(falling(5), bodies, threads);
+      EXPECT_NE(message.find("step 1 "), std::string::npos) << message;
+      EXPECT_NE(message.find("'fall'"), std::string::npos) << message;
+      EXPECT_NE(message.find("body 37:"), std::string::npos) << message;
+    }
+}
+
+// Impulses of a column at rest in steps of 1 ms, handed to one of a nanosecond with a single sweep to take
+// them back: energy from nowhere. (One sweep per step also brings the column to rest, only later.)
+TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
+  talus::Setup setup;
+  setup.walls = box(3 * radius, 3 * radius, 8 * radius);
+  Bodies column;
+  for (int k = 0; k < 4; ++k)
+    add_sphere(column, BodyId{k}, radius * Vec3(1.5, 1.5, 2 * k + 1), radius, density);
+  Stage squeeze = stage("squeeze", 50000), release = stage("release", 1);
+  squeeze.loads = {{"z+", pressed(1e4)}};
+  squeeze.end.equilibrium = 1e-9;
+  release.time_step = 1e-9;
+  setup.stages = {squeeze, release};
+  setup.solver.max_iterations = 1;
+  const std::string message = runaway_message(setup, column, 1);
+  EXPECT_NE(message.find("kinetic energy"), std::string::npos) << message;
+  EXPECT_NE(message.find("'release'"), std::string::npos) << message;
+  EXPECT_NE(message.find("body "), std::string::npos) << message;
+}
+
+}  // namespace
+}  // namespace talus
