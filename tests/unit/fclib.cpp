@@ -242,6 +242,20 @@ TEST_F(Fclib, RefusesSizesThatDisagree) {
   expect_refused(c, "fewer than nz = 9");
 }
 
+TEST_F(Fclib, DoesNotBelieveASizeThatTheFileCannotHold) {
+  write(compressed_rows());
+  const hid_t file = H5Fopen(path().c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  H5Ldelete(file, "/fclib_local/vectors/q", H5P_DEFAULT);
+  const hsize_t terabytes = hsize_t{1} << 40;
+  const hid_t space = H5Screate_simple(1, &terabytes, nullptr);
+  // Never written, so never allocated: it reads as 8 TB of zeros.
+  H5Dclose(H5Dcreate2(file, "/fclib_local/vectors/q", H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT,
+                      H5P_DEFAULT));
+  H5Sclose(space);
+  H5Fclose(file);
+  EXPECT_NE(refusal(path()).find("more than the file holds"), std::string::npos);
+}
+
 TEST_F(Fclib, RefusesIndicesThatPointOutside) {
   Contents c = compressed_rows();
   c.i[3] = 6;

@@ -243,18 +243,22 @@ TEST(LocalLaw, SaysSoWhenThereIsNoSolution) {
 
 TEST(LocalLaw, SolvesOrSaysSoForAnyMatrix) {
   Random random(8);
-  int failed = 0;
+  int failed = 0, failed_with_stiffness = 0;
   for (int i = 0; i < 20000; ++i) {
     const Mat3 W = random.matrix();
     const Vec3 q = random.vector();
     const auto s = solve_local(local_block(W, 0.6), q, Vec3::Zero());
     ASSERT_TRUE(s.r.allFinite());
-    if (s.status == LocalStatus::failed)
+    if (s.status == LocalStatus::failed) {
       ++failed;
-    else
+      failed_with_stiffness += W(0, 0) > 0;
+    } else
       expect_law(W, q, 0.6, s, 1e-6);
   }
-  EXPECT_LT(failed, 10000);
+  // A quarter of these matrices have W_NN < 0 and an approach: no solution. Of the rest about 530 have none
+  // that the quartic finds; the bracket alone leaves 680.
+  EXPECT_LT(failed, 6000);
+  EXPECT_LT(failed_with_stiffness, 600);
 }
 
 }  // namespace
