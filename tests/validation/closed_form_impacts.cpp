@@ -73,8 +73,7 @@ TEST(BouncingBall, SpeedIsMultipliedByRestitutionAtEachImpact) {
   for (double e : {0.5, 0.8, 1.0}) {
     const Bounces found = bounce(0.5, e, 1e-3, 1.0);
     ASSERT_GE(found.speed_ratios.size(), 1u);
-    for (double ratio : found.speed_ratios)
-      EXPECT_NEAR(ratio, e, 1e-12) << "e = " << e;
+    for (double ratio : found.speed_ratios) EXPECT_NEAR(ratio, e, 1e-12) << "e = " << e;
   }
 }
 
@@ -86,7 +85,8 @@ TEST(BouncingBall, ReboundHeightsFallWithTheSquareOfRestitution) {
   for (std::size_t k = 0; k < 5; ++k) {
     expected *= e * e;
     // Each impact is met up to one step late: the height is off by up to h v per impact.
-    EXPECT_NEAR(found.heights[k], expected, static_cast<double>(k + 1) * 2 * h * std::sqrt(2 * g_earth * height));
+    EXPECT_NEAR(found.heights[k], expected,
+                static_cast<double>(k + 1) * 2 * h * std::sqrt(2 * g_earth * height));
   }
 }
 
@@ -113,8 +113,8 @@ TEST(BouncingBall, ElasticBallKeepsItsEnergy) {
   EXPECT_NEAR(run.mechanical_energy(), before, 1e-10 * before);
 }
 
-/// Two spheres of different size, spinning, that would touch after `head_start` steps; at 1/2 they touch where
-/// the first step detects.
+/// Two spheres of different size, spinning, that would touch after `head_start` steps; at 1/2 they touch
+/// where the first step detects.
 
 Scene two_spheres(double e, double mu, double head_start) {
   const double h = 1e-3, r_0 = 0.1, r_1 = 0.17;

@@ -13,7 +13,7 @@
 
 namespace talus::validation {
 
-constexpr double g_earth = 9.81;      // [m/s^2]
+constexpr double g_earth = 9.81;  // [m/s^2]
 constexpr double pi = 3.14159265358979324;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
@@ -62,7 +62,8 @@ struct Scene {
 class Experiment {
  public:
   explicit Experiment(Scene scene, int threads = 1)
-      : executor_({.threads = threads}), simulation_(std::move(scene.setup), std::move(scene.bodies), executor_) {}
+      : executor_({.threads = threads}),
+        simulation_(std::move(scene.setup), std::move(scene.bodies), executor_) {}
 
   const StepReport& step() { return simulation_.step(); }
   void steps(std::int64_t count) {
