@@ -16,14 +16,14 @@ double mean_order(const std::vector<double>& errors) {
   return std::log2(errors.front() / errors.back()) / static_cast<double>(errors.size() - 1);
 }
 
-void print(const char* what, const std::vector<double>& errors) {
+void record(const char* what, const std::vector<double>& errors) {
   for (std::size_t k = 0; k < errors.size(); ++k)
     ::testing::Test::RecordProperty(std::string(what) + std::to_string(k), fmt::format("{:.3e}", errors[k]));
 }
 
-/// A grain that slides or rolls off the top of a boulder so heavy that it does not recoil, from an angle of
-/// 0.2 from the vertical at rest; the angle reached is compared at a speed-free place: speed against height.
-/// Rolling: 7/10 v^2 = g (R + r)(cos a_0 - cos a); sliding: 1/2 v^2.
+/// A grain slides or rolls down a boulder so heavy that it does not recoil, from rest at an angle of 0.2 from
+/// the top. Largest relative error of its speed against its loss of height: sliding 1/2 v^2, rolling 7/10
+/// v^2.
 double boulder_error(double h, double mu) {
   const double boulder = 1.0, grain = 0.2, start = 0.2, arm = boulder + grain;
   Scene scene(h);
@@ -47,7 +47,7 @@ TEST(Order, GrainOnABoulderIsAtLeastOfFirstOrder) {
   for (double mu : {0.0, 5.0}) {
     std::vector<double> errors;
     for (double h : {4e-3, 2e-3, 1e-3, 5e-4}) errors.push_back(boulder_error(h, mu));
-    print(mu > 0 ? "rolling_" : "sliding_", errors);
+    record(mu > 0 ? "rolling_" : "sliding_", errors);
     for (std::size_t k = 1; k < errors.size(); ++k)
       EXPECT_GE(errors[k - 1] / errors[k], 1.8) << "mu = " << mu;
     EXPECT_GE(mean_order(errors), 0.9) << "mu = " << mu;
@@ -55,8 +55,8 @@ TEST(Order, GrainOnABoulderIsAtLeastOfFirstOrder) {
   }
 }
 
-/// Time of the first impact's end, or error of the sliding distance: events are met within a step, at a place
-/// in it that is as good as random, so the error is averaged over many starts.
+/// Errors for four time steps. An event is met within a step, at a place in it that is as good as random: so
+/// the error is averaged over 64 starts.
 template <class Error>
 std::vector<double> averaged(Error error) {
   std::vector<double> errors;
@@ -81,7 +81,7 @@ TEST(Order, OfAnImpactsTimeIsOne) {
     const double flown = run.time() - lands, v = e * g_earth * lands;
     return std::abs(run.x()[2] - 0.1 - (v * flown - 0.5 * g_earth * flown * flown));
   });
-  print("impact_", errors);
+  record("impact_", errors);
   EXPECT_GE(mean_order(errors), 0.9);
 }
 
@@ -98,7 +98,7 @@ TEST(Order, OfTheTurnFromSlidingToRollingIsOneOrBetter) {
         v_0 * rolls - 0.5 * mu * g_earth * rolls * rolls + 5.0 / 7 * v_0 * (run.time() - rolls);
     return std::abs(run.x()[0] - path);
   });
-  print("turn_", errors);
+  record("turn_", errors);
   EXPECT_GE(mean_order(errors), 0.9);
 }
 

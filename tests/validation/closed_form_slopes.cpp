@@ -1,6 +1,7 @@
 /// One body on a plane: rolling, sliding, resting. Velocities change linearly in time, which the theta-scheme
 /// integrates exactly, so the tolerances here are rounding unless a test says otherwise.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/validation/experiment.hpp"
@@ -85,7 +86,7 @@ TEST(Sliding, BlockBelowTheFrictionAngleRestsExactly) {
     run.steps(n);
     // Creep: what rounding leaves of the velocity h g in each step, at worst all in one direction.
     const double creep = (run.x() - Vec3(0, 0, 0.1)).norm();
-    RecordProperty("creep_m", std::to_string(creep));
+    RecordProperty(fmt::format("creep_m_at_{:.2f}", angle), fmt::format("{:.3e}", creep));
     EXPECT_LE(creep, static_cast<double>(n) * h * (4 * epsilon * h * g_earth) + 4 * epsilon * 0.1) << angle;
   }
 }
@@ -127,7 +128,7 @@ TEST(Resting, HundredThousandStepsDoNotMoveABlock) {
     Experiment run(on_slope(angle, 0.5, false, Vec3::Zero(), 0.05));
     run.steps(100000);
     const double creep = (run.x() - Vec3(0, 0, 0.05)).norm();
-    RecordProperty("creep_m", std::to_string(creep));
+    RecordProperty(fmt::format("creep_m_at_{:.2f}", angle), fmt::format("{:.3e}", creep));
     EXPECT_LE(creep, 1e5 * h * 4 * epsilon * h * g_earth + 4 * epsilon * 0.05);
     EXPECT_LE(run.u().norm(), 4 * epsilon * h * g_earth);
   }
