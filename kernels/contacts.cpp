@@ -15,13 +15,14 @@ struct Found {
   std::int32_t candidate;
 };
 
-/// Bias of a contact, or false when it constrains nothing in this step. v_n is of the beginning of the step:
-/// Moreau's law on any other (that of the fall within the step, say) would give energy at each bounce.
-/// `falling` is what gravity adds to it within the step.
-bool constrain(const NarrowPhase& in, double gap, double v_n, double falling, double slow, double& bias) {
-  if (gap >= in.alert && gap >= -in.time_step * (v_n + falling)) return false;
+/// Bias of a contact, or false when it constrains nothing in this step. `v_n` is the normal velocity at the
+/// beginning of the step, `v_n_free` the one at its end without contacts.
+bool constrain(const NarrowPhase& in, double gap, double v_n, double v_n_free, double slow, double& bias) {
+  if (gap >= in.alert && gap >= -in.time_step * v_n_free) return false;
   bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
-  if (in.restitution > 0 && v_n < -slow) {
+  // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
+  // between both would gain energy.
+  if (in.restitution > 0 && std::abs(v_n) > slow) {
     if (gap > 0) return false;
     bias = in.restitution * v_n;
   }
@@ -43,18 +44,20 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
       const double distance = d.norm();
       const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
       double bias;
-      if (constrain(in, distance - in.radius[i] - in.radius[j], normal.dot(u(i) - u(j)), 0, slow, bias))
+      const double v_n = normal.dot(u(i) - u(j));  // gravity moves both alike
+      if (constrain(in, distance - in.radius[i] - in.radius[j], v_n, v_n, slow, bias))
         found.push_back({normal, bias, static_cast<std::int32_t>(k)});
     }
     return;
   }
   const Wall& wall = in.walls[static_cast<std::size_t>(chunks.wall[chunk])];
-  const double falling = in.time_step * wall.normal.dot(in.gravity);
+  const double fall = in.time_step * wall.normal.dot(in.gravity);
   for (std::size_t k = begin; k < end; ++k) {
     const auto i = static_cast<std::size_t>(candidates.wall_pairs[k - grains].body);
     const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
+    const double v_n = wall.normal.dot(u(i) - wall.velocity);
     double bias;
-    if (constrain(in, gap, wall.normal.dot(u(i) - wall.velocity), falling, slow, bias))
+    if (constrain(in, gap, v_n, v_n + fall, slow, bias))
       found.push_back({wall.normal, bias, static_cast<std::int32_t>(k)});
   }
 }

@@ -140,9 +140,14 @@ struct Simulation::Implementation {
   void write_report(double elapsed) {
     const StepSums& sums = graph.sums();
     const IterationResult& result = graph.iteration().result();
-    const double impulse_unit = std::max(sums.motion.impulse_scale, std::numeric_limits<double>::min());
+    // Grains at rest between pressed walls gain nothing, and what the walls give cancels: the walls' impulses
+    // are the measure then.
+    double impulse_unit = std::max(sums.motion.impulse_scale, std::numeric_limits<double>::min());
     Vec3 from_walls = Vec3::Zero();
-    for (const WallState& wall : state.wall_states) from_walls += wall.impulse;
+    for (const WallState& wall : state.wall_states) {
+      from_walls += wall.impulse;
+      impulse_unit = std::max(impulse_unit, wall.impulse.norm());
+    }
     const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
     ++stage_steps;
     ++report.step;

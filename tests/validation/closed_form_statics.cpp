@@ -1,0 +1,185 @@
+/// Force balance: columns, pressed walls, wedges, and walls too heavy to be moved.
+
+#include <gtest/gtest.h>
+
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation {
+namespace {
+
+constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
+
+void stack(Scene& scene, int count) {
+  for (int k = 0; k < count; ++k) scene.sphere({0, 0, radius * (2 * k + 1)}, radius, mass);
+}
+
+TEST(Tower, FloorCarriesTheWholeWeightFromAColdStart) {
+  for (double mu : {0.0, 0.35}) {
+    const int count = 10;
+    Scene scene(h);
+    scene.slope(0);
+    scene.friction(mu);
+    scene.setup.solver.warm_start = false;
+    scene.setup.solver.tolerance = 1e-9;
+    stack(scene, count);
+    Experiment run(std::move(scene));
+    for (int k = 0; k < 20; ++k) {
+      const StepReport& report = run.step();
+      EXPECT_TRUE(report.converged);
+      EXPECT_NEAR(run.wall_force(0)[2], count * mass * g_earth, 1e-5 * count * mass * g_earth)
+          << "step " << k;
+    }
+    EXPECT_NEAR(run.x(count - 1)[2], radius * (2 * count - 1), 1e-6 * radius);
+  }
+}
+
+TEST(Tower, EachContactCarriesWhatStandsOnIt) {
+  const int count = 10;
+  Scene scene(h);
+  scene.slope(0);
+  scene.friction(0.35);
+  stack(scene, count);
+  Experiment run(std::move(scene));
+  run.steps(5);
+  const Frame frame = run.simulation().frame();
+  ASSERT_EQ(frame.contact_force.size(), static_cast<std::size_t>(count));
+  for (std::size_t k = 0; k < frame.contact_force.size(); ++k) {
+    const double below = frame.contact_point[k][2] / (2 * radius);  // grains below the contact
+    const double above = count - std::round(below);
+    EXPECT_NEAR(std::abs(frame.contact_force[k][2]), above * mass * g_earth, 1e-8) << below;
+  }
+}
+
+Scene pressed_column(int count, double pressure, double area, double wall_mass, double e) {
+  Scene scene(h);
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.stage().law.restitution = e;
+  scene.friction(0.3);
+  stack(scene, count);
+  Wall& lid = scene.wall("lid", {0, 0, 2 * radius * count + 0.001}, -Vec3::UnitZ());
+  lid.area = area;
+  lid.load = {.drive = WallDrive::pressure, .pressure = pressure, .mass = wall_mass};
+  return scene;
+}
+
+TEST(PressedWall, ColumnCarriesPressureTimesArea) {
+  const double pressure = 2e3, area = 0.3, force = pressure * area;
+  for (int count : {1, 10}) {
+    Experiment run(pressed_column(count, pressure, area, 5.0, 0));
+    run.steps(200);
+    EXPECT_TRUE(run.simulation().report().converged);
+    EXPECT_NEAR(run.wall_force(0)[2], force, 1e-8 * force) << count;
+    EXPECT_NEAR(run.wall_force(1)[2], -force, 1e-8 * force) << count;
+    EXPECT_NEAR(run.simulation().walls()[1].position, -2 * radius * count, 1e-9) << "closed, not crushed";
+    EXPECT_LE(run.simulation().report().penetration_max, 1e-9);
+  }
+}
+
+TEST(PressedWall, ComesToRestOnABouncingColumn) {
+  // With restitution an approach below twice what the load adds in a step is no impact: else the wall would
+  // rattle for ever, one step in the air and one on the column.
+  const double pressure = 2e3, area = 0.3, force = pressure * area;
+  for (double e : {0.3, 0.8}) {
+    Experiment run(pressed_column(3, pressure, area, 5.0, e));
+    run.steps(3000);
+    for (int k = 0; k < 20; ++k) {
+      run.step();
+      EXPECT_NEAR(run.wall_force(0)[2], force, 1e-6 * force) << "e = " << e;
+      EXPECT_NEAR(run.wall_force(1)[2], -force, 1e-6 * force) << "e = " << e;
+    }
+  }
+}
+
+TEST(HeavyWall, PlanetPushedByATinyForceRestsOnAGrain) {
+  Scene scene(h);
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.setup.solver.max_iterations = 200;
+  stack(scene, 1);
+  Wall& planet = scene.wall("planet", {0, 0, 2 * radius}, -Vec3::UnitZ());
+  planet.load = {.drive = WallDrive::force, .force = 1e-3, .mass = 6e24};
+  Experiment run(std::move(scene));
+  run.steps(1000);
+  EXPECT_TRUE(run.simulation().report().converged);
+  EXPECT_NEAR(run.x()[2], radius, 1e-15);
+  EXPECT_NEAR(run.simulation().walls()[1].position, -2 * radius, 1e-15);
+  EXPECT_NEAR(run.wall_force(0)[2], mass * g_earth, 1e-9);
+}
+
+TEST(HeavyWall, CertificateRefusesAPlanetThatCannotBeStopped) {
+  // A moving planet drives a grain against the floor. Sweeps pass on one grain mass at a time, so the natural
+  // map shrinks like 1/sweeps while the forces are wrong by a factor of 10^20: the drift of the wall forces
+  // must refuse what the residual would accept.
+  Scene scene(h);
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.setup.solver = {.tolerance = 1e-2, .balance_tolerance = 1e-2, .max_iterations = 2000};
+  stack(scene, 1);
+  Wall& planet = scene.wall("planet", {0, 0, 2 * radius}, -Vec3::UnitZ());
+  planet.velocity = {0, 0, -1e-3};
+  planet.load = {.drive = WallDrive::force, .force = 1e-3, .mass = 6e24};
+  Experiment run(std::move(scene));
+  const StepReport& report = run.step();
+  EXPECT_LE(report.error_rms, 1e-2);
+  EXPECT_GT(report.balance, 0.1);
+  EXPECT_FALSE(report.converged);
+}
+
+/// A sphere between two walls that meet at the origin in a line along y; each is `half_angle` from the
+/// vertical.
+Scene wedge(double half_angle, double mu) {
+  Scene scene(h);
+  const double c = std::cos(half_angle), s = std::sin(half_angle);
+  scene.wall("left", Vec3::Zero(), {c, 0, s});
+  scene.wall("right", Vec3::Zero(), {-c, 0, s});
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.friction(mu);
+  scene.sphere({0, 0, radius / s}, radius, mass);
+  return scene;
+}
+
+TEST(Wedge, WallsCarryTheWeightOfAJammedSphere) {
+  for (double half_angle : {0.8, 0.3, 0.1}) {
+    Experiment run(wedge(half_angle, 0));
+    run.steps(100);
+    EXPECT_TRUE(run.simulation().report().converged);
+    const double force = mass * g_earth / (2 * std::sin(half_angle));
+    for (std::size_t wall : {0u, 1u})
+      EXPECT_NEAR(run.wall_force(wall).norm(), force, 1e-6 * force) << half_angle << ' ' << wall;
+    EXPECT_LE(run.u().norm(), 1e-6 * h * g_earth) << half_angle;
+  }
+}
+
+TEST(Wedge, WithFrictionTheForcesAreNotUniqueButTheirSumIs) {
+  for (double half_angle : {0.8, 0.3, 0.1}) {
+    Experiment run(wedge(half_angle, 0.4));
+    run.steps(100);
+    EXPECT_TRUE(run.simulation().report().converged);
+    const Vec3 sum = run.wall_force(0) + run.wall_force(1);
+    EXPECT_NEAR(sum[2], mass * g_earth, 1e-6 * mass * g_earth) << half_angle;
+    EXPECT_NEAR(sum[0], 0, 1e-6 * mass * g_earth) << half_angle;
+    EXPECT_LE((run.u() + run.w()).norm(), 1e-6 * h * g_earth) << half_angle;
+    const Frame frame = run.simulation().frame();
+    for (std::size_t k = 0; k < frame.contact_force.size(); ++k) {
+      const double normal = frame.contact_force[k].dot(frame.contact_normal[k]);
+      EXPECT_LE((frame.contact_force[k] - normal * frame.contact_normal[k]).norm(),
+                0.4 * normal * (1 + 1e-12));
+    }
+  }
+}
+
+TEST(Wedge, SphereDrivenIntoItByAWallStops) {
+  Scene scene = wedge(0.3, 0.2);
+  const double top = radius / std::sin(0.3) + radius;
+  Wall& lid = scene.wall("lid", {0, 0, top}, -Vec3::UnitZ());
+  lid.load = {.drive = WallDrive::force, .force = 500, .mass = 2.0};
+  scene.stage().law.mu_walls = 0;
+  Experiment run(std::move(scene));
+  run.steps(100);
+  const double force = (500 + mass * g_earth) / (2 * std::sin(0.3));
+  EXPECT_NEAR(run.wall_force(0).norm(), force, 1e-6 * force);
+  EXPECT_NEAR(run.wall_force(1).norm(), force, 1e-6 * force);
+  EXPECT_NEAR(run.simulation().walls()[2].position, -top, 1e-9);
+}
+
+}  // namespace
+}  // namespace talus::validation
