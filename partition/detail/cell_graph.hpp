@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "partition/partitioner.hpp"
+
+namespace talus::detail {
+
+/// Weighted grid of cells over a frame, summed over all ranks. An edge joins a cell to one of its 26
+/// neighbours; it is kept at the cell that comes first.
+struct CellGraph {
+  std::array<std::int32_t, 3> cells{};
+  std::vector<std::int64_t> weight;  ///< per cell: sum of the weights of its points
+  std::vector<std::int64_t>
+      shared;  ///< 13 per cell, for the neighbours `half_neighbours`: see build_cell_graph
+};
+
+/// The neighbours that follow a cell in order of (z, y, x).
+inline constexpr std::array<std::array<std::int32_t, 3>, 13> half_neighbours = {{{1, 0, 0},
+                                                                                 {-1, 1, 0},
+                                                                                 {0, 1, 0},
+                                                                                 {1, 1, 0},
+                                                                                 {-1, -1, 1},
+                                                                                 {0, -1, 1},
+                                                                                 {1, -1, 1},
+                                                                                 {-1, 0, 1},
+                                                                                 {0, 0, 1},
+                                                                                 {1, 0, 1},
+                                                                                 {-1, 1, 1},
+                                                                                 {0, 1, 1},
+                                                                                 {1, 1, 1}}};
+
+/// Cells of roughly cubic shape, as large as leaves `wanted` of them with weight, but at most 2^18 in all.
+/// A point weighs on the cell it lies in. Its two bodies tie that cell to the cells of their centres: a cut
+/// between the two is likely to leave the body with contacts on both sides. So an edge counts the bodies that
+/// two cells share once per contact across it; unlike a count of bodies it is a sum over candidates, that
+/// every rank can begin without knowing the candidates of another. A centre further away than a neighbour
+/// ties to the neighbour on the way.
+CellGraph build_cell_graph(const PartitionPoints& points, const Frame& frame, std::int64_t wanted,
+                           const Reduction& reduction);
+
+/// Cells to n subdomains by METIS_PartGraphKway, with a fixed seed, on the first rank, whose answer all get.
+/// Cells without weight go to the subdomain of the nearest cell (in steps through faces) that has some.
+/// Throws std::runtime_error if METIS fails. While METIS runs it holds the process's SIGTERM and SIGABRT
+/// handlers.
+CellTable cut_cell_graph(const CellGraph& graph, std::int32_t n, const Reduction& reduction);
+
+/// Renumbers the subdomains of `table`: greedily, by falling weight in common with a subdomain of `previous`
+/// (ties: lower old, then lower new number).
+void keep_numbers(CellTable& table, const Partition& previous, const PartitionPoints& points,
+                  const Frame& frame, std::int32_t n, const Reduction& reduction);
+
+}  // namespace talus::detail
