@@ -1,3 +1,5 @@
+#include <hdf5.h>
+
 #include <CLI/CLI.hpp>
 
 #include "apps/exit_codes.hpp"
@@ -11,6 +13,9 @@
 
 int main(int argc, char** argv) {
   using namespace talus;
+  // After a write that failed (a full disk) the library's clean-up at exit crashes, and would turn exit code
+  // 1 into a signal; every file is closed where it is written.
+  H5dont_atexit();
   CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
   app.set_version_flag("--version", "talus " + io::version());
   app.require_subcommand(1);

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <memory>
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
@@ -223,18 +222,17 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies) 
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  std::unique_ptr<io::Recorder> recorder;
   try {
     io::prepare_output_directory(directory, options.force);
-    recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
-    io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
   } catch (const io::FileError& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   }
+  io::Recorder recorder(directory, files, scene.setup, provenance);
+  io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
   print_start(scene, bodies, threads);
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, *recorder);
-  recorder->finish(summary);
+  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder);
+  recorder.finish(summary);
   print_end(summary, directory);
   return summary.exit_code;
 }
