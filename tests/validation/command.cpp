@@ -108,8 +108,8 @@ TEST_F(Command, RefusesSamplesThatDoNotFitAndWritesNothing) {
 TEST_F(Command, RefusesMissingScenesAndBadOverridesAndWritesNothing) {
   write(at("scene.toml"), pressed_box);
   const std::vector<std::pair<std::string, std::string>> mistakes = {
-      {"run none.toml", "none.toml"},
-      {"run .", "talus: error: .:"},
+      {"run none.toml", "none.toml: cannot open the scene: No such file"},
+      {"run .", "directory"},
       {"run scene.toml --set solver.tolerence=1e-4", "tolerance"},
       {"run scene.toml --set solver.tolerance=small", "--set solver.tolerance=small"},
       {"run scene.toml --set stage.sheer.friction=1", "stage.sheer"},
