@@ -12,6 +12,7 @@
 #include "io/version.hpp"
 
 #include <cstdio>
+#include <cstdlib>
 
 int main(int argc, char** argv) {
   using namespace talus;
@@ -77,7 +78,13 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_done : exit_bad_input;
   }
-  if (*run_app) return run_command(run);
+  if (*run_app) {
+    const graph::MpiSession session(&argc, &argv);
+    double delay = 0;  // a slow network on one machine, for tests and benchmarks
+    if (const char* seconds = std::getenv("TALUS_MESSAGE_DELAY")) delay = std::atof(seconds);
+    const graph::Communicator ranks(session, {.delay = delay});
+    return run_command(run, ranks);
+  }
   if (*plan_app) return plan_command(plan);
   if (*solve_app) return solve_command(solve);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <memory>
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
@@ -68,8 +69,8 @@ class RecorderFeed {
   RecorderFeed(graph::Executor& executor, io::Recorder& recorder)
       : executor_(executor), recorder_(recorder) {}
 
-  void row(const Simulation& simulation) {
-    rows_.push_back({simulation.report(), simulation.walls(), simulation.triaxial()});
+  void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+    rows_.push_back({simulation.report(), simulation.walls(), triaxial});
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
   }
 
@@ -124,44 +125,66 @@ std::string contents(const io::Scene& scene, const Bodies& bodies) {
                      counted(scene.setup.stages.size(), "stage"));
 }
 
-void print_start(const io::Scene& scene, const Bodies& bodies, int threads) {
+void print_start(const io::Scene& scene, const Bodies& bodies, int threads, const graph::Communicator& ranks) {
   fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, bodies));
-  const auto cores = static_cast<std::size_t>(omp_get_num_procs());
-  fmt::print(stderr, "talus: 1 rank, {}, {} for this process\n",
-             counted(static_cast<std::size_t>(threads), "thread"), counted(cores, "core"));
-  if (threads > omp_get_num_procs())
+  const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
+  const int cores = omp_get_num_procs();
+  fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n", count(ranks.ranks(), "rank"),
+             count(threads, "thread"), count(cores, "core"), ranks.thread_level());
+  if (scene.setup.decomposition.subdomains > 1 || ranks.ranks() > 1)
+    fmt::print(stderr, "talus: {} by {}, {}, {}\n",
+               count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
+               name_of(scene.setup.decomposition.partitioner),
+               scene.setup.decomposition.coupling == Coupling::nscdd ? "NSCDD" : "Schwarz",
+               scene.setup.decomposition.exchange == ExchangeScheme::dcs ? "DCS" : "CCS");
+  // Ranks that are bound have cores of their own; unbound ones share those of the machine.
+  const bool bound = cores < io::collect_provenance().cores_online;
+  if (threads * (bound ? 1 : ranks.ranks_on_node()) > cores)
     fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
 }
 
-/// Runs the steps; returns the signal that stopped them, or 0.
+/// The signal that any of the ranks received, or 0.
+int signal_of(const graph::Communicator& ranks) {
+  double signal[1] = {static_cast<double>(stop_signal.load())};
+  ranks.max(signal);
+  return static_cast<int>(signal[0]);
+}
+
+/// Runs the steps; returns the signal that stopped them, or 0. `feed` and `progress` on rank 0 only.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-            RecorderFeed& feed, Tally& tally) {
-  io::Progress progress = io::progress_on_stderr();
+            RecorderFeed* feed, Tally& tally, const graph::Communicator& ranks) {
+  std::optional<io::Progress> progress;
+  if (feed) progress.emplace(io::progress_on_stderr());
   FrameClock clock(output);
-  if (output.stage_frames) feed.frame(simulation.frame(output.contacts));
+  const auto write_frame = [&] {
+    Frame frame = simulation.frame(output.contacts);
+    if (feed) feed->frame(std::move(frame));
+  };
+  if (output.stage_frames) write_frame();
   while (!simulation.finished()) {
     const StepReport& report = simulation.step();
     tally.add(report);
-    feed.row(simulation);
+    const std::optional<TriaxialReport> triaxial = simulation.triaxial();
+    if (feed) feed->row(simulation, triaxial);
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames))
-      feed.frame(simulation.frame(output.contacts));
-    progress.update(report, simulation.stage().name, simulation.stage_fraction());
-    if (const int signal = stop_signal.load(); signal != 0) {
-      progress.finish();
+      write_frame();
+    if (progress) progress->update(report, simulation.stage().name, simulation.stage_fraction());
+    if (const int signal = signal_of(ranks); signal != 0) {
+      if (progress) progress->finish();
       return signal;
     }
     if (last) break;
     simulation.begin_next_stage();
   }
-  progress.finish();
+  if (progress) progress->finish();
   return 0;
 }
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
-                     io::Recorder& recorder) {
+                     io::Recorder* recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = bodies.size();
@@ -173,10 +196,12 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.exit_code = exit_failure;
   };
   graph::Executor executor({.threads = threads});
-  Simulation simulation(scene.setup, std::move(bodies), executor);
-  RecorderFeed feed(executor, recorder);
+  Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
+  std::optional<RecorderFeed> feed;
+  if (recorder) feed.emplace(executor, *recorder);
   try {
-    if (const int signal = advance(simulation, options, scene.output, feed, tally); signal != 0) {
+    if (const int signal = advance(simulation, options, scene.output, feed ? &*feed : nullptr, tally, ranks);
+        signal != 0) {
       summary.status = "stopped";
       summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
       summary.exit_code = exit_failure;
@@ -185,16 +210,22 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     failed(error);
   }
   try {
-    feed.flush();
+    if (feed) feed->flush();
     executor.drain();
   } catch (const std::exception& error) {
     failed(error);
+  }
+  if (summary.status == "failed") {
+    // The other ranks may wait for what will not come: the caller ends them when the files are whole.
+    summary.steps = simulation.report().step;
+    summary.wall_s = watch.seconds();
+    return summary;
   }
   if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
     summary.exit_code = exit_tolerance_missed;
   summary.steps = simulation.report().step;
   summary.time = simulation.report().time;
-  summary.digest = digest(simulation.state().bodies);
+  summary.digest = simulation.digest();
   summary.iterations = tally.iterations;
   summary.unconverged_steps = tally.unconverged;
   summary.converged_steps = summary.steps - tally.unconverged;
@@ -221,7 +252,30 @@ void print_end(const io::Summary& summary, const SolverSettings& solver, const s
   fmt::print(stderr, "talus: results in {}\n", directory);
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies) {
+/// What rank 0 alone knows at the start, when it has made the sample: where the walls stand and what they weigh.
+void share_walls(Setup& setup, const graph::Communicator& ranks) {
+  std::vector<double*> values;
+  for (Wall& wall : setup.walls) {
+    for (Eigen::Index k = 0; k < 3; ++k) values.push_back(&wall.point[k]);
+    values.push_back(&wall.load.mass);
+  }
+  for (Stage& stage : setup.stages)
+    for (auto& [name, load] : stage.loads) values.push_back(&load.mass);
+  std::vector<double> own;
+  if (ranks.rank() == 0)
+    for (const double* value : values) own.push_back(*value);
+  const std::vector<double> shared = ranks.gather_records(std::span<const double>(own));
+  for (std::size_t k = 0; k < values.size(); ++k) *values[k] = shared[k];
+}
+
+/// True when something failed on any rank.
+bool any_failed(bool failed, const graph::Communicator& ranks) {
+  double flag[1] = {failed ? 1.0 : 0.0};
+  ranks.max(flag);
+  return flag[0] > 0;
+}
+
+int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies, const graph::Communicator& ranks) {
   const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();
@@ -233,24 +287,39 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies) 
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  try {
-    io::prepare_output_directory(directory, options.force);
-  } catch (const io::FileError& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
-    return exit_bad_input;
+  std::unique_ptr<io::Recorder> recorder;
+  bool refused = false;
+  if (ranks.rank() == 0) {
+    try {
+      io::prepare_output_directory(directory, options.force);
+    } catch (const io::FileError& error) {
+      fmt::print(stderr, "talus: error: {}\n", error.what());
+      refused = true;
+    }
+    if (!refused) {
+      recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
+      io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
+      print_start(scene, bodies, threads, ranks);
+    }
   }
-  io::Recorder recorder(directory, files, scene.setup, provenance);
-  io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
-  print_start(scene, bodies, threads);
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder);
-  recorder.finish(summary);
-  print_end(summary, scene.setup.solver, directory);
+  if (any_failed(refused, ranks)) return exit_bad_input;
+  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder.get(), ranks);
+  if (recorder) {
+    recorder->finish(summary);
+    print_end(summary, scene.setup.solver, directory);
+  } else if (summary.status == "failed") {
+    fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);
+  }
+  if (summary.status == "failed" && ranks.ranks() > 1) {
+    std::fflush(nullptr);
+    ranks.abort(summary.exit_code);
+  }
   return summary.exit_code;
 }
 
 }  // namespace
 
-int run_command(const RunOptions& options) {
+int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Bodies bodies;
   try {
@@ -259,24 +328,31 @@ int run_command(const RunOptions& options) {
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     scene = io::load_scene(options.scene, options.overrides);
-    bodies = build_sample(scene);
-    io::place_walls(scene, bodies);
-    if (options.dry_run) {
+    if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
+    if (ranks.rank() == 0) {
+      bodies = build_sample(scene);
+      io::place_walls(scene, bodies);
+    }
+    if (options.dry_run && ranks.rank() == 0) {
       fmt::print("{}", io::resolved_scene(scene));
       fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n",
                  options.scene, contents(scene, bodies));
-      return exit_done;
     }
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    if (ranks.rank() == 0) fmt::print(stderr, "talus: error: {}\n", error.what());
+    any_failed(true, ranks);
     return exit_bad_input;
   }
+  if (any_failed(false, ranks)) return exit_bad_input;
+  if (options.dry_run) return exit_done;
+  share_walls(scene.setup, ranks);
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(bodies));
+    return run_scene(options, scene, std::move(bodies), ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
+    if (ranks.ranks() > 1) ranks.abort(exit_failure);
     return exit_failure;
   }
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "runtime/graph/communicator.hpp"
+
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -19,6 +21,6 @@ struct RunOptions {
 };
 
 /// `talus run`: from a scene file to a directory of results. Prints to stderr; returns an ExitCode.
-int run_command(const RunOptions& options);
+int run_command(const RunOptions& options, const graph::Communicator& ranks);
 
 }  // namespace talus

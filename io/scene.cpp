@@ -28,7 +28,7 @@ class SceneReader {
   }
 
   Scene read() && {
-    read_table(root_, "", keys_.top, {"material", "sample", "wall", "stage", "detection", "solver", "output"},
+    read_table(root_, "", keys_.top, {"material", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_table(table_at(root_, "material"), "material", keys_.material, {}, scene_);
@@ -37,6 +37,8 @@ class SceneReader {
     read_stages();
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
+    read_table(table_at(root_, "decomposition"), "decomposition", keys_.decomposition, {},
+               scene_.setup.decomposition);
     read_table(table_at(root_, "output"), "output", keys_.output, {}, scene_.output);
     if (scene_.output.directory.empty()) scene_.output.directory = "out/" + scene_.name;
     return std::move(scene_);

@@ -30,6 +30,7 @@ std::string resolved_scene(const Scene& scene) {
   write_section(out, keys.sample, scene.sample);
   write_section(out, keys.detection, scene.setup.detection);
   write_section(out, keys.solver, scene.setup.solver);
+  write_section(out, keys.decomposition, scene.setup.decomposition);
   write_section(out, keys.output, scene.output);
   for (const Wall& wall : scene.setup.walls) write_section(out, keys.wall, wall);
   for (const Stage& stage : scene.setup.stages) {

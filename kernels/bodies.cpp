@@ -113,21 +113,17 @@ std::size_t memory_used(const Bodies& bodies) {
          bodies.orientation.capacity() * sizeof(std::array<double, 4>);
 }
 
-std::uint64_t digest(const Bodies& bodies) {
-  std::vector<Slot> order(bodies.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](Slot a, Slot b) {
-    return bodies.id[static_cast<std::size_t>(a)] < bodies.id[static_cast<std::size_t>(b)];
-  });
-  std::uint64_t hash = 0x9e3779b97f4a7c15ULL;
-  const auto mix = [&hash](std::uint64_t word) {  // one round of the splitmix64 finaliser per word
-    hash = (hash ^ word) * 0xbf58476d1ce4e5b9ULL;
-    hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebULL;
-    hash ^= hash >> 31;
-  };
-  const auto mix_real = [&mix](double value) { mix(std::bit_cast<std::uint64_t>(value)); };
-  for (Slot slot : order) {
-    const auto k = static_cast<std::size_t>(slot);
+std::uint64_t digest(const Bodies& bodies, std::span<const char> counts) {
+  std::uint64_t sum = 0;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    if (!counts.empty() && !counts[k]) continue;
+    std::uint64_t hash = 0x9e3779b97f4a7c15ULL;
+    const auto mix = [&hash](std::uint64_t word) {  // one round of the splitmix64 finaliser per word
+      hash = (hash ^ word) * 0xbf58476d1ce4e5b9ULL;
+      hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebULL;
+      hash ^= hash >> 31;
+    };
+    const auto mix_real = [&mix](double value) { mix(std::bit_cast<std::uint64_t>(value)); };
     mix(static_cast<std::uint64_t>(bodies.id[k]));
     for (int c = 0; c < 3; ++c) mix_real(bodies.x[k][c]);
     mix_real(bodies.radius[k]);
@@ -135,8 +131,9 @@ std::uint64_t digest(const Bodies& bodies) {
     for (double w : bodies.velocity[k].w) mix_real(w);
     if (!bodies.orientation.empty())
       for (double q : bodies.orientation[k]) mix_real(q);
+    sum += hash;
   }
-  return hash;
+  return sum;
 }
 
 }  // namespace talus

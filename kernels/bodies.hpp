@@ -65,8 +65,9 @@ void validate(const Bodies& bodies);
 /// Bytes held by the arrays.
 std::size_t memory_used(const Bodies& bodies);
 
-/// 64-bit hash of the exact bits of (id, x, radius, u, w, orientation) of every body, taken in order of id:
-/// equal if and only if (up to hash collisions) the states are equal bit for bit.
-std::uint64_t digest(const Bodies& bodies);
+/// 64-bit hash of the exact bits of (id, x, radius, u, w, orientation) of every body for which `counts` is
+/// not 0 (empty: of all): a sum over bodies, so that it depends neither on their order nor on how they are
+/// dealt to ranks. Equal if and only if (up to hash collisions) the states are equal bit for bit.
+std::uint64_t digest(const Bodies& bodies, std::span<const char> counts = {});
 
 }  // namespace talus

@@ -11,27 +11,19 @@ std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-void place_boundaries(const Candidates& candidates, int target, Chunks& chunks) {
-  const auto grains = static_cast<std::int32_t>(candidates.grain_pairs.size());
-  const auto all = static_cast<std::int32_t>(candidates.size());
-  const auto cut = [&](std::int32_t from, std::int32_t to, std::int32_t wall) {
+void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
+  for (const CandidateGroup& group : groups) {
     // Pieces of equal length: a short last piece would be a poor task.
-    const std::int32_t pieces = (to - from + target - 1) / target;
+    const std::int32_t pieces = (group.end - group.begin + group.target - 1) / group.target;
     for (std::int32_t k = 0; k < pieces; ++k) {
-      chunks.begin.push_back(from +
-                             static_cast<std::int32_t>(static_cast<std::int64_t>(to - from) * k / pieces));
-      chunks.wall.push_back(wall);
+      const auto part = static_cast<std::int64_t>(group.end - group.begin) * k / pieces;
+      chunks.begin.push_back(group.begin + static_cast<std::int32_t>(part));
+      chunks.wall.push_back(group.wall);
+      chunks.subdomain.push_back(group.subdomain);
+      chunks.boundary.push_back(group.boundary ? 1 : 0);
     }
-  };
-  cut(0, grains, -1);
-  for (std::int32_t from = grains; from < all;) {
-    const std::int32_t wall = candidates.wall_pairs[index(from - grains)].wall;
-    std::int32_t to = from;
-    while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall) ++to;
-    cut(from, to, wall);
-    from = to;
   }
-  chunks.begin.push_back(all);
+  chunks.begin.push_back(groups.empty() ? 0 : groups.back().end);
 }
 
 void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunks) {
@@ -103,19 +95,24 @@ void find_conflicts(const Incidence& incidence, Chunks& chunks) {
   }
 }
 
+/// Greedily, those at the boundary first and the others above them.
 void colour_chunks(Chunks& chunks) {
   const std::size_t count = chunks.wall.size();
   chunks.colour.assign(count, -1);
   std::vector<std::uint32_t> taken_by(count + 1, ~0u);  // colour -> last chunk that found it taken
-  for (std::size_t c = 0; c < count; ++c) {
-    for (auto k = chunks.conflict_begin[c]; k < chunks.conflict_begin[c + 1]; ++k) {
-      const std::int32_t colour = chunks.colour[chunks.conflicts[index(k)]];
-      if (colour >= 0) taken_by[index(colour)] = static_cast<std::uint32_t>(c);
+  for (const char boundary : {char{1}, char{0}}) {
+    for (std::size_t c = 0; c < count; ++c) {
+      if (chunks.boundary[c] != boundary) continue;
+      for (auto k = chunks.conflict_begin[c]; k < chunks.conflict_begin[c + 1]; ++k) {
+        const std::int32_t colour = chunks.colour[chunks.conflicts[index(k)]];
+        if (colour >= 0) taken_by[index(colour)] = static_cast<std::uint32_t>(c);
+      }
+      std::int32_t colour = boundary ? 0 : chunks.boundary_colours;
+      while (taken_by[index(colour)] == c) ++colour;
+      chunks.colour[c] = colour;
+      chunks.colours = std::max(chunks.colours, colour + 1);
     }
-    std::int32_t colour = 0;
-    while (taken_by[index(colour)] == c) ++colour;
-    chunks.colour[c] = colour;
-    chunks.colours = std::max(chunks.colours, colour + 1);
+    if (boundary) chunks.boundary_colours = chunks.colours;
   }
 }
 
@@ -162,15 +159,35 @@ bool before(const WallPair& a, const WallPair& b) {
 
 }  // namespace
 
-Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target) {
+std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates, std::span<const char> glued,
+                                                    int target) {
+  const auto grains = static_cast<std::int32_t>(candidates.grain_pairs.size());
+  const auto all = static_cast<std::int32_t>(candidates.size());
+  std::vector<CandidateGroup> groups;
+  if (grains > 0) groups.push_back({0, grains, -1, 0, false, target});
+  for (std::int32_t from = grains; from < all;) {
+    const std::int32_t wall = candidates.wall_pairs[index(from - grains)].wall;
+    std::int32_t to = from;
+    while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall) ++to;
+    groups.push_back({from, to, wall, 0, !glued.empty() && glued[index(wall)] != 0, target});
+    from = to;
+  }
+  return groups;
+}
+
+Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies) {
   Chunks chunks;
-  place_boundaries(candidates, target, chunks);
+  place_boundaries(groups, chunks);
   list_bodies(candidates, bodies, chunks);
   const Incidence incidence = chunks_of_bodies(chunks, bodies);
   find_conflicts(incidence, chunks);
   colour_chunks(chunks);
   assign_resets(incidence, bodies, chunks);
   return chunks;
+}
+
+Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target) {
+  return cut_chunks(candidates, groups_of_one_subdomain(candidates, {}, target), bodies);
 }
 
 void match_impulses(const Candidates& old, Candidates& fresh) {
@@ -232,12 +249,12 @@ std::size_t memory_used(const Candidates& candidates) {
 }
 
 std::size_t memory_used(const Chunks& chunks) {
-  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.colour.capacity() +
+  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.subdomain.capacity() + chunks.colour.capacity() +
           chunks.body_begin.capacity() + chunks.bodies.capacity() + chunks.owned_begin.capacity() +
           chunks.owned.capacity() + chunks.untouched.capacity() + chunks.conflict_begin.capacity() +
           chunks.conflicts.capacity()) *
              4 +
-         chunks.local.capacity() * 2;
+         chunks.local.capacity() * 2 + chunks.boundary.capacity();
 }
 
 }  // namespace talus

@@ -29,14 +29,29 @@ struct Candidates {
   std::size_t size() const { return grain_pairs.size() + wall_pairs.size(); }
 };
 
-/// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes grains and walls,
-/// nor two walls. Two chunks conflict when they share a grain, and then differ in colour: the sweep's result
+/// Candidates [begin, end) that may share a chunk: of one subdomain, of one wall or of none, and all at the
+/// interface or all inside. Groups follow one another, and together hold all candidates.
+struct CandidateGroup {
+  std::int32_t begin;
+  std::int32_t end;
+  std::int32_t wall;       ///< index of the wall, or -1
+  std::int32_t subdomain;  ///< index among those of this process
+  bool boundary;           ///< a body of each stands in several subdomains, or its wall is glued
+  int target;              ///< candidates in a chunk at most, a few hundred, < 32768
+};
+
+/// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so neither
+/// grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept first, and
+/// what they leave at the interface can travel while the inner chunks are swept. Two chunks conflict when they share a grain, and then differ in colour: the sweep's result
 /// depends on colours alone. Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0
 /// begin a chunk of their own.
 struct Chunks {
   std::vector<std::int32_t> begin;   ///< chunks + 1 offsets into the candidates
   std::vector<std::int32_t> wall;    ///< per chunk: index of its wall, or -1
-  std::vector<std::int32_t> colour;  ///< per chunk
+  std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
+  std::vector<char> boundary;           ///< per chunk: that of its group
+  std::vector<std::int32_t> colour;     ///< per chunk; at the boundary 0 .. boundary_colours - 1, inside the rest
+  int boundary_colours = 0;
   int colours = 0;
   std::vector<std::int32_t> body_begin;  ///< chunks + 1 offsets into `bodies`
   std::vector<Slot> bodies;              ///< the grains that a chunk touches, in order of first use
@@ -52,9 +67,16 @@ struct Chunks {
   std::size_t size() const { return colour.size(); }
 };
 
-/// Cuts the candidates into chunks of at most `target` (a few hundred, < 32768), colours them greedily in
-/// order, and lists who resets which body.
+/// Cuts the groups into chunks, colours them greedily in order, and lists who resets which body.
+Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies);
+
+/// The same with all candidates of one subdomain and nothing glued.
 Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target);
+
+/// The groups of candidates that are all of one subdomain, in the order of `Candidates`; the wall pairs of
+/// walls with `glued[wall]` are at the boundary (none when empty).
+std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates, std::span<const char> glued,
+                                                    int target);
 
 /// Carries impulses from `old` to `fresh` where the same pair stands in both; others start from 0. Both are
 /// sorted; the slots must mean the same bodies. Impulses are carried between equal `components` only: with

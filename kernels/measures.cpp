@@ -52,7 +52,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
   return sums;
 }
 
-double coordination(const Contacts& contacts, const Chunks& chunks, std::size_t bodies, int rattler_below) {
+std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies) {
   std::vector<std::int32_t> touching(bodies, 0);
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const auto begin = static_cast<std::size_t>(chunks.begin[c]);
@@ -62,13 +62,7 @@ double coordination(const Contacts& contacts, const Chunks& chunks, std::size_t 
       if (contacts.second[k] >= 0) ++touching[static_cast<std::size_t>(contacts.second[k])];
     }
   }
-  std::int64_t held = 0, total = 0;
-  for (std::int32_t count : touching) {
-    if (count < rattler_below) continue;
-    ++held;
-    total += count;
-  }
-  return held > 0 ? static_cast<double>(total) / static_cast<double>(held) : 0;
+  return touching;
 }
 
 }  // namespace talus

@@ -30,9 +30,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
 Vec3 contact_impulse(const Contacts& contacts, std::size_t k);
 Vec3 contact_normal(const Contacts& contacts, std::size_t k);
 
-/// Mean number of active contacts of the grains that are no rattlers. A grain with fewer than `rattler_below`
-/// active contacts is a rattler: 4 without friction, 2 with it (a frictionless grain cannot be held by
-/// three).
-double coordination(const Contacts& contacts, const Chunks& chunks, std::size_t bodies, int rattler_below);
+/// Active contacts (r_n > 0) of each grain: one entry per slot.
+std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies);
 
 }  // namespace talus

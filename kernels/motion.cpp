@@ -11,17 +11,18 @@ double square(const double (&v)[3]) {
 }
 }  // namespace
 
-void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-             const Vec3& gravity, FreeVelocity& free) {
-  for (std::size_t s = range.begin; s < range.end; ++s) {
-    const Velocity& v = velocity[s];
+void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step) {
+  for (std::size_t s = range.begin; s < range.end; ++s)
+    for (std::size_t c = 0; c < 3; ++c) x[s][static_cast<Eigen::Index>(c)] += 0.5 * time_step * velocity[s].u[c];
+}
+
+void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step, const Vec3& gravity,
+                     FreeVelocity& free) {
+  for (std::size_t s = range.begin; s < range.end; ++s)
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto axis = static_cast<Eigen::Index>(c);
-      x[s][axis] += 0.5 * time_step * v.u[c];
-      free.u[s][c] = v.u[c] + time_step * gravity[axis];
-      if (!free.w.empty()) free.w[s][c] = v.w[c];
+      free.u[s][c] = velocity[s].u[c] + time_step * gravity[static_cast<Eigen::Index>(c)];
+      if (!free.w.empty()) free.w[s][c] = velocity[s].w[c];
     }
-  }
 }
 
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity) {
@@ -45,21 +46,22 @@ void MotionSums::add(const MotionSums& other) {
 }
 
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free) {
+                  const FreeVelocity& free, Multiplicities multiplicity) {
   MotionSums sums;
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Velocity& v = velocity[s];
     const Vec3 u(v.u[0], v.u[1], v.u[2]), u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
     x[s] += 0.5 * time_step * u;
-    const double mass = 1 / v.inv_mass, u2 = u.squaredNorm();
+    const double share = multiplicity.empty() ? 1 : 1.0 / multiplicity[s];
+    const double mass = share / v.inv_mass, u2 = u.squaredNorm();
     const Vec3 gained = mass * (u - u_free);
     sums.energy.translation += 0.5 * mass * u2;
     sums.energy_free += 0.5 * mass * u_free.squaredNorm();
     if (v.spin_mobility > 0) {
-      const double spin = 0.5 * square(v.w) / v.spin_mobility;
+      const double spin = 0.5 * share * square(v.w) / v.spin_mobility;
       sums.energy.rotation += spin;
       sums.energy_free += free.w.empty() ? spin
-                                         : 0.5 *
+                                         : 0.5 * share *
                                                (free.w[s][0] * free.w[s][0] + free.w[s][1] * free.w[s][1] +
                                                 free.w[s][2] * free.w[s][2]) /
                                                v.spin_mobility;

@@ -20,9 +20,12 @@ struct FreeVelocity {
   std::vector<std::array<double, 3>> w;  ///< [m/s]
 };
 
-/// First half of Moreau's theta-scheme (theta = 1/2): x += h/2 u-, free velocity = V- + h g.
-void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-             const Vec3& gravity, FreeVelocity& free);
+/// First half of Moreau's theta-scheme (theta = 1/2): x += h/2 u-.
+void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step);
+
+/// Free velocity = V- + h g.
+void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step, const Vec3& gravity,
+                     FreeVelocity& free);
 
 /// V = free velocity for the given grains.
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity);
@@ -39,9 +42,10 @@ struct MotionSums {
   void add(const MotionSums& other);
 };
 
-/// Second half: x += h/2 u, with the sums.
+/// Second half: x += h/2 u, with the sums. Where copies carry the whole mass (Schwarz), `multiplicity` divides
+/// what a copy adds to the sums.
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free);
+                  const FreeVelocity& free, Multiplicities multiplicity = {});
 
 /// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
 void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,

@@ -132,6 +132,11 @@ inline V3 project_on_cone(V3 z, V3 n, double mu) {
   return r_n * n + (mu * r_n / length) * t;
 }
 
+/// 1/M of the body whose copy this is.
+inline double whole(const Velocity& copy, Slot slot, Multiplicities multiplicity) {
+  return multiplicity.empty() ? copy.inv_mass : copy.inv_mass / multiplicity[static_cast<std::size_t>(slot)];
+}
+
 template <bool Friction>
 inline void add_error(ErrorSums& sums, V3 r, V3 v, V3 n, double bias, double w_nn, double mu) {
   const double v_n = dot(v, n) + bias;
@@ -211,28 +216,29 @@ void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Vel
 
 template <bool Friction>
 ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                       double mu) {
+                       double mu, Multiplicities multiplicity) {
   ErrorSums sums;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
     const V3 n = normal_of(contacts, k);
+    const double w_nn = whole(a, contacts.first[k], multiplicity) + whole(b, contacts.second[k], multiplicity);
     add_error<Friction>(sums, impulse_of<Friction>(contacts, k, n), relative<Friction>(a, b, n), n,
-                        contacts.bias[k], a.inv_mass + b.inv_mass, mu);
+                        contacts.bias[k], w_nn, mu);
   }
   return sums;
 }
 
 template <bool Friction>
 ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                     double mu, const WallCopy& wall, double wall_inv_mass) {
+                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities multiplicity) {
   ErrorSums sums;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const V3 n = normal_of(contacts, k);
     const V3 r = impulse_of<Friction>(contacts, k, n);
     add_error<Friction>(sums, r, relative<Friction>(a, wall, n), n, contacts.bias[k],
-                        a.inv_mass + wall_inv_mass, mu);
+                        whole(a, contacts.first[k], multiplicity) + wall_inv_mass, mu);
     add_to(sums.wall_impulse, r);
   }
   return sums;
@@ -261,6 +267,43 @@ void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which
   }
 }
 
+template <bool Friction>
+void copy_impulses(const Contacts& contacts, ContactRange range, std::vector<double>& out) {
+  out.clear();
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    if constexpr (Friction) {
+      out.insert(out.end(), {contacts.rx[k], contacts.ry[k], contacts.rz[k]});
+    } else {
+      out.push_back(contacts.rn[k]);
+    }
+  }
+}
+
+template <bool Friction>
+void relax(Contacts& contacts, ContactRange range, std::span<const double> before,
+           Multiplicities multiplicity, std::span<Velocity> velocity, WallCopy* wall) {
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const auto i = static_cast<std::size_t>(contacts.first[k]);
+    const auto j = static_cast<std::size_t>(std::max(contacts.second[k], 0));
+    const auto m = wall ? multiplicity[i] : std::max(multiplicity[i], multiplicity[j]);
+    if (m == 1) continue;
+    const V3 n = normal_of(contacts, k);
+    const V3 r = impulse_of<Friction>(contacts, k, n);
+    const double* b = &before[(k - range.begin) * (Friction ? 3 : 1)];
+    V3 r_before;
+    if constexpr (Friction)
+      r_before = load(b);
+    else
+      r_before = *b * n;
+    const V3 r_new = r_before + (1.0 / m) * (r - r_before);
+    if (wall)
+      push<Friction>(velocity[i], *wall, n, r_new - r);
+    else
+      push<Friction>(velocity[i], velocity[j], n, r_new - r);
+    store_impulse<Friction>(contacts, k, r_new, n);
+  }
+}
+
 template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double);
 template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double);
 template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
@@ -269,11 +312,19 @@ template void accumulate_grains<true>(const Contacts&, ContactRange, std::span<V
 template void accumulate_grains<false>(const Contacts&, ContactRange, std::span<Velocity>);
 template void accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);
 template void accumulate_wall<false>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);
-template ErrorSums error_grains<true>(const Contacts&, ContactRange, std::span<const Velocity>, double);
-template ErrorSums error_grains<false>(const Contacts&, ContactRange, std::span<const Velocity>, double);
+template ErrorSums error_grains<true>(const Contacts&, ContactRange, std::span<const Velocity>, double,
+                                      Multiplicities);
+template ErrorSums error_grains<false>(const Contacts&, ContactRange, std::span<const Velocity>, double,
+                                       Multiplicities);
 template ErrorSums error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>, double,
-                                    const WallCopy&, double);
+                                    const WallCopy&, double, Multiplicities);
 template ErrorSums error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>, double,
-                                     const WallCopy&, double);
+                                     const WallCopy&, double, Multiplicities);
+template void relax<true>(Contacts&, ContactRange, std::span<const double>, Multiplicities, std::span<Velocity>,
+                          WallCopy*);
+template void relax<false>(Contacts&, ContactRange, std::span<const double>, Multiplicities,
+                           std::span<Velocity>, WallCopy*);
+template void copy_impulses<true>(const Contacts&, ContactRange, std::vector<double>&);
+template void copy_impulses<false>(const Contacts&, ContactRange, std::vector<double>&);
 
 }  // namespace talus

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "kernels/bodies.hpp"
 #include "kernels/contacts.hpp"
@@ -62,13 +63,25 @@ struct ErrorSums {
 /// = 1/W_nn [m/s] (design.md §4). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
 template <bool Friction>
 ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                       double mu);
+                       double mu, Multiplicities multiplicity = {});
 template <bool Friction>
 ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                     double mu, const WallCopy& wall, double wall_inv_mass);
+                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities multiplicity = {});
 
 /// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies
 /// have equal masses. Summed in order.
 void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which);
+
+/// Keeps a part of what a sweep changed: r <- before + part (r - before), and V with it. `before` holds the
+/// impulses of the range (3 each, or 1 without friction). For a contact whose bodies stand in m_1 and m_2
+/// subdomains part = 1/max(m_1, m_2): the damping that makes block Jacobi on full masses (Schwarz, (24))
+/// converge, docs/decisions/0007-couplings.md.
+template <bool Friction>
+void relax(Contacts& contacts, ContactRange range, std::span<const double> before,
+           Multiplicities multiplicity, std::span<Velocity> velocity, WallCopy* wall);
+
+/// Copies the impulses of a range into `out`, as `relax` wants them.
+template <bool Friction>
+void copy_impulses(const Contacts& contacts, ContactRange range, std::vector<double>& out);
 
 }  // namespace talus

@@ -30,6 +30,7 @@ struct SceneKeys {
   Section<NamedLoad> stage_load;
   Section<DetectionSettings> detection;
   Section<SolverSettings> solver;
+  Section<DecompositionSettings> decomposition;
   Section<OutputSpec> output;
 };
 
@@ -38,7 +39,7 @@ template <class Keys, class F>
 void for_each_section(Keys&& keys, F&& f) {
   f(keys.top), f(keys.material), f(keys.sample), f(keys.wall), f(keys.stage), f(keys.stage_end),
       f(keys.stage_load);
-  f(keys.detection), f(keys.solver), f(keys.output);
+  f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output);
 }
 
 const SceneKeys& scene_keys();

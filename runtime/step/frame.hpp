@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/types.hpp"
+#include "runtime/graph/communicator.hpp"
 
 namespace talus {
 
@@ -73,5 +74,11 @@ struct Frame {
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
 };
+
+struct StepState;
+
+/// Fills the bodies and contacts of `frame` with those of all ranks, in order of id; on rank 0 only, collective.
+void gather_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
+                  double time_step, Frame& frame);
 
 }  // namespace talus

@@ -7,14 +7,20 @@ namespace talus {
 
 std::size_t memory_used(const StepState& state) {
   return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) +
-         memory_used(state.contacts) +
+         memory_used(state.contacts) + memory_used(state.decomposition) +
          (state.free.u.capacity() + state.free.w.capacity()) * sizeof(std::array<double, 3>) +
          state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
          state.copies.capacity() * sizeof(WallCopy);
 }
 
-Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings)
-    : state_(state), parameters_(parameters), settings_(settings) {}
+Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+                     const DecompositionSettings& decomposition, const graph::Communicator& ranks)
+    : state_(state),
+      parameters_(parameters),
+      settings_(settings),
+      decomposition_(decomposition),
+      ranks_(ranks),
+      gluing_(state, decomposition, ranks) {}
 
 void Iteration::begin() {
   const Chunks& chunks = state_.chunks;
@@ -27,18 +33,37 @@ void Iteration::begin() {
     if (chunks.wall[c] >= 0 && state_.contacts.count[c] > 0)
       state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
           static_cast<std::int32_t>(c));
-  glued_.clear();
+  gluing_.begin();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
-    const auto& copies = state_.wall_states[w].copies;
-    const double split = static_cast<double>(copies.size()) * state_.walls[w].inv_mass();
-    for (std::int32_t c : copies) state_.copies[static_cast<std::size_t>(c)].inv_mass = split;
-    if (split > 0 && copies.size() > 1) glued_.push_back(static_cast<std::int32_t>(w));
+    const WallState& wall = state_.wall_states[w];
+    const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
+    for (std::int32_t c : wall.copies) state_.copies[static_cast<std::size_t>(c)].inv_mass = split;
   }
+  const bool damped = decomposition_.coupling == Coupling::schwarz && decomposition_.damping &&
+                      state_.decomposition.several();
+  before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
   impulses_.clear();
   history_.clear();
   result_ = {};
-  segment_ = 0;
+  jump_ = {};
+  sweeps_from_ = segment_ = 0;
+}
+
+template <bool Friction>
+void Iteration::sweep(std::size_t c, ContactRange range, double mu) {
+  const Chunks& chunks = state_.chunks;
+  std::span<Velocity> velocity = state_.bodies.velocity;
+  const bool at_wall = chunks.wall[c] >= 0;
+  const bool damped = !before_.empty() && chunks.boundary[c] != 0;
+  if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
+  if (at_wall)
+    sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
+  else
+    sweep_grains<Friction>(state_.contacts, range, velocity, mu);
+  if (damped)
+    relax<Friction>(state_.contacts, range, before_[c], state_.decomposition.multiplicity, velocity,
+                    at_wall ? &state_.copies[c] : nullptr);
 }
 
 template <bool Friction>
@@ -50,6 +75,10 @@ void Iteration::chunk(std::size_t c, Work work) {
   std::span<Velocity> velocity = state_.bodies.velocity;
   const bool at_wall = chunks.wall[c] >= 0;
   const double mu = at_wall ? parameters_.law.mu_walls : parameters_.law.mu_grains;
+  // With Schwarz a copy has the whole mass.
+  const Multiplicities multiplicity = decomposition_.coupling == Coupling::nscdd && chunks.boundary[c] != 0
+                                          ? Multiplicities(state_.decomposition.multiplicity)
+                                          : Multiplicities();
   WallCopy& copy = state_.copies[c];
   switch (work) {
     case Work::accumulate: {
@@ -69,30 +98,44 @@ void Iteration::chunk(std::size_t c, Work work) {
     case Work::measure:
       sums_[c] = at_wall
                      ? error_wall<Friction>(contacts, range, velocity, mu, copy,
-                                            state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass())
-                     : error_grains<Friction>(contacts, range, velocity, mu);
+                                            state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(),
+                                            multiplicity)
+                     : error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
       break;
     case Work::sweep:
-      if (at_wall)
-        sweep_wall<Friction>(contacts, range, velocity, mu, copy);
-      else
-        sweep_grains<Friction>(contacts, range, velocity, mu);
+      sweep<Friction>(c, range, mu);
       break;
   }
 }
 
+Gluing::Mode Iteration::gluing_mode(int epoch) const {
+  if (work(epoch) == Work::accumulate) return Gluing::Mode::fresh;
+  const int sweeps = epoch - sweeps_from_ + 1;
+  if (epoch + 1 == segment_) return Gluing::Mode::measured;
+  return sweeps % decomposition_.sweeps_per_exchange == 0 ? Gluing::Mode::iterate : Gluing::Mode::local;
+}
+
 void Iteration::node(std::uint32_t node, int epoch) {
   const Work now = work(epoch);
-  if (node < state_.chunks.size()) {
+  const std::size_t chunks = state_.chunks.size();
+  if (node < chunks) {
     if (parameters_.friction)
       chunk<true>(node, now);
     else
       chunk<false>(node, now);
+    // Long messages advance only while somebody calls MPI.
+    if (ranks_.ranks() > 1 && node % 4 == 0) ranks_.progress();
     return;
   }
   if (now == Work::measure) return;
-  const auto wall = static_cast<std::size_t>(glued_[node - state_.chunks.size()]);
-  glue_copies(state_.copies, state_.wall_states[wall].copies);
+  const Gluing::Mode mode = gluing_mode(epoch);
+  const std::size_t here = state_.decomposition.here.size(), task = node - chunks;
+  if (task < here)
+    gluing_.publish(task, mode);
+  else if (task == here)
+    gluing_.centre(mode);
+  else
+    gluing_.glue(task - here - 1, mode);
 }
 
 double Iteration::impulse_scale() const {
@@ -115,22 +158,65 @@ double Iteration::drift() const {
   return change / scale;
 }
 
-bool Iteration::decide(int epoch) {
-  ErrorSums total;
-  std::vector<Vec3> impulses(state_.walls.size(), Vec3::Zero());
+/// Per subdomain in order of chunk, then over subdomains in their order: the same sums on any number of ranks.
+void Iteration::add_up() {
+  constexpr std::size_t head = 9;
+  const std::size_t walls = state_.walls.size(), width = head + 3 * walls;
+  const Decomposition& all = state_.decomposition;
+  std::vector<double> rows(all.here.size() * width, 0.0);
+  std::vector<ErrorSums> sums(all.here.size());
   for (std::size_t c = 0; c < sums_.size(); ++c) {
-    total.add(sums_[c]);
-    if (state_.chunks.wall[c] >= 0)
-      impulses[static_cast<std::size_t>(state_.chunks.wall[c])] +=
-          Eigen::Map<const Vec3>(sums_[c].wall_impulse);
+    const auto e = static_cast<std::size_t>(state_.chunks.subdomain[c]);
+    sums[e].add(sums_[c]);
+    if (state_.chunks.wall[c] < 0) continue;
+    double* wall = &rows[e * width + head + 3 * static_cast<std::size_t>(state_.chunks.wall[c])];
+    for (std::size_t k = 0; k < 3; ++k) wall[k] += sums_[c].wall_impulse[k];
   }
-  for (std::size_t w = 0; w < impulses.size(); ++w) state_.wall_states[w].impulse = impulses[w];
+  for (std::size_t e = 0; e < all.here.size(); ++e) {
+    const JumpSums jump = gluing_.jumps().empty() ? JumpSums{} : gluing_.jumps()[e];
+    const double values[head] = {static_cast<double>(all.here[e]),
+                                 sums[e].residual2,
+                                 sums[e].residual_max,
+                                 sums[e].impulse2,
+                                 sums[e].velocity2,
+                                 static_cast<double>(sums[e].contacts),
+                                 static_cast<double>(sums[e].active),
+                                 jump.jump2,
+                                 jump.velocity2};
+    std::copy_n(values, head, &rows[e * width]);
+  }
+  rows = ranks_.gather_records(std::span<const double>(rows));
+  std::vector<const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
+  for (std::size_t k = 0; k < rows.size(); k += width) by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
+  total_ = {};
+  jump_ = {};
+  std::vector<Vec3> impulses(walls, Vec3::Zero());
+  for (const double* row : by_subdomain) {
+    ErrorSums part;
+    part.residual2 = row[1];
+    part.residual_max = row[2];
+    part.impulse2 = row[3];
+    part.velocity2 = row[4];
+    part.contacts = static_cast<std::int64_t>(row[5]);
+    part.active = static_cast<std::int64_t>(row[6]);
+    total_.add(part);
+    jump_.jump2 += row[7];
+    jump_.velocity2 += row[8];
+    for (std::size_t w = 0; w < walls; ++w) impulses[w] += Eigen::Map<const Vec3>(row + head + 3 * w);
+  }
+  for (std::size_t w = 0; w < walls; ++w) state_.wall_states[w].impulse = impulses[w];
   impulses_.push_back(std::move(impulses));
+}
+
+bool Iteration::decide(int epoch) {
+  add_up();
+  const ErrorSums& total = total_;
 
   const double scale2 = std::max(total.impulse2, total.velocity2);
   const auto count = static_cast<double>(total.contacts);
   result_.error_rms = scale2 > 0 ? std::sqrt(total.residual2 / scale2) : 0;
   result_.error_max = scale2 > 0 ? total.residual_max / std::sqrt(scale2 / count) : 0;
+  result_.jump = jump_.velocity2 > 0 ? std::sqrt(jump_.jump2 / jump_.velocity2) : 0;
   result_.contacts = total.contacts;
   result_.active = total.active;
   history_.push_back({result_.iterations, result_.error_rms});
@@ -140,12 +226,17 @@ bool Iteration::decide(int epoch) {
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
   result_.converged =
       judged && result_.error_rms <= settings_.tolerance && result_.drift <= settings_.balance_tolerance;
+  // A sweep never makes the error of a step a thousand times worse; an exchange that adds up too much does.
+  constexpr double hopeless = 1e3;
+  result_.diverged = result_.error_rms > hopeless * std::max(1.0, history_.front().error_rms);
+  if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
   if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations)
     return false;
   const int sweeps = std::min(std::max(settings_.check_every, result_.iterations / 4),
                               settings_.max_iterations - result_.iterations);
   result_.iterations += sweeps;
+  sweeps_from_ = epoch + 1;
   segment_ = epoch + 1 + sweeps;
   return true;
 }

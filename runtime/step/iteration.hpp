@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
@@ -11,9 +12,11 @@ namespace talus {
 struct IterationResult {
   int iterations = 0;  ///< sweeps
   double error_rms = 0, error_max = 0;
+  double jump = 0;   ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
   double drift = 0;  ///< change of the wall impulses over the second half of the iterations, relative
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
+  bool diverged = false;  ///< the error grows without bound
 };
 
 /// The iteration part of a step as a program on the chunk graph: every epoch, each chunk does one thing, in
@@ -23,23 +26,25 @@ struct IterationResult {
 ///           accumulate   measure -> gate   n sweeps        accumulate   measure -> gate ...
 ///
 /// `accumulate` makes V afresh from r, so that the error is never that of a drifted V and the step ends on
-/// what was certified. At a gate one thread adds the chunks' sums in order and decides whether to go on; the
-/// distance n of the gates grows with the iterations done. Nodes 0..k-1 are the chunks; one node per wall of
-/// finite mass follows and glues the copies that its chunks hold.
+/// what was certified. At a gate one thread adds the chunks' sums in order, by subdomain, and decides whether
+/// to go on; the distance n of the gates grows with the iterations done. Nodes 0..k-1 are the chunks; where
+/// something is to be glued (gluing.hpp), publish of every subdomain, the centre, and glue of every subdomain
+/// follow. Publish comes after the boundary chunks and before the inner ones, which hide the messages.
 class Iteration {
  public:
   /// References are kept. `state.contacts` holds the narrow phase's contacts.
-  Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings);
+  Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+            const DecompositionSettings& decomposition, const graph::Communicator& ranks);
 
   void node(std::uint32_t node, int epoch);
   bool gate(int epoch) const { return epoch == segment_ + 1; }
   bool decide(int epoch);
 
-  /// Before the first epoch of a step: glues, copies and sums fitted to the contacts found. Returns the glued
-  /// walls.
+  /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();
 
-  const std::vector<std::int32_t>& glued_walls() const { return glued_; }
+  Gluing& gluing() { return gluing_; }
+  const Gluing& gluing() const { return gluing_; }
   const IterationResult& result() const { return result_; }
   /// error_rms at each check, with the sweeps done.
   struct Check {
@@ -53,19 +58,29 @@ class Iteration {
   Work work(int epoch) const {
     return epoch < segment_ ? Work::sweep : epoch == segment_ ? Work::accumulate : Work::measure;
   }
+  Gluing::Mode gluing_mode(int epoch) const;
   template <bool Friction>
   void chunk(std::size_t c, Work work);
+  template <bool Friction>
+  void sweep(std::size_t c, ContactRange range, double mu);
+  void add_up();
   double impulse_scale() const;
   double drift() const;
 
   StepState& state_;
   const StepParameters& parameters_;
   const SolverSettings& settings_;
-  std::vector<std::int32_t> glued_;          ///< walls of finite mass with contacts
+  const DecompositionSettings& decomposition_;
+  const graph::Communicator& ranks_;
+  Gluing gluing_;
   std::vector<ErrorSums> sums_;              ///< per chunk
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]
   std::vector<Check> history_;
   IterationResult result_;
+  ErrorSums total_;                          ///< of all subdomains, at the last check
+  JumpSums jump_;                            ///< likewise
+  std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
+  int sweeps_from_ = 0;  ///< epoch of the first sweep of the segment
   int segment_ = 0;  ///< epoch of the next accumulate; written at gates only, when every thread waits
 };
 

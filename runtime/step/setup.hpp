@@ -2,6 +2,7 @@
 
 /// What a simulation is made of, once files have been read: no paths, no formats, SI units.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "kernels/types.hpp"
 #include "kernels/walls.hpp"
+#include "partition/partitioner.hpp"
 
 namespace talus {
 
@@ -58,12 +60,37 @@ struct SolverSettings {
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
 };
 
+/// How subdomains act on one another.
+enum class Coupling {
+  nscdd,    ///< copies carry M/m and are glued to the mean of their velocities (Visseq et al. 2013, (7)-(15))
+  schwarz,  ///< copies carry M and add up what each gained (the paper's (16)-(27))
+};
+
+/// Which way interface velocities travel.
+enum class ExchangeScheme {
+  dcs,  ///< between the subdomains that share a body
+  ccs,  ///< to one rank and back
+};
+
+struct DecompositionSettings {
+  Coupling coupling = Coupling::nscdd;
+  ExchangeScheme exchange = ExchangeScheme::dcs;
+  PartitionKind partitioner = PartitionKind::automatic;
+  int subdomains = 0;                  ///< 0: one per rank
+  std::array<std::int64_t, 3> boxes{}; ///< per axis, for the partitioners that cut boxes; zeros: chosen
+  int sweeps_per_exchange = 1;         ///< n_GS >= 1
+  int repartition_every = 10;          ///< steps between two partitions; one is made when candidates are found anew
+  double max_imbalance = 0.2;          ///< fullest over mean subdomain, less 1: beyond it the partition is made anew
+  bool damping = true;                 ///< schwarz: false is the paper's form, which diverges where m > 2
+};
+
 /// A simulation, apart from its grains.
 struct Setup {
   std::vector<Wall> walls;
   std::vector<Stage> stages;
   DetectionSettings detection;
   SolverSettings solver;
+  DecompositionSettings decomposition;
   bool rotation = true;            ///< false: grains slide and do not turn
   bool orientation = false;        ///< true: integrate and write orientations
   bool allow_unconverged = false;  ///< true: steps over tolerance do not change the exit code

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 namespace talus {
 
@@ -25,6 +26,7 @@ double energy_of(const Wall& wall, const Vec3& velocity) {
 }
 
 std::string describe(const Bodies& bodies, Slot slot) {
+  if (slot < 0) return "the fastest body is on another rank";
   const auto s = static_cast<std::size_t>(slot);
   const Velocity& v = bodies.velocity[s];
   const Vec3& x = bodies.x[s];
@@ -34,30 +36,56 @@ std::string describe(const Bodies& bodies, Slot slot) {
       v.w[0], v.w[1], v.w[2]);
 }
 
+const graph::Communicator& one_rank() {
+  static const graph::Communicator alone;
+  return alone;
+}
+
 }  // namespace
 
 struct Simulation::Implementation {
-  Implementation(Setup given, Bodies bodies, graph::Executor& executor)
+  Implementation(Setup given, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks_)
       : setup(std::move(given)),
-        state(start(setup, std::move(bodies))),
-        graph(state, parameters, setup.solver, executor) {
-    const Bodies& grains = state.bodies;
-    for (double r : grains.radius) {
-      smallest = std::min(smallest, r);
-      mean_diameter += 2 * r / static_cast<double>(grains.size());
-    }
-    for (const Velocity& v : grains.velocity) total_mass += 1 / v.inv_mass;
-    volume = total_volume(grains);
-    const double unit = grains.size() > 0 ? smallest : 1;
+        ranks(ranks_),
+        state(start(setup, std::move(bodies), ranks_)),
+        size(measure_sample()),
+        graph(state, parameters, setup.solver, setup.decomposition, static_cast<std::int64_t>(size.bodies),
+              executor, ranks_) {
+    const double unit = size.bodies > 0 ? size.smallest : 1;
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
     begin_stage();
   }
 
-  static StepState start(const Setup& setup, Bodies bodies) {
+  /// Of all bodies; rank 0 has them in the beginning.
+  struct SampleSize {
+    double bodies = 0;
+    double smallest = std::numeric_limits<double>::infinity();
+    double mean_diameter = 0, total_mass = 0, volume = 0;
+    double orientation = 0;
+  };
+
+  SampleSize measure_sample() {
+    const Bodies& grains = state.bodies;
+    SampleSize own;
+    own.bodies = static_cast<double>(grains.size());
+    for (double r : grains.radius) {
+      own.smallest = std::min(own.smallest, r);
+      own.mean_diameter += 2 * r / own.bodies;
+    }
+    for (const Velocity& v : grains.velocity) own.total_mass += 1 / v.inv_mass;
+    own.volume = total_volume(grains);
+    own.orientation = grains.orientation.empty() ? 0 : 1;
+    const SampleSize all = ranks.gather_records(std::span<const SampleSize>(&own, 1)).front();
+    state.decomposition.orientation = all.orientation > 0;
+    return all;
+  }
+
+  static StepState start(const Setup& setup, Bodies bodies, const graph::Communicator& ranks) {
     validate(setup);
     validate(bodies);
     StepState state;
+    state.decomposition = make_decomposition(setup.decomposition, ranks);
     state.bodies = std::move(bodies);
     reorder(state.bodies, morton_order(state.bodies));
     if (!setup.rotation)
@@ -90,14 +118,18 @@ struct Simulation::Implementation {
     parameters.gravity = stage.gravity;
     parameters.law = stage.law;
     parameters.friction = stage.law.mu_grains > 0 || stage.law.mu_walls > 0;
-    state.free.w.resize(parameters.friction && setup.rotation ? state.bodies.size() : 0);
-    if (state.candidates_valid) {  // later stages: the sample has flowed, sort it again
+    parameters.turns = parameters.friction && setup.rotation;
+    state.free.w.resize(parameters.turns ? state.bodies.size() : 0);
+    if (state.candidates_valid && !state.decomposition.several()) {
+      // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt out.
       const std::vector<Slot> order = morton_order(state.bodies);
       std::vector<Slot> place(order.size());
       for (std::size_t k = 0; k < order.size(); ++k)
         place[static_cast<std::size_t>(order[k])] = static_cast<Slot>(k);
       reorder(state.bodies, order);
       renumber(state.candidates, place);
+    }
+    if (state.candidates_valid) {
       // Forces outlive the change of stage, so impulses go with the time step.
       for (double& impulse : state.candidates.impulse) impulse *= stage.time_step / last_time_step;
       convert_impulses(state.candidates, parameters.friction ? 3 : 1, state.bodies.x, state.walls);
@@ -140,12 +172,18 @@ struct Simulation::Implementation {
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping "
           "grains",
-          step, setup.stages[stage_index].name, describe(state.bodies, std::max(motion.fastest, 0))));
+          step, setup.stages[stage_index].name, describe(state.bodies, motion.fastest)));
+    if (graph.iteration().result().diverged)
+      throw RunawayError(fmt::format(
+          "step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. Undamped Schwarz does so "
+          "where bodies stand in more than two subdomains: set decomposition.damping = true or coupling = \"nscdd\"",
+          step, setup.stages[stage_index].name, graph.iteration().result().error_rms,
+          graph.iteration().result().iterations));
     double fastest_wall2 = 0;
     for (const Wall& wall : state.walls)
       fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
     const double energy = motion.energy.translation + motion.energy.rotation;
-    const double supplied = motion.energy_free + wall_energy_free + total_mass * fastest_wall2;
+    const double supplied = motion.energy_free + wall_energy_free + size.total_mass * fastest_wall2;
     if (energy > 100 * supplied && energy > 0)
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. "
@@ -169,22 +207,25 @@ struct Simulation::Implementation {
     ++stage_steps;
     ++report.step;
     report.time += parameters.time_step;
-    report.candidates = static_cast<std::int64_t>(state.candidates.size());
+    report.candidates = sums.candidates;
     report.contacts = result.contacts;
     report.active = result.active;
     report.iterations = result.iterations;
     report.error_rms = result.error_rms;
     report.error_max = result.error_max;
     report.balance = std::max(result.drift, defect);
+    report.jump = result.jump;
+    report.migrants = sums.migrants;
+    report.imbalance = 1 + state.decomposition.imbalance;
     report.penetration_mean =
         sums.contacts.overlapping > 0
-            ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / smallest
+            ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / size.smallest
             : 0;
-    report.penetration_max = sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / smallest : 0;
+    report.penetration_max = sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / size.smallest : 0;
     report.kinetic_translation = sums.motion.energy.translation;
     report.kinetic_rotation = sums.motion.energy.rotation;
     const double box = box_volume(state.walls);
-    report.solid_fraction = box > 0 ? volume / box : 0;
+    report.solid_fraction = box > 0 ? size.volume / box : 0;
     report.wall_s = elapsed;
     report.converged = result.converged && defect <= setup.solver.balance_tolerance;
   }
@@ -193,7 +234,7 @@ struct Simulation::Implementation {
   /// grain diameter.
   double unrest() const {
     const double h = parameters.time_step;
-    double load = total_mass * parameters.gravity.norm(), net = 0;
+    double load = size.total_mass * parameters.gravity.norm(), net = 0;
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const double applied = state.wall_states[w].applied;
       if (applied == 0) continue;
@@ -203,8 +244,8 @@ struct Simulation::Implementation {
     }
     const double energy = report.kinetic_translation + report.kinetic_rotation;
     if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
-    const Vec3 gained = graph.sums().motion.impulse / h + total_mass * parameters.gravity;
-    return std::max({net, gained.norm() / load, energy / (load * mean_diameter)});
+    const Vec3 gained = graph.sums().motion.impulse / h + size.total_mass * parameters.gravity;
+    return std::max({net, gained.norm() / load, energy / (load * size.mean_diameter)});
   }
 
   double strain(int axis) const {
@@ -234,6 +275,35 @@ struct Simulation::Implementation {
     return fraction;
   }
 
+  /// Mean number of active contacts of the grains that are no rattlers: those with fewer than 4 without friction,
+  /// 2 with it (a frictionless grain cannot be held by three).
+  double coordination() const {
+    const std::int32_t rattler_below = parameters.friction ? 2 : 4;
+    std::vector<std::int32_t> touching = count_active(state.contacts, state.chunks, state.bodies.size());
+    const Decomposition& all = state.decomposition;
+    if (all.several()) {
+      struct Part {
+        std::int64_t id, count;
+      };
+      std::vector<Part> parts;  // of bodies whose contacts are spread over subdomains
+      for (std::size_t s = 0; s < touching.size(); ++s)
+        if (all.multiplicity[s] > 1) parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
+      parts = ranks.gather_records(std::span<const Part>(parts));
+      std::unordered_map<std::int64_t, std::int32_t> whole;
+      for (const Part& part : parts) whole[part.id] += static_cast<std::int32_t>(part.count);
+      for (std::size_t s = 0; s < touching.size(); ++s)
+        if (all.multiplicity[s] > 1) touching[s] = whole[static_cast<std::int64_t>(state.bodies.id[s])];
+    }
+    std::int64_t sums[2] = {0, 0};
+    for (std::size_t s = 0; s < touching.size(); ++s) {
+      if (touching[s] < rattler_below || (!all.counts.empty() && !all.counts[s])) continue;
+      ++sums[0];
+      sums[1] += touching[s];
+    }
+    ranks.sum(sums);
+    return sums[0] > 0 ? static_cast<double>(sums[1]) / static_cast<double>(sums[0]) : 0;
+  }
+
   void pass_ended_stages() {
     while (!over && done() >= 1) {
       if (stage_index + 1 == setup.stages.size())
@@ -246,7 +316,9 @@ struct Simulation::Implementation {
   }
 
   Setup setup;
+  const graph::Communicator& ranks;
   StepState state;
+  SampleSize size;
   StepParameters parameters;
   StepGraph graph;
   StepReport report;
@@ -254,16 +326,15 @@ struct Simulation::Implementation {
   std::int64_t stage_steps = 0;
   bool over = false;
   Vec3 lengths_at_start = Vec3::Zero();
-  double smallest = std::numeric_limits<double>::infinity();
-  double mean_diameter = 0;
-  double total_mass = 0;
-  double volume = 0;
 };
 
-Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
-    : impl_(std::make_unique<Implementation>(std::move(setup), std::move(bodies), executor)) {
+Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks)
+    : impl_(std::make_unique<Implementation>(std::move(setup), std::move(bodies), executor, ranks)) {
   impl_->pass_ended_stages();
 }
+
+Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
+    : Simulation(std::move(setup), std::move(bodies), executor, one_rank()) {}
 
 Simulation::~Simulation() = default;
 
@@ -353,49 +424,35 @@ std::optional<TriaxialReport> Simulation::triaxial() const {
   out.strain_shear = out.strain[axial] - 0.5 * (out.strain[first] + out.strain[second]);
   out.q = out.stress[axial] - 0.5 * (out.stress[first] + out.stress[second]);
   out.q_over_p = out.p > 0 ? out.q / out.p : 0;
-  out.coordination = coordination(impl_->state.contacts, impl_->state.chunks, impl_->state.bodies.size(),
-                                  impl_->parameters.friction ? 2 : 4);
+  out.coordination = impl_->coordination();
   return out;
 }
 
+std::uint64_t Simulation::digest() const {
+  const Decomposition& all = impl_->state.decomposition;
+  std::int64_t sum[1] = {static_cast<std::int64_t>(talus::digest(impl_->state.bodies, all.counts))};
+  impl_->ranks.sum(sum);
+  return static_cast<std::uint64_t>(sum[0]);
+}
+
+std::int64_t Simulation::bodies() const {
+  return static_cast<std::int64_t>(impl_->size.bodies);
+}
+const MessageCount& Simulation::messages() const {
+  return impl_->graph.iteration().gluing().messages();
+}
+double Simulation::exposed() const {
+  return impl_->graph.iteration().gluing().exposed();
+}
+
 Frame Simulation::frame(bool contacts) const {
-  const StepState& state = impl_->state;
-  const Bodies& bodies = state.bodies;
   Frame frame;
   frame.step = impl_->report.step;
   frame.time = impl_->report.time;
   frame.stage = stage().name;
-  for (std::size_t s = 0; s < bodies.size(); ++s) {
-    frame.id.push_back(static_cast<std::int64_t>(bodies.id[s]));
-    frame.u.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].u));
-    if (impl_->setup.rotation)
-      frame.omega.push_back(Eigen::Map<const Vec3>(bodies.velocity[s].w) / bodies.radius[s]);
-  }
-  frame.x = bodies.x;
-  frame.radius = bodies.radius;
-  frame.orientation = bodies.orientation;
+  gather_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
+               impl_->parameters.time_step, frame);
   frame.walls = walls();
-  if (!contacts) return frame;
-  for (std::size_t c = 0; c < state.chunks.size() && frame.step > 0; ++c) {
-    const auto begin = static_cast<std::size_t>(state.chunks.begin[c]);
-    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(state.contacts.count[c]); ++k) {
-      const Vec3 normal = contact_normal(state.contacts, k), impulse = contact_impulse(state.contacts, k);
-      if (impulse.dot(normal) <= 0) continue;
-      const auto i = static_cast<std::size_t>(state.contacts.first[k]);
-      const Slot second = state.contacts.second[k];
-      const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
-      const double gap = second >= 0 ? (bodies.x[i] - bodies.x[static_cast<std::size_t>(second)]).norm() -
-                                           bodies.radius[i] - bodies.radius[static_cast<std::size_t>(second)]
-                                     : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) -
-                                           bodies.radius[i];
-      frame.contact_bodies.push_back({frame.id[i], second >= 0 ? frame.id[static_cast<std::size_t>(second)]
-                                                               : -1 - static_cast<std::int64_t>(wall)});
-      frame.contact_normal.push_back(normal);
-      frame.contact_point.push_back(bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * normal);
-      frame.contact_gap.push_back(gap);
-      frame.contact_force.push_back(impulse / impl_->parameters.time_step);
-    }
-  }
   return frame;
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/communicator.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/iteration.hpp"
@@ -22,7 +23,7 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A simulation on one process: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
+/// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
 /// step").
 ///
 ///   Executor executor({.threads = 2});
@@ -33,15 +34,19 @@ class RunawayError : public std::runtime_error {
 ///     write(frame); }); simulation.begin_next_stage();
 ///   }
 ///
-/// Results do not depend on the number of threads (step_graph.hpp).
+/// On several ranks all call the same functions; those marked collective must be called by all. With the same
+/// subdomains, results depend neither on the number of threads nor on that of ranks (step_graph.hpp).
 class Simulation {
  public:
-  /// Throws std::invalid_argument when the setup makes no sense. Bodies are sorted in Morton order. The
-  /// executor must outlive the simulation.
+  /// Throws std::invalid_argument when the setup makes no sense, on all ranks. The bodies are those of rank 0,
+  /// all others pass none; the first step deals them out. Executor and ranks must outlive the simulation.
+  /// Collective.
+  Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks);
+  /// On one rank.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
   ~Simulation();
 
-  /// Does one time step. Throws RunawayError, or graph::TaskError when a task failed. Not to be called when
+  /// Does one time step. Collective. Throws RunawayError, or graph::TaskError when a task failed. Not to be called when
   /// finished.
   const StepReport& step();
 
@@ -67,10 +72,19 @@ class Simulation {
 
   /// Walls after the last step: positions, velocities, forces.
   std::vector<WallReport> walls() const;
-  /// Strains and stresses after the last step; empty when the walls do not close a box.
+  /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
-  /// A copy of what output needs; contacts with r_n > 0 only, `contacts` false leaves them out.
+  /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them out.
+  /// Collective; whole on rank 0, where the others' are empty.
   Frame frame(bool contacts = true) const;
+
+  /// talus::digest of all bodies. Collective.
+  std::uint64_t digest() const;
+  std::int64_t bodies() const;  ///< of all ranks
+  /// What one iteration sends, as planned with the last candidates.
+  const MessageCount& messages() const;
+  /// Time that this rank's tasks waited for messages in the last step [s].
+  double exposed() const;
 
  private:
   struct Implementation;

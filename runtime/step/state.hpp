@@ -10,6 +10,7 @@
 #include "kernels/motion.hpp"
 #include "kernels/sweep.hpp"
 #include "kernels/walls.hpp"
+#include "runtime/step/decomposition.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus {
@@ -21,6 +22,7 @@ struct StepParameters {
   ContactLaw law;
   bool friction =
       false;         ///< any friction coefficient > 0: impulses have three components and grains may turn
+  bool turns = false;  ///< friction, and grains that rotate
   double alert = 0;  ///< [m]
   double skin = 0;   ///< [m]
 };
@@ -29,7 +31,8 @@ struct StepParameters {
 struct WallState {
   Vec3 free_velocity = Vec3::Zero();  ///< without contacts [m/s]
   double applied = 0;                 ///< force pushed with, along the normal [N]
-  std::vector<std::int32_t> copies;   ///< chunks that hold a copy, ascending; filled by the narrow phase
+  std::vector<std::int32_t> copies;   ///< chunks here that hold a copy, ascending; filled before the sweeps
+  std::int64_t copies_everywhere = 0; ///< on all ranks
   Vec3 impulse = Vec3::Zero();        ///< of the wall on the grains [N s], from the last check
 };
 
@@ -44,6 +47,7 @@ struct StepState {
   std::vector<Vec3> wall_then;         ///< points of the walls at the last broad phase [m]
   Candidates candidates;               ///< c
   Chunks chunks;                       ///< k
+  Decomposition decomposition;
   Contacts contacts;                   ///< c rooms
   std::vector<WallCopy> copies;        ///< k; used by chunks at walls
   bool candidates_valid = false;       ///< false: the next step begins with a broad phase

@@ -17,17 +17,21 @@ std::uint32_t lanes_for(std::size_t bodies) {
 }  // namespace
 
 StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
-                     graph::Executor& executor)
+                     const DecompositionSettings& decomposition, std::int64_t bodies, graph::Executor& executor,
+                     const graph::Communicator& ranks)
     : state_(state),
       parameters_(parameters),
       settings_(settings),
+      decomposition_(decomposition),
       executor_(executor),
-      lanes_(lanes_for(state.bodies.size())),
-      iteration_(state, parameters, settings),
+      ranks_(ranks),
+      lanes_per_subdomain_(
+          lanes_for(static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
+      lanes_(lanes_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
+      iteration_(state, parameters, settings, decomposition, ranks),
       left_(lanes_),
       pairs_(lanes_),
-      motion_(lanes_),
-      contact_sums_(lanes_) {
+      motion_(lanes_) {
   build();
 }
 
@@ -67,6 +71,7 @@ void StepGraph::build() {
 
 void StepGraph::run() {
   sums_ = {};
+  ++steps_;
   started_ = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
   executor_.run(graph_);
 }

@@ -22,7 +22,9 @@ struct StepTimes {
 struct StepSums {
   MotionSums motion;
   ContactSums contacts;
-  bool broad_phase = false;  ///< candidates were found anew
+  bool broad_phase = false;   ///< candidates were found anew
+  std::int64_t migrants = 0;  ///< copies that came to a subdomain where their body did not stand
+  std::int64_t candidates = 0;  ///< of all ranks
   StepTimes times;
 };
 
@@ -31,15 +33,18 @@ struct StepSums {
 ///   predict[lane] -> cells -> pairs[lane] -> chunks -> narrow[lane] -> plan -> iterate (team) ->
 ///   finish[lane], walls -> measure[lane] -> sum
 ///
-/// A lane is a fixed share of the bodies, the cells or the chunks; their number depends on the number of
-/// bodies only, so that sums are the same for any number of threads. cells, pairs and chunks return at once
-/// while every grain and wall is within its margin of the last broad phase. Each task declares what it reads
-/// and writes; the order above follows from that.
+/// A lane is a fixed share of the bodies of a subdomain, or of this rank's cells or chunks; the number of
+/// lanes of a subdomain depends on the number of all bodies and subdomains only, so that sums are the same
+/// for any number of threads and ranks. cells, pairs and chunks return at once while every grain and wall is
+/// within its margin of the last broad phase; otherwise, with several subdomains, cells collects the bodies
+/// around them and chunks deals them out anew. Each task declares what it reads and writes; the order above
+/// follows from that.
 class StepGraph {
  public:
-  /// Keeps references.
+  /// Keeps references. `bodies`: of all ranks.
   StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
-            graph::Executor& executor);
+            const DecompositionSettings& decomposition, std::int64_t bodies, graph::Executor& executor,
+            const graph::Communicator& ranks);
 
   /// One step: poses, velocities, walls, impulses of `state` go from the beginning to the end of the step.
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
@@ -47,15 +52,19 @@ class StepGraph {
 
   const StepSums& sums() const { return sums_; }
   const Iteration& iteration() const { return iteration_; }
+  /// True when this step's candidates were found anew and dealt out by a new partition.
+  bool partition_due() const;
   const graph::Graph& graph() const { return graph_; }
   std::uint32_t lanes() const { return lanes_; }
 
  private:
   void build();
   void predict_lane(std::uint32_t lane);
+  bool needs_broad_phase();
   void make_cells();
   void find_lane_pairs(std::uint32_t lane);
   void make_chunks();
+  void renew_slots();
   void narrow_lane(std::uint32_t lane);
   void plan_iteration();
   void plan_epochs();
@@ -64,26 +73,32 @@ class StepGraph {
   void measure_lane(std::uint32_t lane);
   void sum_up();
   SlotRange share(std::size_t count, std::uint32_t lane) const;
+  SlotRange slots(std::uint32_t lane) const;
   double margin_of(const Wall& wall) const;
   bool walls_left_margin() const;
 
   StepState& state_;
   const StepParameters& parameters_;
   const SolverSettings& settings_;
+  const DecompositionSettings& decomposition_;
   graph::Executor& executor_;
+  const graph::Communicator& ranks_;
+  std::uint32_t lanes_per_subdomain_;
   std::uint32_t lanes_;
   graph::Graph graph_;
   Iteration iteration_;
   graph::EpochGraph epochs_;
-  std::vector<std::int32_t> planned_walls_;            ///< glued walls that epochs_ was built for
   bool planned_ = false;                               ///< false: the chunks are new
   double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at the seams of the step [s]
+  Surroundings around_;              ///< several subdomains: whom the candidates are found among
+  std::int64_t all_candidates_ = 0;  ///< of all ranks
+  std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
   CellGrid cells_;
   std::vector<double> wall_margin_;  ///< at the last broad phase [m]
   std::vector<char> left_;           ///< per lane: a grain left its margin
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
-  std::vector<ContactSums> contact_sums_;
+  std::vector<ContactSums> contact_sums_;  ///< per chunk
   StepSums sums_;
 };
 

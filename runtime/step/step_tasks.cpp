@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "runtime/step/step_graph.hpp"
@@ -15,22 +16,16 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// A few hundred candidates a chunk; fewer in small samples, where colours would otherwise be too thin for
-/// threads.
-int chunk_target(std::size_t candidates) {
-  return static_cast<int>(std::clamp<std::size_t>(candidates / 64, 48, 320));
-}
-
 double speed(const Velocity& v) {
   return std::sqrt(v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2]);
 }
 
-std::vector<WallPair> find_wall_pairs(const Bodies& bodies, const std::vector<Wall>& walls,
+std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, const std::vector<Wall>& walls,
                                       std::span<const double> reach, std::span<const double> margin) {
   std::vector<WallPair> pairs;
   for (std::size_t w = 0; w < walls.size(); ++w)
-    for (std::size_t s = 0; s < bodies.size(); ++s)
-      if (walls[w].normal.dot(bodies.x[s] - walls[w].point) < reach[s] + margin[w])
+    for (std::size_t s = 0; s < x.size(); ++s)
+      if (walls[w].normal.dot(x[s] - walls[w].point) < reach[s] + margin[w])
         pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
   return pairs;
 }
@@ -41,11 +36,25 @@ SlotRange StepGraph::share(std::size_t count, std::uint32_t lane) const {
   return {count * lane / lanes_, count * (lane + 1) / lanes_};
 }
 
+/// Slots of a lane: a share of one subdomain.
+SlotRange StepGraph::slots(std::uint32_t lane) const {
+  const std::size_t e = lane / lanes_per_subdomain_, part = lane % lanes_per_subdomain_;
+  const Decomposition& all = state_.decomposition;
+  const std::size_t begin = all.several() ? all.slot_begin[e] : 0;
+  const std::size_t count = all.several() ? all.slot_begin[e + 1] - begin : state_.bodies.size();
+  return {begin + count * part / lanes_per_subdomain_, begin + count * (part + 1) / lanes_per_subdomain_};
+}
+
+bool StepGraph::partition_due() const {
+  return state_.decomposition.several() && steps_ - partitioned_ >= decomposition_.repartition_every;
+}
+
 void StepGraph::predict_lane(std::uint32_t lane) {
   Bodies& bodies = state_.bodies;
-  const SlotRange range = share(bodies.size(), lane);
+  const SlotRange range = slots(lane);
   const double h = parameters_.time_step;
-  predict(range, bodies.x, bodies.velocity, h, parameters_.gravity, state_.free);
+  predict(range, bodies.x, bodies.velocity, h);
+  free_velocities(range, bodies.velocity, h, parameters_.gravity, state_.free);
   if (!bodies.orientation.empty()) turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
   left_[lane] =
       state_.candidates_valid && left_margin(range, bodies.x, bodies.velocity, bodies.radius, state_.x_then,
@@ -68,25 +77,43 @@ bool StepGraph::walls_left_margin() const {
   return false;
 }
 
+bool StepGraph::needs_broad_phase() {
+  // Several subdomains: candidates are found anew with a new partition as well, when one is due.
+  double needed[1] = {!state_.candidates_valid || walls_left_margin() ||
+                              std::any_of(left_.begin(), left_.end(), [](char left) { return left != 0; })
+                          ? 1.0
+                          : 0.0};
+  ranks_.max(needed);
+  return needed[0] > 0;
+}
+
 void StepGraph::make_cells() {
   const double h = parameters_.time_step;
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
-  sums_.broad_phase = !state_.candidates_valid || walls_left_margin() ||
-                      std::any_of(left_.begin(), left_.end(), [](char left) { return left != 0; });
+  sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   const Bodies& bodies = state_.bodies;
-  state_.x_then = bodies.x;
-  state_.reach_then.resize(bodies.size());
+  std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   for (std::size_t s = 0; s < bodies.size(); ++s)
-    state_.reach_then[s] =
-        bodies.radius[s] + half_skin + contact_margin(speed(bodies.velocity[s]), h, parameters_.alert);
+    reach[s] = bodies.radius[s] + half_skin + contact_margin(speed(bodies.velocity[s]), h, parameters_.alert);
   state_.wall_then.clear();
   wall_margin_.clear();
   for (const Wall& wall : state_.walls) {
     state_.wall_then.push_back(wall.point);
     wall_margin_.push_back(half_skin + margin_of(wall));
   }
+  if (state_.decomposition.several()) {
+    const bool first = state_.decomposition.interfaces.empty();
+    const bool anew = first || partition_due() || state_.decomposition.imbalance > decomposition_.max_imbalance;
+    if (anew) partitioned_ = steps_;
+    around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
+                                   state_.candidates, anew);
+    cells_ = build_cells(around_.bodies.x, around_.reach);
+    return;
+  }
+  state_.x_then = bodies.x;
+  state_.reach_then = std::move(reach);
   cells_ = build_cells(state_.x_then, state_.reach_then);
 }
 
@@ -94,23 +121,56 @@ void StepGraph::find_lane_pairs(std::uint32_t lane) {
   if (!sums_.broad_phase) return;
   pairs_[lane].clear();
   const SlotRange range = share(cells_.cells.size(), lane);
-  find_pairs(cells_, state_.x_then, state_.reach_then, range.begin, range.end, pairs_[lane]);
+  const bool several = state_.decomposition.several();
+  find_pairs(cells_, several ? around_.bodies.x : state_.x_then, several ? around_.reach : state_.reach_then,
+             range.begin, range.end, pairs_[lane]);
 }
 
 void StepGraph::make_chunks() {
   if (!sums_.broad_phase) return;
   cells_ = {};
+  const bool several = state_.decomposition.several();
   Candidates fresh;
   fresh.components = parameters_.friction ? 3 : 1;
-  fresh.grain_pairs = sort_pairs(pairs_, state_.bodies.size());
+  fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
   for (auto& part : pairs_) part = {};
-  fresh.wall_pairs = find_wall_pairs(state_.bodies, state_.walls, state_.reach_then, wall_margin_);
-  match_impulses(state_.candidates, fresh);
-  state_.candidates = std::move(fresh);
-  state_.chunks = cut_chunks(state_.candidates, state_.bodies.size(), chunk_target(state_.candidates.size()));
+  fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
+                                     several ? around_.reach : state_.reach_then, wall_margin_);
+  std::vector<char> glued;
+  for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
+  std::vector<CandidateGroup> groups;
+  if (several) {
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, fresh, glued, state_.bodies,
+                        state_.candidates);
+    sums_.migrants = state_.decomposition.migrants;
+    renew_slots();
+  } else {
+    match_impulses(state_.candidates, fresh);
+    state_.candidates = std::move(fresh);
+    groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(state_.candidates.size()));
+  }
+  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  iteration_.gluing().plan(parameters_.turns);
+  std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
+  ranks_.sum(candidates);
+  all_candidates_ = candidates[0];
   state_.candidates_valid = true;
   planned_ = false;
+}
+
+/// What is kept per slot follows the copies to their new places.
+void StepGraph::renew_slots() {
+  const Bodies& bodies = state_.bodies;
+  const double h = parameters_.time_step;
+  state_.x_then = bodies.x;
+  state_.reach_then.resize(bodies.size());
+  for (std::size_t s = 0; s < bodies.size(); ++s)
+    state_.reach_then[s] = around_.reach[static_cast<std::size_t>(around_.find(static_cast<std::int64_t>(bodies.id[s])))];
+  around_ = {};
+  state_.free.u.resize(bodies.size());
+  state_.free.w.resize(parameters_.turns ? bodies.size() : 0);
+  free_velocities({0, bodies.size()}, bodies.velocity, h, parameters_.gravity, state_.free);
 }
 
 void StepGraph::narrow_lane(std::uint32_t lane) {
@@ -141,39 +201,65 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
 void StepGraph::plan_iteration() {
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
   iteration_.begin();
-  if (!planned_ || planned_walls_ != iteration_.glued_walls()) plan_epochs();
+  if (!planned_) plan_epochs();
   iterating_ = now();
 }
 
-/// Chunks as they conflict, and behind them one node per glued wall that conflicts with its copies and has a
-/// colour of its own, the last.
+/// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the centre
+/// behind all chunks, glue[e] last (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
-  const std::size_t count = chunks.size();
-  planned_walls_ = iteration_.glued_walls();
-  const std::size_t nodes = count + planned_walls_.size();
-  std::vector<std::vector<std::uint32_t>> glue_of(count);
-  for (std::size_t g = 0; g < planned_walls_.size(); ++g)
-    for (std::size_t c = 0; c < count; ++c)
-      if (chunks.wall[c] == planned_walls_[g]) glue_of[c].push_back(static_cast<std::uint32_t>(count + g));
+  const Gluing& gluing = iteration_.gluing();
+  const std::size_t count = chunks.size(), here = state_.decomposition.here.size();
+  const std::size_t nodes = count + (gluing.needed() ? 2 * here + 1 : 0);
+  const auto publish = [&](std::size_t e) { return static_cast<std::uint32_t>(count + e); };
+  const auto centre = static_cast<std::uint32_t>(count + here);
+  const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + 1 + e); };
 
-  std::vector<std::uint32_t> colour(nodes, static_cast<std::uint32_t>(chunks.colours)), offset(1, 0),
-      neighbour;
+  std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
+  std::vector<std::vector<std::uint32_t>> boundary(here);
+  const auto last = static_cast<std::uint32_t>(chunks.colours);
   for (std::size_t c = 0; c < count; ++c) {
-    colour[c] = static_cast<std::uint32_t>(chunks.colour[c]);
+    const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
+    const bool at_interface = gluing.needed() && chunks.boundary[c] != 0;
+    colour[c] = static_cast<std::uint32_t>(chunks.colour[c]) + (chunks.boundary[c] != 0 ? 0 : 1);
     neighbour.insert(neighbour.end(), chunks.conflicts.begin() + chunks.conflict_begin[c],
                      chunks.conflicts.begin() + chunks.conflict_begin[c + 1]);
-    neighbour.insert(neighbour.end(), glue_of[c].begin(), glue_of[c].end());
+    if (at_interface) {
+      neighbour.push_back(publish(e));
+      neighbour.push_back(glue(e));
+      boundary[e].push_back(static_cast<std::uint32_t>(c));
+    }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
   }
-  for (std::int32_t wall : planned_walls_) {
-    for (std::size_t c = 0; c < count; ++c)
-      if (chunks.wall[c] == wall) neighbour.push_back(static_cast<std::uint32_t>(c));
+  if (gluing.needed()) {
+    for (std::size_t e = 0; e < here; ++e) {
+      colour[publish(e)] = static_cast<std::uint32_t>(chunks.boundary_colours);
+      neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
+      neighbour.push_back(centre);
+      neighbour.push_back(glue(e));
+      for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(glue(reader));
+      offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
+    }
+    colour[centre] = last + 1;
+    for (std::size_t e = 0; e < here; ++e) {
+      neighbour.push_back(publish(e));
+      neighbour.push_back(glue(e));
+    }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
+    for (std::size_t e = 0; e < here; ++e) {
+      colour[glue(e)] = last + 2;
+      neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
+      neighbour.push_back(centre);
+      neighbour.push_back(publish(e));
+      for (std::uint32_t writer : gluing.readers_here(e)) neighbour.push_back(publish(writer));
+      offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
+    }
   }
 
-  // Bodies stand in Morton order, so the first body of a chunk says where it lies; walls' chunks go to
-  // whoever sweeps the grains beside them.
+  // Bodies stand in Morton order, subdomain after subdomain, so the first body of a chunk says where it lies;
+  // walls' chunks go to whoever sweeps the grains beside them, and a subdomain's gluing to who has its first
+  // chunk.
   std::vector<std::uint32_t> order(count), weight(count), owner_in_order(count), owner(nodes, 0);
   std::iota(order.begin(), order.end(), 0u);
   const auto place = [&](std::uint32_t c) {
@@ -184,47 +270,117 @@ void StepGraph::plan_epochs() {
   for (std::size_t k = 0; k < count; ++k)
     weight[k] = 1 + static_cast<std::uint32_t>(state_.contacts.count[order[k]]);
   graph::assign_owners(weight, executor_.threads(), owner_in_order);
-  for (std::size_t k = 0; k < count; ++k) owner[order[k]] = owner_in_order[k];
+  for (std::size_t k = count; k-- > 0;) {
+    owner[order[k]] = owner_in_order[k];
+    if (!gluing.needed() || (ranks_.ranks() > 1 && !ranks_.any_thread())) continue;
+    const auto e = static_cast<std::size_t>(chunks.subdomain[order[k]]);
+    owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
+  }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
   planned_ = true;
 }
 
 void StepGraph::finish_lane(std::uint32_t lane) {
   Bodies& bodies = state_.bodies;
-  const SlotRange range = share(bodies.size(), lane);
-  motion_[lane] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free);
+  const SlotRange range = slots(lane);
+  const bool whole = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several();
+  motion_[lane] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
+                         whole ? Multiplicities(state_.decomposition.multiplicity) : Multiplicities());
   if (!bodies.orientation.empty())
     turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
 }
 
 void StepGraph::finish_walls() {
   iterated_ = now();
-  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+  // A wall without a copy here has its velocity from the ranks that hold one, or its free one.
+  const std::size_t walls = state_.walls.size();
+  std::vector<double> velocities(3 * walls, -std::numeric_limits<double>::infinity());
+  for (std::size_t w = 0; w < walls; ++w) {
     const WallState& wall = state_.wall_states[w];
-    Vec3 velocity = wall.free_velocity;
+    const double* copy = wall.free_velocity.data();
     if (!wall.copies.empty())
-      velocity =
-          Eigen::Map<const Vec3>(state_.copies[static_cast<std::size_t>(wall.copies.front())].velocity);
-    state_.walls[w].velocity = velocity;
-    state_.walls[w].point += 0.5 * parameters_.time_step * velocity;
+      copy = state_.copies[static_cast<std::size_t>(wall.copies.front())].velocity;
+    else if (wall.copies_everywhere > 0)
+      continue;
+    std::copy_n(copy, 3, &velocities[3 * w]);
   }
+  ranks_.max(velocities);
+  for (std::size_t w = 0; w < walls; ++w) {
+    state_.walls[w].velocity = Eigen::Map<const Vec3>(&velocities[3 * w]);
+    state_.walls[w].point += 0.5 * parameters_.time_step * state_.walls[w].velocity;
+  }
+  contact_sums_.resize(state_.chunks.size());
 }
 
 void StepGraph::measure_lane(std::uint32_t lane) {
   const SlotRange range = share(state_.chunks.size(), lane);
-  contact_sums_[lane] = {};
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
-    contact_sums_[lane].add(measure_contacts(state_.contacts, state_.chunks, c, state_.bodies.x,
-                                             state_.bodies.radius, state_.walls));
+    contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c, state_.bodies.x,
+                                        state_.bodies.radius, state_.walls);
   }
 }
 
+namespace {
+
+/// What a subdomain adds to the report, as numbers that travel.
+constexpr std::size_t row_width = 1 + 9 + 13;
+
+void write_row(std::int32_t subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
+  const double head[] = {static_cast<double>(subdomain),
+                         motion.energy.translation,
+                         motion.energy.rotation,
+                         motion.energy_free,
+                         motion.impulse[0],
+                         motion.impulse[1],
+                         motion.impulse[2],
+                         motion.impulse_scale,
+                         motion.speed2_max,
+                         static_cast<double>(motion.fastest),
+                         static_cast<double>(contacts.overlapping),
+                         contacts.penetration,
+                         contacts.penetration_max,
+                         contacts.normal_impulse};
+  row = std::copy(std::begin(head), std::end(head), row);
+  std::copy_n(contacts.moment.data(), 9, row);
+}
+
+void add_row(const double* row, bool here, StepSums& sums) {
+  MotionSums motion;
+  motion.energy = {row[1], row[2]};
+  motion.energy_free = row[3];
+  motion.impulse = {row[4], row[5], row[6]};
+  motion.impulse_scale = row[7];
+  motion.speed2_max = row[8];
+  motion.fastest = here ? static_cast<Slot>(row[9]) : -1;
+  sums.motion.add(motion);
+  ContactSums contacts;
+  contacts.overlapping = static_cast<std::int64_t>(row[10]);
+  contacts.penetration = row[11];
+  contacts.penetration_max = row[12];
+  contacts.normal_impulse = row[13];
+  contacts.moment = Eigen::Map<const Eigen::Matrix3d>(row + 14);
+  sums.contacts.add(contacts);
+}
+
+}  // namespace
+
 void StepGraph::sum_up() {
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane) {
-    sums_.motion.add(motion_[lane]);
-    sums_.contacts.add(contact_sums_[lane]);
-  }
+  const Decomposition& all = state_.decomposition;
+  std::vector<MotionSums> motion(all.here.size());
+  std::vector<ContactSums> contacts(all.here.size());
+  for (std::uint32_t lane = 0; lane < lanes_; ++lane) motion[lane / lanes_per_subdomain_].add(motion_[lane]);
+  for (std::size_t c = 0; c < contact_sums_.size(); ++c)
+    contacts[static_cast<std::size_t>(state_.chunks.subdomain[c])].add(contact_sums_[c]);
+  std::vector<double> rows(all.here.size() * row_width);
+  for (std::size_t e = 0; e < all.here.size(); ++e)
+    write_row(all.here[e], motion[e], contacts[e], &rows[e * row_width]);
+  rows = ranks_.gather_records(std::span<const double>(rows));
+  std::vector<const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
+  for (std::size_t k = 0; k < rows.size(); k += row_width) by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
+  for (std::size_t e = 0; e < by_subdomain.size(); ++e)
+    add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
+  sums_.candidates = all_candidates_;
   sums_.times = {iterating_ - started_, iterated_ - iterating_, now() - iterated_};
 }
 

@@ -1,0 +1,211 @@
+#include "runtime/graph/communicator.hpp"
+
+#include <mpi.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <utility>
+
+namespace talus::graph {
+
+namespace {
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void check(int code, const char* call) {
+  if (code == MPI_SUCCESS) return;
+  char text[MPI_MAX_ERROR_STRING];
+  int length = 0;
+  MPI_Error_string(code, text, &length);
+  throw std::runtime_error(std::string(call) + " failed: " + std::string(text, static_cast<std::size_t>(length)));
+}
+
+/// Started by a launcher of some kind: Open MPI, MPICH and Intel MPI, or Slurm with PMIx.
+bool launched() {
+  for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"})
+    if (std::getenv(name)) return true;
+  return false;
+}
+
+}  // namespace
+
+MpiSession::MpiSession(int* argc, char*** argv, bool always) {
+  if (!always && !launched()) return;
+  int level = 0;
+  check(MPI_Init_thread(argc, argv, MPI_THREAD_MULTIPLE, &level), "MPI_Init_thread");
+  started_ = true;
+}
+
+MpiSession::~MpiSession() {
+  if (started_) MPI_Finalize();
+}
+
+Communicator::Communicator() = default;
+
+Communicator::Communicator(const MpiSession& session, CommunicatorOptions options) : options_(options) {
+  if (!session.started()) return;
+  check(MPI_Comm_rank(MPI_COMM_WORLD, &rank_), "MPI_Comm_rank");
+  check(MPI_Comm_size(MPI_COMM_WORLD, &ranks_), "MPI_Comm_size");
+  int level = 0;
+  check(MPI_Query_thread(&level), "MPI_Query_thread");
+  any_thread_ = level == MPI_THREAD_MULTIPLE;
+  MPI_Comm node;
+  check(MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &node),
+        "MPI_Comm_split_type");
+  check(MPI_Comm_size(node, &ranks_on_node_), "MPI_Comm_size");
+  MPI_Comm_free(&node);
+}
+
+Communicator::~Communicator() = default;
+
+std::string Communicator::thread_level() const {
+  int started = 0;
+  MPI_Initialized(&started);
+  if (!started) return "none";
+  int level = 0;
+  MPI_Query_thread(&level);
+  return level == MPI_THREAD_MULTIPLE     ? "multiple"
+         : level == MPI_THREAD_SERIALIZED ? "serialized"
+         : level == MPI_THREAD_FUNNELED   ? "funneled"
+                                          : "single";
+}
+
+std::vector<std::vector<std::byte>> Communicator::exchange(std::vector<std::vector<std::byte>> to) const {
+  if (to.size() != static_cast<std::size_t>(ranks_))
+    throw std::invalid_argument("Communicator::exchange wants one part per rank");
+  if (ranks_ == 1) return to;
+  const auto n = static_cast<std::size_t>(ranks_);
+  std::vector<std::uint64_t> out_bytes(n), in_bytes(n);
+  for (std::size_t r = 0; r < n; ++r) out_bytes[r] = to[r].size();
+  check(MPI_Alltoall(out_bytes.data(), 1, MPI_UINT64_T, in_bytes.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD),
+        "MPI_Alltoall");
+  constexpr std::uint64_t limit = 0x7fffffff;
+  std::vector<std::vector<std::byte>> from(n);
+  std::vector<MPI_Request> requests;
+  for (std::size_t r = 0; r < n; ++r) {
+    if (out_bytes[r] > limit || in_bytes[r] > limit)
+      throw std::runtime_error("a message of more than 2 GiB between two ranks; use more ranks");
+    from[r].resize(in_bytes[r]);
+    if (static_cast<int>(r) == rank_) {
+      from[r] = std::move(to[r]);
+      continue;
+    }
+    if (in_bytes[r] > 0)
+      check(MPI_Irecv(from[r].data(), static_cast<int>(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
+                      MPI_COMM_WORLD, &requests.emplace_back()),
+            "MPI_Irecv");
+  }
+  for (std::size_t r = 0; r < n; ++r)
+    if (static_cast<int>(r) != rank_ && out_bytes[r] > 0)
+      check(MPI_Isend(to[r].data(), static_cast<int>(out_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
+                      MPI_COMM_WORLD, &requests.emplace_back()),
+            "MPI_Isend");
+  check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
+  return from;
+}
+
+void Communicator::sum(std::span<std::int64_t> values) const {
+  if (ranks_ == 1) return;
+  check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_INT64_T, MPI_SUM,
+                      MPI_COMM_WORLD),
+        "MPI_Allreduce");
+}
+
+void Communicator::max(std::span<double> values) const {
+  if (ranks_ == 1) return;
+  check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX,
+                      MPI_COMM_WORLD),
+        "MPI_Allreduce");
+}
+
+std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) const {
+  if (ranks_ == 1) return {part.begin(), part.end()};
+  const auto n = static_cast<std::size_t>(ranks_);
+  const int own = static_cast<int>(part.size());
+  std::vector<int> bytes(n), begin(n + 1, 0);
+  check(MPI_Allgather(&own, 1, MPI_INT, bytes.data(), 1, MPI_INT, MPI_COMM_WORLD), "MPI_Allgather");
+  for (std::size_t r = 0; r < n; ++r) begin[r + 1] = begin[r] + bytes[r];
+  std::vector<std::byte> all(static_cast<std::size_t>(begin[n]));
+  check(MPI_Allgatherv(part.data(), own, MPI_BYTE, all.data(), bytes.data(), begin.data(), MPI_BYTE,
+                       MPI_COMM_WORLD),
+        "MPI_Allgatherv");
+  return all;
+}
+
+void Communicator::progress() const {
+  int flag = 0;
+  MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_COMM_SELF, &flag, MPI_STATUS_IGNORE);
+}
+
+void Communicator::abort(int code) const {
+  if (ranks_ > 1) MPI_Abort(MPI_COMM_WORLD, code);
+  std::exit(code);
+}
+
+struct Communicator::Channel::Request {
+  MPI_Request handle = MPI_REQUEST_NULL;
+  std::span<double> buffer;
+  double delay = 0;
+  bool sends = false;
+  bool open = false;     ///< started and not yet done
+  bool arrived = false;  ///< received, but held back
+};
+
+Communicator::Channel::Channel(std::unique_ptr<Request> request) : request_(std::move(request)) {}
+
+Communicator::Channel::~Channel() {
+  if (!request_ || request_->handle == MPI_REQUEST_NULL) return;
+  if (request_->open && !request_->arrived) {
+    MPI_Cancel(&request_->handle);
+    MPI_Wait(&request_->handle, MPI_STATUS_IGNORE);
+  }
+  MPI_Request_free(&request_->handle);
+}
+
+void Communicator::Channel::start() {
+  Request& r = *request_;
+  if (r.sends && r.delay > 0) r.buffer.back() = now();
+  check(MPI_Start(&r.handle), "MPI_Start");
+  r.open = true;
+  r.arrived = false;
+}
+
+bool Communicator::Channel::done() {
+  Request& r = *request_;
+  if (!r.open) return true;
+  if (!r.arrived) {
+    int flag = 0;
+    check(MPI_Test(&r.handle, &flag, MPI_STATUS_IGNORE), "MPI_Test");
+    if (!flag) return false;
+    r.arrived = true;
+  }
+  if (!r.sends && r.delay > 0 && now() < r.buffer.back() + r.delay) return false;
+  r.open = false;
+  return true;
+}
+
+std::unique_ptr<Communicator::Channel> Communicator::open_send(int to, int tag, std::span<double> buffer) const {
+  auto request = std::make_unique<Channel::Request>();
+  request->buffer = buffer;
+  request->delay = options_.delay;
+  request->sends = true;
+  check(MPI_Send_init(buffer.data(), static_cast<int>(buffer.size()), MPI_DOUBLE, to, tag, MPI_COMM_WORLD,
+                      &request->handle),
+        "MPI_Send_init");
+  return std::unique_ptr<Channel>(new Channel(std::move(request)));
+}
+
+std::unique_ptr<Communicator::Channel> Communicator::open_receive(int from, int tag,
+                                                                  std::span<double> buffer) const {
+  auto request = std::make_unique<Channel::Request>();
+  request->buffer = buffer;
+  request->delay = options_.delay;
+  check(MPI_Recv_init(buffer.data(), static_cast<int>(buffer.size()), MPI_DOUBLE, from, tag, MPI_COMM_WORLD,
+                      &request->handle),
+        "MPI_Recv_init");
+  return std::unique_ptr<Channel>(new Channel(std::move(request)));
+}
+
+}  // namespace talus::graph

@@ -1,0 +1,137 @@
+#pragma once
+
+/// Ranks as the rest of the program sees them: collective calls for what happens once a step or more rarely,
+/// and channels for what travels every iteration. With one rank nothing is sent and MPI is not called.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace talus::graph {
+
+/// Starts MPI for the life of the object when the process was started by mpirun or srun (or `always`), and
+/// ends it. Create one, in main.
+class MpiSession {
+ public:
+  MpiSession(int* argc, char*** argv, bool always = false);
+  ~MpiSession();
+  MpiSession(const MpiSession&) = delete;
+  MpiSession& operator=(const MpiSession&) = delete;
+  bool started() const { return started_; }
+
+ private:
+  bool started_ = false;
+};
+
+struct CommunicatorOptions {
+  /// Every channel message is held back until this time after it was sent [s]: a slow network on one machine,
+  /// for tests and benchmarks. Ranks must share a clock then, as those of one machine do.
+  double delay = 0;
+};
+
+class Communicator {
+ public:
+  /// One rank.
+  Communicator();
+  /// All ranks of the session; one rank when MPI was not started.
+  explicit Communicator(const MpiSession& session, CommunicatorOptions options = {});
+  ~Communicator();
+  Communicator(const Communicator&) = delete;
+  Communicator& operator=(const Communicator&) = delete;
+
+  int rank() const noexcept { return rank_; }
+  int ranks() const noexcept { return ranks_; }
+  /// What MPI grants: "none", "single", "funneled", "serialized" or "multiple".
+  std::string thread_level() const;
+  /// Any thread may use channels; else thread 0 only.
+  bool any_thread() const noexcept { return any_thread_; }
+  /// Ranks on this machine.
+  int ranks_on_node() const noexcept { return ranks_on_node_; }
+
+  // Collective: every rank calls, in the same order.
+  /// Sends to[r] to rank r and returns what each rank sent here.
+  std::vector<std::vector<std::byte>> exchange(std::vector<std::vector<std::byte>> to) const;
+  void sum(std::span<std::int64_t> values) const;
+  void max(std::span<double> values) const;
+  /// The parts of all ranks in order of rank.
+  std::vector<std::byte> gather(std::span<const std::byte> part) const;
+
+  /// Lets messages under way advance; cheap, from any thread that may use channels.
+  void progress() const;
+  /// Ends all ranks with exit code `code`: what is left when one of several ranks has failed and the others
+  /// wait for it.
+  [[noreturn]] void abort(int code) const;
+
+  /// Records instead of bytes.
+  template <class Record>
+  std::vector<std::vector<Record>> exchange_records(const std::vector<std::vector<Record>>& to) const;
+  template <class Record>
+  std::vector<Record> gather_records(std::span<const Record> part) const;
+
+  // Channels. Of one rank: used by one thread at a time.
+  /// A message of fixed length that is sent again and again (MPI's persistent requests).
+  class Channel;
+  /// Opens the sending and the receiving end; both ranks must name the same tag and length. `buffer` must
+  /// outlive the channel; with a delay the last entry is the time stamp, so make it `payload + 1` long.
+  std::unique_ptr<Channel> open_send(int to, int tag, std::span<double> buffer) const;
+  std::unique_ptr<Channel> open_receive(int from, int tag, std::span<double> buffer) const;
+
+ private:
+  int rank_ = 0, ranks_ = 1, ranks_on_node_ = 1;
+  bool any_thread_ = true;
+  CommunicatorOptions options_;
+};
+
+/// See Communicator::open_send. A sender calls `start` when its buffer is full, and `done` until true before it
+/// fills it again; a receiver calls `start` when its buffer may be overwritten, then `done` until true.
+class Communicator::Channel {
+ public:
+  ~Channel();
+  Channel(const Channel&) = delete;
+  Channel& operator=(const Channel&) = delete;
+  void start();
+  /// True when the message has left, or has come; true as well when none was started.
+  bool done();
+
+ private:
+  friend class Communicator;
+  struct Request;
+  explicit Channel(std::unique_ptr<Request> request);
+  std::unique_ptr<Request> request_;
+};
+
+template <class Record>
+std::vector<std::vector<Record>> Communicator::exchange_records(
+    const std::vector<std::vector<Record>>& to) const {
+  static_assert(std::is_trivially_copyable_v<Record>);
+  std::vector<std::vector<std::byte>> bytes(to.size());
+  for (std::size_t r = 0; r < to.size(); ++r) {
+    bytes[r].resize(to[r].size() * sizeof(Record));
+    if (!to[r].empty()) std::memcpy(bytes[r].data(), to[r].data(), bytes[r].size());
+  }
+  bytes = exchange(std::move(bytes));
+  std::vector<std::vector<Record>> from(bytes.size());
+  for (std::size_t r = 0; r < from.size(); ++r) {
+    from[r].resize(bytes[r].size() / sizeof(Record));
+    if (!from[r].empty()) std::memcpy(from[r].data(), bytes[r].data(), bytes[r].size());
+  }
+  return from;
+}
+
+template <class Record>
+std::vector<Record> Communicator::gather_records(std::span<const Record> part) const {
+  static_assert(std::is_trivially_copyable_v<Record>);
+  if (ranks_ == 1) return {part.begin(), part.end()};
+  const std::vector<std::byte> bytes = gather(std::as_bytes(part));
+  std::vector<Record> all(bytes.size() / sizeof(Record));
+  if (!all.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
+  return all;
+}
+
+}  // namespace talus::graph

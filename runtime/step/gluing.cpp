@@ -1,0 +1,412 @@
+#include "runtime/step/gluing.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <map>
+#include <thread>
+
+#include "runtime/graph/worker.hpp"
+
+namespace talus {
+
+namespace {
+
+using Channel = graph::Communicator::Channel;
+
+std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// Polls, and adds the time it took to `waited`. Ranks that share a core give way to one another.
+void await(Channel& channel, double& waited) {
+  if (channel.done()) return;
+  const auto start = std::chrono::steady_clock::now();
+  for (int polls = 0; !channel.done(); ++polls)
+    if (polls < 256)
+      graph::pause();
+    else
+      std::this_thread::yield();
+  waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// A message from and to another rank; buffers have one room more than payload, for the time stamp of a delay.
+struct Link {
+  std::vector<double> out, in;
+  std::unique_ptr<Channel> sender, receiver;
+};
+
+constexpr int centre_tag = 1;
+int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
+  return 2 + from * subdomains + to;
+}
+
+}  // namespace
+
+/// Towards one neighbour.
+struct Gluing::Side {
+  std::vector<std::size_t> slots;    ///< of the bodies in the message, in its order
+  Link link;                         ///< `in` and the channels: of neighbours on other ranks only
+  const double* source = nullptr;    ///< the neighbour's message to this subdomain
+  std::int32_t local = -1;           ///< the neighbour's place here, -1 on another rank
+};
+
+struct Gluing::Subdomain {
+  std::vector<Side> sides;
+  std::vector<std::size_t> shared;            ///< slots
+  std::vector<double> base;                   ///< Schwarz: velocities after the last gluing, per shared body
+  std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
+  std::vector<double> partial;                ///< to the centre: 3 per wall, then width per hub
+  std::vector<std::size_t> hub_item;          ///< per hub: its place in the centre's results
+  double waited = 0;
+};
+
+/// The one rank through which some velocities go is rank 0.
+struct Gluing::Centre {
+  struct Contribution {
+    const double* partial = nullptr;
+    std::vector<std::size_t> item;  ///< per hub of the subdomain
+  };
+  std::vector<Contribution> contributions;  ///< rank 0: of every subdomain, in order
+  std::vector<double> sums;                 ///< 3 per wall, then width per item: all on rank 0, else those asked for
+  std::vector<std::unique_ptr<Link>> links;                 ///< rank 0: per other rank
+  std::vector<std::vector<std::size_t>> items_of_rank;      ///< rank 0: per other rank
+  std::unique_ptr<Link> to_centre;                          ///< other ranks
+  double waited = 0;
+};
+
+Gluing::Gluing(StepState& state, const DecompositionSettings& settings, const graph::Communicator& ranks)
+    : state_(state), settings_(settings), ranks_(ranks) {}
+
+Gluing::~Gluing() = default;
+
+void Gluing::plan(bool rotation) {
+  const Decomposition& all = state_.decomposition;
+  width_ = rotation ? 6 : 3;
+  walls_.clear();
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    if (state_.walls[w].inv_mass() > 0) walls_.push_back(static_cast<std::int32_t>(w));
+  needed_ = all.several() || !walls_.empty();
+  // Channels of the plan before must be closed on all ranks before new ones of the same tag are used.
+  subdomains_.clear();
+  centre_.reset();
+  subdomains_.resize(all.here.size());
+  jumps_.assign(all.here.size(), {});
+  messages_ = {};
+  if (!needed_) return;
+  for (std::size_t e = 0; e < subdomains_.size(); ++e) plan_sides(e);
+  for (Subdomain& subdomain : subdomains_)
+    for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
+      Side& side = subdomain.sides[n];
+      if (side.local < 0) continue;
+      const auto e = static_cast<std::int32_t>(&subdomain - subdomains_.data());
+      for (const Side& back : subdomains_[at(side.local)].sides)
+        if (back.local == e) side.source = back.link.out.data();
+    }
+  plan_centre();
+  count_messages();
+}
+
+void Gluing::plan_sides(std::size_t e) {
+  const Decomposition& all = state_.decomposition;
+  Subdomain& mine = subdomains_[e];
+  mine.wall_copies.resize(walls_.size());
+  if (!all.several()) return;
+  const SubdomainInterface& interface = all.interfaces[e];
+  const std::size_t begin = all.slot_begin[e];
+  for (std::int32_t s : interface.shared) mine.shared.push_back(begin + at(s));
+  if (settings_.coupling == Coupling::schwarz) mine.base.resize(mine.shared.size() * width_);
+  mine.sides.resize(interface.neighbours.size());
+  for (std::size_t n = 0; n < mine.sides.size(); ++n) {
+    const Neighbour& neighbour = interface.neighbours[n];
+    Side& side = mine.sides[n];
+    for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
+      side.slots.push_back(begin + at(interface.exchange[at(k)]));
+    const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
+    const std::size_t length = side.slots.size() * width_;
+    side.link.out.resize(length + 1);
+    if (rank == ranks_.rank()) {
+      side.local = static_cast<std::int32_t>(
+          std::lower_bound(all.here.begin(), all.here.end(), neighbour.subdomain) - all.here.begin());
+      continue;
+    }
+    side.link.in.resize(length + 1);
+    side.source = side.link.in.data();
+    const std::int32_t count = all.partition.subdomains;
+    side.link.sender = ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
+    side.link.receiver =
+        ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
+    side.link.receiver->start();
+  }
+}
+
+void Gluing::plan_centre() {
+  const Decomposition& all = state_.decomposition;
+  /// A body that goes through the centre, as a subdomain names it.
+  struct HubRecord {
+    std::int64_t subdomain;
+    std::int64_t id;
+  };
+  std::vector<HubRecord> mine;
+  for (std::size_t e = 0; e < all.here.size() && all.several(); ++e) {
+    const SubdomainInterface& interface = all.interfaces[e];
+    for (std::int32_t hub : interface.hubs) {
+      const std::size_t slot = subdomains_[e].shared[at(hub)];
+      mine.push_back({all.here[e], static_cast<std::int64_t>(state_.bodies.id[slot])});
+    }
+  }
+  // Every rank learns all names: a few words per hub, none in most scenes.
+  std::vector<HubRecord> everywhere = ranks_.gather_records(std::span<const HubRecord>(mine));
+  std::stable_sort(everywhere.begin(), everywhere.end(),
+                   [](const HubRecord& a, const HubRecord& b) { return a.subdomain < b.subdomain; });
+  const auto items_of = [&](auto wanted) {
+    std::vector<std::int64_t> ids;
+    for (const HubRecord& record : everywhere)
+      if (wanted(all.rank_of[static_cast<std::size_t>(record.subdomain)])) ids.push_back(record.id);
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
+  };
+  const auto place = [](const std::vector<std::int64_t>& ids, std::int64_t id) {
+    return static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
+  };
+  const bool is_centre = ranks_.rank() == 0;
+  const std::vector<std::int64_t> items = items_of([&](std::int32_t rank) { return is_centre || rank == ranks_.rank(); });
+  const std::size_t at_walls = 3 * walls_.size();
+  centre_ = std::make_unique<Centre>();
+  Centre& centre = *centre_;
+  centre.sums.resize(at_walls + items.size() * width_);
+  std::vector<std::size_t> length(at(all.partition.subdomains), at_walls);
+  for (const HubRecord& record : everywhere) length[static_cast<std::size_t>(record.subdomain)] += width_;
+  for (std::size_t e = 0; e < all.here.size(); ++e) {
+    Subdomain& subdomain = subdomains_[e];
+    subdomain.partial.resize(length[at(all.here[e])]);
+    for (const HubRecord& record : everywhere)
+      if (record.subdomain == all.here[e]) subdomain.hub_item.push_back(place(items, record.id));
+  }
+  if (ranks_.ranks() > 1 && (at_walls > 0 || !everywhere.empty())) {
+    const auto open = [&](int other, std::size_t out, std::size_t in) {
+      auto link = std::make_unique<Link>();
+      link->out.resize(out + 1);
+      link->in.resize(in + 1);
+      link->sender = ranks_.open_send(other, centre_tag, link->out);
+      link->receiver = ranks_.open_receive(other, centre_tag, link->in);
+      link->receiver->start();
+      return link;
+    };
+    const auto length_of_rank = [&](int rank) {
+      std::size_t sum = 0;
+      for (std::size_t e = 0; e < length.size(); ++e)
+        if (all.rank_of[e] == rank) sum += length[e];
+      return sum;
+    };
+    if (is_centre) {
+      for (int rank = 1; rank < ranks_.ranks(); ++rank) {
+        std::vector<std::size_t>& wanted = centre.items_of_rank.emplace_back();
+        for (std::int64_t id : items_of([&](std::int32_t r) { return r == rank; })) wanted.push_back(place(items, id));
+        centre.links.push_back(open(rank, at_walls + wanted.size() * width_, length_of_rank(rank)));
+      }
+    } else {
+      centre.to_centre = open(0, length_of_rank(ranks_.rank()), centre.sums.size());
+    }
+  }
+  if (!is_centre) return;
+  std::vector<std::size_t> read_of_rank(static_cast<std::size_t>(ranks_.ranks()), 0);
+  for (std::size_t e = 0; e < length.size(); ++e) {
+    Centre::Contribution contribution;
+    const std::int32_t rank = all.rank_of[e];
+    if (rank == 0) {
+      const auto local = std::lower_bound(all.here.begin(), all.here.end(), static_cast<std::int32_t>(e));
+      contribution.partial = subdomains_[static_cast<std::size_t>(local - all.here.begin())].partial.data();
+    } else if (!centre.links.empty()) {
+      contribution.partial = centre.links[at(rank - 1)]->in.data() + read_of_rank[at(rank)];
+      read_of_rank[at(rank)] += length[e];
+    }
+    for (const HubRecord& record : everywhere)
+      if (record.subdomain == static_cast<std::int64_t>(e)) contribution.item.push_back(place(items, record.id));
+    centre.contributions.push_back(std::move(contribution));
+  }
+}
+
+void Gluing::count_messages() {
+  std::array<std::int64_t, 4> count{};
+  const auto add = [&](std::size_t doubles, bool between) {
+    count[0] += 1;
+    count[1] += static_cast<std::int64_t>(8 * doubles);
+    count[2] += between ? 1 : 0;
+    count[3] += between ? static_cast<std::int64_t>(8 * doubles) : 0;
+  };
+  const Decomposition& all = state_.decomposition;
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
+    const Subdomain& subdomain = subdomains_[e];
+    for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local < 0);
+    if (subdomain.partial.empty()) continue;
+    add(subdomain.partial.size(), false);  // to the centre
+    add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
+  }
+  if (centre_ && centre_->to_centre) {
+    count[2] += 2;
+    count[3] += static_cast<std::int64_t>(8 * (centre_->to_centre->out.size() + centre_->to_centre->in.size() - 2));
+  }
+  ranks_.sum(count);
+  messages_ = {count[0], count[1], count[2], count[3]};
+}
+
+void Gluing::begin() {
+  for (Subdomain& subdomain : subdomains_) {
+    subdomain.waited = 0;
+    for (auto& copies : subdomain.wall_copies) copies.clear();
+  }
+  if (centre_) centre_->waited = 0;
+  std::vector<std::int64_t> copies(state_.walls.size(), 0);
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    copies[w] = static_cast<std::int64_t>(state_.wall_states[w].copies.size());
+  if (!walls_.empty()) ranks_.sum(copies);
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].copies_everywhere = copies[w];
+  for (std::size_t g = 0; g < walls_.size(); ++g)
+    for (std::int32_t c : state_.wall_states[at(walls_[g])].copies)
+      subdomains_[at(state_.chunks.subdomain[at(c)])].wall_copies[g].push_back(c);
+}
+
+std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
+  std::vector<std::uint32_t> readers;
+  for (const Side& side : subdomains_[e].sides)
+    if (side.local >= 0) readers.push_back(static_cast<std::uint32_t>(side.local));
+  return readers;
+}
+
+void Gluing::write_velocity(std::size_t slot, double* out) const {
+  const Velocity& v = state_.bodies.velocity[slot];
+  std::copy_n(v.u, 3, out);
+  if (width_ == 6) std::copy_n(v.w, 3, out + 3);
+}
+
+void Gluing::publish(std::size_t e, Mode mode) {
+  if (mode == Mode::local) return;
+  Subdomain& mine = subdomains_[e];
+  for (Side& side : mine.sides) {
+    if (side.link.sender) await(*side.link.sender, mine.waited);
+    for (std::size_t k = 0; k < side.slots.size(); ++k) write_velocity(side.slots[k], &side.link.out[k * width_]);
+    if (side.link.sender) side.link.sender->start();
+  }
+  for (std::size_t g = 0; g < walls_.size(); ++g) {
+    double* sum = &mine.partial[3 * g];
+    std::fill_n(sum, 3, 0.0);
+    for (std::int32_t c : mine.wall_copies[g])
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[at(c)].velocity[k];
+  }
+  if (mine.hub_item.empty()) return;
+  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+  for (std::size_t h = 0; h < interface.hubs.size(); ++h)
+    write_velocity(mine.shared[at(interface.hubs[h])], &mine.partial[3 * walls_.size() + h * width_]);
+}
+
+void Gluing::centre(Mode mode) {
+  if (mode == Mode::local || centre_->sums.empty()) return;
+  Centre& centre = *centre_;
+  if (centre.to_centre) {
+    Link& link = *centre.to_centre;
+    await(*link.sender, centre.waited);
+    auto out = link.out.begin();
+    for (const Subdomain& subdomain : subdomains_)
+      out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
+    link.sender->start();
+    await(*link.receiver, centre.waited);
+    std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
+    link.receiver->start();
+    return;
+  }
+  for (const auto& link : centre.links) await(*link->receiver, centre.waited);
+  std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
+  const std::size_t at_walls = 3 * walls_.size();
+  for (const Centre::Contribution& contribution : centre.contributions) {
+    for (std::size_t k = 0; k < at_walls; ++k) centre.sums[k] += contribution.partial[k];
+    for (std::size_t h = 0; h < contribution.item.size(); ++h)
+      for (std::size_t k = 0; k < width_; ++k)
+        centre.sums[at_walls + contribution.item[h] * width_ + k] += contribution.partial[at_walls + h * width_ + k];
+  }
+  for (std::size_t r = 0; r < centre.links.size(); ++r) {
+    Link& link = *centre.links[r];
+    link.receiver->start();
+    await(*link.sender, centre.waited);
+    auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
+    for (std::size_t item : centre.items_of_rank[r])
+      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_, out);
+    link.sender->start();
+  }
+}
+
+void Gluing::glue(std::size_t e, Mode mode) {
+  Subdomain& mine = subdomains_[e];
+  for (std::size_t g = 0; g < walls_.size(); ++g) {
+    const auto& copies = mine.wall_copies[g];
+    if (copies.empty()) continue;
+    if (mode == Mode::local) {
+      glue_copies(state_.copies, copies);
+      continue;
+    }
+    const double part = 1 / static_cast<double>(state_.wall_states[at(walls_[g])].copies_everywhere);
+    for (std::int32_t c : copies)
+      for (std::size_t k = 0; k < 3; ++k) state_.copies[at(c)].velocity[k] = part * centre_->sums[3 * g + k];
+  }
+  if (mode == Mode::local || !state_.decomposition.several()) return;
+  for (Side& side : mine.sides)
+    if (side.link.receiver) await(*side.link.receiver, mine.waited);
+
+  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+  const bool schwarz = settings_.coupling == Coupling::schwarz;
+  JumpSums jump;
+  // One shared body: the sum of its copies becomes what all copies go on with.
+  const auto settle = [&](std::size_t s, const double* sum) {
+    const std::size_t slot = mine.shared[s];
+    Velocity& v = state_.bodies.velocity[slot];
+    const double m = state_.decomposition.multiplicity[slot];
+    std::array<double, 6> next{};
+    double* base = schwarz ? &mine.base[s * width_] : nullptr;
+    if (schwarz && mode == Mode::fresh)
+      for (std::size_t k = 0; k < width_; ++k)
+        base[k] = k < 3 ? state_.free.u[slot][k] : state_.free.w[slot][k - 3];
+    for (std::size_t k = 0; k < width_; ++k) next[k] = schwarz ? base[k] + (sum[k] - m * base[k]) : sum[k] / m;
+    if (mode == Mode::measured) {
+      const auto& whole = state_.decomposition.whole[slot];
+      for (std::size_t k = 0; k < width_; ++k) {
+        const double mobility = whole[k < 3 ? 0 : 1];
+        if (mobility == 0) continue;
+        const double now = k < 3 ? v.u[k] : v.w[k - 3];
+        jump.jump2 += (now - next[k]) * (now - next[k]) / (m * mobility);
+        jump.velocity2 += next[k] * next[k] / (m * mobility);
+      }
+    }
+    std::copy_n(next.begin(), 3, v.u);
+    if (width_ == 6) std::copy_n(next.begin() + 3, 3, v.w);
+    if (schwarz) std::copy_n(next.begin(), width_, base);
+  };
+  for (std::size_t s = 0; s < interface.shared.size(); ++s) {
+    const auto begin = interface.copies_begin[s], end = interface.copies_begin[s + 1];
+    if (begin == end) continue;  // a hub
+    std::array<double, 6> sum{}, own;
+    for (auto c = begin; c < end; ++c) {
+      const CopySource& source = interface.copies[at(c)];
+      const double* from = own.data();
+      if (source.neighbour < 0)
+        write_velocity(mine.shared[s], own.data());
+      else
+        from = mine.sides[at(source.neighbour)].source + at(source.place) * width_;
+      for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
+    }
+    settle(s, sum.data());
+  }
+  for (std::size_t h = 0; h < interface.hubs.size(); ++h)
+    settle(at(interface.hubs[h]), &centre_->sums[3 * walls_.size() + mine.hub_item[h] * width_]);
+  for (Side& side : mine.sides)
+    if (side.link.receiver) side.link.receiver->start();
+  if (mode == Mode::measured) jumps_[e] = jump;
+}
+
+double Gluing::exposed() const {
+  double sum = centre_ ? centre_->waited : 0;
+  for (const Subdomain& subdomain : subdomains_) sum += subdomain.waited;
+  return sum;
+}
+
+}  // namespace talus

@@ -1,0 +1,91 @@
+#pragma once
+
+/// What subdomains tell one another in an iteration, and how copies come to agree.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// Messages of one iteration, all ranks: between subdomains (each as if alone on its rank), and those that
+/// leave a rank.
+struct MessageCount {
+  std::int64_t messages = 0, bytes = 0;
+  std::int64_t between_ranks = 0, bytes_between_ranks = 0;
+};
+
+/// Kinetic norms at the interface: of the jumps of the copies, and of their velocities [J]; per subdomain.
+struct JumpSums {
+  double jump2 = 0;
+  double velocity2 = 0;
+};
+
+/// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in three kinds of tasks:
+///
+///   publish[e]   after the boundary chunks of subdomain e: its interface velocities leave
+///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >= 9
+///                always, so that k copies cost O(k) messages)
+///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up what
+///                all have gained (Schwarz); summed in order of subdomain
+///
+/// Between subdomains of one rank the messages are memory. A body sends its velocity, 6 numbers or 3 without
+/// rotation.
+class Gluing {
+ public:
+  /// Keeps references.
+  Gluing(StepState& state, const DecompositionSettings& settings, const graph::Communicator& ranks);
+  ~Gluing();
+
+  /// Collective, after the candidates were distributed: buffers and channels for these interfaces.
+  void plan(bool rotation);
+  /// Collective, in every step before its sweeps: the copies of the walls.
+  void begin();
+
+  /// False when there is nothing to glue: no tasks then.
+  bool needed() const { return needed_; }
+  std::span<const std::int32_t> walls() const { return walls_; }  ///< of finite mass
+  /// Subdomains here (index among those) whose glue reads what e publishes; ascending, without e.
+  std::vector<std::uint32_t> readers_here(std::size_t e) const;
+
+  enum class Mode {
+    fresh,     ///< velocities were made afresh from the impulses
+    iterate,   ///< after a sweep
+    measured,  ///< after a sweep, with the jump measured
+    local,     ///< between two exchanges: only the walls' copies of each subdomain
+  };
+  void publish(std::size_t e, Mode mode);
+  void centre(Mode mode);
+  void glue(std::size_t e, Mode mode);
+
+  const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
+  const MessageCount& messages() const { return messages_; }
+  /// Time that tasks of this rank waited for messages since begin() [s]; 0 with one rank.
+  double exposed() const;
+
+ private:
+  struct Side;
+  struct Subdomain;
+  struct Centre;
+  void plan_sides(std::size_t e);
+  void plan_centre();
+  void count_messages();
+  void write_velocity(std::size_t slot, double* out) const;
+
+  StepState& state_;
+  const DecompositionSettings& settings_;
+  const graph::Communicator& ranks_;
+  bool needed_ = false;
+  std::size_t width_ = 6;             ///< numbers per body
+  std::vector<std::int32_t> walls_;
+  std::vector<Subdomain> subdomains_;  ///< per subdomain here
+  std::unique_ptr<Centre> centre_;
+  std::vector<JumpSums> jumps_;
+  MessageCount messages_;
+};
+
+}  // namespace talus
