@@ -125,12 +125,14 @@ std::string contents(const io::Scene& scene, const Bodies& bodies) {
                      counted(scene.setup.stages.size(), "stage"));
 }
 
-void print_start(const io::Scene& scene, const Bodies& bodies, int threads, const graph::Communicator& ranks) {
+void print_start(const io::Scene& scene, const Bodies& bodies, int threads,
+                 const graph::Communicator& ranks) {
   fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, bodies));
   const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
   const int cores = omp_get_num_procs();
-  fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n", count(ranks.ranks(), "rank"),
-             count(threads, "thread"), count(cores, "core"), ranks.thread_level());
+  fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n",
+             count(ranks.ranks(), "rank"), count(threads, "thread"), count(cores, "core"),
+             ranks.thread_level());
   if (scene.setup.decomposition.subdomains > 1 || ranks.ranks() > 1)
     fmt::print(stderr, "talus: {} by {}, {}, {}\n",
                count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
@@ -168,8 +170,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
     if (feed) feed->row(simulation, triaxial);
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
-    if (clock.due(report) || ((stage_ends || last) && output.stage_frames))
-      write_frame();
+    if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
     if (progress) progress->update(report, simulation.stage().name, simulation.stage_fraction());
     if (const int signal = signal_of(ranks); signal != 0) {
       if (progress) progress->finish();
@@ -252,7 +253,8 @@ void print_end(const io::Summary& summary, const SolverSettings& solver, const s
   fmt::print(stderr, "talus: results in {}\n", directory);
 }
 
-/// What rank 0 alone knows at the start, when it has made the sample: where the walls stand and what they weigh.
+/// What rank 0 alone knows at the start, when it has made the sample: where the walls stand and what they
+/// weigh.
 void share_walls(Setup& setup, const graph::Communicator& ranks) {
   std::vector<double*> values;
   for (Wall& wall : setup.walls) {
@@ -275,7 +277,8 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies, const graph::Communicator& ranks) {
+int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
+              const graph::Communicator& ranks) {
   const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();

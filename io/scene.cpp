@@ -28,7 +28,8 @@ class SceneReader {
   }
 
   Scene read() && {
-    read_table(root_, "", keys_.top, {"material", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
+    read_table(root_, "", keys_.top,
+               {"material", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_table(table_at(root_, "material"), "material", keys_.material, {}, scene_);

@@ -249,10 +249,10 @@ std::size_t memory_used(const Candidates& candidates) {
 }
 
 std::size_t memory_used(const Chunks& chunks) {
-  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.subdomain.capacity() + chunks.colour.capacity() +
-          chunks.body_begin.capacity() + chunks.bodies.capacity() + chunks.owned_begin.capacity() +
-          chunks.owned.capacity() + chunks.untouched.capacity() + chunks.conflict_begin.capacity() +
-          chunks.conflicts.capacity()) *
+  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.subdomain.capacity() +
+          chunks.colour.capacity() + chunks.body_begin.capacity() + chunks.bodies.capacity() +
+          chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
+          chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
              4 +
          chunks.local.capacity() * 2 + chunks.boundary.capacity();
 }

@@ -40,17 +40,18 @@ struct CandidateGroup {
   int target;              ///< candidates in a chunk at most, a few hundred, < 32768
 };
 
-/// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so neither
-/// grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept first, and
-/// what they leave at the interface can travel while the inner chunks are swept. Two chunks conflict when they share a grain, and then differ in colour: the sweep's result
-/// depends on colours alone. Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0
-/// begin a chunk of their own.
+/// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
+/// neither grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept
+/// first, and what they leave at the interface can travel while the inner chunks are swept. Two chunks
+/// conflict when they share a grain, and then differ in colour: the sweep's result depends on colours alone.
+/// Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
 struct Chunks {
-  std::vector<std::int32_t> begin;   ///< chunks + 1 offsets into the candidates
-  std::vector<std::int32_t> wall;    ///< per chunk: index of its wall, or -1
+  std::vector<std::int32_t> begin;      ///< chunks + 1 offsets into the candidates
+  std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
   std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
   std::vector<char> boundary;           ///< per chunk: that of its group
-  std::vector<std::int32_t> colour;     ///< per chunk; at the boundary 0 .. boundary_colours - 1, inside the rest
+  std::vector<std::int32_t>
+      colour;  ///< per chunk; at the boundary 0 .. boundary_colours - 1, inside the rest
   int boundary_colours = 0;
   int colours = 0;
   std::vector<std::int32_t> body_begin;  ///< chunks + 1 offsets into `bodies`

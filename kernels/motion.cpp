@@ -13,11 +13,12 @@ double square(const double (&v)[3]) {
 
 void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step) {
   for (std::size_t s = range.begin; s < range.end; ++s)
-    for (std::size_t c = 0; c < 3; ++c) x[s][static_cast<Eigen::Index>(c)] += 0.5 * time_step * velocity[s].u[c];
+    for (std::size_t c = 0; c < 3; ++c)
+      x[s][static_cast<Eigen::Index>(c)] += 0.5 * time_step * velocity[s].u[c];
 }
 
-void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step, const Vec3& gravity,
-                     FreeVelocity& free) {
+void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step,
+                     const Vec3& gravity, FreeVelocity& free) {
   for (std::size_t s = range.begin; s < range.end; ++s)
     for (std::size_t c = 0; c < 3; ++c) {
       free.u[s][c] = velocity[s].u[c] + time_step * gravity[static_cast<Eigen::Index>(c)];

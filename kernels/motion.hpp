@@ -24,8 +24,8 @@ struct FreeVelocity {
 void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step);
 
 /// Free velocity = V- + h g.
-void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step, const Vec3& gravity,
-                     FreeVelocity& free);
+void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step,
+                     const Vec3& gravity, FreeVelocity& free);
 
 /// V = free velocity for the given grains.
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity);
@@ -42,8 +42,8 @@ struct MotionSums {
   void add(const MotionSums& other);
 };
 
-/// Second half: x += h/2 u, with the sums. Where copies carry the whole mass (Schwarz), `multiplicity` divides
-/// what a copy adds to the sums.
+/// Second half: x += h/2 u, with the sums. Where copies carry the whole mass (Schwarz), `multiplicity`
+/// divides what a copy adds to the sums.
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
                   const FreeVelocity& free, Multiplicities multiplicity = {});
 

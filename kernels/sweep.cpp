@@ -222,7 +222,8 @@ ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<c
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
     const V3 n = normal_of(contacts, k);
-    const double w_nn = whole(a, contacts.first[k], multiplicity) + whole(b, contacts.second[k], multiplicity);
+    const double w_nn =
+        whole(a, contacts.first[k], multiplicity) + whole(b, contacts.second[k], multiplicity);
     add_error<Friction>(sums, impulse_of<Friction>(contacts, k, n), relative<Friction>(a, b, n), n,
                         contacts.bias[k], w_nn, mu);
   }
@@ -320,8 +321,8 @@ template ErrorSums error_wall<true>(const Contacts&, ContactRange, std::span<con
                                     const WallCopy&, double, Multiplicities);
 template ErrorSums error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>, double,
                                      const WallCopy&, double, Multiplicities);
-template void relax<true>(Contacts&, ContactRange, std::span<const double>, Multiplicities, std::span<Velocity>,
-                          WallCopy*);
+template void relax<true>(Contacts&, ContactRange, std::span<const double>, Multiplicities,
+                          std::span<Velocity>, WallCopy*);
 template void relax<false>(Contacts&, ContactRange, std::span<const double>, Multiplicities,
                            std::span<Velocity>, WallCopy*);
 template void copy_impulses<true>(const Contacts&, ContactRange, std::vector<double>&);

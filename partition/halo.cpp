@@ -16,15 +16,17 @@ void collect(const CutTree& tree, std::int32_t node, const Corner& low, const Co
   }
   const CutTree::Cut& cut = tree.cuts[static_cast<std::size_t>(node)];
   // The two other coordinates only tell points of the very plane of the cut apart.
-  const auto plane = static_cast<std::uint32_t>(cut.key >> (2 * CutFrame::bits));
+  const auto plane = static_cast<std::uint32_t>(cut.key >> (2 * IntegerFrame::bits));
   const auto axis = static_cast<std::size_t>(cut.axis);
   if (low[axis] <= plane) collect(tree, cut.below, low, high, found);
   if (high[axis] >= plane) collect(tree, cut.above, low, high, found);
 }
 
-void collect(const CellTable& table, const Corner& low, const Corner& high, std::vector<std::int32_t>& found) {
+void collect(const CellTable& table, const Corner& low, const Corner& high,
+             std::vector<std::int32_t>& found) {
   const auto cell = [&](std::size_t axis, std::uint32_t q) {
-    return static_cast<std::size_t>(std::uint64_t{q} * static_cast<std::uint64_t>(table.cells[axis]) >> CutFrame::bits);
+    return static_cast<std::size_t>(std::uint64_t{q} * static_cast<std::uint64_t>(table.cells[axis]) >>
+                                    IntegerFrame::bits);
   };
   const auto nx = static_cast<std::size_t>(table.cells[0]), ny = static_cast<std::size_t>(table.cells[1]);
   for (std::size_t z = cell(2, low[2]); z <= cell(2, high[2]); ++z)
@@ -38,7 +40,8 @@ void collect(const CellTable& table, const Corner& low, const Corner& high, std:
 std::vector<std::int32_t> subdomains_within(const Partition& partition, const Vec3& point, double distance) {
   if (partition.subdomains == 1) return {0};
   const Vec3 reach = Vec3::Constant(distance);
-  const Corner low = partition.frame.coordinates(point - reach), high = partition.frame.coordinates(point + reach);
+  const Corner low = partition.frame.coordinates(point - reach),
+               high = partition.frame.coordinates(point + reach);
   std::vector<std::int32_t> found;
   if (partition.kind == PartitionKind::metis)
     collect(partition.table, low, high, found);

@@ -342,36 +342,43 @@ Section<SolverSettings> solver_keys() {
 Section<DecompositionSettings> decomposition_keys() {
   using D = DecompositionSettings;
   const auto schwarz = [](const D& d) { return d.coupling == Coupling::schwarz; };
-  return {"[decomposition]",
-          "How the sample is cut into subdomains, and how these act on one another.",
-          {
-              key<D>("subdomains", "", at_least_one, "Number of subdomains, at least one per rank.", &D::subdomains)
-                  .or_auto(0, "one per rank"),
-              choice<D>("partitioner", {"auto", "boxes", "fitted", "rcb", "metis"},
-                        "`boxes`: equal boxes; `fitted`: boxes of equal work; `rcb`: recursive bisection; `metis`: "
-                        "a graph of cells; `auto`: boxes where they are balanced, else rcb.",
-                        &D::partitioner),
-              key<D>("boxes", "", countable, "Boxes along x, y and z; their product is `subdomains`.", &D::boxes)
-                  .blank_when_zero(),
-              choice<D>("coupling", {"nscdd", "schwarz"},
-                        "`nscdd`: copies of a body share its mass and are glued; `schwarz`: copies have its mass and "
-                        "exchange what they gain.",
-                        &D::coupling),
-              choice<D>("exchange", {"dcs", "ccs"},
-                        "`dcs`: between the subdomains that share a body; `ccs`: through one rank.", &D::exchange),
-              key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
-                     &D::sweeps_per_exchange),
-              key<D>("repartition_every", "", countable,
-                     "Steps after which space is cut anew, with the next broad phase.", &D::repartition_every),
-              key<D>("max_imbalance", "", positive,
-                     "Fullest subdomain over the mean, less 1, beyond which the next broad phase cuts space anew.",
-                     &D::max_imbalance),
-              key<D>("damping", "", any,
-                     "Damp contacts at the interface by multiplicity. Without, Schwarz diverges where bodies stand "
-                     "in more than two subdomains.",
-                     &D::damping)
-                  .only("coupling = schwarz", schwarz),
-          }};
+  return {
+      "[decomposition]",
+      "How the sample is cut into subdomains, and how these act on one another.",
+      {
+          key<D>("subdomains", "", at_least_one, "Number of subdomains, at least one per rank.",
+                 &D::subdomains)
+              .or_auto(0, "one per rank"),
+          choice<D>(
+              "partitioner", {"auto", "boxes", "fitted", "rcb", "metis"},
+              "`boxes`: equal boxes; `fitted`: boxes of equal work; `rcb`: recursive bisection; `metis`: "
+              "a graph of cells; `auto`: boxes where they are balanced, else rcb.",
+              &D::partitioner),
+          key<D>("boxes", "", countable, "Boxes along x, y and z; their product is `subdomains`.", &D::boxes)
+              .blank_when_zero(),
+          choice<D>(
+              "coupling", {"nscdd", "schwarz"},
+              "`nscdd`: copies of a body share its mass and are glued; `schwarz`: copies have its mass and "
+              "exchange what they gain.",
+              &D::coupling),
+          choice<D>("exchange", {"dcs", "ccs"},
+                    "`dcs`: between the subdomains that share a body; `ccs`: through one rank.",
+                    &D::exchange),
+          key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
+                 &D::sweeps_per_exchange),
+          key<D>("repartition_every", "", countable,
+                 "Steps after which space is cut anew, with the next broad phase.", &D::repartition_every),
+          key<D>(
+              "max_imbalance", "", positive,
+              "Fullest subdomain over the mean, less 1, beyond which the next broad phase cuts space anew.",
+              &D::max_imbalance),
+          key<D>(
+              "damping", "", any,
+              "Damp contacts at the interface by multiplicity. Without, Schwarz diverges where bodies stand "
+              "in more than two subdomains.",
+              &D::damping)
+              .only("coupling = schwarz", schwarz),
+      }};
 }
 
 Section<OutputSpec> output_keys() {
@@ -396,8 +403,8 @@ Section<OutputSpec> output_keys() {
 }  // namespace
 
 const SceneKeys& scene_keys() {
-  static const SceneKeys keys = {top_keys(),    material_keys(),  sample_keys(),     wall_keys(),
-                                 stage_keys(),  stage_end_keys(), stage_load_keys(), detection_keys(),
+  static const SceneKeys keys = {top_keys(),    material_keys(),      sample_keys(),     wall_keys(),
+                                 stage_keys(),  stage_end_keys(),     stage_load_keys(), detection_keys(),
                                  solver_keys(), decomposition_keys(), output_keys()};
   return keys;
 }

@@ -1,5 +1,8 @@
 #include "runtime/graph/communicator.hpp"
 
+// The C interface only: the C++ bindings of old are not linked.
+#define OMPI_SKIP_MPICXX
+#define MPICH_SKIP_MPICXX
 #include <mpi.h>
 
 #include <chrono>
@@ -19,7 +22,8 @@ void check(int code, const char* call) {
   char text[MPI_MAX_ERROR_STRING];
   int length = 0;
   MPI_Error_string(code, text, &length);
-  throw std::runtime_error(std::string(call) + " failed: " + std::string(text, static_cast<std::size_t>(length)));
+  throw std::runtime_error(std::string(call) +
+                           " failed: " + std::string(text, static_cast<std::size_t>(length)));
 }
 
 /// Started by a launcher of some kind: Open MPI, MPICH and Intel MPI, or Slurm with PMIx.
@@ -186,7 +190,8 @@ bool Communicator::Channel::done() {
   return true;
 }
 
-std::unique_ptr<Communicator::Channel> Communicator::open_send(int to, int tag, std::span<double> buffer) const {
+std::unique_ptr<Communicator::Channel> Communicator::open_send(int to, int tag,
+                                                               std::span<double> buffer) const {
   auto request = std::make_unique<Channel::Request>();
   request->buffer = buffer;
   request->delay = options_.delay;

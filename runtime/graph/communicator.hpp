@@ -88,8 +88,8 @@ class Communicator {
   CommunicatorOptions options_;
 };
 
-/// See Communicator::open_send. A sender calls `start` when its buffer is full, and `done` until true before it
-/// fills it again; a receiver calls `start` when its buffer may be overwritten, then `done` until true.
+/// See Communicator::open_send. A sender calls `start` when its buffer is full, and `done` until true before
+/// it fills it again; a receiver calls `start` when its buffer may be overwritten, then `done` until true.
 class Communicator::Channel {
  public:
   ~Channel();

@@ -88,8 +88,7 @@ void append(const BodyRecord& record, bool orientation, Bodies& bodies) {
 /// Points to balance: the candidates there are; in the beginning, the bodies.
 PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& bodies,
                               const Candidates& candidates, std::int64_t all_candidates) {
-  if (all_candidates > 0)
-    return candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs);
+  if (all_candidates > 0) return candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs);
   PartitionPoints points;
   for (std::size_t s = 0; s < bodies.size(); ++s)
     if (counts(decomposition, s)) points.x.push_back(bodies.x[s]);
@@ -98,7 +97,8 @@ PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& 
 }
 
 std::vector<std::vector<BodyRecord>> send_to_surroundings(const Decomposition& decomposition,
-                                                          const graph::Communicator& ranks, const Bodies& bodies,
+                                                          const graph::Communicator& ranks,
+                                                          const Bodies& bodies,
                                                           std::span<const double> reach) {
   std::vector<std::vector<BodyRecord>> to(static_cast<std::size_t>(ranks.ranks()));
   if (ranks.ranks() == 1) {
@@ -191,8 +191,9 @@ int chunk_target(std::size_t candidates) {
 }
 
 Slot Surroundings::find(std::int64_t id) const {
-  const auto found = std::lower_bound(by_id.begin(), by_id.end(), id,
-                                      [](const auto& entry, std::int64_t wanted) { return entry.first < wanted; });
+  const auto found =
+      std::lower_bound(by_id.begin(), by_id.end(), id,
+                       [](const auto& entry, std::int64_t wanted) { return entry.first < wanted; });
   return found != by_id.end() && found->first == id ? found->second : -1;
 }
 
@@ -200,14 +201,13 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
   Decomposition decomposition;
   const std::int32_t subdomains = settings.subdomains > 0 ? settings.subdomains : ranks.ranks();
   if (subdomains < ranks.ranks())
-    throw std::invalid_argument(
-        fmt::format("{} ranks for {} subdomains: a rank without a subdomain has nothing to do. Start fewer ranks or "
-                    "set decomposition.subdomains to {} or more",
-                    ranks.ranks(), subdomains, ranks.ranks()));
+    throw std::invalid_argument(fmt::format(
+        "{} ranks for {} subdomains: a rank without a subdomain has nothing to do. Start fewer ranks or "
+        "set decomposition.subdomains to {} or more",
+        ranks.ranks(), subdomains, ranks.ranks()));
   decomposition.partition.subdomains = subdomains;
   for (std::int32_t e = 0; e < subdomains; ++e) {
-    const auto rank =
-        static_cast<std::int32_t>(std::int64_t{e} * ranks.ranks() / subdomains);
+    const auto rank = static_cast<std::int32_t>(std::int64_t{e} * ranks.ranks() / subdomains);
     decomposition.rank_of.push_back(rank);
     if (rank == ranks.rank()) decomposition.here.push_back(e);
   }
@@ -227,10 +227,11 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
     PartitionOptions options;
     options.kind = settings.partitioner;
     options.subdomains = before.subdomains;
-    for (std::size_t axis = 0; axis < 3; ++axis) options.boxes[axis] = static_cast<std::int32_t>(settings.boxes[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      options.boxes[axis] = static_cast<std::int32_t>(settings.boxes[axis]);
     options.previous = first ? nullptr : &before;
-    decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0]), options,
-                                             reduction_over(ranks));
+    decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0]),
+                                             options, reduction_over(ranks));
   }
   std::vector<std::pair<std::uint64_t, const BodyRecord*>> order;
   const auto from = send_to_surroundings(decomposition, ranks, bodies, reach);
@@ -352,8 +353,8 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     last = &key;
     const std::size_t k = at(key.candidate);
     if (k < grains)
-      cut.grain_pairs.push_back({slot_in(key.local, found.grain_pairs[k].first),
-                                 slot_in(key.local, found.grain_pairs[k].second)});
+      cut.grain_pairs.push_back(
+          {slot_in(key.local, found.grain_pairs[k].first), slot_in(key.local, found.grain_pairs[k].second)});
     else
       cut.wall_pairs.push_back({key.wall, slot_in(key.local, found.wall_pairs[k - grains].body)});
     for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(matched.impulse[components * k + c]);
@@ -374,10 +375,9 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
 }
 
 std::size_t memory_used(const Decomposition& decomposition) {
-  std::size_t bytes = memory_used(decomposition.partition) +
-                      decomposition.multiplicity.capacity() * sizeof(std::uint16_t) +
-                      decomposition.counts.capacity() +
-                      decomposition.whole.capacity() * sizeof(std::array<double, 2>);
+  std::size_t bytes =
+      memory_used(decomposition.partition) + decomposition.multiplicity.capacity() * sizeof(std::uint16_t) +
+      decomposition.counts.capacity() + decomposition.whole.capacity() * sizeof(std::array<double, 2>);
   for (const SubdomainInterface& interface : decomposition.interfaces) bytes += memory_used(interface);
   return bytes;
 }

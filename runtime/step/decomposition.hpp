@@ -17,22 +17,23 @@
 
 namespace talus {
 
-/// How space is cut, who has which subdomain, and which copies stand here. The slots of this rank are those of
-/// its first subdomain, then those of the second, ...; within a subdomain bodies stand in Morton order, ties by
-/// id. Everything of a subdomain is the same on whatever rank it is.
+/// How space is cut, who has which subdomain, and which copies stand here. The slots of this rank are those
+/// of its first subdomain, then those of the second, ...; within a subdomain bodies stand in Morton order,
+/// ties by id. Everything of a subdomain is the same on whatever rank it is.
 ///
 /// Example, two subdomains on one rank, grain 7 in both: slots 0..4 are subdomain 0 with grain 7 at slot 4,
 /// slots 5..9 subdomain 1 with grain 7 at slot 5; multiplicity[4] = multiplicity[5] = 2, counts[4] = 1,
 /// counts[5] = 0.
 struct Decomposition {
   Partition partition;
-  std::vector<std::int32_t> rank_of;        ///< of every subdomain
-  std::vector<std::int32_t> here;           ///< subdomains of this rank, ascending
-  std::vector<std::size_t> slot_begin;      ///< here + 1 offsets into the slots
-  std::vector<std::uint16_t> multiplicity;  ///< m_i per slot; empty with one subdomain
-  std::vector<char> counts;                 ///< per slot: the copy of the lowest subdomain; empty likewise
+  std::vector<std::int32_t> rank_of;         ///< of every subdomain
+  std::vector<std::int32_t> here;            ///< subdomains of this rank, ascending
+  std::vector<std::size_t> slot_begin;       ///< here + 1 offsets into the slots
+  std::vector<std::uint16_t> multiplicity;   ///< m_i per slot; empty with one subdomain
+  std::vector<char> counts;                  ///< per slot: the copy of the lowest subdomain; empty likewise
   std::vector<std::array<double, 2>> whole;  ///< 1/M and R^2/I of the body [1/kg]; empty likewise
-  std::vector<SubdomainInterface> interfaces;  ///< per `here`; bodies[k] stands in slot_begin + k. Empty likewise
+  std::vector<SubdomainInterface>
+      interfaces;             ///< per `here`; bodies[k] stands in slot_begin + k. Empty likewise
   bool orientation = false;   ///< bodies have orientations, also where there is no body
   std::int64_t migrants = 0;  ///< bodies that came to a subdomain where they did not stand, all ranks
   double imbalance = 0;       ///< candidates of the fullest subdomain over the mean, less 1
@@ -48,9 +49,9 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
 /// Morton order of the partition's frame. Masses are whole.
 struct Surroundings {
   Bodies bodies;
-  std::vector<double> reach;                           ///< [m]
+  std::vector<double> reach;                         ///< [m]
   std::vector<std::pair<std::int64_t, Slot>> by_id;  ///< sorted
-  Slot find(std::int64_t id) const;                    ///< -1 when it is not among them
+  Slot find(std::int64_t id) const;                  ///< -1 when it is not among them
 };
 
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of

@@ -55,11 +55,13 @@ std::vector<ContactRow> contact_rows(const StepState& state, double time_step) {
       const auto j = static_cast<std::size_t>(std::max(second, 0));
       const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
       const double gap =
-          second >= 0 ? (bodies.x[i] - bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
-                      : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
+          second >= 0
+              ? (bodies.x[i] - bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
+              : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
       ContactRow& row = rows.emplace_back();
       row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
-      row.bodies[1] = second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
+      row.bodies[1] =
+          second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
       copy3(normal, row.normal);
       copy3(bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * normal, row.point);
       row.gap = gap;
@@ -92,7 +94,8 @@ void gather_frame(const StepState& state, const graph::Communicator& ranks, bool
     frame.u.push_back(vector_of(row.u));
     if (rotation) frame.omega.push_back(vector_of(row.omega));
     if (state.decomposition.orientation)
-      frame.orientation.push_back({row.orientation[0], row.orientation[1], row.orientation[2], row.orientation[3]});
+      frame.orientation.push_back(
+          {row.orientation[0], row.orientation[1], row.orientation[2], row.orientation[3]});
   }
   if (!contacts) return;
   std::vector<ContactRow> rows = on_rank_0(contact_rows(state, time_step), ranks);

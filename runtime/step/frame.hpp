@@ -77,7 +77,8 @@ struct Frame {
 
 struct StepState;
 
-/// Fills the bodies and contacts of `frame` with those of all ranks, in order of id; on rank 0 only, collective.
+/// Fills the bodies and contacts of `frame` with those of all ranks, in order of id; on rank 0 only,
+/// collective.
 void gather_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
                   double time_step, Frame& frame);
 

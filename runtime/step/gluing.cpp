@@ -30,7 +30,8 @@ void await(Channel& channel, double& waited) {
   waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// A message from and to another rank; buffers have one room more than payload, for the time stamp of a delay.
+/// A message from and to another rank; buffers have one room more than payload, for the time stamp of a
+/// delay.
 struct Link {
   std::vector<double> out, in;
   std::unique_ptr<Channel> sender, receiver;
@@ -45,19 +46,19 @@ int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
 
 /// Towards one neighbour.
 struct Gluing::Side {
-  std::vector<std::size_t> slots;    ///< of the bodies in the message, in its order
-  Link link;                         ///< `in` and the channels: of neighbours on other ranks only
-  const double* source = nullptr;    ///< the neighbour's message to this subdomain
-  std::int32_t local = -1;           ///< the neighbour's place here, -1 on another rank
+  std::vector<std::size_t> slots;  ///< of the bodies in the message, in its order
+  Link link;                       ///< `in` and the channels: of neighbours on other ranks only
+  const double* source = nullptr;  ///< the neighbour's message to this subdomain
+  std::int32_t local = -1;         ///< the neighbour's place here, -1 on another rank
 };
 
 struct Gluing::Subdomain {
   std::vector<Side> sides;
-  std::vector<std::size_t> shared;            ///< slots
-  std::vector<double> base;                   ///< Schwarz: velocities after the last gluing, per shared body
+  std::vector<std::size_t> shared;  ///< slots
+  std::vector<double> base;         ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
-  std::vector<double> partial;                ///< to the centre: 3 per wall, then width per hub
-  std::vector<std::size_t> hub_item;          ///< per hub: its place in the centre's results
+  std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
+  std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
   double waited = 0;
 };
 
@@ -68,10 +69,10 @@ struct Gluing::Centre {
     std::vector<std::size_t> item;  ///< per hub of the subdomain
   };
   std::vector<Contribution> contributions;  ///< rank 0: of every subdomain, in order
-  std::vector<double> sums;                 ///< 3 per wall, then width per item: all on rank 0, else those asked for
-  std::vector<std::unique_ptr<Link>> links;                 ///< rank 0: per other rank
-  std::vector<std::vector<std::size_t>> items_of_rank;      ///< rank 0: per other rank
-  std::unique_ptr<Link> to_centre;                          ///< other ranks
+  std::vector<double> sums;  ///< 3 per wall, then width per item: all on rank 0, else those asked for
+  std::vector<std::unique_ptr<Link>> links;             ///< rank 0: per other rank
+  std::vector<std::vector<std::size_t>> items_of_rank;  ///< rank 0: per other rank
+  std::unique_ptr<Link> to_centre;                      ///< other ranks
   double waited = 0;
 };
 
@@ -133,7 +134,8 @@ void Gluing::plan_sides(std::size_t e) {
     side.link.in.resize(length + 1);
     side.source = side.link.in.data();
     const std::int32_t count = all.partition.subdomains;
-    side.link.sender = ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
+    side.link.sender =
+        ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
     side.link.receiver =
         ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
     side.link.receiver->start();
@@ -171,7 +173,8 @@ void Gluing::plan_centre() {
     return static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
   };
   const bool is_centre = ranks_.rank() == 0;
-  const std::vector<std::int64_t> items = items_of([&](std::int32_t rank) { return is_centre || rank == ranks_.rank(); });
+  const std::vector<std::int64_t> items =
+      items_of([&](std::int32_t rank) { return is_centre || rank == ranks_.rank(); });
   const std::size_t at_walls = 3 * walls_.size();
   centre_ = std::make_unique<Centre>();
   Centre& centre = *centre_;
@@ -203,7 +206,8 @@ void Gluing::plan_centre() {
     if (is_centre) {
       for (int rank = 1; rank < ranks_.ranks(); ++rank) {
         std::vector<std::size_t>& wanted = centre.items_of_rank.emplace_back();
-        for (std::int64_t id : items_of([&](std::int32_t r) { return r == rank; })) wanted.push_back(place(items, id));
+        for (std::int64_t id : items_of([&](std::int32_t r) { return r == rank; }))
+          wanted.push_back(place(items, id));
         centre.links.push_back(open(rank, at_walls + wanted.size() * width_, length_of_rank(rank)));
       }
     } else {
@@ -223,7 +227,8 @@ void Gluing::plan_centre() {
       read_of_rank[at(rank)] += length[e];
     }
     for (const HubRecord& record : everywhere)
-      if (record.subdomain == static_cast<std::int64_t>(e)) contribution.item.push_back(place(items, record.id));
+      if (record.subdomain == static_cast<std::int64_t>(e))
+        contribution.item.push_back(place(items, record.id));
     centre.contributions.push_back(std::move(contribution));
   }
 }
@@ -241,12 +246,13 @@ void Gluing::count_messages() {
     const Subdomain& subdomain = subdomains_[e];
     for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local < 0);
     if (subdomain.partial.empty()) continue;
-    add(subdomain.partial.size(), false);  // to the centre
+    add(subdomain.partial.size(), false);                                // to the centre
     add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
   }
   if (centre_ && centre_->to_centre) {
     count[2] += 2;
-    count[3] += static_cast<std::int64_t>(8 * (centre_->to_centre->out.size() + centre_->to_centre->in.size() - 2));
+    count[3] +=
+        static_cast<std::int64_t>(8 * (centre_->to_centre->out.size() + centre_->to_centre->in.size() - 2));
   }
   ranks_.sum(count);
   messages_ = {count[0], count[1], count[2], count[3]};
@@ -286,7 +292,8 @@ void Gluing::publish(std::size_t e, Mode mode) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
     if (side.link.sender) await(*side.link.sender, mine.waited);
-    for (std::size_t k = 0; k < side.slots.size(); ++k) write_velocity(side.slots[k], &side.link.out[k * width_]);
+    for (std::size_t k = 0; k < side.slots.size(); ++k)
+      write_velocity(side.slots[k], &side.link.out[k * width_]);
     if (side.link.sender) side.link.sender->start();
   }
   for (std::size_t g = 0; g < walls_.size(); ++g) {
@@ -323,7 +330,8 @@ void Gluing::centre(Mode mode) {
     for (std::size_t k = 0; k < at_walls; ++k) centre.sums[k] += contribution.partial[k];
     for (std::size_t h = 0; h < contribution.item.size(); ++h)
       for (std::size_t k = 0; k < width_; ++k)
-        centre.sums[at_walls + contribution.item[h] * width_ + k] += contribution.partial[at_walls + h * width_ + k];
+        centre.sums[at_walls + contribution.item[h] * width_ + k] +=
+            contribution.partial[at_walls + h * width_ + k];
   }
   for (std::size_t r = 0; r < centre.links.size(); ++r) {
     Link& link = *centre.links[r];
@@ -331,7 +339,8 @@ void Gluing::centre(Mode mode) {
     await(*link.sender, centre.waited);
     auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
     for (std::size_t item : centre.items_of_rank[r])
-      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_, out);
+      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
+                        out);
     link.sender->start();
   }
 }
@@ -366,7 +375,8 @@ void Gluing::glue(std::size_t e, Mode mode) {
     if (schwarz && mode == Mode::fresh)
       for (std::size_t k = 0; k < width_; ++k)
         base[k] = k < 3 ? state_.free.u[slot][k] : state_.free.w[slot][k - 3];
-    for (std::size_t k = 0; k < width_; ++k) next[k] = schwarz ? base[k] + (sum[k] - m * base[k]) : sum[k] / m;
+    for (std::size_t k = 0; k < width_; ++k)
+      next[k] = schwarz ? base[k] + (sum[k] - m * base[k]) : sum[k] / m;
     if (mode == Mode::measured) {
       const auto& whole = state_.decomposition.whole[slot];
       for (std::size_t k = 0; k < width_; ++k) {

@@ -30,7 +30,8 @@ struct JumpSums {
 ///   publish[e]   after the boundary chunks of subdomain e: its interface velocities leave
 ///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >= 9
 ///                always, so that k copies cost O(k) messages)
-///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up what
+///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
+///   what
 ///                all have gained (Schwarz); summed in order of subdomain
 ///
 /// Between subdomains of one rank the messages are memory. A body sends its velocity, 6 numbers or 3 without
@@ -80,7 +81,7 @@ class Gluing {
   const DecompositionSettings& settings_;
   const graph::Communicator& ranks_;
   bool needed_ = false;
-  std::size_t width_ = 6;             ///< numbers per body
+  std::size_t width_ = 6;  ///< numbers per body
   std::vector<std::int32_t> walls_;
   std::vector<Subdomain> subdomains_;  ///< per subdomain here
   std::unique_ptr<Centre> centre_;

@@ -158,7 +158,8 @@ double Iteration::drift() const {
   return change / scale;
 }
 
-/// Per subdomain in order of chunk, then over subdomains in their order: the same sums on any number of ranks.
+/// Per subdomain in order of chunk, then over subdomains in their order: the same sums on any number of
+/// ranks.
 void Iteration::add_up() {
   constexpr std::size_t head = 9;
   const std::size_t walls = state_.walls.size(), width = head + 3 * walls;
@@ -187,7 +188,8 @@ void Iteration::add_up() {
   }
   rows = ranks_.gather_records(std::span<const double>(rows));
   std::vector<const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
-  for (std::size_t k = 0; k < rows.size(); k += width) by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
+  for (std::size_t k = 0; k < rows.size(); k += width)
+    by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
   total_ = {};
   jump_ = {};
   std::vector<Vec3> impulses(walls, Vec3::Zero());
@@ -226,9 +228,11 @@ bool Iteration::decide(int epoch) {
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
   result_.converged =
       judged && result_.error_rms <= settings_.tolerance && result_.drift <= settings_.balance_tolerance;
-  // A sweep never makes the error of a step a thousand times worse; an exchange that adds up too much does.
+  // A sweep never makes the residual of a step a thousand times worse; an exchange that adds up too much
+  // does.
+  if (history_.size() == 1) first_residual2_ = std::max(total.residual2, scale2);
   constexpr double hopeless = 1e3;
-  result_.diverged = result_.error_rms > hopeless * std::max(1.0, history_.front().error_rms);
+  result_.diverged = total.residual2 > hopeless * hopeless * first_residual2_;
   if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
   if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations)

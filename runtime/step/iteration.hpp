@@ -80,7 +80,8 @@ class Iteration {
   ErrorSums total_;                          ///< of all subdomains, at the last check
   JumpSums jump_;                            ///< likewise
   std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
-  int sweeps_from_ = 0;  ///< epoch of the first sweep of the segment
+  double first_residual2_ = 0;               ///< at the first check of the step [m^2/s^2]
+  int sweeps_from_ = 0;                      ///< epoch of the first sweep of the segment
   int segment_ = 0;  ///< epoch of the next accumulate; written at gates only, when every thread waits
 };
 

@@ -76,12 +76,12 @@ struct DecompositionSettings {
   Coupling coupling = Coupling::nscdd;
   ExchangeScheme exchange = ExchangeScheme::dcs;
   PartitionKind partitioner = PartitionKind::automatic;
-  int subdomains = 0;                  ///< 0: one per rank
-  std::array<std::int64_t, 3> boxes{}; ///< per axis, for the partitioners that cut boxes; zeros: chosen
-  int sweeps_per_exchange = 1;         ///< n_GS >= 1
-  int repartition_every = 10;          ///< steps between two partitions; one is made when candidates are found anew
-  double max_imbalance = 0.2;          ///< fullest over mean subdomain, less 1: beyond it the partition is made anew
-  bool damping = true;                 ///< schwarz: false is the paper's form, which diverges where m > 2
+  int subdomains = 0;                   ///< 0: one per rank
+  std::array<std::int64_t, 3> boxes{};  ///< per axis, for the partitioners that cut boxes; zeros: chosen
+  int sweeps_per_exchange = 1;          ///< n_GS >= 1
+  int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
+  double max_imbalance = 0.2;  ///< fullest over mean subdomain, less 1: beyond it the partition is made anew
+  bool damping = true;         ///< schwarz: false is the paper's form, which diverges where m > 2
 };
 
 /// A simulation, apart from its grains.

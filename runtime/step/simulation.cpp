@@ -121,7 +121,8 @@ struct Simulation::Implementation {
     parameters.turns = parameters.friction && setup.rotation;
     state.free.w.resize(parameters.turns ? state.bodies.size() : 0);
     if (state.candidates_valid && !state.decomposition.several()) {
-      // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt out.
+      // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt
+      // out.
       const std::vector<Slot> order = morton_order(state.bodies);
       std::vector<Slot> place(order.size());
       for (std::size_t k = 0; k < order.size(); ++k)
@@ -167,18 +168,20 @@ struct Simulation::Implementation {
   void check_for_runaway(double wall_energy_free) const {
     const MotionSums& motion = graph.sums().motion;
     const std::int64_t step = report.step + 1;
+    if (graph.iteration().result().diverged)
+      throw RunawayError(
+          fmt::format("step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. Undamped "
+                      "Schwarz does so "
+                      "where bodies stand in more than two subdomains: set decomposition.damping = true or "
+                      "coupling = \"nscdd\"",
+                      step, setup.stages[stage_index].name, graph.iteration().result().error_rms,
+                      graph.iteration().result().iterations));
     if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) ||
         std::isnan(graph.iteration().result().error_rms))
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping "
           "grains",
           step, setup.stages[stage_index].name, describe(state.bodies, motion.fastest)));
-    if (graph.iteration().result().diverged)
-      throw RunawayError(fmt::format(
-          "step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. Undamped Schwarz does so "
-          "where bodies stand in more than two subdomains: set decomposition.damping = true or coupling = \"nscdd\"",
-          step, setup.stages[stage_index].name, graph.iteration().result().error_rms,
-          graph.iteration().result().iterations));
     double fastest_wall2 = 0;
     for (const Wall& wall : state.walls)
       fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
@@ -221,7 +224,8 @@ struct Simulation::Implementation {
         sums.contacts.overlapping > 0
             ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / size.smallest
             : 0;
-    report.penetration_max = sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / size.smallest : 0;
+    report.penetration_max =
+        sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / size.smallest : 0;
     report.kinetic_translation = sums.motion.energy.translation;
     report.kinetic_rotation = sums.motion.energy.rotation;
     const double box = box_volume(state.walls);
@@ -275,8 +279,8 @@ struct Simulation::Implementation {
     return fraction;
   }
 
-  /// Mean number of active contacts of the grains that are no rattlers: those with fewer than 4 without friction,
-  /// 2 with it (a frictionless grain cannot be held by three).
+  /// Mean number of active contacts of the grains that are no rattlers: those with fewer than 4 without
+  /// friction, 2 with it (a frictionless grain cannot be held by three).
   double coordination() const {
     const std::int32_t rattler_below = parameters.friction ? 2 : 4;
     std::vector<std::int32_t> touching = count_active(state.contacts, state.chunks, state.bodies.size());
@@ -287,7 +291,8 @@ struct Simulation::Implementation {
       };
       std::vector<Part> parts;  // of bodies whose contacts are spread over subdomains
       for (std::size_t s = 0; s < touching.size(); ++s)
-        if (all.multiplicity[s] > 1) parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
+        if (all.multiplicity[s] > 1)
+          parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
       parts = ranks.gather_records(std::span<const Part>(parts));
       std::unordered_map<std::int64_t, std::int32_t> whole;
       for (const Part& part : parts) whole[part.id] += static_cast<std::int32_t>(part.count);
@@ -328,7 +333,8 @@ struct Simulation::Implementation {
   Vec3 lengths_at_start = Vec3::Zero();
 };
 
-Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks)
+Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
+                       const graph::Communicator& ranks)
     : impl_(std::make_unique<Implementation>(std::move(setup), std::move(bodies), executor, ranks)) {
   impl_->pass_ended_stages();
 }

@@ -21,19 +21,19 @@ struct StepParameters {
   Vec3 gravity = Vec3::Zero();
   ContactLaw law;
   bool friction =
-      false;         ///< any friction coefficient > 0: impulses have three components and grains may turn
+      false;           ///< any friction coefficient > 0: impulses have three components and grains may turn
   bool turns = false;  ///< friction, and grains that rotate
-  double alert = 0;  ///< [m]
-  double skin = 0;   ///< [m]
+  double alert = 0;    ///< [m]
+  double skin = 0;     ///< [m]
 };
 
 /// One wall during a step.
 struct WallState {
-  Vec3 free_velocity = Vec3::Zero();  ///< without contacts [m/s]
-  double applied = 0;                 ///< force pushed with, along the normal [N]
-  std::vector<std::int32_t> copies;   ///< chunks here that hold a copy, ascending; filled before the sweeps
-  std::int64_t copies_everywhere = 0; ///< on all ranks
-  Vec3 impulse = Vec3::Zero();        ///< of the wall on the grains [N s], from the last check
+  Vec3 free_velocity = Vec3::Zero();   ///< without contacts [m/s]
+  double applied = 0;                  ///< force pushed with, along the normal [N]
+  std::vector<std::int32_t> copies;    ///< chunks here that hold a copy, ascending; filled before the sweeps
+  std::int64_t copies_everywhere = 0;  ///< on all ranks
+  Vec3 impulse = Vec3::Zero();         ///< of the wall on the grains [N s], from the last check
 };
 
 /// All that a step reads and writes. Sizes: n bodies, c candidates, k chunks.
@@ -48,9 +48,9 @@ struct StepState {
   Candidates candidates;               ///< c
   Chunks chunks;                       ///< k
   Decomposition decomposition;
-  Contacts contacts;                   ///< c rooms
-  std::vector<WallCopy> copies;        ///< k; used by chunks at walls
-  bool candidates_valid = false;       ///< false: the next step begins with a broad phase
+  Contacts contacts;              ///< c rooms
+  std::vector<WallCopy> copies;   ///< k; used by chunks at walls
+  bool candidates_valid = false;  ///< false: the next step begins with a broad phase
 };
 
 std::size_t memory_used(const StepState& state);

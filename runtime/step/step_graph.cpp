@@ -17,16 +17,16 @@ std::uint32_t lanes_for(std::size_t bodies) {
 }  // namespace
 
 StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
-                     const DecompositionSettings& decomposition, std::int64_t bodies, graph::Executor& executor,
-                     const graph::Communicator& ranks)
+                     const DecompositionSettings& decomposition, std::int64_t bodies,
+                     graph::Executor& executor, const graph::Communicator& ranks)
     : state_(state),
       parameters_(parameters),
       settings_(settings),
       decomposition_(decomposition),
       executor_(executor),
       ranks_(ranks),
-      lanes_per_subdomain_(
-          lanes_for(static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
+      lanes_per_subdomain_(lanes_for(
+          static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
       lanes_(lanes_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
       iteration_(state, parameters, settings, decomposition, ranks),
       left_(lanes_),

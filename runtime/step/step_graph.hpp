@@ -22,8 +22,8 @@ struct StepTimes {
 struct StepSums {
   MotionSums motion;
   ContactSums contacts;
-  bool broad_phase = false;   ///< candidates were found anew
-  std::int64_t migrants = 0;  ///< copies that came to a subdomain where their body did not stand
+  bool broad_phase = false;     ///< candidates were found anew
+  std::int64_t migrants = 0;    ///< copies that came to a subdomain where their body did not stand
   std::int64_t candidates = 0;  ///< of all ranks
   StepTimes times;
 };
@@ -90,8 +90,8 @@ class StepGraph {
   graph::EpochGraph epochs_;
   bool planned_ = false;                               ///< false: the chunks are new
   double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at the seams of the step [s]
-  Surroundings around_;              ///< several subdomains: whom the candidates are found among
-  std::int64_t all_candidates_ = 0;  ///< of all ranks
+  Surroundings around_;                       ///< several subdomains: whom the candidates are found among
+  std::int64_t all_candidates_ = 0;           ///< of all ranks
   std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
   CellGrid cells_;
   std::vector<double> wall_margin_;  ///< at the last broad phase [m]

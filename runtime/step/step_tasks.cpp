@@ -105,7 +105,8 @@ void StepGraph::make_cells() {
   }
   if (state_.decomposition.several()) {
     const bool first = state_.decomposition.interfaces.empty();
-    const bool anew = first || partition_due() || state_.decomposition.imbalance > decomposition_.max_imbalance;
+    const bool anew =
+        first || partition_due() || state_.decomposition.imbalance > decomposition_.max_imbalance;
     if (anew) partitioned_ = steps_;
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
@@ -166,7 +167,8 @@ void StepGraph::renew_slots() {
   state_.x_then = bodies.x;
   state_.reach_then.resize(bodies.size());
   for (std::size_t s = 0; s < bodies.size(); ++s)
-    state_.reach_then[s] = around_.reach[static_cast<std::size_t>(around_.find(static_cast<std::int64_t>(bodies.id[s])))];
+    state_.reach_then[s] =
+        around_.reach[static_cast<std::size_t>(around_.find(static_cast<std::int64_t>(bodies.id[s])))];
   around_ = {};
   state_.free.u.resize(bodies.size());
   state_.free.w.resize(parameters_.turns ? bodies.size() : 0);
@@ -205,8 +207,8 @@ void StepGraph::plan_iteration() {
   iterating_ = now();
 }
 
-/// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the centre
-/// behind all chunks, glue[e] last (iteration.hpp).
+/// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the
+/// centre behind all chunks, glue[e] last (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
@@ -377,7 +379,8 @@ void StepGraph::sum_up() {
     write_row(all.here[e], motion[e], contacts[e], &rows[e * row_width]);
   rows = ranks_.gather_records(std::span<const double>(rows));
   std::vector<const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
-  for (std::size_t k = 0; k < rows.size(); k += row_width) by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
+  for (std::size_t k = 0; k < rows.size(); k += row_width)
+    by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
   for (std::size_t e = 0; e < by_subdomain.size(); ++e)
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
   sums_.candidates = all_candidates_;
