@@ -1,3 +1,7 @@
+#include <hdf5.h>
+
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
 #include "apps/exit_codes.hpp"
@@ -11,38 +15,59 @@
 
 int main(int argc, char** argv) {
   using namespace talus;
+  // After a write that failed (a full disk) the library's clean-up at exit crashes, and would turn exit code
+  // 1 into a signal; every file is closed where it is written.
+  H5dont_atexit();
   CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
   app.set_version_flag("--version", "talus " + io::version());
   app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done; 1 failed, or stopped by a signal; 2 bad input, nothing was written; 3 done, but "
+      "a\n"
+      "step or problem missed its tolerance. First run: docs/tutorial.md; files it leaves: docs/formats.md");
+  app.failure_message([](const CLI::App* of, const CLI::Error& error) {
+    std::string command = "talus";
+    for (const CLI::App* chosen : of->get_subcommands()) command += " " + chosen->get_name();
+    return fmt::format("talus: error: {}; `{} --help` lists what there is\n", error.what(), command);
+  });
 
   RunOptions run;
   run.command_line.assign(argv, argv + argc);
   CLI::App* run_app = app.add_subcommand("run", "simulate a scene and write its results");
-  run_app->add_option("scene", run.scene, "scene file (docs/scenes.md)")->required();
-  run_app->add_option("--out", run.out, "directory of the results [the scene's output.directory]");
+  run_app->add_option("scene", run.scene, "scene file (docs/scenes.md)")->type_name("FILE")->required();
+  run_app->add_option("--out", run.out, "directory of the results [the scene's output.directory]")
+      ->type_name("DIR");
   run_app->add_flag("--force", run.force, "replace earlier results in the directory");
-  run_app->add_option("--steps", run.steps, "stop after so many time steps");
-  run_app->add_option("--threads", run.threads, "threads [one per core]")->check(CLI::PositiveNumber);
-  run_app->add_option("--set", run.overrides, "override a key of the scene: a.b=c")->allow_extra_args(false);
+  run_app->add_option("--steps", run.steps, "stop after so many time steps")->type_name("N");
+  run_app->add_option("--threads", run.threads, "threads [one per core]")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  run_app->add_option("--set", run.overrides, "override a key of the scene, may be repeated")
+      ->type_name("a.b=c")
+      ->allow_extra_args(false);
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;
   CLI::App* plan_app = app.add_subcommand("plan", "say what a scene needs and what is left out");
-  plan_app->add_option("scene", plan.scene, "scene file")->required();
-  plan_app->add_option("--threads", plan.threads, "threads [one per core]")->check(CLI::PositiveNumber);
-  plan_app->add_option("--set", plan.overrides, "override a key of the scene: a.b=c")
+  plan_app->add_option("scene", plan.scene, "scene file")->type_name("FILE")->required();
+  plan_app->add_option("--threads", plan.threads, "threads [one per core]")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  plan_app->add_option("--set", plan.overrides, "override a key of the scene, may be repeated")
+      ->type_name("a.b=c")
       ->allow_extra_args(false);
 
   SolveOptions solve;
   CLI::App* solve_app = app.add_subcommand("solve", "solve a contact problem of an FCLIB file");
-  solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->required();
+  solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->type_name("FILE")->required();
   solve_app->add_option("--tol", solve.tol, "tolerance on the error of fc3d_compute_error")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   solve_app->add_option("--max-seconds", solve.max_seconds, "give up after so many seconds")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file");
+  solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file")
+      ->type_name("FILE");
 
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");

@@ -36,11 +36,13 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
        turning               ? "tangential impulses turn the grains"
        : parameters.friction ? "rotation = false"
                              : "nothing turns grains without friction");
-  line("free angular velocities", !state.free.w.empty(), "24 bytes per grain");
+  line("free angular velocities", !state.free.w.empty(),
+       state.free.w.empty() ? "no grain turns" : "24 bytes per grain");
   line("orientations", !state.bodies.orientation.empty(),
        state.bodies.orientation.empty() ? "spheres need none; not asked for"
                                         : "asked for: 32 bytes per grain");
-  line("gravity", parameters.gravity.norm() > 0, fmt::format("{:g} m/s^2", parameters.gravity.norm()));
+  line("gravity", parameters.gravity.norm() > 0,
+       parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   line("restitution", parameters.law.restitution > 0, fmt::format("e = {:g}", parameters.law.restitution));
   line("moving walls", driven + pressed > 0,
        fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
@@ -65,7 +67,7 @@ void print_costs(const Simulation& simulation) {
   fmt::print("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(),
              state.candidates.size(), simulation.report().contacts, state.chunks.size(),
              state.chunks.colours);
-  fmt::print("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.1f} MB in all\n",
+  fmt::print("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.3g} MB in all\n",
              of_bodies / bodies, of_contacts / candidates, of_contacts / contacts,
              static_cast<double>(memory_used(state)) / 1e6);
   fmt::print("  {} tasks per sweep ({:.4f} per contact), {} tasks per step outside the sweeps\n",

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <memory>
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
@@ -116,11 +115,20 @@ struct Tally {
   }
 };
 
+std::string counted(std::size_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+std::string contents(const io::Scene& scene, const Bodies& bodies) {
+  return fmt::format("{}, {}, {}", counted(bodies.size(), "grain"), counted(scene.setup.walls.size(), "wall"),
+                     counted(scene.setup.stages.size(), "stage"));
+}
+
 void print_start(const io::Scene& scene, const Bodies& bodies, int threads) {
-  fmt::print(stderr, "talus: {}, {} grains, {} walls, {} stage{}\n", scene.name, bodies.size(),
-             scene.setup.walls.size(), scene.setup.stages.size(), scene.setup.stages.size() == 1 ? "" : "s");
-  fmt::print(stderr, "talus: 1 rank, {} thread{}, {} core{} for this process\n", threads,
-             threads == 1 ? "" : "s", omp_get_num_procs(), omp_get_num_procs() == 1 ? "" : "s");
+  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, bodies));
+  const auto cores = static_cast<std::size_t>(omp_get_num_procs());
+  fmt::print(stderr, "talus: 1 rank, {}, {} for this process\n",
+             counted(static_cast<std::size_t>(threads), "thread"), counted(cores, "core"));
   if (threads > omp_get_num_procs())
     fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
 }
@@ -196,18 +204,20 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
   return summary;
 }
 
-void print_end(const io::Summary& summary, const std::string& directory) {
+void print_end(const io::Summary& summary, const SolverSettings& solver, const std::string& directory) {
   if (!summary.message.empty())
     fmt::print(stderr, "talus: {}: {}\n", summary.status == "failed" ? "error" : "stopped", summary.message);
-  fmt::print(stderr, "talus: {} steps, {:.6g} s simulated in {:.1f} s, {} sweeps, digest {:016x}\n",
-             summary.steps, summary.time, summary.wall_s, summary.iterations, summary.digest);
+  fmt::print(stderr, "talus: {}, {:.6g} s simulated in {:.1f} s, {} sweeps, digest {:016x}\n",
+             counted(static_cast<std::size_t>(summary.steps), "step"), summary.time, summary.wall_s,
+             summary.iterations, summary.digest);
   if (summary.unconverged_steps > 0)
     fmt::print(
         stderr,
-        "talus: {} of {} steps missed the tolerance (worst error {:.2e}, worst balance {:.2e}): `converged` "
-        "in steps.csv says which. "
-        "Raise solver.max_iterations, reduce time_step, or accept them with allow_unconverged = true\n",
-        summary.unconverged_steps, summary.steps, summary.worst_error_rms, summary.worst_balance);
+        "talus: {} of {} steps missed the tolerance: worst error {:.2e} (allowed {:.2g}), worst balance "
+        "{:.2e} (allowed {:.2g}); `converged` in steps.csv says which. Raise solver.max_iterations, "
+        "reduce time_step, or accept them with allow_unconverged = true\n",
+        summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
+        summary.worst_balance, solver.balance_tolerance);
   fmt::print(stderr, "talus: results in {}\n", directory);
 }
 
@@ -223,19 +233,18 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies) 
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  std::unique_ptr<io::Recorder> recorder;
   try {
     io::prepare_output_directory(directory, options.force);
-    recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
-    io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
   } catch (const io::FileError& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   }
+  io::Recorder recorder(directory, files, scene.setup, provenance);
+  io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
   print_start(scene, bodies, threads);
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, *recorder);
-  recorder->finish(summary);
-  print_end(summary, directory);
+  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder);
+  recorder.finish(summary);
+  print_end(summary, scene.setup.solver, directory);
   return summary.exit_code;
 }
 
@@ -254,10 +263,8 @@ int run_command(const RunOptions& options) {
     io::place_walls(scene, bodies);
     if (options.dry_run) {
       fmt::print("{}", io::resolved_scene(scene));
-      fmt::print(
-          stderr,
-          "talus: {}: {} grains, {} walls, {} stages; the scene is sound, nothing was written (--dry-run)\n",
-          options.scene, bodies.size(), scene.setup.walls.size(), scene.setup.stages.size());
+      fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n",
+                 options.scene, contents(scene, bodies));
       return exit_done;
     }
   } catch (const std::exception& error) {

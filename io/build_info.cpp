@@ -1,6 +1,6 @@
 #include "io/build_info.hpp"
 
-#include "build_info_values.hpp"
+#include "io/build_info_values.hpp"
 
 namespace talus::io {
 

@@ -172,7 +172,8 @@ void draw_legend(Svg& svg, const Slab& slab, const View& view, double top) {
   if (!(slab.mean_force > 0)) return;
   for (const double multiple : {0.5, 1.0, 2.0, 4.0}) {
     draw_force(svg, x, top + 18, x + 36, top + 18, multiple * slab.mean_force, slab, view);
-    svg.text(x, top + 38, detail::with_unit(multiple * slab.mean_force, "N"), {12, style::ink});
+    svg.text(x, top + 38, (multiple == 1 ? "mean " : "") + detail::with_unit(multiple * slab.mean_force, "N"),
+             {12, style::ink});
     x += 92;
   }
 }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <system_error>
 
 #include "io/detail/scene_read.hpp"
 #include "io/detail/wall_conflict.hpp"
@@ -273,7 +275,8 @@ Scene parse_scene(const std::string& text, const std::string& file,
 
 Scene load_scene(const std::string& path, const std::vector<std::string>& overrides) {
   std::ifstream in(path);
-  if (!in || std::filesystem::is_directory(path)) throw SceneError(path, 0, "", "cannot open the scene");
+  if (!in) throw SceneError(path, 0, "", "cannot open the scene: " + std::generic_category().message(errno));
+  if (std::filesystem::is_directory(path)) throw SceneError(path, 0, "", "is a directory, not a scene file");
   std::ostringstream text;
   text << in.rdbuf();
   return parse_scene(text.str(), path, overrides);

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 
 #include "kernels/morton.hpp"
 
@@ -80,6 +83,28 @@ std::vector<Slot> morton_order(const Bodies& bodies) {
     return key[ka] != key[kb] ? key[ka] < key[kb] : bodies.id[ka] < bodies.id[kb];
   });
   return order;
+}
+
+void validate(const Bodies& bodies) {
+  const std::size_t n = bodies.size();
+  if (bodies.x.size() != n || bodies.radius.size() != n || bodies.velocity.size() != n ||
+      (!bodies.orientation.empty() && bodies.orientation.size() != n))
+    throw std::invalid_argument("the arrays of the bodies differ in length");
+  for (std::size_t k = 0; k < n; ++k) {
+    const Velocity& v = bodies.velocity[k];
+    const auto refuse = [&](const std::string& what) {
+      throw std::invalid_argument("body " + std::to_string(static_cast<std::int64_t>(bodies.id[k])) + ": " +
+                                  what);
+    };
+    if (!bodies.x[k].allFinite()) refuse("its centre is not finite");
+    if (!(bodies.radius[k] > 0) || !std::isfinite(bodies.radius[k]))
+      refuse("its radius must be positive and finite, not " + std::to_string(bodies.radius[k]) + " m");
+    if (!(v.inv_mass > 0) || !std::isfinite(v.inv_mass)) refuse("its mass must be positive and finite");
+    if (!(v.spin_mobility >= 0) || !std::isfinite(v.spin_mobility))
+      refuse("its R^2/I must be finite and not negative");
+    for (int c = 0; c < 3; ++c)
+      if (!std::isfinite(v.u[c]) || !std::isfinite(v.w[c])) refuse("its velocity is not finite");
+  }
 }
 
 std::size_t memory_used(const Bodies& bodies) {

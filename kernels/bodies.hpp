@@ -58,6 +58,10 @@ void reorder(Bodies& bodies, std::span<const Slot> order);
 /// Slots in Morton order of the centres: close in space, close in memory. Ties are broken by id.
 std::vector<Slot> morton_order(const Bodies& bodies);
 
+/// Throws std::invalid_argument with id and value unless every array has its length, every centre and
+/// velocity is finite, every radius and mass positive and finite.
+void validate(const Bodies& bodies);
+
 /// Bytes held by the arrays.
 std::size_t memory_used(const Bodies& bodies);
 

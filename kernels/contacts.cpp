@@ -29,6 +29,13 @@ bool constrain(const NarrowPhase& in, double gap, double v_n, double v_n_free, d
   return true;
 }
 
+/// Unit normal from `second` to `first`; +z for coincident centres.
+Vec3 normal_between(const Vec3& first, const Vec3& second) {
+  const Vec3 d = first - second;
+  const double distance = d.norm();
+  return distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
+}
+
 void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                    std::size_t chunk, std::vector<Found>& found) {
   const std::size_t grains = candidates.grain_pairs.size();
@@ -40,9 +47,8 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
     for (std::size_t k = begin; k < end; ++k) {
       const auto i = static_cast<std::size_t>(candidates.grain_pairs[k].first);
       const auto j = static_cast<std::size_t>(candidates.grain_pairs[k].second);
-      const Vec3 d = in.x[i] - in.x[j];
-      const double distance = d.norm();
-      const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
+      const double distance = (in.x[i] - in.x[j]).norm();
+      const Vec3 normal = normal_between(in.x[i], in.x[j]);
       double bias;
       const double v_n = normal.dot(u(i) - u(j));  // gravity moves both alike
       if (constrain(in, distance - in.radius[i] - in.radius[j], v_n, v_n, slow, bias))
@@ -167,6 +173,30 @@ void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t 
       candidates.impulse[k] = contacts.rn[a];
     }
   }
+}
+
+void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
+                      std::span<const Wall> walls) {
+  if (components == candidates.components) return;
+  const std::size_t grains = candidates.grain_pairs.size();
+  std::vector<double> converted(candidates.size() * static_cast<std::size_t>(components));
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    Vec3 normal;
+    if (k < grains) {
+      const GrainPair& pair = candidates.grain_pairs[k];
+      normal =
+          normal_between(x[static_cast<std::size_t>(pair.first)], x[static_cast<std::size_t>(pair.second)]);
+    } else {
+      normal = walls[static_cast<std::size_t>(candidates.wall_pairs[k - grains].wall)].normal;
+    }
+    if (components == 3)
+      for (std::size_t c = 0; c < 3; ++c)
+        converted[3 * k + c] = candidates.impulse[k] * normal[static_cast<Eigen::Index>(c)];
+    else
+      converted[k] = std::max(0.0, Eigen::Map<const Vec3>(&candidates.impulse[3 * k]).dot(normal));
+  }
+  candidates.impulse = std::move(converted);
+  candidates.components = components;
 }
 
 std::size_t memory_used(const Contacts& contacts) {

@@ -36,8 +36,8 @@ struct NarrowPhase {
   double time_step;                    ///< h [s]
   double alert;                        ///< [m]
   double restitution;                  ///< e in [0, 1]
-  double overlap_correction;           ///< in [0, 1]
   Vec3 gravity;                        ///< [m/s^2]
+  double overlap_correction = 0;       ///< in [0, 1]
 };
 
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.
@@ -52,6 +52,12 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
 /// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.
 void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                     Candidates& candidates);
+
+/// Gives the impulses `components` (3 or 1) when a stage brings friction or drops it: normal parts become
+/// vectors along today's normals, and vectors their normal parts, so that forces outlive the change. x [m] of
+/// all grains.
+void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
+                      std::span<const Wall> walls);
 
 std::size_t memory_used(const Contacts& contacts);
 

@@ -33,7 +33,11 @@ struct Wall {
   double area = 0;               ///< [m^2] the pressure acts on; 0: the current face of the box of walls
   WallLoad load;                 ///< in force now
   Vec3 velocity = Vec3::Zero();  ///< [m/s] now
-  double inv_mass() const { return load.mass > 0 ? 1 / load.mass : 0; }
+  /// 1/M [1/kg] of a pushed wall; 0 for one that is fixed or driven, whatever mass its load names.
+  double inv_mass() const {
+    const bool pushed = load.drive == WallDrive::pressure || load.drive == WallDrive::force;
+    return pushed && load.mass > 0 ? 1 / load.mass : 0;
+  }
 };
 
 /// Area of the face of wall `index` [m^2]: its own `area` if positive, else the product of the distances

@@ -69,7 +69,7 @@ struct Frame {
   std::vector<std::array<std::int64_t, 2>> contact_bodies;  ///< ids; second is -(1 + wall index) at a wall
   std::vector<Vec3> contact_point;                          ///< [m]
   std::vector<Vec3> contact_normal;                         ///< unit, from the second body to the first
-  std::vector<double> contact_gap;                          ///< [m] at the detection pose
+  std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
 };

@@ -56,6 +56,7 @@ struct Simulation::Implementation {
 
   static StepState start(const Setup& setup, Bodies bodies) {
     validate(setup);
+    validate(bodies);
     StepState state;
     state.bodies = std::move(bodies);
     reorder(state.bodies, morton_order(state.bodies));
@@ -84,6 +85,7 @@ struct Simulation::Implementation {
       if (wall.load.drive == WallDrive::pressure)
         face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
     }
+    const double last_time_step = parameters.time_step;
     parameters.time_step = stage.time_step;
     parameters.gravity = stage.gravity;
     parameters.law = stage.law;
@@ -96,10 +98,25 @@ struct Simulation::Implementation {
         place[static_cast<std::size_t>(order[k])] = static_cast<Slot>(k);
       reorder(state.bodies, order);
       renumber(state.candidates, place);
+      // Forces outlive the change of stage, so impulses go with the time step.
+      for (double& impulse : state.candidates.impulse) impulse *= stage.time_step / last_time_step;
+      convert_impulses(state.candidates, parameters.friction ? 3 : 1, state.bodies.x, state.walls);
       state.candidates_valid = false;
     }
     stage_steps = 0;
     lengths_at_start = box_lengths(state.walls);
+  }
+
+  /// The stage began with a box; when it is none any more, walls have run through one another.
+  double pressed_area(std::size_t w) const {
+    try {
+      return face_area(state.walls, w);
+    } catch (const std::invalid_argument&) {
+      throw RunawayError(fmt::format(
+          "step {} (stage '{}'): the walls beside wall '{}' have passed each other, so its "
+          "pressure acts on nothing. Are there grains between them? Reduce the time step or the pressure",
+          report.step + 1, setup.stages[stage_index].name, state.walls[w].name));
+    }
   }
 
   /// Loads of the walls for the step: applied forces and free velocities.
@@ -107,9 +124,9 @@ struct Simulation::Implementation {
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const Wall& wall = state.walls[w];
       WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.load.drive == WallDrive::pressure
-                               ? wall.load.pressure * face_area(state.walls, w)
-                               : wall.load.force;
+      wall_state.applied = wall.load.drive == WallDrive::pressure ? wall.load.pressure * pressed_area(w)
+                           : wall.load.drive == WallDrive::force  ? wall.load.force
+                                                                  : 0;
       wall_state.free_velocity =
           wall.velocity + parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
     }

@@ -131,8 +131,8 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
                        parameters_.time_step,
                        parameters_.alert,
                        parameters_.law.restitution,
-                       settings_.overlap_correction,
-                       parameters_.gravity};
+                       parameters_.gravity,
+                       settings_.overlap_correction};
   const SlotRange range = share(state_.chunks.size(), lane);
   for (std::size_t c = range.begin; c < range.end; ++c)
     narrow_chunk(in, state_.candidates, state_.chunks, c, state_.contacts);

@@ -1,0 +1,186 @@
+/// How a run of the command can end other than well, and the scenes that ship with it.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <string>
+
+#include "tests/unit/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus {
+namespace {
+
+using namespace test;
+
+const std::string scenes = TALUS_SOURCE_DIR "/apps/scenes/";
+
+class Ending : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+
+  ScratchDirectory folder_;
+};
+
+TEST_F(Ending, WithMissedTolerancesIsThreeAndMarkedUnlessAllowed) {
+  write(at("scene.toml"), column);
+  const std::string strict =
+      "run scene.toml --force --out results --set solver.max_iterations=1 --set solver.tolerance=1e-9";
+  const Outcome missed = run(strict);
+  EXPECT_EQ(missed.code, 3) << missed.messages;
+  EXPECT_NE(missed.messages.find("missed the tolerance"), std::string::npos) << missed.messages;
+  const Table steps = read_table(at("results/steps.csv"));
+  ASSERT_EQ(steps.rows.size(), 4U);
+  std::int64_t marked = 0;
+  for (const auto& row : steps.rows) marked += row.at("converged") == "0";
+  EXPECT_GT(marked, 0);
+  EXPECT_EQ(summary(at("results")).at("status"), "done");
+  EXPECT_EQ(summary(at("results")).at("exit_code"), 3);
+  EXPECT_EQ(summary(at("results")).at("unconverged_steps"), marked);
+  EXPECT_EQ(summary(at("results")).at("converged_steps"), 4 - marked);
+
+  EXPECT_EQ(run(strict + " --set allow_unconverged=true").code, 0);
+  EXPECT_EQ(summary(at("results")).at("unconverged_steps"), marked);
+  EXPECT_EQ(summary(at("results")).at("exit_code"), 0);
+}
+
+TEST_F(Ending, OfARunawayIsOneWithStepAndBody) {
+  // Half inside one another, to be parted within a microsecond: thousands of metres per second from nothing.
+  write(at("pair.csv"), "id,x,y,z,radius\n0,0,0,0,0.01\n7,0.01,0,0,0.01\n");
+  write(at("scene.toml"), R"(time_step = 1e-6
+[material]
+density = 2600
+[sample]
+kind = "bodies"
+file = "pair.csv"
+[[stage]]
+name = "burst"
+end = { steps = 5 }
+[solver]
+overlap_correction = 1
+)");
+  const Outcome outcome = run("run scene.toml --out results");
+  EXPECT_EQ(outcome.code, 1) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("step 1 (stage 'burst')"), std::string::npos) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("body "), std::string::npos) << outcome.messages;
+  EXPECT_EQ(summary(at("results")).at("status"), "failed");
+  EXPECT_EQ(summary(at("results")).at("exit_code"), 1);
+  EXPECT_NE(summary(at("results")).at("message").get<std::string>().find("step 1 "), std::string::npos);
+}
+
+TEST_F(Ending, BySignalLeavesWholeFiles) {
+  std::string endless = pressed_box;
+  endless.replace(endless.find("steps = 6"), 9, "steps = 1000000000");
+  write(at("scene.toml"), endless);
+  for (const int signal : {SIGTERM, SIGINT}) {
+    int ends[2];
+    ASSERT_EQ(::pipe(ends), 0);
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      ::dup2(ends[1], STDERR_FILENO);
+      ::close(ends[0]);
+      ::close(ends[1]);
+      if (::chdir(folder_.path().c_str()) == 0)
+        ::execl(TALUS_COMMAND, TALUS_COMMAND, "run", "scene.toml", "--force", "--out", "results", nullptr);
+      ::_exit(127);
+    }
+    ::close(ends[1]);
+    std::string messages;
+    std::array<char, 256> buffer;
+    bool asked = false;
+    for (ssize_t n; (n = ::read(ends[0], buffer.data(), buffer.size())) > 0;) {
+      messages.append(buffer.data(), static_cast<std::size_t>(n));
+      // The first line of progress: the run is in its steps.
+      if (!asked && messages.find("  step ") != std::string::npos) asked = ::kill(child, signal) == 0;
+    }
+    ::close(ends[0]);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_TRUE(asked) << messages;
+    ASSERT_TRUE(WIFEXITED(status)) << messages;
+    EXPECT_EQ(WEXITSTATUS(status), 1) << messages;
+
+    const auto end = summary(at("results"));
+    EXPECT_EQ(end.at("status"), "stopped");
+    EXPECT_EQ(end.at("exit_code"), 1);
+    const auto steps = end.at("steps").get<std::size_t>();
+    EXPECT_GE(steps, 1U);
+    EXPECT_NE(messages.find("after step " + std::to_string(steps)), std::string::npos) << messages;
+    EXPECT_EQ(read_table(at("results/steps.csv")).rows.size(), steps);
+    EXPECT_EQ(read_table(at("results/walls.csv")).rows.size(), 6 * steps);
+    EXPECT_TRUE(content(at("results/steps.csv")).ends_with("\n"));
+  }
+}
+
+TEST_F(Ending, OfAPlanIsAListOfWhatIsLeftOut) {
+  write(at("scene.toml"), pressed_box);
+  const Outcome outcome = run("plan scene.toml");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  const std::size_t shear = outcome.output.find("stage 'shear'");
+  ASSERT_NE(shear, std::string::npos) << outcome.output;
+  const auto is = [&](const std::string& what, const std::string& state, std::size_t from) {
+    const std::size_t begin = outcome.output.find("  " + what + " ", from);
+    if (begin == std::string::npos) return false;
+    const std::string line = outcome.output.substr(begin, outcome.output.find('\n', begin) - begin);
+    return line.find(" " + state + " ") != std::string::npos;
+  };
+  EXPECT_TRUE(is("tangential impulses", "out", 0)) << outcome.output;
+  EXPECT_TRUE(is("rotation in the sweeps", "out", 0)) << outcome.output;
+  EXPECT_TRUE(is("tangential impulses", "in", shear)) << outcome.output;
+  EXPECT_TRUE(is("gravity", "out", shear)) << outcome.output;
+  EXPECT_TRUE(is("orientations", "out", shear)) << outcome.output;
+  EXPECT_TRUE(is("moving walls", "in", shear)) << outcome.output;
+  EXPECT_TRUE(is("subdomains", "out", shear)) << outcome.output;
+  for (const std::string words : {"bytes per grain", "bytes per candidate", "tasks per sweep"})
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << words;
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1);
+}
+
+// ---- the scenes that ship
+
+TEST_F(Ending, OfTheFirstStepsOfShippedScenesIsGood) {
+  for (const std::string scene : {"demo", "column-100", "pile-16k"}) {
+    const Outcome outcome = run("run " + scenes + scene + ".toml --steps 2 --out " + scene);
+    EXPECT_TRUE(outcome.code == 0 || outcome.code == 3) << scene << ": " << outcome.messages;
+    EXPECT_EQ(read_table(at(scene + "/steps.csv")).rows.size(), 2U) << scene;
+  }
+}
+
+TEST_F(Ending, OfEveryShippedSceneIsGoodWhenDry) {
+  for (const auto& entry : fs::directory_iterator(scenes)) {
+    // 200,000 grains take a while to deposit; that they do is a benchmark's to show.
+    if (entry.path().extension() != ".toml" || entry.path().stem() == "triaxial-200k") continue;
+    const Outcome outcome = run("run " + entry.path().string() + " --dry-run");
+    EXPECT_EQ(outcome.code, 0) << entry.path() << ": " << outcome.messages;
+    EXPECT_FALSE(outcome.output.empty()) << entry.path();
+  }
+}
+
+// Numbers of apps/scenes/data/iso12k/lmgc90-one-step.txt.
+TEST_F(Ending, OfOneStepOfLmgc90IsThatOfLmgc90) {
+  const Outcome outcome = run("run " + scenes + "replica-iso12k.toml --out results");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  const Table steps = read_table(at("results/steps.csv"));
+  ASSERT_EQ(steps.rows.size(), 1U);
+  EXPECT_EQ(steps.number(0, "candidates"), 34354 + 2142);
+  EXPECT_NEAR(steps.number(0, "active"), 21405 + 1513, 0.02 * (21405 + 1513));
+  EXPECT_NEAR(steps.number(0, "kinetic_translation"), 9.224900e-03, 0.003 * 9.224900e-03);
+  EXPECT_NEAR(steps.number(0, "kinetic_rotation"), 9.247193e-03, 0.003 * 9.247193e-03);
+  const Table walls = read_table(at("results/walls.csv"));
+  const std::map<std::string, std::string> axis{{"x+", "force_x"}, {"y+", "force_y"}, {"z+", "force_z"}};
+  std::size_t pushed = 0;
+  for (std::size_t row = 0; row < walls.rows.size(); ++row) {
+    const auto found = axis.find(walls.rows[row].at("wall"));
+    if (found == axis.end()) continue;
+    ++pushed;
+    EXPECT_NEAR(walls.number(row, found->second), -3076.375239, 0.001 * 3076.375239) << found->first;
+  }
+  EXPECT_EQ(pushed, 3U);
+}
+
+}  // namespace
+}  // namespace talus
