@@ -8,7 +8,7 @@
 
 namespace talus {
 
-std::array<std::uint32_t, 3> Frame::coordinates(const Vec3& point) const {
+std::array<std::uint32_t, 3> IntegerFrame::coordinates(const Vec3& point) const {
   std::array<std::uint32_t, 3> q;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto axis = static_cast<Eigen::Index>(k);
@@ -18,8 +18,8 @@ std::array<std::uint32_t, 3> Frame::coordinates(const Vec3& point) const {
   return q;
 }
 
-Frame make_frame(const Vec3& low, const Vec3& high) {
-  Frame frame;
+IntegerFrame make_frame(const Vec3& low, const Vec3& high) {
+  IntegerFrame frame;
   frame.low = low;
   frame.lengths = high - low;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -31,13 +31,13 @@ Frame make_frame(const Vec3& low, const Vec3& high) {
       throw std::invalid_argument(text.str());
     }
     // Two points a rounding apart, or one point: flat, and no overflow of the quotient.
-    const double scale = static_cast<double>(Frame::steps) / length;
+    const double scale = static_cast<double>(IntegerFrame::steps) / length;
     frame.scale[axis] = std::isfinite(scale) ? scale : 0.0;
   }
   return frame;
 }
 
-Frame make_frame(std::span<const Vec3> points, const Reduction& reduction) {
+IntegerFrame make_frame(std::span<const Vec3> points, const Reduction& reduction) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   // -min and max of each axis, and a flag: a maximum would lose a NaN on its way.
   std::array<double, 7> bounds;

@@ -11,7 +11,7 @@ namespace talus {
 
 /// Integer coordinates of points: 2^21 steps along each axis of a box. All decisions of a partition are taken
 /// on these integers, so that a point gets the same subdomain on every rank, bit for bit.
-struct Frame {
+struct IntegerFrame {
   static constexpr int bits = 21;
   static constexpr std::int64_t steps = std::int64_t{1} << bits;
 
@@ -25,10 +25,10 @@ struct Frame {
 };
 
 /// The box from `low` to `high` [m]. Throws std::invalid_argument unless both are finite and low <= high.
-Frame make_frame(const Vec3& low, const Vec3& high);
+IntegerFrame make_frame(const Vec3& low, const Vec3& high);
 
 /// The smallest box around the points of all ranks; without any point, a point at the origin.
 /// Throws std::invalid_argument, on every rank, if a point is not finite.
-Frame make_frame(std::span<const Vec3> points, const Reduction& reduction);
+IntegerFrame make_frame(std::span<const Vec3> points, const Reduction& reduction);
 
 }  // namespace talus

@@ -32,7 +32,7 @@ void check_weights(const PartitionPoints& points, const Reduction& reduction) {
                                 std::to_string(sums[0]));
 }
 
-std::array<std::int32_t, 3> boxes_of(const PartitionOptions& options, const Frame& frame) {
+std::array<std::int32_t, 3> boxes_of(const PartitionOptions& options, const IntegerFrame& frame) {
   const auto& boxes = options.boxes;
   if (boxes == std::array<std::int32_t, 3>{}) return box_factors(options.subdomains, frame.lengths);
   const auto [x, y, z] = boxes;

@@ -28,6 +28,10 @@ enum class PartitionKind {
   metis,      ///< k-way partition of a graph of cells (METIS)
 };
 
+inline constexpr std::array<PartitionKind, 5> partition_kinds{PartitionKind::automatic, PartitionKind::boxes,
+                                                              PartitionKind::fitted, PartitionKind::rcb,
+                                                              PartitionKind::metis};
+
 /// "auto", "boxes", "fitted", "rcb", "metis". `partition_kind` throws std::invalid_argument naming the five.
 std::string_view name_of(PartitionKind kind);
 PartitionKind partition_kind(std::string_view name);
@@ -64,8 +68,8 @@ struct CellTable {
   std::size_t cell_of(const std::array<std::uint32_t, 3>& q) const {
     std::array<std::size_t, 3> c;
     for (std::size_t k = 0; k < 3; ++k)
-      c[k] =
-          static_cast<std::size_t>(std::uint64_t{q[k]} * static_cast<std::uint64_t>(cells[k]) >> Frame::bits);
+      c[k] = static_cast<std::size_t>(std::uint64_t{q[k]} * static_cast<std::uint64_t>(cells[k]) >>
+                                      IntegerFrame::bits);
     return c[0] + static_cast<std::size_t>(cells[0]) * (c[1] + static_cast<std::size_t>(cells[1]) * c[2]);
   }
 };
@@ -74,7 +78,7 @@ struct CellTable {
 struct Partition {
   std::int32_t subdomains = 1;
   PartitionKind kind = PartitionKind::boxes;  ///< never `automatic`
-  Frame frame;
+  IntegerFrame frame;
   CutTree tree;     ///< boxes, fitted, rcb
   CellTable table;  ///< metis; else empty
 

@@ -10,14 +10,14 @@ namespace {
 
 /// A median is found by radix selection: seven rounds of nine bits settle the 63 bits of a key. A round is
 /// one histogram per open node and one sum over the ranks; three rounds are enough unless points coincide.
-constexpr int key_bits = 3 * Frame::bits;
+constexpr int key_bits = 3 * IntegerFrame::bits;
 constexpr int round_bits = 9;
 constexpr std::size_t bins = std::size_t{1} << round_bits;
 static_assert(key_bits % round_bits == 0);
 
 /// Moments are taken of the upper 16 bits of a coordinate: with weights below 2^31 in all, sums of squares
 /// stay below 2^63.
-constexpr int moment_shift = Frame::bits - 16;
+constexpr int moment_shift = IntegerFrame::bits - 16;
 
 /// A set of points still to be divided; it becomes one cut of the tree.
 struct Node {
@@ -180,7 +180,7 @@ void split_boxes(Node& node) {
 
 std::uint64_t cut_key(const Coordinates& q, std::int32_t axis) {
   const auto k = at(axis);
-  return std::uint64_t{q[k]} << 2 * Frame::bits | std::uint64_t{q[(k + 1) % 3]} << Frame::bits |
+  return std::uint64_t{q[k]} << 2 * IntegerFrame::bits | std::uint64_t{q[(k + 1) % 3]} << IntegerFrame::bits |
          q[(k + 2) % 3];
 }
 
@@ -207,9 +207,9 @@ CutTree regular_boxes(const std::array<std::int32_t, 3>& boxes) {
     above.size[axis] = block.size[axis] - below.size[axis];
     above.low[axis] = block.low[axis] + below.size[axis];
     above.first = block.first + below.size[0] * below.size[1] * below.size[2];
-    const auto plane = static_cast<std::uint64_t>(Frame::steps * above.low[axis] / boxes[axis]);
+    const auto plane = static_cast<std::uint64_t>(IntegerFrame::steps * above.low[axis] / boxes[axis]);
     const std::int32_t low = child(below), high = child(above);
-    tree.cuts.push_back({static_cast<std::int32_t>(axis), plane << 2 * Frame::bits, low, high});
+    tree.cuts.push_back({static_cast<std::int32_t>(axis), plane << 2 * IntegerFrame::bits, low, high});
   }
   return tree;
 }
@@ -222,7 +222,7 @@ CutTree fitted_boxes(const WeightedPoints& points, const std::array<std::int32_t
   });
 }
 
-CutTree recursive_bisection(const WeightedPoints& points, std::int32_t n, const Frame& frame,
+CutTree recursive_bisection(const WeightedPoints& points, std::int32_t n, const IntegerFrame& frame,
                             const CutTree* previous, const Reduction& reduction) {
   Bisection bisection(points, reduction);
   return bisection.run(Node{0, n, {1, 1, 1}, 0}, [&](std::vector<Node>& level) {

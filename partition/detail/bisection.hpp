@@ -33,7 +33,7 @@ CutTree fitted_boxes(const WeightedPoints& points, const std::array<std::int32_t
 /// Recursive bisection into n parts, each cut across the axis along which the weights spread most. `previous`
 /// may be null; its axis is kept while its spread (standard deviation, in metres) is at least 0.9 of the
 /// largest.
-CutTree recursive_bisection(const WeightedPoints& points, std::int32_t n, const Frame& frame,
+CutTree recursive_bisection(const WeightedPoints& points, std::int32_t n, const IntegerFrame& frame,
                             const CutTree* previous, const Reduction& reduction);
 
 /// Subdomain of a point: the leaf of the tree.

@@ -19,7 +19,7 @@ std::size_t at(std::int64_t k) {
   return static_cast<std::size_t>(k);
 }
 
-CellTable empty_table(const Frame& frame, double cells) {
+CellTable empty_table(const IntegerFrame& frame, double cells) {
   // Edge of a cube of which `cells` fill the box; flat axes get one cell.
   double volume = 1;
   int axes = 0;
@@ -59,7 +59,7 @@ std::int64_t neighbour(const CellTable& table, const std::array<std::int32_t, 3>
 }
 
 /// The grid, and its weights over all ranks.
-CellTable choose_cells(const PartitionPoints& points, const Frame& frame, std::int64_t wanted,
+CellTable choose_cells(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
                        const Reduction& reduction, std::vector<std::int64_t>& weight) {
   CellTable table;
   for (double cells = static_cast<double>(std::min(wanted, most_cells));; cells *= 2) {
@@ -153,7 +153,7 @@ std::vector<idx_t> call_metis(Compressed& graph, std::int32_t n) {
 
 }  // namespace
 
-CellGraph build_cell_graph(const PartitionPoints& points, const Frame& frame, std::int64_t wanted,
+CellGraph build_cell_graph(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
                            const Reduction& reduction) {
   CellGraph graph;
   const CellTable table = choose_cells(points, frame, wanted, reduction, graph.weight);
@@ -217,7 +217,7 @@ CellTable cut_cell_graph(const CellGraph& graph, std::int32_t n, const Reduction
 }
 
 void keep_numbers(CellTable& table, const Partition& previous, const PartitionPoints& points,
-                  const Frame& frame, std::int32_t n, const Reduction& reduction) {
+                  const IntegerFrame& frame, std::int32_t n, const Reduction& reduction) {
   std::vector<std::int64_t> common(at(n) * at(n), 0);
   for (std::size_t k = 0; k < points.x.size(); ++k) {
     const auto before = at(previous.subdomain_of(points.x[k]));

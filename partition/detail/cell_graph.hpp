@@ -39,7 +39,7 @@ inline constexpr std::array<std::array<std::int32_t, 3>, 13> half_neighbours = {
 /// two cells share once per contact across it; unlike a count of bodies it is a sum over candidates, that
 /// every rank can begin without knowing the candidates of another. A centre further away than a neighbour
 /// ties to the neighbour on the way.
-CellGraph build_cell_graph(const PartitionPoints& points, const Frame& frame, std::int64_t wanted,
+CellGraph build_cell_graph(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
                            const Reduction& reduction);
 
 /// Cells to n subdomains by METIS_PartGraphKway, with a fixed seed, on the first rank, whose answer all get.
@@ -51,6 +51,6 @@ CellTable cut_cell_graph(const CellGraph& graph, std::int32_t n, const Reduction
 /// Renumbers the subdomains of `table`: greedily, by falling weight in common with a subdomain of `previous`
 /// (ties: lower old, then lower new number).
 void keep_numbers(CellTable& table, const Partition& previous, const PartitionPoints& points,
-                  const Frame& frame, std::int32_t n, const Reduction& reduction);
+                  const IntegerFrame& frame, std::int32_t n, const Reduction& reduction);
 
 }  // namespace talus::detail
