@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "apps/exit_codes.hpp"
+#include "apps/partition_command.hpp"
 #include "apps/plan.hpp"
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
@@ -58,6 +59,29 @@ int main(int argc, char** argv) {
       ->type_name("a.b=c")
       ->allow_extra_args(false);
 
+  PartitionCommandOptions partition;
+  CLI::App* partition_app = app.add_subcommand(
+      "partition", "cut a scene's sample into subdomains: loads and interfaces of each partitioner");
+  partition_app->add_option("scene", partition.scene, "scene file")->type_name("FILE")->required();
+  partition_app->add_option("--subdomains", partition.subdomains, "number of subdomains")
+      ->type_name("N")
+      ->required()
+      ->check(CLI::Range(1, 65536));
+  partition_app
+      ->add_option("--partitioner", partition.partitioners,
+                   "boxes, fitted, rcb, metis or auto, may be repeated [all but auto]")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  partition_app->add_option("--out", partition.out, "directory of the files [out/partition-NAME]")
+      ->type_name("DIR");
+  partition_app->add_flag("--force", partition.force, "replace earlier partitions in the directory");
+  partition_app->add_option("--threads", partition.threads, "threads [one per core]")
+      ->type_name("N")
+      ->check(CLI::PositiveNumber);
+  partition_app->add_option("--set", partition.overrides, "override a key of the scene, may be repeated")
+      ->type_name("a.b=c")
+      ->allow_extra_args(false);
+
   SolveOptions solve;
   CLI::App* solve_app = app.add_subcommand("solve", "solve a contact problem of an FCLIB file");
   solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->type_name("FILE")->required();
@@ -86,6 +110,7 @@ int main(int argc, char** argv) {
     return run_command(run, ranks);
   }
   if (*plan_app) return plan_command(plan);
+  if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;

@@ -12,6 +12,7 @@
 
 #include "io/detail/descriptor.hpp"
 #include "io/error.hpp"
+#include "partition/partitioner.hpp"
 
 namespace talus::io {
 namespace {
@@ -33,14 +34,14 @@ bool is_numbered(std::string_view name, std::string_view prefix, std::string_vie
 }
 
 /// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
-std::vector<fs::path> former_outputs(const fs::path& directory) {
+std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
   std::vector<fs::path> found;
   for (const fs::path& folder : {directory, directory / "fields"}) {
     if (!fs::is_directory(folder)) continue;
     for (const auto& entry : fs::directory_iterator(folder)) {
       if (entry.is_symlink() || !entry.is_regular_file()) continue;
       const fs::path relative = entry.path().lexically_relative(directory);
-      if (is_output_name(relative)) found.push_back(relative);
+      if (is_ours(relative)) found.push_back(relative);
     }
   }
   return found;
@@ -56,7 +57,17 @@ bool is_output_name(const fs::path& relative) {
          is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp");
 }
 
-void prepare_output_directory(const fs::path& directory, bool force) {
+bool is_partition_name(const fs::path& relative) {
+  const std::string text = relative.generic_string();
+  std::string_view name = text;
+  if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
+  return std::ranges::any_of(partition_kinds, [&](PartitionKind kind) {
+    const std::string stem = "partition_" + std::string(name_of(kind));
+    return name == stem + ".vtp" || name == stem + ".svg";
+  });
+}
+
+void prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours) {
   try {
     if (fs::exists(directory) && !fs::is_directory(directory)) {
       throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
@@ -68,7 +79,7 @@ void prepare_output_directory(const fs::path& directory, bool force) {
             "exists and is not empty; choose another directory with --out, or replace the results in "
             "it with --force");
       }
-      for (const fs::path& relative : former_outputs(directory)) fs::remove(directory / relative);
+      for (const fs::path& relative : former_outputs(directory, is_ours)) fs::remove(directory / relative);
     }
     fs::create_directories(directory);
   } catch (const fs::filesystem_error& error) {

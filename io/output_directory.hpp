@@ -7,15 +7,22 @@
 
 namespace talus::io {
 
-/// Makes `directory` (and its parents) ready for a run.
-/// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
-/// only files that is_output_name() knows are removed; whatever else the user keeps there stays. Throws
-/// FileError naming the directory when it is refused, is not a directory, or cannot be created or written to.
-void prepare_output_directory(const std::filesystem::path& directory, bool force);
+/// Tells from a name relative to a directory whether a command of Talus wrote the file.
+using IsOutputName = bool (*)(const std::filesystem::path& relative);
 
 /// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md), and
 /// for their unfinished forms, which end in ".part".
 bool is_output_name(const std::filesystem::path& relative);
+
+/// The same for the files of `talus partition`: partition_NAME.vtp and partition_NAME.svg.
+bool is_partition_name(const std::filesystem::path& relative);
+
+/// Makes `directory` (and its parents) ready for a run.
+/// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
+/// only files that `is_ours` knows are removed; whatever else the user keeps there stays. Throws
+/// FileError naming the directory when it is refused, is not a directory, or cannot be created or written to.
+void prepare_output_directory(const std::filesystem::path& directory, bool force,
+                              IsOutputName is_ours = is_output_name);
 
 /// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
 /// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.

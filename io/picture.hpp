@@ -2,6 +2,7 @@
 
 /// Pictures of a run as SVG text, for those who want to see at once whether it makes sense.
 
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -30,5 +31,17 @@ struct ForcePicture {
 /// to y are drawn where they cut the picture. Throws std::invalid_argument when a contact names a body or
 /// wall that is not there.
 std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options);
+
+struct PartitionPicture {
+  std::string title;
+  std::int32_t subdomains = 1;
+  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+};
+
+/// The grains of such a slab twice: coloured by `subdomain`, and in greys by `multiplicity` as in Figure 6 of
+/// Visseq, Alart and Dureisseix (2013), white for inner grains (m = 1). Both have one entry per body of the
+/// frame. Throws std::invalid_argument when they have not.
+std::string draw_partition(const Frame& frame, std::span<const std::int32_t> subdomain,
+                           std::span<const std::int32_t> multiplicity, const PartitionPicture& options);
 
 }  // namespace talus::io

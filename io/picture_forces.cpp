@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "io/detail/body_index.hpp"
+#include "io/detail/slab.hpp"
 #include "io/detail/svg.hpp"
 #include "io/picture.hpp"
 
@@ -14,6 +15,7 @@ namespace talus::io {
 namespace {
 
 using detail::Svg;
+using detail::View;
 namespace style = detail::style;
 
 /// A point of the picture's plane [m].
@@ -26,43 +28,17 @@ struct Force {
   double normal;  ///< [N]
 };
 
-/// What is seen: places in the frame of the grains in the slab, the forces between them, weak ones first.
-struct Slab {
-  double middle = 0, half = 0;  ///< |y - middle| <= half [m]
-  double mean_radius = 0;       ///< of all grains [m]
-  std::vector<std::size_t> grains;
+/// What is seen: the grains of the slab and the forces between them, weak ones first.
+struct ForceSlab : detail::Slab {
   std::vector<Force> forces;
   double mean_force = 0;  ///< of `forces` [N]
 };
 
-/// From metres to pixels.
-struct View {
-  double x_low, z_low, x_high, z_high;  ///< [m]
-  double scale;                         ///< [px/m]
-  double left, top;                     ///< [px]
-  double x(double metres) const { return left + (metres - x_low) * scale; }
-  double y(double metres) const { return top + (z_high - metres) * scale; }
-};
-
 constexpr double picture_side = 760, margin_left = 40, margin_right = 40, margin_top = 84, margin_bottom = 84;
 
-Slab cut_slab(const Frame& frame, std::size_t walls, const ForcePicture& options) {
-  Slab slab;
-  if (frame.id.empty()) return slab;
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (std::size_t k = 0; k < frame.id.size(); ++k) {
-    low = std::min(low, frame.x[k].y());
-    high = std::max(high, frame.x[k].y());
-    slab.mean_radius += frame.radius[k];
-  }
-  slab.mean_radius /= static_cast<double>(frame.id.size());
-  slab.middle = (low + high) / 2;
-  slab.half = options.thickness > 0 ? options.thickness / 2 : 2 * slab.mean_radius;
-
-  const auto inside = [&](std::size_t k) { return std::abs(frame.x[k].y() - slab.middle) <= slab.half; };
-  for (std::size_t k = 0; k < frame.id.size(); ++k) {
-    if (inside(k)) slab.grains.push_back(k);
-  }
+ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& options) {
+  ForceSlab slab{detail::cut_slab(frame, options.thickness), {}, 0};
+  const auto inside = [&](std::size_t k) { return slab.holds(frame.x[k]); };
   const detail::BodyIndex index(frame.id);
   for (std::size_t k = 0; k < frame.contact_bodies.size(); ++k) {
     const auto [first, second] = frame.contact_bodies[k];
@@ -84,21 +60,6 @@ Slab cut_slab(const Frame& frame, std::size_t walls, const ForcePicture& options
   // file.
   std::ranges::stable_sort(slab.forces, {}, &Force::normal);
   return slab;
-}
-
-View view_of(const Frame& frame, const Slab& slab) {
-  double x_low = std::numeric_limits<double>::infinity(), x_high = -x_low, z_low = x_low, z_high = -x_low;
-  for (const std::size_t k : slab.grains) {
-    x_low = std::min(x_low, frame.x[k].x() - frame.radius[k]);
-    x_high = std::max(x_high, frame.x[k].x() + frame.radius[k]);
-    z_low = std::min(z_low, frame.x[k].z() - frame.radius[k]);
-    z_high = std::max(z_high, frame.x[k].z() + frame.radius[k]);
-  }
-  if (slab.grains.empty()) x_low = z_low = 0, x_high = z_high = 1;
-  const double border = slab.grains.empty() ? 0 : slab.mean_radius;
-  x_low -= border, z_low -= border, x_high += border, z_high += border;
-  const double scale = picture_side / std::max(x_high - x_low, z_high - z_low);
-  return {x_low, z_low, x_high, z_high, scale, margin_left, margin_top};
 }
 
 struct HalfPlane {
@@ -148,7 +109,7 @@ void draw_walls(Svg& svg, const View& view, const Frame& frame, std::span<const 
 }
 
 /// Width of a line [px]: proportional to the force, five mean forces are as wide as 0.6 mean radii.
-double line_width(double normal, const Slab& slab, const View& view) {
+double line_width(double normal, const ForceSlab& slab, const View& view) {
   return std::clamp(normal / slab.mean_force, 0.0, 5.0) / 5 * 0.6 * slab.mean_radius * view.scale;
 }
 
@@ -156,14 +117,14 @@ std::string_view line_colour(double normal, double mean) {
   return normal < mean ? "#e8a27c" : normal < 2 * mean ? "#d3652f" : "#8f2d0c";
 }
 
-void draw_force(Svg& svg, double x1, double y1, double x2, double y2, double normal, const Slab& slab,
+void draw_force(Svg& svg, double x1, double y1, double x2, double y2, double normal, const ForceSlab& slab,
                 const View& view) {
   const double w = line_width(normal, slab, view);
   if (w < 0.05) return;
   svg.line(x1, y1, x2, y2, {line_colour(normal, slab.mean_force), w});
 }
 
-void draw_legend(Svg& svg, const Slab& slab, const View& view, double top) {
+void draw_legend(Svg& svg, const ForceSlab& slab, const View& view, double top) {
   const double length = detail::nice_ticks(0, view.x_high - view.x_low, 16).at(1);
   const double bar = length * view.scale;
   svg.line(margin_left, top + 18, margin_left + bar, top + 18, {style::ink, 3});
@@ -181,10 +142,10 @@ void draw_legend(Svg& svg, const Slab& slab, const View& view, double top) {
 }  // namespace
 
 std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options) {
-  const Slab slab = cut_slab(frame, walls.size(), options);
-  const View view = view_of(frame, slab);
-  const double inner_width = std::max(480.0, (view.x_high - view.x_low) * view.scale);
-  const double bottom = margin_top + (view.z_high - view.z_low) * view.scale;
+  const ForceSlab slab = slab_of(frame, walls.size(), options);
+  const View view = detail::view_of(frame, slab, picture_side, margin_left, margin_top);
+  const double inner_width = std::max(480.0, view.width());
+  const double bottom = margin_top + view.height();
   Svg svg(margin_left + inner_width + margin_right, bottom + margin_bottom);
   svg.text(margin_left, 34,
            fmt::format("Normal forces, stage \u201c{}\u201d, step {}, t = {}", frame.stage, frame.step,

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <iterator>
 #include <span>
+#include <stdexcept>
 #include <string_view>
 
 #include "io/detail/body_index.hpp"
@@ -110,7 +111,13 @@ void append_points(std::string& text, std::span<const float> points) {
 
 }  // namespace
 
-std::string grains_vtp(const Frame& frame) {
+std::string grains_vtp(const Frame& frame, std::span<const GrainField> fields) {
+  for (const GrainField& field : fields) {
+    if (field.values.size() != frame.id.size()) {
+      throw std::invalid_argument(fmt::format("frame: field '{}' has {} values for {} bodies", field.name,
+                                              field.values.size(), frame.id.size()));
+    }
+  }
   std::string text = begin_vtp(frame, frame.id.size(), frame.id.size(), 0);
   text += "<PointData Scalars=\"radius\" Vectors=\"velocity\">\n";
   append_integers(text, "id", frame.id);
@@ -118,6 +125,7 @@ std::string grains_vtp(const Frame& frame) {
   append_floats(text, "velocity", 3, floats(frame.u));
   if (!frame.omega.empty()) append_floats(text, "omega", 3, floats(frame.omega));
   if (!frame.orientation.empty()) append_floats(text, "orientation", 4, floats(frame.orientation));
+  for (const GrainField& field : fields) append_array(text, "Int32", field.name, 1, field.values);
   text += "</PointData>\n";
   append_points(text, floats(frame.x));
   append_cells(text, "Verts", frame.id.size(), 1);

@@ -3,16 +3,27 @@
 /// Files for ParaView: grains and the force network as VTK PolyData, and the collections that give them their
 /// time. Numbers are 32-bit floats, since they are for looking at; results.h5 has the exact ones.
 
+#include <cstdint>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "runtime/step/frame.hpp"
 
 namespace talus::io {
 
+/// A whole number per body of a frame, e.g. its subdomain.
+struct GrainField {
+  std::string_view name;
+  std::span<const std::int32_t> values;
+};
+
 /// Text of a .vtp file with one vertex per body; point data id, radius [m], velocity [m/s], and omega [rad/s]
 /// and orientation (w, x, y, z) where the frame has them. The frame's time is in the field data `TimeValue`.
-std::string grains_vtp(const Frame& frame);
+/// `fields` become point data too. Throws std::invalid_argument naming a field that has not one value per
+/// body.
+std::string grains_vtp(const Frame& frame, std::span<const GrainField> fields = {});
 
 /// Text of a .vtp file with one line per active contact: between the centres of its grains, or from the
 /// centre to the contact point at a wall. Lines do not share points, so that a Tube filter can take its

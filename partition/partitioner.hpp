@@ -28,6 +28,10 @@ enum class PartitionKind {
   metis,      ///< k-way partition of a graph of cells (METIS)
 };
 
+inline constexpr std::array<PartitionKind, 5> partition_kinds{PartitionKind::automatic, PartitionKind::boxes,
+                                                              PartitionKind::fitted, PartitionKind::rcb,
+                                                              PartitionKind::metis};
+
 /// "auto", "boxes", "fitted", "rcb", "metis". `partition_kind` throws std::invalid_argument naming the five.
 std::string_view name_of(PartitionKind kind);
 PartitionKind partition_kind(std::string_view name);

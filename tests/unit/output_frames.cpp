@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
+#include <set>
 
 #include "io/detail/svg.hpp"
 #include "io/error.hpp"
@@ -145,33 +146,6 @@ TEST(Results, ErrorsNameTheFile) {
                scratch / "results.h5");
 }
 
-/// The numbers of an inline base64 array: its element count times, after the 64-bit length.
-template <class T>
-std::vector<T> array_of(const std::string& text, const std::string& name) {
-  const std::size_t tag = text.find("Name=\"" + name + "\"");
-  if (tag == std::string::npos) return {};
-  const std::size_t begin = text.find('>', tag) + 1;
-  const std::string encoded = text.substr(begin, text.find('<', begin) - begin);
-  static const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string bytes;
-  std::uint32_t group = 0;
-  int bits = 0;
-  for (const char c : encoded) {
-    if (c == '=') break;
-    group = group << 6 | static_cast<std::uint32_t>(digits.find(c));
-    if ((bits += 6) >= 8) {
-      bytes += static_cast<char>(group >> (bits -= 8) & 255);
-    }
-  }
-  std::uint64_t length = 0;
-  EXPECT_GE(bytes.size(), sizeof(length));
-  std::memcpy(&length, bytes.data(), sizeof(length));
-  EXPECT_EQ(bytes.size(), sizeof(length) + length) << name;
-  std::vector<T> values(length / sizeof(T));
-  if (length > 0) std::memcpy(values.data(), bytes.data() + sizeof(length), length);
-  return values;
-}
-
 /// Every opened element is closed in order; enough to catch what an XML parser would refuse in files we
 /// write.
 bool well_formed(const std::string& text) {
@@ -220,6 +194,17 @@ TEST(Vtk, ForcesRunBetweenCentresAndToTheWall) {
   EXPECT_EQ(array_of<std::int64_t>(text, "offsets"), (std::vector<std::int64_t>{2, 4}));
 }
 
+TEST(Vtk, GrainsTakeFieldsOfTheirOwnAndRefuseThoseThatDoNotFit) {
+  const std::vector<std::int32_t> subdomain{4, -1, 2}, two{1, 2};
+  const GrainField good{"subdomain", subdomain}, bad{"multiplicity", two};
+  const std::string text = grains_vtp(three_grains(), std::span(&good, 1));
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_EQ(array_of<std::int32_t>(text, "subdomain"), subdomain);
+  EXPECT_EQ(array_of<std::int64_t>(text, "id"), three_grains().id);
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { grains_vtp(three_grains(), std::span(&bad, 1)); }),
+            "frame: field 'multiplicity' has 2 values for 3 bodies");
+}
+
 TEST(Vtk, AFrameWithoutAnythingIsStillAFile) {
   EXPECT_TRUE(well_formed(grains_vtp(Frame{})));
   EXPECT_TRUE(well_formed(forces_vtp(Frame{})));
@@ -253,7 +238,24 @@ TEST(Picture, DrawsTheGrainsAndForcesOfTheSlabOnly) {
   EXPECT_EQ(one.find("nan"), std::string::npos);
 }
 
+TEST(Picture, OfAPartitionColoursGrainsBySubdomainAndByMultiplicity) {
+  const std::vector<std::int32_t> subdomain{0, 1, 1}, multiplicity{1, 2, 9};
+  const std::string text = draw_partition(three_grains(), subdomain, multiplicity, {"a <b>", 2, 0});
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_NE(text.find("a &lt;b&gt;"), std::string::npos);
+  EXPECT_EQ(occurrences(text, "<circle"), 3u + 3u + 5u);  // either panel, and the legend
+  std::map<std::string, int> fills;
+  for (const std::string& line : split(text, '\n'))
+    if (line.starts_with("<circle")) ++fills[split(line, '"')[7]];
+  EXPECT_EQ(fills["#10151a"], 2);  // m = 9 shares the darkest grey with 5: a grain and the legend
+  std::multiset<int> counts;
+  for (const auto& [fill, count] : fills) counts.insert(count);
+  EXPECT_EQ(counts, (std::multiset<int>{1, 1, 1, 2, 2, 2, 2})) << "two subdomains: once and twice";
+  EXPECT_THROW(draw_partition(three_grains(), subdomain, {}, {}), std::invalid_argument);
+}
+
 TEST(Picture, OfNothingIsStillAPicture) {
+  EXPECT_TRUE(well_formed(draw_partition(Frame{}, {}, {}, {})));
   EXPECT_TRUE(well_formed(draw_forces(Frame{}, {}, {})));
   const std::string text = draw_triaxial({}, {});
   EXPECT_TRUE(well_formed(text));

@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -94,6 +96,33 @@ std::string message_of(Action action) {
     return error.what();
   }
   return "";
+}
+
+/// The numbers of an inline base64 array: its element count times, after the 64-bit length.
+template <class T>
+std::vector<T> array_of(const std::string& text, const std::string& name) {
+  const std::size_t tag = text.find("Name=\"" + name + "\"");
+  if (tag == std::string::npos) return {};
+  const std::size_t begin = text.find('>', tag) + 1;
+  const std::string encoded = text.substr(begin, text.find('<', begin) - begin);
+  static const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  std::uint32_t group = 0;
+  int bits = 0;
+  for (const char c : encoded) {
+    if (c == '=') break;
+    group = group << 6 | static_cast<std::uint32_t>(digits.find(c));
+    if ((bits += 6) >= 8) {
+      bytes += static_cast<char>(group >> (bits -= 8) & 255);
+    }
+  }
+  std::uint64_t length = 0;
+  EXPECT_GE(bytes.size(), sizeof(length));
+  std::memcpy(&length, bytes.data(), sizeof(length));
+  EXPECT_EQ(bytes.size(), sizeof(length) + length) << name;
+  std::vector<T> values(length / sizeof(T));
+  if (length > 0) std::memcpy(values.data(), bytes.data() + sizeof(length), length);
+  return values;
 }
 
 /// A floor and a left wall.
