@@ -1,0 +1,312 @@
+/// Subdomains on one rank: the same numbers with any threads, the same physics as without them, and the cases
+/// in which a cut goes through little or nothing.
+
+#include "runtime/step/decomposition.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/dense_sample.hpp"
+
+namespace talus {
+namespace {
+
+using test::Random;
+using test::uniform;
+
+struct Variant {
+  const char* name;
+  Coupling coupling;
+  ExchangeScheme exchange;
+  PartitionKind partitioner;
+};
+const std::vector<Variant> variants = {
+    {"nscdd, dcs, boxes", Coupling::nscdd, ExchangeScheme::dcs, PartitionKind::boxes},
+    {"nscdd, ccs, rcb", Coupling::nscdd, ExchangeScheme::ccs, PartitionKind::rcb},
+    {"nscdd, dcs, metis", Coupling::nscdd, ExchangeScheme::dcs, PartitionKind::metis},
+    {"schwarz, dcs, fitted", Coupling::schwarz, ExchangeScheme::dcs, PartitionKind::fitted},
+    {"schwarz, ccs, boxes", Coupling::schwarz, ExchangeScheme::ccs, PartitionKind::boxes},
+};
+
+/// 6 x 6 x 6 grains in a box whose lid and two sides press with 20 kPa.
+talus::Setup pressed_box(double friction, std::int64_t steps) {
+  talus::Setup setup;
+  setup.walls = test::box_of_walls(0, 6 * 0.021);
+  Stage stage;
+  stage.name = "press";
+  stage.time_step = 1e-3;
+  stage.law = {friction, friction, 0};
+  stage.end.steps = steps;
+  WallLoad load;
+  load.drive = WallDrive::pressure;
+  load.pressure = 2e4;
+  load.mass = 1;
+  for (const char* name : {"x+", "y+", "z+"}) stage.loads.push_back({name, load});
+  setup.stages = {stage};
+  return setup;
+}
+
+Bodies lattice(int edge, std::uint64_t seed) {
+  Random random(seed);
+  Bodies bodies;
+  for (int k = 0; k < edge * edge * edge; ++k) {
+    const Vec3 site(k % edge + 0.5, k / edge % edge + 0.5, k / (edge * edge) + 0.5);
+    add_sphere(bodies, BodyId{k}, 0.021 * site + test::uniform_vector(random, -4e-4, 4e-4),
+               uniform(random, 0.008, 0.01), 2600);
+  }
+  return bodies;
+}
+
+void choose(talus::Setup& setup, const Variant& variant, int subdomains) {
+  setup.decomposition.coupling = variant.coupling;
+  setup.decomposition.exchange = variant.exchange;
+  setup.decomposition.partitioner = variant.partitioner;
+  setup.decomposition.subdomains = subdomains;
+}
+
+struct Outcome {
+  std::uint64_t digest = 0;
+  StepReport last;
+  std::vector<WallReport> walls;
+  std::int64_t unconverged = 0, migrants = 0;
+  double coordination = 0;
+};
+
+Outcome run(const talus::Setup& setup, Bodies bodies, graph::ExecutorOptions options = {.threads = 1}) {
+  graph::Executor executor(options);
+  Simulation simulation(setup, std::move(bodies), executor);
+  Outcome outcome;
+  while (!simulation.finished()) {
+    outcome.last = simulation.step();
+    if (!outcome.last.converged) ++outcome.unconverged;
+    outcome.migrants += outcome.last.migrants;
+    outcome.walls = simulation.walls();
+    if (const auto triaxial = simulation.triaxial()) outcome.coordination = triaxial->coordination;
+    simulation.begin_next_stage();
+  }
+  outcome.digest = simulation.digest();
+  return outcome;
+}
+
+TEST(Decomposition, HasTheSameBitsWithAnyNumberOfThreads) {
+  for (const Variant& variant : variants) {
+    talus::Setup setup = pressed_box(0.3, 12);
+    choose(setup, variant, 5);
+    setup.solver.max_iterations = 40;
+    const Outcome one = run(setup, lattice(6, 1));
+    for (int threads : {2, 3})
+      EXPECT_EQ(run(setup, lattice(6, 1), {.threads = threads}).digest, one.digest)
+          << variant.name << ", " << threads;
+    EXPECT_EQ(run(setup, lattice(6, 1), {.threads = 2, .delay_seed = 7}).digest, one.digest) << variant.name;
+  }
+}
+
+TEST(Decomposition, GivesTheForcesOfTheSequentialSolver) {
+  // Frictionless and pressed from three sides: the forces on the walls and the energy are unique.
+  talus::Setup setup = pressed_box(0, 14);
+  setup.solver.tolerance = 1e-6;
+  setup.solver.balance_tolerance = 1e-5;
+  setup.solver.max_iterations = 200000;
+  const Outcome whole = run(setup, lattice(6, 2));
+  ASSERT_EQ(whole.unconverged, 0);
+  for (const Variant& variant : variants)
+    for (int subdomains : {2, 12}) {
+      choose(setup, variant, subdomains);
+      const Outcome cut = run(setup, lattice(6, 2));
+      const std::string label = std::string(variant.name) + ", " + std::to_string(subdomains);
+      EXPECT_EQ(cut.unconverged, 0) << label;
+      EXPECT_NEAR(cut.last.kinetic_translation, whole.last.kinetic_translation,
+                  1e-3 * whole.last.kinetic_translation)
+          << label;
+      for (std::size_t w = 0; w < whole.walls.size(); ++w)
+        EXPECT_NEAR(cut.walls[w].position, whole.walls[w].position, 1e-6)
+            << label << ", wall " << whole.walls[w].name;
+      EXPECT_GT(cut.last.contacts, 300) << label;
+      // Damped impulses of open contacts fade instead of ending at 0, so that Schwarz counts a few more.
+      if (variant.coupling == Coupling::nscdd) {
+        EXPECT_NEAR(cut.coordination, whole.coordination, 0.05) << label;
+      }
+    }
+}
+
+TEST(Decomposition, ConservesMomentumAcrossABorder) {
+  // Four spheres in a row, the cut between the middle ones, so that these stand in both subdomains.
+  for (const Variant& variant : variants)
+    for (bool damping : {true, false}) {
+      talus::Setup setup;
+      Stage stage;
+      stage.name = "collide";
+      stage.time_step = 1e-3;
+      stage.law = {0.4, 0, 0};
+      stage.end.steps = 8;
+      setup.stages = {stage};
+      setup.solver.max_iterations = 7;  // a solution that is not finished conserves it too
+      choose(setup, variant, 2);
+      setup.decomposition.damping = damping;
+      Bodies bodies;
+      for (int k = 0; k < 4; ++k) {
+        add_sphere(bodies, BodyId{k}, Vec3(0.0199 * k, 1e-3 * k, 0), 0.01, 1000.0 * (k + 1));
+        bodies.velocity.back().u[0] = 2 - k;
+        bodies.velocity.back().u[1] = 0.3 * k;
+      }
+      Vec3 before = Vec3::Zero(), after = Vec3::Zero();
+      for (std::size_t k = 0; k < 4; ++k)
+        before += bodies.mass(k) * Eigen::Map<const Vec3>(bodies.velocity[k].u);
+      graph::Executor executor({.threads = 1});
+      Simulation simulation(setup, bodies, executor);
+      while (!simulation.finished()) {
+        simulation.step();
+        simulation.begin_next_stage();
+      }
+      const Frame frame = simulation.frame();
+      ASSERT_EQ(frame.id.size(), 4u);
+      for (std::size_t k = 0; k < 4; ++k) after += bodies.mass(k) * frame.u[k];
+      EXPECT_LT((after - before).norm(), 1e-14 * before.norm())
+          << variant.name << (damping ? "" : ", undamped");
+      EXPECT_GT(std::abs(frame.u[0][0] - 2), 0.1) << "they are to collide";
+    }
+}
+
+TEST(Decomposition, LetsBodiesMigrateAndKeepsTheirContactsMemory) {
+  // A dense block drifts through the cuts, which stay where they are: with and without the drift the contact
+  // problem is the same, and warm starts that travelled keep it solved in as few iterations.
+  talus::Setup setup;
+  setup.walls = {};
+  Stage stage;
+  stage.name = "drift";
+  stage.time_step = 1e-3;
+  stage.law = {0.3, 0, 0};
+  stage.end.steps = 30;
+  setup.stages = {stage};
+  choose(setup, variants[0], 8);
+  Bodies bodies = lattice(6, 3);
+  for (Velocity& v : bodies.velocity) v.u[0] = 1.0;
+  setup.decomposition.repartition_every = 1000000;
+  setup.detection.skin = 4e-3;
+  const Outcome moved = run(setup, bodies);
+  EXPECT_GT(moved.migrants, 30);
+  EXPECT_GT(moved.last.kinetic_translation, 0);
+  EXPECT_EQ(moved.unconverged, 0);
+}
+
+TEST(Decomposition, NamesTheDivergenceOfUndampedSchwarz) {
+  talus::Setup setup = pressed_box(0.3, 20);
+  choose(setup, variants[3], 27);
+  setup.decomposition.damping = false;
+  setup.solver.tolerance = 1e-6;
+  try {
+    run(setup, lattice(6, 4));
+    FAIL() << "27 subdomains of 8 grains each, and undamped Schwarz converged";
+  } catch (const RunawayError& error) {
+    EXPECT_NE(std::string(error.what()).find("damping"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Decomposition, SendsWhatTheFormulaSays) {
+  // Grains on a line cut in four: three borders, each with two shared bodies when contacts lie on both sides.
+  talus::Setup setup;
+  Stage stage;
+  stage.name = "rest";
+  stage.time_step = 1e-3;
+  stage.law = {0.3, 0, 0};
+  stage.end.steps = 1;
+  setup.stages = {stage};
+  setup.decomposition.subdomains = 4;
+  setup.decomposition.partitioner = PartitionKind::boxes;
+  setup.decomposition.boxes = {4, 1, 1};
+  Bodies bodies;
+  for (int k = 0; k < 17; ++k) add_sphere(bodies, BodyId{k}, Vec3(0.02 * k, 0, 0), 0.01, 2600);
+  graph::Executor executor({.threads = 1});
+  {
+    Simulation simulation(setup, bodies, executor);
+    simulation.step();
+    EXPECT_EQ(simulation.messages().messages, 6) << "one each way over three borders";
+    EXPECT_EQ(simulation.messages().bytes, 6 * 6 * 8) << "the one grain astride, 6 numbers";
+    EXPECT_EQ(simulation.messages().between_ranks, 0);
+  }
+  setup.decomposition.exchange = ExchangeScheme::ccs;
+  Simulation simulation(setup, bodies, executor);
+  simulation.step();
+  EXPECT_EQ(simulation.messages().messages, 8) << "to the centre and back, per subdomain";
+  EXPECT_EQ(simulation.messages().bytes, 2 * 6 * 6 * 8) << "the same velocities, each once up and once down";
+}
+
+TEST(Decomposition, AWallOfKSubdomainsCostsKMessagesNotKSquared) {
+  std::int64_t last = 0;
+  for (int edge : {2, 4}) {
+    talus::Setup setup = pressed_box(0, 1);
+    setup.decomposition.subdomains = edge * edge;
+    setup.decomposition.partitioner = PartitionKind::boxes;
+    setup.decomposition.boxes = {edge, edge, 1};
+    setup.decomposition.exchange = ExchangeScheme::ccs;
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(setup, lattice(6, 5), executor);
+    simulation.step();
+    EXPECT_EQ(simulation.messages().messages, 2 * edge * edge);
+    EXPECT_GT(simulation.messages().messages, last);
+    last = simulation.messages().messages;
+  }
+}
+
+TEST(Decomposition, BearsSubdomainsWithLittleOrNothingInThem) {
+  const auto rest = [](int subdomains, PartitionKind kind) {
+    talus::Setup setup;
+    setup.walls = {test::box_of_walls(0, 1)[4]};
+    Stage stage;
+    stage.name = "fall";
+    stage.time_step = 1e-3;
+    stage.gravity = Vec3(0, 0, -9.81);
+    stage.law = {0.3, 0.3, 0};
+    stage.end.steps = 60;
+    setup.stages = {stage};
+    setup.decomposition.subdomains = subdomains;
+    setup.decomposition.partitioner = kind;
+    return setup;
+  };
+  for (PartitionKind kind :
+       {PartitionKind::boxes, PartitionKind::fitted, PartitionKind::rcb, PartitionKind::metis}) {
+    Bodies one;
+    add_sphere(one, BodyId{7}, Vec3(0, 0, 0.0101), 0.01, 2600);
+    const Outcome alone = run(rest(9, kind), one);
+    EXPECT_EQ(alone.unconverged, 0) << name_of(kind);
+    EXPECT_LT(alone.last.kinetic_translation, 1e-12) << name_of(kind);
+
+    Bodies corner = lattice(3, 6);  // all in one corner, with a boulder larger than any subdomain on top
+    add_sphere(corner, BodyId{100}, Vec3(0.03, 0.03, 0.4), 0.3, 2600);
+    add_sphere(corner, BodyId{101}, Vec3(5, 5, 0.01), 0.01, 2600);
+    const Outcome piled = run(rest(40, kind), corner);
+    EXPECT_EQ(piled.unconverged, 0) << name_of(kind);
+    EXPECT_EQ(run(rest(40, kind), corner, {.threads = 3}).digest, piled.digest) << name_of(kind);
+  }
+}
+
+TEST(Decomposition, CarriesOrientationsAndStagesAlong) {
+  talus::Setup setup = pressed_box(0, 10);
+  Stage shear = setup.stages[0];
+  shear.name = "shear";
+  shear.law = {0.4, 0.2, 0};
+  shear.time_step = 5e-4;
+  setup.stages.push_back(shear);
+  setup.orientation = true;
+  choose(setup, variants[0], 7);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, lattice(6, 8), executor);
+  while (!simulation.finished()) {
+    simulation.step();
+    simulation.begin_next_stage();
+  }
+  const Frame frame = simulation.frame();
+  ASSERT_EQ(frame.orientation.size(), 216u);
+  ASSERT_EQ(frame.id.size(), 216u);
+  int turned = 0;
+  for (std::size_t k = 0; k < 216; ++k) {
+    EXPECT_EQ(frame.id[k], static_cast<std::int64_t>(k));
+    turned += frame.orientation[k][0] < 1;
+  }
+  EXPECT_GT(turned, 100);
+}
+
+}  // namespace
+}  // namespace talus
