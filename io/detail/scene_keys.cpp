@@ -348,7 +348,8 @@ Section<DecompositionSettings> decomposition_keys() {
       {
           key<D>("subdomains", "", at_least_one, "Number of subdomains, at least one per rank.",
                  &D::subdomains)
-              .or_auto(0, "one per rank"),
+              .blank_when_zero()
+              .or_else("one per rank"),
           choice<D>(
               "partitioner", {"auto", "boxes", "fitted", "rcb", "metis"},
               "`boxes`: equal boxes; `fitted`: boxes of equal work; `rcb`: recursive bisection; `metis`: "
