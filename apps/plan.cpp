@@ -47,10 +47,15 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
   line("moving walls", driven + pressed > 0,
        fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
   line("gluing of wall copies", pressed > 0,
-       pressed > 0 ? "one task per pushed wall that several chunks touch" : "no wall of finite mass");
+       pressed > 0 ? "two tasks per subdomain and one for all" : "no wall of finite mass");
   line("chunk dependencies", threads > 1,
        threads > 1 ? "between chunks of different threads only" : "one thread: chunks are swept in order");
-  line("subdomains", false, "one: no interface, no gluing of grains, no messages");
+  const Decomposition& all = state.decomposition;
+  line("subdomains", all.several(),
+       all.several() ? fmt::format("{} by {}: {} messages of {} bytes in all per iteration",
+                                   all.partition.subdomains, name_of(all.partition.kind),
+                                   simulation.messages().messages, simulation.messages().bytes)
+                     : "one: no interface, no gluing of grains, no messages");
   line("MPI", false, "one rank: no MPI call");
   line("trace", false, "not asked for: no field allocated");
 }
