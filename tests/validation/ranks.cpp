@@ -1,5 +1,7 @@
 /// The command on several ranks: same bits, one set of files, errors that end all ranks.
 
+#include <fmt/format.h>
+
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::test {
@@ -61,8 +63,8 @@ TEST_F(Ranks, ChangeNoBitOfAnyResult) {
   const Outcome one = run(folder_, "run scene.toml --out one --threads 1");
   ASSERT_EQ(one.code, 3) << one.messages;
   for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {2, 2}, {3, 1}, {4, 1}}) {
-    const std::string out = "r" + std::to_string(ranks) + "x" + std::to_string(threads);
-    const std::string arguments = "run scene.toml --out " + out + " --threads " + std::to_string(threads);
+    const std::string out = fmt::format("r{}x{}", ranks, threads);
+    const std::string arguments = fmt::format("run scene.toml --out {} --threads {}", out, threads);
     const Outcome other = run(folder_, arguments, ranks > 1 ? launcher(ranks) : "");
     ASSERT_EQ(other.code, 3) << out << ": " << other.messages;
     EXPECT_EQ(digest_of(out), digest_of("one")) << out;
