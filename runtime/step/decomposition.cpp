@@ -333,6 +333,10 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     if (a.local != b.local) return a.local < b.local;
     return a.inner != b.inner ? a.inner < b.inner : a.candidate < b.candidate;
   });
+  ranks.sum(load);
+  // As large as without subdomains: small chunks have poor batches, and subdomains run beside one another.
+  const int target =
+      chunk_target(static_cast<std::size_t>(std::accumulate(load.begin(), load.end(), std::int64_t{0})));
   // Slot of a body in its subdomain: bodies of an interface stand in the order of the surroundings.
   const auto slot_in = [&](std::int32_t local, Slot body) {
     const auto& list = interfaces[at(local)].bodies;
@@ -347,8 +351,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   for (const Key& key : keys) {
     if (!last || key.wall != last->wall || key.local != last->local || key.inner != last->inner) {
       const auto begin = static_cast<std::int32_t>(cut.size());
-      const std::size_t work = static_cast<std::size_t>(load[at(decomposition.here[at(key.local)])]);
-      groups.push_back({begin, begin, key.wall, key.local, key.inner == 0, chunk_target(work)});
+      groups.push_back({begin, begin, key.wall, key.local, key.inner == 0, target});
     }
     last = &key;
     const std::size_t k = at(key.candidate);
@@ -360,7 +363,6 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(matched.impulse[components * k + c]);
     ++groups.back().end;
   }
-  ranks.sum(load);
   ranks.sum(sums);
   decomposition.migrants = decomposition.interfaces.empty() ? 0 : sums[0];
   decomposition.imbalance = imbalance(load);
