@@ -107,8 +107,12 @@ struct Tally {
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;
+  double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
 
-  void add(const StepReport& report) {
+  void add(const Simulation& simulation) {
+    const StepReport& report = simulation.report();
+    exposed += simulation.exposed();
+    iterating += simulation.sums().times.iteration;
     iterations += report.iterations;
     if (!report.converged) ++unconverged;
     worst_error = std::max(worst_error, report.error_rms);
@@ -165,7 +169,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
   if (output.stage_frames) write_frame();
   while (!simulation.finished()) {
     const StepReport& report = simulation.step();
-    tally.add(report);
+    tally.add(simulation);
     const std::optional<TriaxialReport> triaxial = simulation.triaxial();
     if (feed) feed->row(simulation, triaxial);
     const bool stage_ends = simulation.stage_fraction() >= 1;
@@ -222,6 +226,14 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.wall_s = watch.seconds();
     return summary;
   }
+  const MessageCount& messages = simulation.messages();
+  if (ranks.rank() == 0 && messages.messages > 0)
+    fmt::print(stderr,
+               "talus: an exchange: {} messages of {} bytes between subdomains, {} of {} between ranks; "
+               "waiting for them "
+               "took {:.1f} % of the iterations on rank 0\n",
+               messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
+               tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
   if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
     summary.exit_code = exit_tolerance_missed;
   summary.steps = simulation.report().step;
