@@ -373,6 +373,8 @@ Section<DecompositionSettings> decomposition_keys() {
               "max_imbalance", "", positive,
               "Fullest subdomain over the mean, less 1, beyond which the next broad phase cuts space anew.",
               &D::max_imbalance),
+          key<D>("overlap", "", any, "Sweep inner chunks while messages fly; false shows what that is worth.",
+                 &D::overlap),
           key<D>(
               "damping", "", any,
               "Damp contacts at the interface by multiplicity. Without, Schwarz diverges where bodies stand "

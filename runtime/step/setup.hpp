@@ -81,7 +81,8 @@ struct DecompositionSettings {
   int sweeps_per_exchange = 1;          ///< n_GS >= 1
   int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
   double max_imbalance = 0.2;  ///< fullest over mean subdomain, less 1: beyond it the partition is made anew
-  bool damping = true;         ///< schwarz: false is the paper's form, which diverges where m > 2
+  bool overlap = true;  ///< inner chunks while messages fly; false: after them, to see what that is worth
+  bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
 };
 
 /// A simulation, apart from its grains.

@@ -220,11 +220,14 @@ void StepGraph::plan_epochs() {
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here);
-  const auto last = static_cast<std::uint32_t>(chunks.colours);
+  // Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
+  const std::uint32_t inner = decomposition_.overlap ? 1 : 3;
+  const auto last =
+      static_cast<std::uint32_t>(decomposition_.overlap ? chunks.colours : chunks.boundary_colours);
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
     const bool at_interface = gluing.needed() && chunks.boundary[c] != 0;
-    colour[c] = static_cast<std::uint32_t>(chunks.colour[c]) + (chunks.boundary[c] != 0 ? 0 : 1);
+    colour[c] = static_cast<std::uint32_t>(chunks.colour[c]) + (chunks.boundary[c] != 0 ? 0 : inner);
     neighbour.insert(neighbour.end(), chunks.conflicts.begin() + chunks.conflict_begin[c],
                      chunks.conflicts.begin() + chunks.conflict_begin[c + 1]);
     if (at_interface) {

@@ -103,6 +103,14 @@ TEST(Decomposition, HasTheSameBitsWithAnyNumberOfThreads) {
   }
 }
 
+TEST(Decomposition, HasTheSameBitsWithInnerChunksBehindTheExchange) {
+  talus::Setup setup = pressed_box(0.3, 8);
+  choose(setup, variants[0], 4);
+  const Outcome overlapped = run(setup, lattice(6, 9), {.threads = 2});
+  setup.decomposition.overlap = false;
+  EXPECT_EQ(run(setup, lattice(6, 9), {.threads = 2}).digest, overlapped.digest);
+}
+
 TEST(Decomposition, GivesTheForcesOfTheSequentialSolver) {
   // Frictionless and pressed from three sides: the forces on the walls and the energy are unique.
   talus::Setup setup = pressed_box(0, 14);
