@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <map>
 #include <thread>
@@ -72,6 +73,7 @@ struct Gluing::Centre {
   std::vector<double> sums;  ///< 3 per wall, then width per item: all on rank 0, else those asked for
   std::vector<std::unique_ptr<Link>> links;             ///< rank 0: per other rank
   std::vector<std::vector<std::size_t>> items_of_rank;  ///< rank 0: per other rank
+  std::atomic<std::size_t> published{0};                ///< other ranks: subdomains whose part is ready
   std::unique_ptr<Link> to_centre;                      ///< other ranks
   double waited = 0;
 };
@@ -302,10 +304,21 @@ void Gluing::publish(std::size_t e, Mode mode) {
     for (std::int32_t c : mine.wall_copies[g])
       for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[at(c)].velocity[k];
   }
-  if (mine.hub_item.empty()) return;
-  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
-  for (std::size_t h = 0; h < interface.hubs.size(); ++h)
-    write_velocity(mine.shared[at(interface.hubs[h])], &mine.partial[3 * walls_.size() + h * width_]);
+  if (!mine.hub_item.empty()) {
+    const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+    for (std::size_t h = 0; h < interface.hubs.size(); ++h)
+      write_velocity(mine.shared[at(interface.hubs[h])], &mine.partial[3 * walls_.size() + h * width_]);
+  }
+  if (!centre_->to_centre) return;
+  // The last of this rank's subdomains sends for all: its count has seen what the others wrote.
+  if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
+  centre_->published.store(0, std::memory_order_relaxed);
+  Link& link = *centre_->to_centre;
+  await(*link.sender, centre_->waited);
+  auto out = link.out.begin();
+  for (const Subdomain& subdomain : subdomains_)
+    out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
+  link.sender->start();
 }
 
 void Gluing::centre(Mode mode) {
@@ -313,11 +326,6 @@ void Gluing::centre(Mode mode) {
   Centre& centre = *centre_;
   if (centre.to_centre) {
     Link& link = *centre.to_centre;
-    await(*link.sender, centre.waited);
-    auto out = link.out.begin();
-    for (const Subdomain& subdomain : subdomains_)
-      out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-    link.sender->start();
     await(*link.receiver, centre.waited);
     std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
     link.receiver->start();

@@ -220,14 +220,21 @@ void StepGraph::plan_epochs() {
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here);
-  // Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
-  const std::uint32_t inner = decomposition_.overlap ? 1 : 3;
-  const auto last =
-      static_cast<std::uint32_t>(decomposition_.overlap ? chunks.colours : chunks.boundary_colours);
+  // Even colours are those of chunks, inner ones shifted behind publish. The rank that is the centre does its
+  // part half-way through the inner chunks, so that the way there and the way back are both hidden. Inner
+  // chunks share nothing with the gluing: before or behind it, the bits are the same.
+  const auto first_inner = static_cast<std::uint32_t>(2 * chunks.boundary_colours);
+  const auto end = static_cast<std::uint32_t>(2 * chunks.colours);
+  const std::uint32_t shift = decomposition_.overlap ? 2 : 4;
+  const std::uint32_t half_way = (first_inner / 2 + end / 2) / 2 * 2 + 3;
+  const std::uint32_t centre_colour = !decomposition_.overlap ? first_inner + 1
+                                      : ranks_.rank() == 0    ? std::min(half_way, end + 1)
+                                                              : end + 1;
+  const std::uint32_t glue_colour = decomposition_.overlap ? end + 2 : first_inner + 2;
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
     const bool at_interface = gluing.needed() && chunks.boundary[c] != 0;
-    colour[c] = static_cast<std::uint32_t>(chunks.colour[c]) + (chunks.boundary[c] != 0 ? 0 : inner);
+    colour[c] = 2 * static_cast<std::uint32_t>(chunks.colour[c]) + (chunks.boundary[c] != 0 ? 0 : shift);
     neighbour.insert(neighbour.end(), chunks.conflicts.begin() + chunks.conflict_begin[c],
                      chunks.conflicts.begin() + chunks.conflict_begin[c + 1]);
     if (at_interface) {
@@ -239,21 +246,21 @@ void StepGraph::plan_epochs() {
   }
   if (gluing.needed()) {
     for (std::size_t e = 0; e < here; ++e) {
-      colour[publish(e)] = static_cast<std::uint32_t>(chunks.boundary_colours);
+      colour[publish(e)] = first_inner;
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
       neighbour.push_back(centre);
       neighbour.push_back(glue(e));
       for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(glue(reader));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
-    colour[centre] = last + 1;
+    colour[centre] = centre_colour;
     for (std::size_t e = 0; e < here; ++e) {
       neighbour.push_back(publish(e));
       neighbour.push_back(glue(e));
     }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     for (std::size_t e = 0; e < here; ++e) {
-      colour[glue(e)] = last + 2;
+      colour[glue(e)] = glue_colour;
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
       neighbour.push_back(centre);
       neighbour.push_back(publish(e));
