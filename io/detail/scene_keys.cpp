@@ -317,6 +317,12 @@ Section<SolverSettings> solver_keys() {
   return {"[solver]",
           "When a step counts as solved, and how hard to try.",
           {
+              choice<SolverSettings>(
+                  "method", {"auto", "nlgs", "nlgs+momentum", "nncg"},
+                  "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
+                  "ended; `nncg`: nonsmooth conjugate gradients; `auto`: momentum, or nncg for "
+                  "tight tolerances with friction and where momentum has made it worse.",
+                  &SolverSettings::method),
               key<SolverSettings>("tolerance", "", positive,
                                   "Bound on the relative error of the contact law (error_rms).",
                                   &SolverSettings::tolerance),

@@ -48,7 +48,16 @@ struct DetectionSettings {
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
 
+/// What makes of sweeps a solver.
+enum class SolverMethod {
+  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse
+  nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
+  momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
+  nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
+};
+
 struct SolverSettings {
+  SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
       5e-2;                   ///< on balance: drift of the wall forces over the second half of the iterations
