@@ -1,6 +1,7 @@
 #include "runtime/step/iteration.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -25,6 +26,10 @@ constexpr double momentum_reach = 5e-5;
 /// What momentum makes worse shows within as many sweeps.
 constexpr int trusted_sweeps = 25;
 
+double clock_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 Carry carry_of(SolverMethod method) {
   return method == SolverMethod::nncg ? Carry::conjugate : Carry::momentum;
 }
@@ -39,6 +44,11 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       decomposition_(decomposition),
       ranks_(ranks),
       gluing_(state, decomposition, ranks) {}
+
+void Iteration::plan() {
+  gluing_.plan(parameters_.turns);
+  busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);
+}
 
 void Iteration::begin() {
   const Chunks& chunks = state_.chunks;
@@ -179,6 +189,13 @@ void Iteration::chunk(std::size_t c, int epoch) {
   }
 }
 
+std::vector<double> Iteration::busy() const {
+  std::vector<double> sums(state_.decomposition.here.size(), 0.0);
+  for (std::size_t c = 0; c < busy_.size(); ++c)
+    sums[static_cast<std::size_t>(state_.chunks.subdomain[c])] += busy_[c];
+  return sums;
+}
+
 Gluing::Mode Iteration::gluing_mode(int epoch) const {
   if (work(epoch) == Work::accumulate || work(epoch) == Work::restore) return Gluing::Mode::fresh;
   const int sweeps = epoch - sweeps_from_ + 1;
@@ -190,10 +207,12 @@ void Iteration::node(std::uint32_t node, int epoch) {
   const Work now = work(epoch);
   const std::size_t chunks = state_.chunks.size();
   if (node < chunks) {
+    const double start = busy_.empty() ? 0 : clock_now();
     if (parameters_.friction)
       chunk<true>(node, epoch);
     else
       chunk<false>(node, epoch);
+    if (!busy_.empty()) busy_[node] += clock_now() - start;
     // Long messages advance only while somebody calls MPI.
     if (ranks_.ranks() > 1 && node % 4 == 0) ranks_.progress();
     return;
@@ -277,6 +296,7 @@ void Iteration::add_up(std::span<const double> rows) {
   const std::size_t walls = state_.walls.size(), width = row_head + 3 * walls;
   total_ = {};
   jump_ = {};
+  std::int64_t fullest = 0;
   std::vector<Vec3> impulses(walls, Vec3::Zero());
   for (const double* row : sorted_rows(rows, width, state_.decomposition.partition.subdomains)) {
     ErrorSums part;
@@ -287,10 +307,16 @@ void Iteration::add_up(std::span<const double> rows) {
     part.contacts = static_cast<std::int64_t>(row[5]);
     part.active = static_cast<std::int64_t>(row[6]);
     total_.add(part);
+    fullest = std::max(fullest, part.contacts);
     jump_.jump2 += row[7];
     jump_.velocity2 += row[8];
     for (std::size_t w = 0; w < walls; ++w) impulses[w] += Eigen::Map<const Vec3>(row + row_head + 3 * w);
   }
+  imbalance_ = total_.contacts > 0
+                   ? static_cast<double>(fullest) * state_.decomposition.partition.subdomains /
+                             static_cast<double>(total_.contacts) -
+                         1
+                   : 0;
   for (std::size_t w = 0; w < walls; ++w) state_.wall_states[w].impulse = impulses[w];
   impulses_.push_back(std::move(impulses));
 }

@@ -55,9 +55,15 @@ class Iteration {
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();
 
-  Gluing& gluing() { return gluing_; }
+  /// Collective, after the candidates were distributed.
+  void plan();
+
   const Gluing& gluing() const { return gluing_; }
   const IterationResult& result() const { return result_; }
+  /// Contacts of the fullest subdomain over the mean one, less 1, at the last check.
+  double imbalance() const { return imbalance_; }
+  /// Per subdomain here, with BalanceBy::time: time of its chunks since the plan [s].
+  std::vector<double> busy() const;
   /// error_rms at each check, with the sweeps done.
   struct Check {
     int iterations;
@@ -112,6 +118,8 @@ class Iteration {
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]
   std::vector<Check> history_;
   IterationResult result_;
+  std::vector<double> busy_;  ///< per chunk [s]; empty unless asked for
+  double imbalance_ = 0;
   ErrorSums total_;                          ///< of all subdomains, at the last check
   JumpSums jump_;                            ///< likewise
   std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
