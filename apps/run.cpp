@@ -17,6 +17,7 @@
 #include "io/recorder.hpp"
 #include "io/run_json.hpp"
 #include "io/scene.hpp"
+#include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -124,14 +125,13 @@ std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-std::string contents(const io::Scene& scene, const Bodies& bodies) {
-  return fmt::format("{}, {}, {}", counted(bodies.size(), "grain"), counted(scene.setup.walls.size(), "wall"),
+std::string contents(const io::Scene& scene, std::size_t grains) {
+  return fmt::format("{}, {}, {}", counted(grains, "grain"), counted(scene.setup.walls.size(), "wall"),
                      counted(scene.setup.stages.size(), "stage"));
 }
 
-void print_start(const io::Scene& scene, const Bodies& bodies, int threads,
-                 const graph::Communicator& ranks) {
-  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, bodies));
+void print_start(const io::Scene& scene, std::size_t grains, int threads, const graph::Communicator& ranks) {
+  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, grains));
   const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
   const int cores = omp_get_num_procs();
   fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n",
@@ -188,11 +188,11 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 }
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
-io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
+io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
                      io::Recorder* recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
-  summary.bodies = bodies.size();
+  summary.bodies = sample.size();
   summary.status = "done";
   Tally tally;
   const auto failed = [&summary](const std::exception& error) {
@@ -201,7 +201,8 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.exit_code = exit_failure;
   };
   graph::Executor executor({.threads = threads});
-  Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
+  Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
+                        ranks);
   std::optional<RecorderFeed> feed;
   if (recorder) feed.emplace(executor, *recorder);
   try {
@@ -289,7 +290,7 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
+int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
               const graph::Communicator& ranks) {
   const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
@@ -314,11 +315,11 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
     if (!refused) {
       recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
       io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
-      print_start(scene, bodies, threads, ranks);
+      print_start(scene, sample.size(), threads, ranks);
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder.get(), ranks);
+  const io::Summary summary = simulate(options, scene, std::move(sample), threads, recorder.get(), ranks);
   if (recorder) {
     recorder->finish(summary);
     print_end(summary, scene.setup.solver, directory);
@@ -336,7 +337,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
 
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
-  Bodies bodies;
+  Sample sample;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
@@ -345,13 +346,13 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     scene = io::load_scene(options.scene, options.overrides);
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
-      bodies = build_sample(scene);
-      io::place_walls(scene, bodies);
+      sample = build_sample(scene);
+      io::place_walls(scene, sample);
     }
     if (options.dry_run && ranks.rank() == 0) {
       fmt::print("{}", io::resolved_scene(scene));
       fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n",
-                 options.scene, contents(scene, bodies));
+                 options.scene, contents(scene, sample.size()));
     }
   } catch (const std::exception& error) {
     if (ranks.rank() == 0) fmt::print(stderr, "talus: error: {}\n", error.what());
@@ -364,7 +365,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(bodies), ranks);
+    return run_scene(options, scene, std::move(sample), ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

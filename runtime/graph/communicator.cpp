@@ -76,38 +76,32 @@ std::string Communicator::thread_level() const {
                                           : "single";
 }
 
-std::vector<std::vector<std::byte>> Communicator::exchange(std::vector<std::vector<std::byte>> to) const {
-  if (to.size() != static_cast<std::size_t>(ranks_))
-    throw std::invalid_argument("Communicator::exchange wants one part per rank");
-  if (ranks_ == 1) return to;
-  const auto n = static_cast<std::size_t>(ranks_);
-  std::vector<std::uint64_t> out_bytes(n), in_bytes(n);
-  for (std::size_t r = 0; r < n; ++r) out_bytes[r] = to[r].size();
+void Communicator::exchange(std::span<const std::span<const std::byte>> to,
+                            const std::function<std::byte*(std::size_t, std::size_t)>& room) const {
+  const auto n = static_cast<std::size_t>(ranks_), own = static_cast<std::size_t>(rank_);
+  if (to.size() != n) throw std::invalid_argument("Communicator::exchange wants one part per rank");
+  if (n == 1) return;
+  std::vector<std::uint64_t> out_bytes(n, 0), in_bytes(n);
+  for (std::size_t r = 0; r < n; ++r)
+    if (r != own) out_bytes[r] = to[r].size();
   check(MPI_Alltoall(out_bytes.data(), 1, MPI_UINT64_T, in_bytes.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD),
         "MPI_Alltoall");
   constexpr std::uint64_t limit = 0x7fffffff;
-  std::vector<std::vector<std::byte>> from(n);
   std::vector<MPI_Request> requests;
   for (std::size_t r = 0; r < n; ++r) {
     if (out_bytes[r] > limit || in_bytes[r] > limit)
       throw std::runtime_error("a message of more than 2 GiB between two ranks; use more ranks");
-    from[r].resize(in_bytes[r]);
-    if (static_cast<int>(r) == rank_) {
-      from[r] = std::move(to[r]);
-      continue;
-    }
     if (in_bytes[r] > 0)
-      check(MPI_Irecv(from[r].data(), static_cast<int>(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
+      check(MPI_Irecv(room(r, in_bytes[r]), static_cast<int>(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
                       MPI_COMM_WORLD, &requests.emplace_back()),
             "MPI_Irecv");
   }
   for (std::size_t r = 0; r < n; ++r)
-    if (static_cast<int>(r) != rank_ && out_bytes[r] > 0)
+    if (out_bytes[r] > 0)
       check(MPI_Isend(to[r].data(), static_cast<int>(out_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
                       MPI_COMM_WORLD, &requests.emplace_back()),
             "MPI_Isend");
   check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
-  return from;
 }
 
 void Communicator::sum(std::span<std::int64_t> values) const {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <span>
 #include <stdexcept>
@@ -55,8 +56,10 @@ class Communicator {
   int ranks_on_node() const noexcept { return ranks_on_node_; }
 
   // Collective: every rank calls, in the same order.
-  /// Sends to[r] to rank r and returns what each rank sent here.
-  std::vector<std::vector<std::byte>> exchange(std::vector<std::vector<std::byte>> to) const;
+  /// Sends to[r] to rank r. `room(r, bytes)` gives the place for what rank r sends here, and is not asked for
+  /// this rank itself, whose own part is nobody's message. One part per rank, each below 2 GiB.
+  void exchange(std::span<const std::span<const std::byte>> to,
+                const std::function<std::byte*(std::size_t, std::size_t)>& room) const;
   void sum(std::span<std::int64_t> values) const;
   void max(std::span<double> values) const;
   /// The parts of all ranks in order of rank.
@@ -68,9 +71,10 @@ class Communicator {
   /// wait for it.
   [[noreturn]] void abort(int code) const;
 
-  /// Records instead of bytes.
+  /// Sends to[r] to rank r and returns what each rank sent here. Nothing is copied on the way, and what is
+  /// for this rank is moved.
   template <class Record>
-  std::vector<std::vector<Record>> exchange_records(const std::vector<std::vector<Record>>& to) const;
+  std::vector<std::vector<Record>> exchange_records(std::vector<std::vector<Record>> to) const;
   template <class Record>
   std::vector<Record> gather_records(std::span<const Record> part) const;
 
@@ -107,20 +111,17 @@ class Communicator::Channel {
 };
 
 template <class Record>
-std::vector<std::vector<Record>> Communicator::exchange_records(
-    const std::vector<std::vector<Record>>& to) const {
+std::vector<std::vector<Record>> Communicator::exchange_records(std::vector<std::vector<Record>> to) const {
   static_assert(std::is_trivially_copyable_v<Record>);
-  std::vector<std::vector<std::byte>> bytes(to.size());
-  for (std::size_t r = 0; r < to.size(); ++r) {
-    bytes[r].resize(to[r].size() * sizeof(Record));
-    if (!to[r].empty()) std::memcpy(bytes[r].data(), to[r].data(), bytes[r].size());
-  }
-  bytes = exchange(std::move(bytes));
-  std::vector<std::vector<Record>> from(bytes.size());
-  for (std::size_t r = 0; r < from.size(); ++r) {
-    from[r].resize(bytes[r].size() / sizeof(Record));
-    if (!from[r].empty()) std::memcpy(from[r].data(), bytes[r].data(), bytes[r].size());
-  }
+  if (ranks_ == 1) return to;
+  std::vector<std::span<const std::byte>> bytes;
+  for (const auto& part : to) bytes.push_back(std::as_bytes(std::span(part)));
+  std::vector<std::vector<Record>> from(to.size());
+  exchange(bytes, [&](std::size_t r, std::size_t size) {
+    from[r].resize(size / sizeof(Record));
+    return reinterpret_cast<std::byte*>(from[r].data());
+  });
+  from[static_cast<std::size_t>(rank_)] = std::move(to[static_cast<std::size_t>(rank_)]);
   return from;
 }
 

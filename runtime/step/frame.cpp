@@ -77,7 +77,8 @@ std::vector<Row> on_rank_0(std::vector<Row> rows, const graph::Communicator& ran
   std::vector<std::vector<Row>> to(static_cast<std::size_t>(ranks.ranks()));
   to[0] = std::move(rows);
   std::vector<Row> all;
-  for (const auto& part : ranks.exchange_records(to)) all.insert(all.end(), part.begin(), part.end());
+  for (const auto& part : ranks.exchange_records(std::move(to)))
+    all.insert(all.end(), part.begin(), part.end());
   return all;
 }
 

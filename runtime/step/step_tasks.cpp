@@ -92,7 +92,10 @@ void StepGraph::make_cells() {
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
-  const Bodies& bodies = state_.bodies;
+  // What the last step found is in the impulses of the candidates; detection works in its room.
+  state_.contacts = {};
+  state_.chunks = {};
+  Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -141,8 +144,8 @@ void StepGraph::make_chunks() {
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
   if (several) {
-    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, fresh, glued, state_.bodies,
-                        state_.candidates);
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
+                        state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
   } else {
