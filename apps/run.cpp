@@ -7,7 +7,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <memory>
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
@@ -64,19 +63,27 @@ class FrameClock {
 };
 
 /// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go
-/// in batches, since a row is less work than handing it over.
+/// in batches, since a row is less work than handing it over. Frames of several ranks are written by all of
+/// them together, between two steps: messages of a background lane would need an order among those of the
+/// steps.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder)
-      : executor_(executor), recorder_(recorder) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks)
+      : executor_(executor), recorder_(recorder), ranks_(ranks) {}
 
   void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+    if (ranks_.rank() != 0) return;
     rows_.push_back({simulation.report(), simulation.walls(), triaxial});
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
   }
 
   void frame(Frame&& frame) {
     flush();
+    if (ranks_.ranks() > 1) {
+      executor_.drain();
+      recorder_.record_frame(std::move(frame));
+      return;
+    }
     executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
       recorder_.record_frame(std::move(moved));
     });
@@ -99,6 +106,7 @@ class RecorderFeed {
   };
   graph::Executor& executor_;
   io::Recorder& recorder_;
+  const graph::Communicator& ranks_;
   std::vector<Row> rows_;
   Stopwatch since_;
 };
@@ -156,22 +164,19 @@ int signal_of(const graph::Communicator& ranks) {
   return static_cast<int>(signal[0]);
 }
 
-/// Runs the steps; returns the signal that stopped them, or 0. `feed` and `progress` on rank 0 only.
+/// Runs the steps; returns the signal that stopped them, or 0.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-            RecorderFeed* feed, Tally& tally, const graph::Communicator& ranks) {
+            RecorderFeed& feed, Tally& tally, const graph::Communicator& ranks) {
   std::optional<io::Progress> progress;
-  if (feed) progress.emplace(io::progress_on_stderr());
+  if (ranks.rank() == 0) progress.emplace(io::progress_on_stderr());
   FrameClock clock(output);
-  const auto write_frame = [&] {
-    Frame frame = simulation.frame(output.contacts);
-    if (feed) feed->frame(std::move(frame));
-  };
+  const auto write_frame = [&] { feed.frame(simulation.frame(output.contacts)); };
   if (output.stage_frames) write_frame();
   while (!simulation.finished()) {
     const StepReport& report = simulation.step();
     tally.add(simulation);
     const std::optional<TriaxialReport> triaxial = simulation.triaxial();
-    if (feed) feed->row(simulation, triaxial);
+    feed.row(simulation, triaxial);
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
@@ -189,7 +194,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     io::Recorder* recorder, const graph::Communicator& ranks) {
+                     io::Recorder& recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = sample.size();
@@ -203,11 +208,9 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   graph::Executor executor({.threads = threads});
   Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
                         ranks);
-  std::optional<RecorderFeed> feed;
-  if (recorder) feed.emplace(executor, *recorder);
+  RecorderFeed feed(executor, recorder, ranks);
   try {
-    if (const int signal = advance(simulation, options, scene.output, feed ? &*feed : nullptr, tally, ranks);
-        signal != 0) {
+    if (const int signal = advance(simulation, options, scene.output, feed, tally, ranks); signal != 0) {
       summary.status = "stopped";
       summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
       summary.exit_code = exit_failure;
@@ -216,7 +219,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     failed(error);
   }
   try {
-    if (feed) feed->flush();
+    feed.flush();
     executor.drain();
   } catch (const std::exception& error) {
     failed(error);
@@ -303,7 +306,6 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  std::unique_ptr<io::Recorder> recorder;
   bool refused = false;
   if (ranks.rank() == 0) {
     try {
@@ -313,15 +315,15 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
       refused = true;
     }
     if (!refused) {
-      recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
       io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
       print_start(scene, sample.size(), threads, ranks);
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  const io::Summary summary = simulate(options, scene, std::move(sample), threads, recorder.get(), ranks);
-  if (recorder) {
-    recorder->finish(summary);
+  io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
+  const io::Summary summary = simulate(options, scene, std::move(sample), threads, recorder, ranks);
+  recorder.finish(summary);
+  if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
   } else if (summary.status == "failed") {
     fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);

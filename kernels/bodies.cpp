@@ -9,6 +9,7 @@
 #include <string>
 
 #include "kernels/morton.hpp"
+#include "kernels/permute.hpp"
 
 namespace talus {
 
@@ -56,16 +57,6 @@ KineticEnergy kinetic_energy(std::span<const Velocity> velocity) {
   }
   return energy;
 }
-
-namespace {
-template <class T>
-void permute(std::vector<T>& values, std::span<const Slot> order) {
-  if (values.empty()) return;
-  std::vector<T> moved(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) moved[k] = values[static_cast<std::size_t>(order[k])];
-  values.swap(moved);
-}
-}  // namespace
 
 void reorder(Bodies& bodies, std::span<const Slot> order) {
   permute(bodies.id, order);

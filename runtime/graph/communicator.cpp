@@ -5,6 +5,7 @@
 #define MPICH_SKIP_MPICXX
 #include <mpi.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <utility>
@@ -63,6 +64,11 @@ Communicator::Communicator(const MpiSession& session, CommunicatorOptions option
 }
 
 Communicator::~Communicator() = default;
+
+const Communicator& one_rank() {
+  static const Communicator alone;
+  return alone;
+}
 
 std::string Communicator::thread_level() const {
   int started = 0;
@@ -130,6 +136,35 @@ std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) con
                        MPI_COMM_WORLD),
         "MPI_Allgatherv");
   return all;
+}
+
+void Communicator::to_first(std::span<const std::byte> part, std::size_t piece,
+                            const std::function<void(std::span<const std::byte>)>& take) const {
+  const auto in_pieces = [piece](std::size_t bytes, const auto& work) {
+    for (std::size_t begin = 0; begin < bytes; begin += piece) work(begin, std::min(piece, bytes - begin));
+  };
+  if (rank_ != 0) {
+    const std::uint64_t bytes = part.size();
+    check(MPI_Send(&bytes, 1, MPI_UINT64_T, 0, 0, MPI_COMM_WORLD), "MPI_Send");
+    in_pieces(part.size(), [&](std::size_t begin, std::size_t size) {
+      check(MPI_Send(part.data() + begin, static_cast<int>(size), MPI_BYTE, 0, 0, MPI_COMM_WORLD),
+            "MPI_Send");
+    });
+    return;
+  }
+  in_pieces(part.size(), [&](std::size_t begin, std::size_t size) { take(part.subspan(begin, size)); });
+  std::vector<std::byte> received;
+  for (int rank = 1; rank < ranks_; ++rank) {
+    std::uint64_t bytes = 0;
+    check(MPI_Recv(&bytes, 1, MPI_UINT64_T, rank, 0, MPI_COMM_WORLD, MPI_STATUS_IGNORE), "MPI_Recv");
+    in_pieces(bytes, [&](std::size_t, std::size_t size) {
+      received.resize(size);
+      check(MPI_Recv(received.data(), static_cast<int>(size), MPI_BYTE, rank, 0, MPI_COMM_WORLD,
+                     MPI_STATUS_IGNORE),
+            "MPI_Recv");
+      take(received);
+    });
+  }
 }
 
 void Communicator::progress() const {

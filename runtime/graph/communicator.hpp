@@ -3,6 +3,7 @@
 /// Ranks as the rest of the program sees them: collective calls for what happens once a step or more rarely,
 /// and channels for what travels every iteration. With one rank nothing is sent and MPI is not called.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -64,6 +65,10 @@ class Communicator {
   void max(std::span<double> values) const;
   /// The parts of all ranks in order of rank.
   std::vector<std::byte> gather(std::span<const std::byte> part) const;
+  /// The parts of all ranks in order of rank go to rank 0, whose `take` gets them in pieces of at most
+  /// `piece` > 0 bytes, of one rank each; the others' is not called.
+  void to_first(std::span<const std::byte> part, std::size_t piece,
+                const std::function<void(std::span<const std::byte>)>& take) const;
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   void progress() const;
@@ -77,6 +82,9 @@ class Communicator {
   std::vector<std::vector<Record>> exchange_records(std::vector<std::vector<Record>> to) const;
   template <class Record>
   std::vector<Record> gather_records(std::span<const Record> part) const;
+  /// Pieces of about 256 kB.
+  template <class Record, class Take>
+  void records_to_first(std::span<const Record> part, const Take& take) const;
 
   // Channels. Of one rank: used by one thread at a time.
   /// A message of fixed length that is sent again and again (MPI's persistent requests).
@@ -91,6 +99,9 @@ class Communicator {
   bool any_thread_ = true;
   CommunicatorOptions options_;
 };
+
+/// For programs of one rank: no MPI call is ever made through it.
+const Communicator& one_rank();
 
 /// See Communicator::open_send. A sender calls `start` when its buffer is full, and `done` until true before
 /// it fills it again; a receiver calls `start` when its buffer may be overwritten, then `done` until true.
@@ -133,6 +144,18 @@ std::vector<Record> Communicator::gather_records(std::span<const Record> part) c
   std::vector<Record> all(bytes.size() / sizeof(Record));
   if (!all.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
   return all;
+}
+
+template <class Record, class Take>
+void Communicator::records_to_first(std::span<const Record> part, const Take& take) const {
+  static_assert(std::is_trivially_copyable_v<Record>);
+  constexpr std::size_t records = std::max<std::size_t>(1, (std::size_t{1} << 18) / sizeof(Record));
+  std::vector<Record> aligned;
+  to_first(std::as_bytes(part), records * sizeof(Record), [&](std::span<const std::byte> bytes) {
+    aligned.resize(bytes.size() / sizeof(Record));
+    std::memcpy(aligned.data(), bytes.data(), bytes.size());
+    take(std::span<const Record>(aligned));
+  });
 }
 
 }  // namespace talus::graph

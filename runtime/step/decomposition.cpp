@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "kernels/morton.hpp"
+#include "kernels/release.hpp"
 #include "partition/halo.hpp"
 
 namespace talus {
@@ -122,7 +123,7 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
   }
   for (auto& part : ranks.exchange_records(std::move(to))) {
     gathered.come.insert(gathered.come.end(), part.begin(), part.end());
-    part = {};
+    release(part);
   }
   return gathered;
 }
@@ -229,19 +230,19 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
   take(
       around.bodies.radius, [&](std::size_t s) { return bodies.radius[s]; },
       [](const BodyRecord& record) { return record.radius; });
-  bodies.radius = {};
+  release(bodies.radius);
   take(
       around.bodies.velocity, [&](std::size_t s) { return whole_velocity(decomposition, bodies, s); },
       velocity_of);
-  bodies.velocity = {};
+  release(bodies.velocity);
   if (decomposition.orientation)
     take(
         around.bodies.orientation, [&](std::size_t s) { return bodies.orientation[s]; }, orientation_of);
-  bodies.orientation = {};
+  release(bodies.orientation);
   take(
       around.reach, [&](std::size_t s) { return reach[s]; },
       [](const BodyRecord& record) { return record.reach; });
-  order = {};
+  release(order);
   gathered = {};
   around.by_id.reserve(count);
   for (std::size_t k = 0; k < count; ++k)

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "kernels/release.hpp"
 #include "runtime/step/decomposition.hpp"
 
 namespace talus {
@@ -155,7 +156,7 @@ Bodies make_copies(Decomposition& decomposition, bool split, Bodies& around) {
     to.reserve(decomposition.slot_begin.back());
     for (const SubdomainInterface& interface : decomposition.interfaces)
       for (Slot body : interface.bodies) to.push_back(from[at(body)]);
-    from = {};
+    release(from);
   };
   copy(around.id, copies.id);
   copy(around.x, copies.x);
@@ -184,7 +185,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   const std::size_t grains = found.grain_pairs.size();
   match_impulses(collect_impulses(decomposition, ranks, around, bodies, std::move(candidates)), found);
   candidates = {};
-  bodies.x = {};
+  release(bodies.x);
 
   std::vector<std::int64_t> load(at(partition.subdomains), 0);
   std::vector<Key> keys;
@@ -237,7 +238,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
     ++groups.back().end;
   }
-  keys = {};
+  release(keys);
   found = {};
 
   Bodies copies = make_copies(decomposition, settings.coupling == Coupling::nscdd, around.bodies);

@@ -38,11 +38,6 @@ std::string describe(const Bodies& bodies, Slot slot) {
       v.w[0], v.w[1], v.w[2]);
 }
 
-const graph::Communicator& one_rank() {
-  static const graph::Communicator alone;
-  return alone;
-}
-
 }  // namespace
 
 struct Simulation::Implementation {
@@ -322,7 +317,7 @@ Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
 }
 
 Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
-    : Simulation(std::move(setup), std::move(bodies), executor, one_rank()) {}
+    : Simulation(std::move(setup), std::move(bodies), executor, graph::one_rank()) {}
 
 Simulation::~Simulation() = default;
 
@@ -438,8 +433,8 @@ Frame Simulation::frame(bool contacts) const {
   frame.step = impl_->report.step;
   frame.time = impl_->report.time;
   frame.stage = stage().name;
-  gather_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
-               impl_->parameters.time_step, frame);
+  fill_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
+             impl_->parameters.time_step, frame);
   frame.walls = walls();
   return frame;
 }

@@ -75,7 +75,7 @@ class Simulation {
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them
-  /// out. Collective; whole on rank 0, where the others' are empty.
+  /// out. Collective; each rank gets its part (frame.hpp).
   Frame frame(bool contacts = true) const;
 
   /// talus::digest of all bodies. Collective.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/release.hpp"
 #include "runtime/step/step_graph.hpp"
 
 namespace talus {
@@ -137,7 +138,7 @@ void StepGraph::make_chunks() {
   Candidates fresh;
   fresh.components = parameters_.friction ? 3 : 1;
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
-  for (auto& part : pairs_) part = {};
+  for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
                                      several ? around_.reach : state_.reach_then, wall_margin_);
   std::vector<char> glued;
