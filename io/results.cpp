@@ -42,8 +42,6 @@ Hdf5Object file_access(const std::string& file, bool together) {
 #ifdef H5_HAVE_PARALLEL
   if (together) {
     demand(H5Pset_fapl_mpio(access.id(), MPI_COMM_WORLD, MPI_INFO_NULL), file, "preparing HDF5 for MPI");
-    cache.dirty_bytes_threshold = std::size_t{64}
-                                  << 20;  // the most there is: ranks flush when the file is closed
   }
 #else
   if (together) throw FileError(file, "cannot be written by several ranks: this HDF5 is built without MPI");
