@@ -87,6 +87,9 @@ struct Simulation::Implementation {
     StepState state;
     state.decomposition = make_decomposition(setup.decomposition, ranks);
     state.bodies = std::move(bodies);
+    // Until the first step deals them out, the first subdomain moves them all.
+    std::fill(state.decomposition.slot_begin.begin() + 1, state.decomposition.slot_begin.end(),
+              state.bodies.size());
     reorder(state.bodies, morton_order(state.bodies));
     if (!setup.rotation)
       for (Velocity& v : state.bodies.velocity) {
