@@ -45,7 +45,8 @@ TEST_F(Ranks, MayHaveAnySubdomainsOfAllCouplings) {
           "decomposition.exchange={}",
           coupling, exchange);
       ASSERT_EQ(run(1, keys + " --out one").code, 3);
-      for (int ranks : {2, 3, 4}) {
+      // All of them once; with three ranks, neighbours in number are never neighbours on a rank.
+      for (int ranks : coupling + exchange == "nscddccs" ? std::vector{2, 3, 4} : std::vector{3}) {
         const Outcome dealt = run(ranks, keys + " --out dealt --set decomposition.mapping=cyclic");
         ASSERT_EQ(dealt.code, 3) << dealt.messages;
         EXPECT_EQ(digest_of("dealt"), digest_of("one")) << coupling << " " << exchange << ", " << ranks;
