@@ -115,6 +115,7 @@ struct Count {
 };
 
 Count solve(Setup setup, const Bodies& bodies, int max_iterations) {
+  setup.solver.method = SolverMethod::nlgs;
   setup.solver.max_iterations = max_iterations;
   setup.solver.balance_tolerance = 1e9;  // sweeps to an error are what other codes report
   graph::Executor executor({.threads = 1});

@@ -84,6 +84,7 @@ int main(int argc, char** argv) {
   if (ranks.rank() != 0) bodies = {};
   Setup setup = scene.setup;
   setup.stages.resize(1);
+  setup.solver.method = SolverMethod::nlgs;
   const int sweeps = argc > 3 ? std::atoi(argv[3]) : 200;
   const int only = argc > 4 ? std::atoi(argv[4]) : 0;
   if (sweeps > 0) {
