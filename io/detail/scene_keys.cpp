@@ -371,6 +371,10 @@ Section<DecompositionSettings> decomposition_keys() {
           choice<D>("exchange", {"dcs", "ccs"},
                     "`dcs`: between the subdomains that share a body; `ccs`: through one rank.",
                     &D::exchange),
+          choice<D>("mapping", {"block", "cyclic"},
+                    "Subdomains on ranks, `block`: consecutive ones share a rank; `cyclic`: dealt out one by "
+                    "one. No result depends on it.",
+                    &D::mapping),
           key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
                  &D::sweeps_per_exchange),
           choice<D>(
