@@ -68,40 +68,43 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
   }
 }
 
-constexpr int batch_width = 8;
-constexpr int batches_at_most = 64;
+constexpr int group_size = 16;
+constexpr int groups_open = 64;
 
-/// Deals the contacts to batches of 8 without a common grain, first fit, with one bit per batch and grain;
-/// what fits in none of 64 batches (a large grain among small ones) follows in its own order. Returns places
-/// in `found`.
-void order_in_batches(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found,
-                      std::vector<std::int32_t>& order) {
+/// Deals the contacts to groups of 16 without a common grain, first fit, with one bit per group and grain;
+/// what fits in none of 64 open groups (a large grain among small ones) follows, each a group of its own.
+/// `order` gets places in `found`, `sizes` those of the groups.
+void order_in_groups(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found,
+                     std::vector<std::int32_t>& order, std::uint8_t* sizes) {
   const auto bodies = static_cast<std::size_t>(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
   const bool wall = chunks.wall[chunk] >= 0;
-  std::vector<std::uint64_t> in_batch(bodies, 0);
-  std::array<std::array<std::int32_t, batch_width>, batches_at_most> batch;
-  std::array<int, batches_at_most> filled{};
+  std::vector<std::uint64_t> in_group(bodies, 0);
+  std::array<std::array<std::int32_t, group_size>, groups_open> group;
+  std::array<int, groups_open> filled{};
   std::uint64_t open = ~std::uint64_t{0};
   std::vector<std::int32_t> late;
   for (std::size_t f = 0; f < found.size(); ++f) {
     const auto k = static_cast<std::size_t>(found[f].candidate);
-    std::uint64_t& mask_i = in_batch[chunks.local[2 * k]];
-    std::uint64_t& mask_j = in_batch[wall ? chunks.local[2 * k] : chunks.local[2 * k + 1]];
+    std::uint64_t& mask_i = in_group[chunks.local[2 * k]];
+    std::uint64_t& mask_j = in_group[wall ? chunks.local[2 * k] : chunks.local[2 * k + 1]];
     const std::uint64_t room = open & ~(mask_i | mask_j);
     if (room == 0) {
       late.push_back(static_cast<std::int32_t>(f));
       continue;
     }
-    const auto b = static_cast<std::size_t>(std::countr_zero(room));
-    const std::uint64_t bit = std::uint64_t{1} << b;
+    const auto g = static_cast<std::size_t>(std::countr_zero(room));
+    const std::uint64_t bit = std::uint64_t{1} << g;
     mask_i |= bit;
     mask_j |= bit;
-    batch[b][static_cast<std::size_t>(filled[b]++)] = static_cast<std::int32_t>(f);
-    if (filled[b] == batch_width) open &= ~bit;
+    group[g][static_cast<std::size_t>(filled[g]++)] = static_cast<std::int32_t>(f);
+    if (filled[g] == group_size) open &= ~bit;
   }
-  for (std::size_t b = 0; b < batches_at_most; ++b)
-    order.insert(order.end(), batch[b].begin(), batch[b].begin() + filled[b]);
+  for (std::size_t g = 0; g < groups_open && filled[g] > 0; ++g) {
+    order.insert(order.end(), group[g].begin(), group[g].begin() + filled[g]);
+    *sizes++ = static_cast<std::uint8_t>(filled[g]);
+  }
   order.insert(order.end(), late.begin(), late.end());
+  std::fill_n(sizes, late.size(), std::uint8_t{1});
 }
 
 }  // namespace
@@ -117,6 +120,7 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
   contacts.candidate.resize(n);
+  contacts.group.resize(n);
   contacts.count.assign(chunks.size(), 0);
 }
 
@@ -127,7 +131,8 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
   find_contacts(in, candidates, chunks, chunk, found);
   std::vector<std::int32_t> order;
   order.reserve(found.size());
-  order_in_batches(chunks, chunk, found, order);
+  order_in_groups(chunks, chunk, found, order,
+                  contacts.group.data() + static_cast<std::size_t>(chunks.begin[chunk]));
 
   const std::size_t grains = candidates.grain_pairs.size();
   const bool friction = candidates.components == 3;
@@ -204,9 +209,11 @@ std::size_t memory_used(const Contacts& contacts) {
   for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
                              &contacts.ry, &contacts.rz, &contacts.rn})
     bytes += values->capacity() * sizeof(double);
-  return bytes + (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
-                  contacts.count.capacity()) *
-                     4;
+  return bytes +
+         (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
+          contacts.count.capacity()) *
+             4 +
+         contacts.group.capacity();
 }
 
 }  // namespace talus

@@ -1,0 +1,143 @@
+#pragma once
+
+/// The error of kernels/sweep.hpp on W = 4 or 8 contacts at a time. It reads only, so that any contacts may
+/// stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever W is.
+
+#include "kernels/detail/sweep_lanes.hpp"
+
+namespace talus {
+namespace {
+
+template <class V>
+struct ErrorLanes {
+  V residual2{}, residual_max{}, impulse2{}, velocity2{};
+  Space<V> wall_impulse{};
+  V active{};
+};
+
+/// Projection of z on the Coulomb cone about n.
+template <class V>
+[[gnu::always_inline]] inline Space<V> project_on_cone(const Space<V>& z, const Space<V>& n, double mu) {
+  const V z_n = dot(z, n);
+  const Space<V> t = z - z_n * n;
+  const V length = root(dot(t, t));
+  const V r_n = (z_n + mu * length) * (1 / (1 + mu * mu));
+  const Space<V> edge = r_n * n + (mu * r_n / length) * t;
+  const auto apex = mu * length <= -z_n, inside = length <= mu * z_n;
+  const auto choose = [&](V on_edge, V own) { return apex ? V{} : inside ? own : on_edge; };
+  return {choose(edge.x, z.x), choose(edge.y, z.y), choose(edge.z, z.z)};
+}
+
+template <bool Friction, class V>
+[[gnu::always_inline]] inline void add_error(const Slice& c, const Space<V>& n, const Space<V>& v, V w_nn,
+                                             double mu, ErrorLanes<V>& sums) {
+  const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias);
+  V e, r_n, carried;
+  if constexpr (Friction) {
+    const Space<V> r = load_impulse<true, V>(c, 0, n);
+    const Space<V> v_t = v - v_0 * n;
+    const V v_t2 = dot(v_t, v_t);
+    const Space<V> v_hat = v_t + (v_n + mu * root(v_t2)) * n;
+    const Space<V> miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
+    e = w_nn * root(dot(miss, miss));
+    r_n = dot(r, n);
+    sums.impulse2 += dot(r, r) * (w_nn * w_nn);
+    carried = v_t2 + v_n * v_n;
+  } else {
+    r_n = load<V>(c.rn);
+    const V next = r_n - v_n / w_nn;
+    e = w_nn * absolute(r_n - 0.5 * (next + absolute(next)));
+    sums.impulse2 += r_n * r_n * (w_nn * w_nn);
+    carried = v_n * v_n;
+  }
+  sums.velocity2 += (r_n > 0) | (v_n < 0) ? carried : V{};
+  sums.residual2 += e * e;
+  sums.residual_max = sums.residual_max < e ? e : sums.residual_max;
+  sums.active += r_n > 0 ? V{} + 1.0 : V{};
+}
+
+/// 1/M of the bodies whose copies these are, by which the error counts.
+template <class V>
+[[gnu::always_inline]] inline V whole(const double* const* a, const std::int32_t* slot, std::size_t count,
+                                      const std::uint16_t* multiplicity) {
+  V inv_mass = V{} + 1.0;
+  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / multiplicity[slot[l]];
+  return inv_mass;
+}
+
+/// Adds up lanes in order; those of `sums` follow one another.
+template <int W>
+ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
+  ErrorTotals total{};
+  double active = 0;
+  for (const ErrorLanes<Lanes<W>>& part : sums)
+    for (int l = 0; l < W; ++l) {
+      total.residual2 += part.residual2[l];
+      total.residual_max =
+          total.residual_max < part.residual_max[l] ? part.residual_max[l] : total.residual_max;
+      total.impulse2 += part.impulse2[l];
+      total.velocity2 += part.velocity2[l];
+      total.wall_impulse[0] += part.wall_impulse.x[l];
+      total.wall_impulse[1] += part.wall_impulse.y[l];
+      total.wall_impulse[2] += part.wall_impulse.z[l];
+      active += part.active[l];
+    }
+  total.active = static_cast<std::int64_t>(active);
+  return total;
+}
+
+/// `wall` is null between grains.
+template <bool Friction, bool AtWall, int W>
+[[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
+                                                   const double* wall, double wall_inv_mass,
+                                                   const std::uint16_t* multiplicity) {
+  using V = Lanes<W>;
+  const ContactView c = view;
+  ErrorLanes<V> sums[8 / W];
+  std::size_t part = 0;
+  // Parts of a group hold addresses to write to; nothing is written here.
+  double* own_bodies = const_cast<double*>(bodies);
+  for (std::size_t k = c.begin; k < c.end; k += W, part = (part + 1) % (8 / W)) {
+    const std::size_t count = minimum(c.end - k, W);
+    Part<Friction, W> rest(c, k, count < W ? count : 0, own_bodies, !AtWall);
+    if (count == W) {
+      find_bodies<W>(own_bodies, c.first + k, rest.a);
+      if constexpr (!AtWall) find_bodies<W>(own_bodies, c.second + k, rest.b);
+    }
+    // A lane without a contact sees no motion, and so no error.
+    if constexpr (AtWall) __builtin_memcpy(rest.padded.grain, wall, 3 * sizeof(double));
+    const Slice own = count == W ? slice(c, k) : rest.padded.slice();
+    const Space<V> n = load_normal<V>(own, 0);
+    Meeting<V> m = gather<Friction, !AtWall>(rest.a, rest.b, V{});
+    if (multiplicity) {
+      m.w_nn = whole<V>(rest.a, c.first + k, count, multiplicity);
+      if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(rest.b, c.second + k, count, multiplicity);
+    }
+    if constexpr (AtWall) {
+      m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
+      m.w_nn = m.w_nn + wall_inv_mass;
+      sums[part].wall_impulse = sums[part].wall_impulse + load_impulse<Friction, V>(own, 0, n);
+    }
+    add_error<Friction>(own, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums[part]);
+  }
+  return add_lanes<W>(sums);
+}
+
+template <bool Friction, int W>
+ErrorTotals error_grains(const ContactView& c, const double* bodies, double mu,
+                         const std::uint16_t* multiplicity) {
+  return error_of<Friction, false, W>(c, bodies, mu, nullptr, 0, multiplicity);
+}
+template <bool Friction, int W>
+ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, const double* wall,
+                       double wall_inv_mass, const std::uint16_t* multiplicity) {
+  return error_of<Friction, true, W>(c, bodies, mu, wall, wall_inv_mass, multiplicity);
+}
+
+template <bool Friction, int W>
+constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,      sweep_wall<Friction, W>,
+                                          accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,
+                                          error_grains<Friction, W>,      error_wall<Friction, W>};
+
+}  // namespace
+}  // namespace talus

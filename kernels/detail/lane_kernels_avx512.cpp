@@ -1,0 +1,12 @@
+/// Compiled for AVX-512 F, DQ and VL (kernels/CMakeLists.txt): includes nothing with inline functions of
+/// external linkage.
+
+#include "kernels/detail/error_lanes.hpp"
+
+namespace talus {
+
+LaneKernelPair lane_kernels_avx512() {
+  return {kernels_of_lanes<true, 8>, kernels_of_lanes<false, 8>};
+}
+
+}  // namespace talus
