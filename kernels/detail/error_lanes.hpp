@@ -86,39 +86,50 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
   return total;
 }
 
+/// Adds up the error of `count` <= W contacts from k on, whose arrays are `own` and whose bodies are a, b.
+template <bool Friction, bool AtWall, int W>
+[[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
+                                               const Slice& own, double* const* a, double* const* b,
+                                               double mu, const double* wall, double wall_inv_mass,
+                                               const std::uint16_t* multiplicity,
+                                               ErrorLanes<Lanes<W>>& sums) {
+  using V = Lanes<W>;
+  const Space<V> n = load_normal<V>(own, 0);
+  Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
+  if (multiplicity) {
+    m.w_nn = whole<V>(a, c.first + k, count, multiplicity);
+    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second + k, count, multiplicity);
+  }
+  if constexpr (AtWall) {
+    m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
+    m.w_nn = m.w_nn + wall_inv_mass;
+    sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(own, 0, n);
+  }
+  add_error<Friction>(own, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums);
+}
+
 /// `wall` is null between grains.
 template <bool Friction, bool AtWall, int W>
 [[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
                                                    const double* wall, double wall_inv_mass,
                                                    const std::uint16_t* multiplicity) {
-  using V = Lanes<W>;
   const ContactView c = view;
-  ErrorLanes<V> sums[8 / W];
-  std::size_t part = 0;
-  // Parts of a group hold addresses to write to; nothing is written here.
-  double* own_bodies = const_cast<double*>(bodies);
-  for (std::size_t k = c.begin; k < c.end; k += W, part = (part + 1) % (8 / W)) {
-    const std::size_t count = minimum(c.end - k, W);
-    Part<Friction, W> rest(c, k, count < W ? count : 0, own_bodies, !AtWall);
-    if (count == W) {
-      find_bodies<W>(own_bodies, c.first + k, rest.a);
-      if constexpr (!AtWall) find_bodies<W>(own_bodies, c.second + k, rest.b);
-    }
+  ErrorLanes<Lanes<W>> sums[8 / W];
+  double* records = const_cast<double*>(bodies);  // addresses are those that a sweep would write to
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
+    double *a[W], *b[W];
+    find_bodies<W>(records, c.first + k, a);
+    if constexpr (!AtWall) find_bodies<W>(records, c.second + k, b);
+    error_block<Friction, AtWall, W>(c, k, W, slice(c, k), a, b, mu, wall, wall_inv_mass, multiplicity,
+                                     sums[lanes]);
+  }
+  if (k < c.end) {
+    Part<Friction, W> part(c, k, c.end - k, records, !AtWall);
     // A lane without a contact sees no motion, and so no error.
-    if constexpr (AtWall) __builtin_memcpy(rest.padded.grain, wall, 3 * sizeof(double));
-    const Slice own = count == W ? slice(c, k) : rest.padded.slice();
-    const Space<V> n = load_normal<V>(own, 0);
-    Meeting<V> m = gather<Friction, !AtWall>(rest.a, rest.b, V{});
-    if (multiplicity) {
-      m.w_nn = whole<V>(rest.a, c.first + k, count, multiplicity);
-      if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(rest.b, c.second + k, count, multiplicity);
-    }
-    if constexpr (AtWall) {
-      m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
-      m.w_nn = m.w_nn + wall_inv_mass;
-      sums[part].wall_impulse = sums[part].wall_impulse + load_impulse<Friction, V>(own, 0, n);
-    }
-    add_error<Friction>(own, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums[part]);
+    if constexpr (AtWall) __builtin_memcpy(part.grain, wall, 3 * sizeof(double));
+    error_block<Friction, AtWall, W>(c, k, c.end - k, part.slice(), part.a, part.b, mu, wall, wall_inv_mass,
+                                     multiplicity, sums[lanes]);
   }
   return add_lanes<W>(sums);
 }

@@ -232,46 +232,6 @@ template <bool Friction, int W, int Blocks>
     scatter<Friction, true>(a + W * k, b + W * k, load_normal<V>(c, static_cast<std::size_t>(W * k)), dr[k]);
 }
 
-/// A copy of a group that is not full. The lanes behind its contacts have n = r = 0 and a grain of mass 1 at
-/// rest, so that nothing happens there.
-struct Padded {
-  double nx[group_size]{}, ny[group_size]{}, nz[group_size]{}, bias[group_size]{};
-  double rx[group_size]{}, ry[group_size]{}, rz[group_size]{}, rn[group_size]{};
-  double grain[record]{0, 0, 0, 1, 0, 0, 0, 0};
-
-  Slice slice() { return {nx, ny, nz, bias, rx, ry, rz, rn}; }
-};
-
-template <bool Friction>
-inline void copy_in(const ContactView& c, std::size_t k, std::size_t count, Padded& padded) {
-  for (std::size_t l = 0; l < count; ++l) {
-    padded.nx[l] = c.nx[k + l];
-    padded.ny[l] = c.ny[k + l];
-    padded.nz[l] = c.nz[k + l];
-    padded.bias[l] = c.bias[k + l];
-    if constexpr (Friction) {
-      padded.rx[l] = c.rx[k + l];
-      padded.ry[l] = c.ry[k + l];
-      padded.rz[l] = c.rz[k + l];
-    } else {
-      padded.rn[l] = c.rn[k + l];
-    }
-  }
-}
-
-template <bool Friction>
-inline void copy_out(const Padded& padded, std::size_t k, std::size_t count, const ContactView& c) {
-  for (std::size_t l = 0; l < count; ++l) {
-    if constexpr (Friction) {
-      c.rx[k + l] = padded.rx[l];
-      c.ry[k + l] = padded.ry[l];
-      c.rz[k + l] = padded.rz[l];
-    } else {
-      c.rn[k + l] = padded.rn[l];
-    }
-  }
-}
-
 /// Blocks of W contacts that go through the phases together: more would not stay in registers.
 constexpr int blocks_at_once = 2;
 
@@ -314,71 +274,102 @@ template <int Count>
   }
 }
 
-/// Contacts [k, k + count) of a group that is not full, 0 < count <= Width.
-template <bool Friction, int Width>
+/// A copy of contacts [k, k + count), count < W. The lanes behind them have n = r = bias = 0 and a grain of
+/// mass 1 at rest, so that nothing happens there.
+template <bool Friction, int W>
 struct Part {
-  const ContactView& c;
-  std::size_t k, count;
-  Padded padded;
-  double *a[Width], *b[Width];
+  double nx[W], ny[W], nz[W], bias[W], rx[W], ry[W], rz[W], rn[W];
+  double grain[record] = {0, 0, 0, 1, 0, 0, 0, 0};
+  double *a[W], *b[W];
 
-  Part(const ContactView& view, std::size_t from, std::size_t contacts, double* bodies, bool pairs)
-      : c(view), k(from), count(contacts) {
-    copy_in<Friction>(c, k, count, padded);
-    for (std::size_t l = 0; l < Width; ++l) {
-      a[l] = l < count ? body(bodies, c.first[k + l]) : padded.grain;
-      if (pairs) b[l] = l < count ? body(bodies, c.second[k + l]) : padded.grain;
+  [[gnu::always_inline]] Part(const ContactView& c, std::size_t k, std::size_t count, double* bodies,
+                              bool pairs) {
+    for (std::size_t l = 0; l < W; ++l) {
+      const bool real = l < count;
+      const std::size_t from = real ? k + l : k;
+      nx[l] = real ? c.nx[from] : 0;
+      ny[l] = real ? c.ny[from] : 0;
+      nz[l] = real ? c.nz[from] : 0;
+      bias[l] = real ? c.bias[from] : 0;
+      if constexpr (Friction) {
+        rx[l] = real ? c.rx[from] : 0;
+        ry[l] = real ? c.ry[from] : 0;
+        rz[l] = real ? c.rz[from] : 0;
+      } else {
+        rn[l] = real ? c.rn[from] : 0;
+      }
+      a[l] = real ? body(bodies, c.first[from]) : grain;
+      if (pairs) b[l] = real ? body(bodies, c.second[from]) : grain;
+    }
+  }
+
+  [[gnu::always_inline]] Slice slice() { return {nx, ny, nz, bias, rx, ry, rz, rn}; }
+
+  [[gnu::always_inline]] void copy_out(const ContactView& c, std::size_t k, std::size_t count) const {
+    for (std::size_t l = 0; l < count; ++l) {
+      if constexpr (Friction) {
+        c.rx[k + l] = rx[l];
+        c.ry[k + l] = ry[l];
+        c.rz[k + l] = rz[l];
+      } else {
+        c.rn[k + l] = rn[l];
+      }
     }
   }
 };
 
 template <bool Friction, int W>
 void sweep_grains(const ContactView& view, double* bodies, double mu) {
-  constexpr int at_once = W * blocks_at_once;
+  constexpr std::size_t at_once = W * blocks_at_once;
   const ContactView c = view;  // a local one, so that no store can change it
   const std::uint8_t* group = c.group;
-  for (std::size_t k = c.begin; k < c.end; k += *group++) {
-    if (*group < group_size) {
-      for (std::size_t l = 0; l < *group; l += W) {
-        Part<Friction, W> part(c, k + l, minimum(*group - l, W), bodies, true);
-        sweep_block<Friction, W, 1>(part.padded.slice(), part.a, part.b, mu);
-        copy_out<Friction>(part.padded, k + l, part.count, c);
-      }
-      continue;
-    }
+  for (std::size_t k = c.begin; k < c.end; ++group) {
+    const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
-    for (std::size_t from = k; from < k + group_size; from += at_once) {
+    for (; k + at_once <= end; k += at_once) {
       double *a[at_once], *b[at_once];
-      find_bodies<at_once>(bodies, c.first + from, a);
-      find_bodies<at_once>(bodies, c.second + from, b);
-      sweep_block<Friction, W, at_once / W>(slice(c, from), a, b, mu);
+      find_bodies<at_once>(bodies, c.first + k, a);
+      find_bodies<at_once>(bodies, c.second + k, b);
+      sweep_block<Friction, W, blocks_at_once>(slice(c, k), a, b, mu);
     }
+    for (; k + W <= end; k += W) {
+      double *a[W], *b[W];
+      find_bodies<W>(bodies, c.first + k, a);
+      find_bodies<W>(bodies, c.second + k, b);
+      sweep_block<Friction, W, 1>(slice(c, k), a, b, mu);
+    }
+    if (k == end) continue;
+    Part<Friction, W> part(c, k, end - k, bodies, true);
+    sweep_block<Friction, W, 1>(part.slice(), part.a, part.b, mu);
+    part.copy_out(c, k, end - k);
+    k = end;
   }
+}
+
+/// V += M^-1 H r for W contacts.
+template <bool Friction, bool Pair, int W>
+[[gnu::always_inline]] inline void accumulate_block(const Slice& c, double* const* a, double* const* b) {
+  const auto n = load_normal<Lanes<W>>(c, 0);
+  scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, n));
 }
 
 template <bool Friction, int W>
 void accumulate_grains(const ContactView& view, double* bodies) {
-  using V = Lanes<W>;
   const ContactView c = view;
   const std::uint8_t* group = c.group;
-  for (std::size_t k = c.begin; k < c.end; k += *group++) {
-    if (*group == group_size) prefetch_group(c, k, bodies);
-    for (std::size_t l = 0; l < *group; l += W) {
-      const std::size_t count = *group - l;
-      if (count < W) {
-        Part<Friction, W> part(c, k + l, count, bodies, true);
-        const Slice own = part.padded.slice();
-        const Space<V> n = load_normal<V>(own, 0);
-        scatter<Friction, true>(part.a, part.b, n, load_impulse<Friction, V>(own, 0, n));
-        continue;
-      }
+  for (std::size_t k = c.begin; k < c.end; ++group) {
+    const std::size_t end = k + *group;
+    prefetch_group(c, k, bodies);
+    for (; k + W <= end; k += W) {
       double *a[W], *b[W];
-      find_bodies<W>(bodies, c.first + k + l, a);
-      find_bodies<W>(bodies, c.second + k + l, b);
-      const Slice own = slice(c, k + l);
-      const Space<V> n = load_normal<V>(own, 0);
-      scatter<Friction, true>(a, b, n, load_impulse<Friction, V>(own, 0, n));
+      find_bodies<W>(bodies, c.first + k, a);
+      find_bodies<W>(bodies, c.second + k, b);
+      accumulate_block<Friction, true, W>(slice(c, k), a, b);
     }
+    if (k == end) continue;
+    Part<Friction, W> part(c, k, end - k, bodies, true);
+    accumulate_block<Friction, true, W>(part.slice(), part.a, part.b);
+    k = end;
   }
 }
 
@@ -414,37 +405,36 @@ struct SplitWall {
   }
 };
 
-/// A block of W grains against the lanes `part` of a wall.
+/// A block of W grains against as many copies of a wall.
 template <bool Friction, int W>
 [[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, double* const* a, double mu,
-                                                    std::size_t part, SplitWall<W>& wall) {
+                                                    std::size_t lanes, SplitWall<W>& wall) {
   using V = Lanes<W>;
   Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
-  m.du = m.du - wall.velocity[part];
+  m.du = m.du - wall.velocity[lanes];
   const Space<V> n = load_normal<V>(c, 0);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
   const Space<V> dr =
       solve_law<Friction>(c, 0, n, relative_velocity<Friction>(m, n), m.w_nn + wall.inv_mass, w_tt, mu);
   scatter<Friction, false>(a, nullptr, n, dr);
-  wall.push(part, n, dr);
+  wall.push(lanes, n, dr);
 }
 
 template <bool Friction, int W>
 void sweep_wall(const ContactView& view, double* bodies, double mu, double* wall, double wall_inv_mass) {
   const ContactView c = view;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
-  std::size_t part = 0;
-  for (std::size_t k = c.begin; k < c.end; k += W, part = (part + 1) % (wall_lanes / W)) {
-    if (c.end - k < W) {
-      Part<Friction, W> rest(c, k, c.end - k, bodies, false);
-      sweep_wall_block<Friction, W>(rest.padded.slice(), rest.a, mu, part, split);
-      copy_out<Friction>(rest.padded, k, rest.count, c);
-    } else {
-      double* a[W];
-      find_bodies<W>(bodies, c.first + k, a);
-      sweep_wall_block<Friction, W>(slice(c, k), a, mu, part, split);
-    }
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
+    double* a[W];
+    find_bodies<W>(bodies, c.first + k, a);
+    sweep_wall_block<Friction, W>(slice(c, k), a, mu, lanes, split);
+  }
+  if (k < c.end) {
+    Part<Friction, W> part(c, k, c.end - k, bodies, false);
+    sweep_wall_block<Friction, W>(part.slice(), part.a, mu, lanes, split);
+    part.copy_out(c, k, c.end - k);
   }
   split.glue(wall);
 }
@@ -454,15 +444,20 @@ void accumulate_wall(const ContactView& view, double* bodies, double* wall, doub
   using V = Lanes<W>;
   const ContactView c = view;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
-  std::size_t part = 0;
-  for (std::size_t k = c.begin; k < c.end; k += W, part = (part + 1) % (wall_lanes / W)) {
-    const bool whole = c.end - k >= W;
-    Part<Friction, W> rest(c, k, whole ? 0 : c.end - k, bodies, false);
-    if (whole) find_bodies<W>(bodies, c.first + k, rest.a);
-    const Slice own = whole ? slice(c, k) : rest.padded.slice();
-    const Space<V> n = load_normal<V>(own, 0), r = load_impulse<Friction, V>(own, 0, n);
-    scatter<Friction, false>(rest.a, nullptr, n, r);
-    split.push(part, n, r);
+  const auto add = [&](const Slice& own, double* const* a, std::size_t lanes) {
+    const Space<V> n = load_normal<V>(own, 0);
+    accumulate_block<Friction, false, W>(own, a, nullptr);
+    split.push(lanes, n, load_impulse<Friction, V>(own, 0, n));
+  };
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
+    double* a[W];
+    find_bodies<W>(bodies, c.first + k, a);
+    add(slice(c, k), a, lanes);
+  }
+  if (k < c.end) {
+    Part<Friction, W> part(c, k, c.end - k, bodies, false);
+    add(part.slice(), part.a, lanes);
   }
   split.glue(wall);
 }
