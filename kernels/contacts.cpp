@@ -29,13 +29,12 @@ bool constrain(const NarrowPhase& in, double gap, double v_n, double v_n_free, d
   return true;
 }
 
-/// Unit normal from `second` to `first`; +z for coincident centres.
-Vec3 normal_between(const Vec3& first, const Vec3& second) {
-  const Vec3 d = first - second;
-  const double distance = d.norm();
-  return distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
+/// d over its length; +z for coincident centres.
+Vec3 unit_normal(const Vec3& d, double length) {
+  return length > 0 ? Vec3(d / length) : Vec3::UnitZ();
 }
 
+/// Appends the contacts of a chunk to `found`, in the order in which they are to be dealt to groups.
 void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                    std::size_t chunk, std::vector<Found>& found) {
   const std::size_t grains = candidates.grain_pairs.size();
@@ -44,11 +43,13 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
   const double slow = 2 * in.time_step * in.gravity.norm();
   const auto u = [&](std::size_t s) { return Eigen::Map<const Vec3>(in.velocity[s].u); };
   if (chunks.wall[chunk] < 0) {
-    for (std::size_t k = begin; k < end; ++k) {
+    for (std::size_t at = begin; at < end; ++at) {
+      const std::size_t k = begin + chunks.order[at];
       const auto i = static_cast<std::size_t>(candidates.grain_pairs[k].first);
       const auto j = static_cast<std::size_t>(candidates.grain_pairs[k].second);
-      const double distance = (in.x[i] - in.x[j]).norm();
-      const Vec3 normal = normal_between(in.x[i], in.x[j]);
+      const Vec3 d = in.x[i] - in.x[j];
+      const double distance = d.norm();
+      const Vec3 normal = unit_normal(d, distance);
       double bias;
       const double v_n = normal.dot(u(i) - u(j));  // gravity moves both alike
       if (constrain(in, distance - in.radius[i] - in.radius[j], v_n, v_n, slow, bias))
@@ -68,25 +69,31 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
   }
 }
 
-constexpr int group_size = 16;
-constexpr int groups_open = 64;
+constexpr std::size_t group_size = 16;
+constexpr std::size_t groups_open = 64;
 
 /// Deals the contacts to groups of 16 without a common grain, first fit, with one bit per group and grain;
 /// what fits in none of 64 open groups (a large grain among small ones) follows, each a group of its own.
-/// `order` gets places in `found`, `sizes` those of the groups.
+/// `order` gets places in `found`, `sizes` those of the groups. The order of the candidates (cut_chunks),
+/// made once per broad phase, is what makes the groups full; this walk costs less than a sweep.
 void order_in_groups(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found,
                      std::vector<std::int32_t>& order, std::uint8_t* sizes) {
+  if (chunks.wall[chunk] >= 0) {  // a grain meets a wall once
+    for (std::size_t f = 0; f < found.size(); ++f) order.push_back(static_cast<std::int32_t>(f));
+    for (std::size_t f = 0; f < found.size(); f += group_size)
+      *sizes++ = static_cast<std::uint8_t>(std::min(group_size, found.size() - f));
+    return;
+  }
   const auto bodies = static_cast<std::size_t>(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
-  const bool wall = chunks.wall[chunk] >= 0;
   std::vector<std::uint64_t> in_group(bodies, 0);
   std::array<std::array<std::int32_t, group_size>, groups_open> group;
-  std::array<int, groups_open> filled{};
+  std::array<std::size_t, groups_open> filled{};
   std::uint64_t open = ~std::uint64_t{0};
   std::vector<std::int32_t> late;
   for (std::size_t f = 0; f < found.size(); ++f) {
     const auto k = static_cast<std::size_t>(found[f].candidate);
     std::uint64_t& mask_i = in_group[chunks.local[2 * k]];
-    std::uint64_t& mask_j = in_group[wall ? chunks.local[2 * k] : chunks.local[2 * k + 1]];
+    std::uint64_t& mask_j = in_group[chunks.local[2 * k + 1]];
     const std::uint64_t room = open & ~(mask_i | mask_j);
     if (room == 0) {
       late.push_back(static_cast<std::int32_t>(f));
@@ -96,11 +103,11 @@ void order_in_groups(const Chunks& chunks, std::size_t chunk, const std::vector<
     const std::uint64_t bit = std::uint64_t{1} << g;
     mask_i |= bit;
     mask_j |= bit;
-    group[g][static_cast<std::size_t>(filled[g]++)] = static_cast<std::int32_t>(f);
+    group[g][filled[g]++] = static_cast<std::int32_t>(f);
     if (filled[g] == group_size) open &= ~bit;
   }
   for (std::size_t g = 0; g < groups_open && filled[g] > 0; ++g) {
-    order.insert(order.end(), group[g].begin(), group[g].begin() + filled[g]);
+    order.insert(order.end(), group[g].begin(), group[g].begin() + static_cast<std::ptrdiff_t>(filled[g]));
     *sizes++ = static_cast<std::uint8_t>(filled[g]);
   }
   order.insert(order.end(), late.begin(), late.end());
@@ -189,8 +196,8 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
     Vec3 normal;
     if (k < grains) {
       const GrainPair& pair = candidates.grain_pairs[k];
-      normal =
-          normal_between(x[static_cast<std::size_t>(pair.first)], x[static_cast<std::size_t>(pair.second)]);
+      const Vec3 d = x[static_cast<std::size_t>(pair.first)] - x[static_cast<std::size_t>(pair.second)];
+      normal = unit_normal(d, d.norm());
     } else {
       normal = walls[static_cast<std::size_t>(candidates.wall_pairs[k - grains].wall)].normal;
     }

@@ -187,7 +187,7 @@ std::int64_t arrivals(std::span<const BodyId> before, std::span<const BodyId> no
 }  // namespace
 
 int chunk_target(std::size_t candidates) {
-  return static_cast<int>(std::clamp<std::size_t>(candidates / 64, 48, 320));
+  return static_cast<int>(std::clamp<std::size_t>(candidates / 32, 64, 512));
 }
 
 Slot Surroundings::find(std::int64_t id) const {
