@@ -12,7 +12,7 @@ namespace talus {
 
 namespace {
 
-constexpr std::array<std::string_view, 3> names = {"portable", "avx2", "avx512"};
+constexpr std::array<std::string_view, 4> names = {"auto", "portable", "avx2", "avx512"};
 
 /// Lane kernels see a body as 8 doubles.
 static_assert(offsetof(Velocity, u) == 0 && offsetof(Velocity, inv_mass) == 24 &&
@@ -82,14 +82,15 @@ InstructionSet best_instruction_set() {
   return InstructionSet::portable;
 }
 
-SweepKernels::SweepKernels(InstructionSet set) : set_(set), lanes_{nullptr, nullptr} {
-  if (!runs(set))
+SweepKernels::SweepKernels(InstructionSet set)
+    : set_(set == InstructionSet::automatic ? best_instruction_set() : set), lanes_{nullptr, nullptr} {
+  if (!runs(set_))
     throw std::invalid_argument("instruction set '" + std::string(name_of(set)) +
                                 "': this processor runs at most '" +
                                 std::string(name_of(best_instruction_set())) + "'");
-  if (set == InstructionSet::portable) return;
+  if (set_ == InstructionSet::portable) return;
   static const LaneKernelPair avx2 = lane_kernels_avx2(), avx512 = lane_kernels_avx512();
-  const LaneKernelPair& pair = set == InstructionSet::avx2 ? avx2 : avx512;
+  const LaneKernelPair& pair = set_ == InstructionSet::avx2 ? avx2 : avx512;
   lanes_[0] = &pair.frictionless;
   lanes_[1] = &pair.friction;
 }

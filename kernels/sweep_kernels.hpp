@@ -17,13 +17,14 @@ struct LaneKernels;
 /// From the weakest to the strongest. Results do not depend on the set, to the bit: every lane does what the
 /// scalar kernel does, nothing is fused (docs/decisions/0008-lanes.md). So ranks may differ in it.
 enum class InstructionSet {
-  portable,  ///< the scalar kernels
-  avx2,      ///< 4 contacts at a time
-  avx512,    ///< 8 contacts at a time (F, DQ, VL)
+  automatic,  ///< the strongest that runs here
+  portable,   ///< the scalar kernels
+  avx2,       ///< 4 contacts at a time
+  avx512,     ///< 8 contacts at a time (F, DQ, VL)
 };
 
 std::string_view name_of(InstructionSet set);
-/// "portable", "avx2" or "avx512"; nothing for other names.
+/// "auto", "portable", "avx2" or "avx512"; nothing for other names.
 std::optional<InstructionSet> instruction_set_of(std::string_view name);
 
 /// The strongest that the processor and the operating system run.
@@ -36,6 +37,7 @@ class SweepKernels {
   /// Throws std::invalid_argument when this processor does not run `set`.
   explicit SweepKernels(InstructionSet set);
 
+  /// What was chosen, never `automatic`.
   InstructionSet set() const { return set_; }
 
   template <bool Friction>

@@ -20,7 +20,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       settings_(settings),
       decomposition_(decomposition),
       ranks_(ranks),
-      kernels_(settings.simd.value_or(best_instruction_set())),
+      kernels_(settings.simd),
       gluing_(state, decomposition, ranks) {}
 
 void Iteration::begin() {

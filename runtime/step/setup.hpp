@@ -59,7 +59,7 @@ struct SolverSettings {
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
-  std::optional<InstructionSet> simd;  ///< of the sweeps; none: the best of this processor. Same bits
+  InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps; all give the same bits
 };
 
 /// How subdomains act on one another.

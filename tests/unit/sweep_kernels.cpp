@@ -231,6 +231,7 @@ TEST(InstructionSets, AreNamedAndRefusedWhereTheProcessorLacksThem) {
     else
       EXPECT_THROW(SweepKernels{set}, std::invalid_argument);
   }
+  EXPECT_EQ(SweepKernels(InstructionSet::automatic).set(), best_instruction_set());
   EXPECT_FALSE(instruction_set_of("sse9"));
 }
 
