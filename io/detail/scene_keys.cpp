@@ -342,6 +342,10 @@ Section<SolverSettings> solver_keys() {
                   "Part of an overlap that a step undoes. 0: overlaps stay, and what the tolerance "
                   "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
                   &SolverSettings::overlap_correction),
+              choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
+                                     "Instructions of the sweeps. All give the same bits; `auto`: the "
+                                     "widest that the processor has.",
+                                     &SolverSettings::simd),
           }};
 }
 

@@ -138,7 +138,7 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
 }  // namespace
 
 int chunk_target(std::size_t candidates) {
-  return static_cast<int>(std::clamp<std::size_t>(candidates / 64, 48, 320));
+  return static_cast<int>(std::clamp<std::size_t>(candidates / 32, 64, 512));
 }
 
 Slot Surroundings::find(std::int64_t id) const {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/sweep_kernels.hpp"
 #include "kernels/types.hpp"
 #include "kernels/walls.hpp"
 #include "partition/partitioner.hpp"
@@ -67,6 +68,7 @@ struct SolverSettings {
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
+  InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps; all give the same bits
 };
 
 /// How subdomains act on one another.
