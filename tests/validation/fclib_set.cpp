@@ -14,7 +14,7 @@
 
 #include "io/error.hpp"
 #include "io/fclib.hpp"
-#include "kernels/delassus.hpp"
+#include "kernels/delassus_solve.hpp"
 
 namespace talus {
 namespace {
@@ -69,7 +69,7 @@ TEST_F(FclibSet, NlgsSolvesAtLeastWhatSiconosNsgsSolves) {
     const DelassusProblem problem = io::read_fclib(folder / "local" / (name + ".hdf5"));
     std::vector<double> r(3 * problem.contacts(), 0.0), u(r.size());
     // A limit of sweeps and not of time: the verdict must not depend on the machine.
-    const auto report = solve_nlgs(problem, {.tolerance = 1e-4, .max_iterations = 20'000}, r);
+    const auto report = solve_delassus(problem, DelassusMethod::nlgs_momentum, {.tolerance = 1e-4, .max_iterations = 20'000}, r);
     EXPECT_TRUE(report.converged) << name << ": error " << report.error.siconos << " after "
                                   << report.iterations << " sweeps";
     EXPECT_LE(delassus_error(problem, r, u).siconos, 1e-4) << name;
@@ -87,7 +87,7 @@ TEST_F(FclibSet, NlgsSolvesEveryProblemFarBelowTheToleranceToo) {
   for (const auto& file : files_in(folder / "local")) {
     const DelassusProblem problem = io::read_fclib(file);
     std::vector<double> r(3 * problem.contacts(), 0.0);
-    const auto report = solve_nlgs(problem, {.tolerance = 1e-8, .max_iterations = 20'000}, r);
+    const auto report = solve_delassus(problem, DelassusMethod::nlgs_momentum, {.tolerance = 1e-8, .max_iterations = 20'000}, r);
     EXPECT_TRUE(report.converged) << file.stem() << ": error " << report.error.siconos << " after "
                                   << report.iterations << " sweeps";
   }
