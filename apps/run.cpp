@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <functional>
 #include <memory>
 
+#include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
 #include "io/error.hpp"
@@ -79,6 +82,12 @@ class RecorderFeed {
     executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
       recorder_.record_frame(std::move(moved));
     });
+  }
+
+  /// Anything that writes files: one thread at a time may be inside HDF5.
+  void later(const char* name, std::function<void()> work) {
+    flush();
+    executor_.submit_background(name, std::move(work));
   }
 
   void flush() {
@@ -158,7 +167,8 @@ int signal_of(const graph::Communicator& ranks) {
 
 /// Runs the steps; returns the signal that stopped them, or 0. `feed` and `progress` on rank 0 only.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-            RecorderFeed* feed, Tally& tally, const graph::Communicator& ranks) {
+            const std::string& directory, RecorderFeed* feed, Tally& tally,
+            const graph::Communicator& ranks) {
   std::optional<io::Progress> progress;
   if (feed) progress.emplace(io::progress_on_stderr());
   FrameClock clock(output);
@@ -172,6 +182,8 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
     tally.add(simulation);
     const std::optional<TriaxialReport> triaxial = simulation.triaxial();
     if (feed) feed->row(simulation, triaxial);
+    if (feed && std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
+      feed->later("dump of a contact problem", fclib_dump(simulation, directory));
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
@@ -189,7 +201,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
-                     io::Recorder* recorder, const graph::Communicator& ranks) {
+                     const std::string& directory, io::Recorder* recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = bodies.size();
@@ -205,7 +217,8 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
   std::optional<RecorderFeed> feed;
   if (recorder) feed.emplace(executor, *recorder);
   try {
-    if (const int signal = advance(simulation, options, scene.output, feed ? &*feed : nullptr, tally, ranks);
+    if (const int signal =
+            advance(simulation, options, scene.output, directory, feed ? &*feed : nullptr, tally, ranks);
         signal != 0) {
       summary.status = "stopped";
       summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
@@ -318,7 +331,8 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder.get(), ranks);
+  const io::Summary summary =
+      simulate(options, scene, std::move(bodies), threads, directory, recorder.get(), ranks);
   if (recorder) {
     recorder->finish(summary);
     print_end(summary, scene.setup.solver, directory);
@@ -343,6 +357,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     scene = io::load_scene(options.scene, options.overrides);
+    if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
       bodies = build_sample(scene);

@@ -139,7 +139,8 @@ TEST(Nlgs, ReportsAMissedToleranceAndHandsBackItsBestAnswer) {
   const Tower t = tower(50);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> r(150, 0.0), u(150);
-  const auto report = solve_nlgs(p, {.tolerance = 1e-12, .measure = ErrorMeasure::siconos, .max_iterations = 37}, {}, r);
+  const auto report =
+      solve_nlgs(p, {.tolerance = 1e-12, .measure = ErrorMeasure::siconos, .max_iterations = 37}, {}, r);
   EXPECT_FALSE(report.converged);
   EXPECT_EQ(report.iterations, 37);
   EXPECT_EQ(report.history.back().iteration, 37);
