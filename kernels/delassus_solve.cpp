@@ -26,6 +26,7 @@ class NewtonTrials {
 
   /// SweepSettings::intervene.
   bool operator()(BestAnswer& answer) {
+    if (answer.report().failed_contacts > 0) return false;
     const double sweeps = static_cast<double>(answer.report().iterations);
     if (sweeps < next_trial_) return false;
     if (step_cost_ == 0) {

@@ -162,6 +162,11 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
   BestAnswer answer(problem, goal, r);
   if (answer.done() || problem.contacts() == 0) return answer.hand_back();
   DelassusReport& report = answer.report();
+  for (const LocalBlock& own : problem.diagonal) {
+    const auto c = static_cast<std::size_t>(&own - problem.diagonal.data());
+    report.failed_contacts += !(own.W(0, 0) > 0) && problem.q[c][0] < 0;
+  }
+  if (report.failed_contacts > 0) return answer.hand_back();
   const UnitDiagonal scaled = unit_diagonal(problem);
   Vector x(first_row(problem.contacts())), trial(x.size()), centre(x.size());
   for (std::size_t k = 0; k < r.size(); ++k) x[static_cast<Eigen::Index>(k)] = r[k] * scaled.root[k / 3];

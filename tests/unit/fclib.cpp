@@ -216,6 +216,7 @@ TEST_F(Fclib, RefusesSizesThatDisagree) {
   expect_refused(c, "6 x 9");
   c = compressed_rows();
   c.m = c.n = {7};
+  c.p.push_back(8);
   expect_refused(c, "7 x 7");
   c = compressed_rows();
   c.m = c.n = {-6};
