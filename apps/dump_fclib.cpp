@@ -48,7 +48,7 @@ std::function<void()> fclib_dump(const Simulation& simulation, const std::filesy
           "u = W r + q: velocities in m/s at the end of the step, impulses in N s, normal first; q has "
           "the gap and restitution terms in it"};
   return [problem = io::FclibProblem{.contact = std::move(step.problem), .global = {}}, r = std::move(step.r),
-          info = std::move(info), path = directory / fmt::format("fclib_{}.hdf5", report.step)] {
+          info = std::move(info), path = directory / fmt::format("fclib_{:06}.hdf5", report.step)] {
     io::write_fclib(problem.contact, io::fclib_solution(problem, r), info, path);
   };
 }

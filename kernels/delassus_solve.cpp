@@ -32,12 +32,12 @@ class NewtonTrials {
     if (step_cost_ == 0) {
       // Only now: small tolerances often are met before this is worth finding out.
       step_cost_ = newton_cost(problem_) / sweep_cost(problem_);
-      next_trial_ = 2 * step_cost_;
+      next_trial_ = 4 * step_cost_;
       if (sweeps < next_trial_) return false;
     }
     // Sweeps that have not made the error a third while they doubled have stalled.
     const bool stalled = last_error_ > 0 && answer.least() > 0.3 * last_error_;
-    const bool helped = newton(answer, stalled ? 6 : 2, static_cast<std::int64_t>(sweeps / step_cost_));
+    const bool helped = newton(answer, stalled ? 6 : 2, static_cast<std::int64_t>(0.5 * sweeps / step_cost_));
     last_error_ = answer.least();
     next_trial_ = 2 * sweeps;
     return helped;
