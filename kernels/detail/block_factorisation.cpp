@@ -1,8 +1,7 @@
 #include "kernels/detail/block_factorisation.hpp"
 
-#include <iostream>  // for Eigen's MetisSupport, which lacks it
-//
-#include <Eigen/MetisSupport>
+#include <metis.h>
+
 #include <algorithm>
 #include <numeric>
 
@@ -12,18 +11,27 @@ std::vector<std::int32_t> elimination_order(const DelassusProblem& problem) {
   std::vector<std::int32_t> order(problem.contacts());
   std::iota(order.begin(), order.end(), 0);
   if (problem.column.empty() || problem.contacts() <= dense_contacts) return order;
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(problem.column.size());
+  // The graph of W and W', as METIS wants it: every edge from both ends, none from a contact to itself.
+  std::vector<std::vector<idx_t>> neighbours(problem.contacts());
   for (std::size_t a = 0; a < problem.contacts(); ++a) {
-    for (auto k = problem.row_begin[a]; k < problem.row_begin[a + 1]; ++k)
-      entries.emplace_back(static_cast<int>(a), problem.column[static_cast<std::size_t>(k)], 1.0);
+    for (auto k = problem.row_begin[a]; k < problem.row_begin[a + 1]; ++k) {
+      const std::int32_t b = problem.column[static_cast<std::size_t>(k)];
+      neighbours[a].push_back(static_cast<idx_t>(b));
+      neighbours[static_cast<std::size_t>(b)].push_back(static_cast<idx_t>(a));
+    }
   }
-  const auto size = static_cast<Eigen::Index>(problem.contacts());
-  Eigen::SparseMatrix<double> graph(size, size);
-  graph.setFromTriplets(entries.begin(), entries.end());
-  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> contact_at;
-  Eigen::MetisOrdering<int>()(graph, contact_at);  // makes the pattern symmetric itself
-  for (Eigen::Index k = 0; k < size; ++k) order[static_cast<std::size_t>(k)] = contact_at.indices()[k];
+  std::vector<idx_t> begin{0}, edges;
+  for (auto& list : neighbours) {
+    std::sort(list.begin(), list.end());
+    edges.insert(edges.end(), list.begin(), std::unique(list.begin(), list.end()));
+    begin.push_back(static_cast<idx_t>(edges.size()));
+  }
+  auto size = static_cast<idx_t>(problem.contacts());
+  std::vector<idx_t> contact_at(problem.contacts()), place(problem.contacts());
+  // Without an order from METIS (out of memory) the natural one is right too, only slower.
+  if (METIS_NodeND(&size, begin.data(), edges.data(), nullptr, nullptr, contact_at.data(), place.data()) ==
+      METIS_OK)
+    std::copy(contact_at.begin(), contact_at.end(), order.begin());
   return order;
 }
 
