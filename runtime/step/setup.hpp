@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/sweep_kernels.hpp"
 #include "kernels/types.hpp"
 #include "kernels/walls.hpp"
 #include "partition/partitioner.hpp"
@@ -48,7 +49,16 @@ struct DetectionSettings {
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
 
+/// What makes of sweeps a solver.
+enum class SolverMethod {
+  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse
+  nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
+  momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
+  nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
+};
+
 struct SolverSettings {
+  SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
       5e-2;                   ///< on balance: drift of the wall forces over the second half of the iterations
@@ -58,6 +68,7 @@ struct SolverSettings {
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
+  InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps; all give the same bits
 };
 
 /// How subdomains act on one another.
@@ -72,15 +83,31 @@ enum class ExchangeScheme {
   ccs,  ///< to one rank and back
 };
 
+/// What subdomains are to have equal shares of.
+enum class BalanceBy {
+  contacts,  ///< candidates
+  time,  ///< measured time of their sweeps: for cores of unequal speed. The partition, and with it the bits
+         ///< of the results, then depends on the machine's day
+};
+
+/// Which rank has which subdomain. No result depends on it.
+enum class SubdomainMapping {
+  block,   ///< consecutive subdomains share a rank: fewest messages between ranks
+  cyclic,  ///< subdomain e is on rank e modulo the ranks: where work varies slowly over the sample
+};
+
 struct DecompositionSettings {
   Coupling coupling = Coupling::nscdd;
   ExchangeScheme exchange = ExchangeScheme::dcs;
   PartitionKind partitioner = PartitionKind::automatic;
   int subdomains = 0;                   ///< 0: one per rank
   std::array<std::int64_t, 3> boxes{};  ///< per axis, for the partitioners that cut boxes; zeros: chosen
-  int sweeps_per_exchange = 1;          ///< n_GS >= 1
+  SubdomainMapping mapping = SubdomainMapping::block;
+  int sweeps_per_exchange = 1;  ///< n_GS >= 1
+  BalanceBy balance = BalanceBy::contacts;
   int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
-  double max_imbalance = 0.2;  ///< fullest over mean subdomain, less 1: beyond it the partition is made anew
+  double max_imbalance = 0.2;  ///< contacts of the fullest over those of the mean subdomain, less 1: beyond
+                               ///< it candidates are found and space is cut anew at once
   bool overlap = true;  ///< inner chunks while messages fly; false: after them, to see what that is worth
   bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
 };

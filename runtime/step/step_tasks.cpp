@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/release.hpp"
 #include "runtime/step/step_graph.hpp"
 
 namespace talus {
@@ -46,7 +47,43 @@ SlotRange StepGraph::slots(std::uint32_t lane) const {
 }
 
 bool StepGraph::partition_due() const {
-  return state_.decomposition.several() && steps_ - partitioned_ >= decomposition_.repartition_every;
+  return state_.decomposition.several() &&
+         (steps_ - partitioned_ >= decomposition_.repartition_every || out_of_balance());
+}
+
+/// Not if the last partition was made against it in vain: the sample may not be divisible any better.
+bool StepGraph::out_of_balance() const {
+  const double imbalance = iteration_.imbalance();
+  return state_.decomposition.several() && imbalance > decomposition_.max_imbalance &&
+         imbalance > 1.25 * imbalance_then_;
+}
+
+/// Per subdomain: the time of a candidate over the mean, from the time of all ranks since the candidates are
+/// these.
+std::vector<double> StepGraph::measured_costs() const {
+  struct Row {
+    double subdomain, busy, candidates;
+  };
+  const Decomposition& all = state_.decomposition;
+  const std::vector<double> busy = iteration_.busy();
+  std::vector<Row> rows;
+  for (std::size_t e = 0; e < all.here.size(); ++e)
+    rows.push_back({static_cast<double>(all.here[e]), busy[e], 0});
+  for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+    rows[static_cast<std::size_t>(state_.chunks.subdomain[c])].candidates +=
+        state_.chunks.begin[c + 1] - state_.chunks.begin[c];
+  rows = ranks_.gather_records(std::span<const Row>(rows));
+  double time = 0, candidates = 0;
+  for (const Row& row : rows) {
+    time += row.busy;
+    candidates += row.candidates;
+  }
+  if (time == 0 || candidates == 0) return {};
+  std::vector<double> cost(static_cast<std::size_t>(all.partition.subdomains), 1.0);
+  for (const Row& row : rows)
+    if (row.candidates > 0)
+      cost[static_cast<std::size_t>(row.subdomain)] = row.busy / row.candidates * (candidates / time);
+  return cost;
 }
 
 void StepGraph::predict_lane(std::uint32_t lane) {
@@ -78,8 +115,7 @@ bool StepGraph::walls_left_margin() const {
 }
 
 bool StepGraph::needs_broad_phase() {
-  // Several subdomains: candidates are found anew with a new partition as well, when one is due.
-  double needed[1] = {!state_.candidates_valid || walls_left_margin() ||
+  double needed[1] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ||
                               std::any_of(left_.begin(), left_.end(), [](char left) { return left != 0; })
                           ? 1.0
                           : 0.0};
@@ -92,7 +128,7 @@ void StepGraph::make_cells() {
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
-  const Bodies& bodies = state_.bodies;
+  Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -103,16 +139,28 @@ void StepGraph::make_cells() {
     state_.wall_then.push_back(wall.point);
     wall_margin_.push_back(half_skin + margin_of(wall));
   }
+  // What the last step found is in the impulses of the candidates; detection works in its room.
+  const auto make_room = [this] {
+    state_.contacts = {};
+    state_.chunks = {};
+  };
   if (state_.decomposition.several()) {
     const bool first = state_.decomposition.interfaces.empty();
-    const bool anew =
-        first || partition_due() || state_.decomposition.imbalance > decomposition_.max_imbalance;
-    if (anew) partitioned_ = steps_;
+    const bool anew = first || partition_due();
+    if (anew) {
+      partitioned_ = steps_;
+      imbalance_then_ = iteration_.imbalance();
+      if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
+    }
+    make_room();
+    const double began = now();
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
+    sums_.times.dealing = now() - began;
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
   }
+  make_room();
   state_.x_then = bodies.x;
   state_.reach_then = std::move(reach);
   cells_ = build_cells(state_.x_then, state_.reach_then);
@@ -134,17 +182,19 @@ void StepGraph::make_chunks() {
   Candidates fresh;
   fresh.components = parameters_.friction ? 3 : 1;
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
-  for (auto& part : pairs_) part = {};
+  for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
                                      several ? around_.reach : state_.reach_then, wall_margin_);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
+  const double began = now();
   if (several) {
-    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, fresh, glued, state_.bodies,
-                        state_.candidates);
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
+                        state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
+    sums_.times.dealing += now() - began;
   } else {
     match_impulses(state_.candidates, fresh);
     state_.candidates = std::move(fresh);
@@ -152,7 +202,9 @@ void StepGraph::make_chunks() {
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
-  iteration_.gluing().plan(parameters_.turns);
+  const double planning = now();
+  iteration_.plan();
+  if (several) sums_.times.dealing += now() - planning;
   std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
   ranks_.sum(candidates);
   all_candidates_ = candidates[0];
@@ -394,7 +446,9 @@ void StepGraph::sum_up() {
   for (std::size_t e = 0; e < by_subdomain.size(); ++e)
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
   sums_.candidates = all_candidates_;
-  sums_.times = {iterating_ - started_, iterated_ - iterating_, now() - iterated_};
+  sums_.times.detection = iterating_ - started_;
+  sums_.times.iteration = iterated_ - iterating_;
+  sums_.times.rest = now() - iterated_;
 }
 
 }  // namespace talus
