@@ -47,6 +47,11 @@ int main(int argc, char** argv) {
   run_app->add_option("--set", run.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
+  CLI::Option* const trace_flag = run_app->add_flag(
+      "--trace", run.trace, "record every task into trace.h5 (`talus trace`, `talus replay`)");
+  run_app->add_option("--trace-steps", run.trace_steps, "record these steps only")
+      ->type_name("FIRST:LAST")
+      ->needs(trace_flag);
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;

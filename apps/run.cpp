@@ -11,6 +11,7 @@
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
+#include "apps/trace_feed.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
 #include "io/progress.hpp"
@@ -189,7 +190,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
-                     io::Recorder* recorder, const graph::Communicator& ranks) {
+                     const std::string& directory, io::Recorder* recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = bodies.size();
@@ -200,7 +201,10 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.message = error.what();
     summary.exit_code = exit_failure;
   };
-  graph::Executor executor({.threads = threads});
+  std::optional<TraceFeed> trace;
+  if (options.trace) trace.emplace(directory, parse_steps(options.trace_steps), threads, ranks);
+  graph::Executor executor({.threads = threads, .trace = trace ? &trace->recorder() : nullptr});
+  if (trace) trace->start(executor);
   Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
   std::optional<RecorderFeed> feed;
   if (recorder) feed.emplace(executor, *recorder);
@@ -226,6 +230,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.wall_s = watch.seconds();
     return summary;
   }
+  if (trace) trace->finish(executor);
   const MessageCount& messages = simulation.messages();
   if (ranks.rank() == 0 && messages.messages > 0)
     fmt::print(stderr,
@@ -318,7 +323,8 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder.get(), ranks);
+  const io::Summary summary =
+      simulate(options, scene, std::move(bodies), threads, directory, recorder.get(), ranks);
   if (recorder) {
     recorder->finish(summary);
     print_end(summary, scene.setup.solver, directory);
@@ -342,6 +348,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
     scene = io::load_scene(options.scene, options.overrides);
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {

@@ -16,6 +16,8 @@ struct RunOptions {
   std::optional<std::int64_t> steps;      ///< stop after so many steps
   int threads = 0;                        ///< 0: one per core this process may use
   std::vector<std::string> overrides;     ///< "a.b=c"
+  bool trace = false;                     ///< record the tasks into trace.h5
+  std::string trace_steps;                ///< "first:last", recorded alone; empty: all
   bool dry_run = false;                   ///< read, build, place and check; write nothing
   std::vector<std::string> command_line;  ///< for run.json
 };

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "runtime/trace/recorder.hpp"
+
 namespace talus::graph {
 
 namespace {
@@ -80,6 +82,7 @@ std::vector<std::vector<std::byte>> Communicator::exchange(std::vector<std::vect
   if (to.size() != static_cast<std::size_t>(ranks_))
     throw std::invalid_argument("Communicator::exchange wants one part per rank");
   if (ranks_ == 1) return to;
+  const trace::Span span(trace_, trace::kind_collective);
   const auto n = static_cast<std::size_t>(ranks_);
   std::vector<std::uint64_t> out_bytes(n), in_bytes(n);
   for (std::size_t r = 0; r < n; ++r) out_bytes[r] = to[r].size();
@@ -112,6 +115,7 @@ std::vector<std::vector<std::byte>> Communicator::exchange(std::vector<std::vect
 
 void Communicator::sum(std::span<std::int64_t> values) const {
   if (ranks_ == 1) return;
+  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_INT64_T, MPI_SUM,
                       MPI_COMM_WORLD),
         "MPI_Allreduce");
@@ -119,6 +123,7 @@ void Communicator::sum(std::span<std::int64_t> values) const {
 
 void Communicator::max(std::span<double> values) const {
   if (ranks_ == 1) return;
+  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX,
                       MPI_COMM_WORLD),
         "MPI_Allreduce");
@@ -126,6 +131,7 @@ void Communicator::max(std::span<double> values) const {
 
 std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) const {
   if (ranks_ == 1) return {part.begin(), part.end()};
+  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(part.size()));
   const auto n = static_cast<std::size_t>(ranks_);
   const int own = static_cast<int>(part.size());
   std::vector<int> bytes(n), begin(n + 1, 0);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "runtime/step/gluing.hpp"
@@ -39,6 +40,8 @@ class Iteration {
   void node(std::uint32_t node, int epoch);
   bool gate(int epoch) const { return epoch == segment_ + 1; }
   bool decide(int epoch);
+  /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
+  std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();

@@ -8,6 +8,7 @@
 #include "runtime/graph/graph.hpp"
 #include "runtime/step/iteration.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/trace/recorder.hpp"
 
 namespace talus {
 
@@ -68,6 +69,9 @@ class StepGraph {
   void narrow_lane(std::uint32_t lane);
   void plan_iteration();
   void plan_epochs();
+  void iterate(graph::Worker& worker);
+  void declare_tasks(trace::Recorder& recorder) const;
+  trace::Plan describe_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) const;
   void finish_lane(std::uint32_t lane);
   void finish_walls();
   void measure_lane(std::uint32_t lane);

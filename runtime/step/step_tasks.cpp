@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "runtime/step/step_graph.hpp"
+#include "runtime/step/task_kinds.hpp"
 
 namespace talus {
 
@@ -108,8 +109,10 @@ void StepGraph::make_cells() {
     const bool anew =
         first || partition_due() || state_.decomposition.imbalance > decomposition_.max_imbalance;
     if (anew) partitioned_ = steps_;
+    trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
+    span.end();
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
   }
@@ -141,6 +144,7 @@ void StepGraph::make_chunks() {
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
   if (several) {
+    const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     groups = distribute(state_.decomposition, decomposition_, ranks_, around_, fresh, glued, state_.bodies,
                         state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
@@ -289,6 +293,7 @@ void StepGraph::plan_epochs() {
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
+  if (executor_.trace()) executor_.trace()->plan(describe_plan({colour, offset, neighbour}, owner));
   planned_ = true;
 }
 
