@@ -27,6 +27,7 @@ void Recorder::begin_step(std::uint32_t step) {
 
 void Recorder::end_step() {
   left_ = active_ ? now() : -1;
+  ++step_;  // what follows is between two steps, and counts to the next
 }
 
 void Recorder::plan(Plan plan) {
