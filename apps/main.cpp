@@ -36,6 +36,8 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
       ->capture_default_str();
   app.add_option("--node-bandwidth", replay.machine.node_bandwidth, "of a message inside a node [B/s]")
       ->capture_default_str();
+  app.add_option("--line", replay.machine.line, "to hand a cache line to another core [s]")
+      ->capture_default_str();
   app.add_option("--noise", replay.machine.noise, "each task takes up to this part longer")
       ->capture_default_str();
   app.add_option("--seed", replay.machine.seed, "of the noise")->capture_default_str();

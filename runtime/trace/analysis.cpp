@@ -72,21 +72,16 @@ void add_paths(const Timeline& timeline, Summary& sum) {
   };
   for (std::uint32_t step : timeline.steps()) {
     const StepIndex index = timeline.index(step);
-    double later = -1;
-    Place behind;
-    for (const Place place : critical_path(timeline, index)) {
-      const Record& record = timeline.record(place);
-      if (later >= 0) {
-        const double wait = later - record.end();
+    const PathHop* behind = nullptr;
+    const std::vector<PathHop> path = critical_path(timeline, index);
+    for (const PathHop& hop : path) {
+      if (behind) {
         const bool other =
-            timeline.trace().lanes[place.lane].rank != timeline.trace().lanes[behind.lane].rank;
-        add(other ? "messages under way" : "between tasks", wait);
+            timeline.trace().lanes[hop.place.lane].rank != timeline.trace().lanes[behind->place.lane].rank;
+        add(other ? "messages under way" : "between tasks", behind->from - hop.until);
       }
-      // Up to where the next task on the path went on: what this one still did then was off the path.
-      const double end = later >= 0 ? std::min(later, record.end()) : record.end();
-      add(path_name(timeline, index, place), end - static_cast<double>(record.begin));
-      later = static_cast<double>(record.begin);
-      behind = place;
+      add(path_name(timeline, index, hop.place), hop.until - hop.from);
+      behind = &hop;
     }
   }
   for (auto& [what, share] : shares) sum.path.push_back(std::move(share));

@@ -62,8 +62,15 @@ Summary analyse(const Timeline& timeline);
 /// The summary as a table for people.
 std::string describe(const Summary& summary);
 
-/// The records that the makespan hung on, from the last backwards: each began when the one before it had
-/// ended, or its message had come. Per step, since steps meet at their ends.
-std::vector<Place> critical_path(const Timeline& timeline, const StepIndex& index);
+/// A record on the critical path, and when it was: from when it had all it waited for, until the next on the
+/// path could go on. [ns]
+struct PathHop {
+  Place place;
+  double from = 0, until = 0;
+};
+
+/// What the makespan hung on, from the last record backwards: each went on when the one before it on the path
+/// had ended, or its message had come. Per step, since steps meet at their ends.
+std::vector<PathHop> critical_path(const Timeline& timeline, const StepIndex& index);
 
 }  // namespace talus::trace

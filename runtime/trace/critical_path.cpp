@@ -13,19 +13,28 @@ class Walker {
  public:
   Walker(const Timeline& timeline, const StepIndex& index) : timeline_(timeline), index_(index) {}
 
-  std::vector<Place> walk() {
-    std::vector<Place> path;
-    for (Place at = last(); at.exists();) {
-      path.push_back(at);
-      const Place before = before_of(at);
-      // Clocks of ranks agree to some 100 ns only: a path that would not go back in time ends here.
-      if (before.exists() && timeline_.record(before).begin >= timeline_.record(at).begin) break;
-      at = before;
+  std::vector<PathHop> walk() {
+    std::vector<PathHop> path;
+    Place at = last();
+    double until = at.exists() ? record(at).end() : 0;
+    // Each hop goes back in time, or to a rank that came later to the same call: never more than all records.
+    for (std::size_t hops = timeline_.trace().record_count(); at.exists() && hops > 0; --hops) {
+      const Cause cause = cause_of(at);
+      path.push_back({at, std::min(cause.known, until), until});
+      if (!cause.place.exists()) break;
+      until = std::min(cause.left, path.back().from);
+      at = cause.place;
     }
     return path;
   }
 
  private:
+  /// What a record waited for: until when that was at work, and when the record could go on.
+  struct Cause {
+    Place place;
+    double left = 0, known = 0;
+  };
+
   const Record& record(Place place) const { return timeline_.record(place); }
   std::size_t rank_of(Place place) const {
     return static_cast<std::size_t>(timeline_.trace().lanes[place.lane].rank);
@@ -76,18 +85,22 @@ class Walker {
     return best;
   }
 
-  Place before_of(Place at) const {
+  Cause cause_of(Place at) const {
+    const auto begin = static_cast<double>(record(at).begin);
     if (const Place wait = longest_wait(at);
         wait.exists() && static_cast<double>(record(wait).duration) > no_wait) {
-      const Place cause = record(wait).kind() == kind_receive ? sender_of(wait) : last_to_come(at);
-      if (cause.exists() && !(cause.lane == at.lane && cause.record == at.record)) return cause;
+      const bool message = record(wait).kind() == kind_receive;
+      const Place cause = message ? sender_of(wait) : last_to_come(at);
+      if (cause.exists() && !(cause.lane == at.lane && cause.record == at.record)) {
+        const double left =
+            message ? record(cause).end() : static_cast<double>(record(cause).begin) + timeline_.self(cause);
+        return {cause, left, record(wait).end()};
+      }
     }
-    const double limit = static_cast<double>(record(at).begin) + no_wait;
-    const Place own = previous(at);
-    if (own.exists() && record(own).end() + no_wait > static_cast<double>(record(at).begin)) return own;
-    Place best = own;
-    for (const Place cause : causes(at)) keep_later(best, cause, limit);
-    return best;
+    Place best = previous(at);
+    if (!best.exists() || record(best).end() + no_wait < begin)
+      for (const Place cause : causes(at)) keep_later(best, cause, begin + no_wait);
+    return {best, best.exists() ? record(best).end() : begin, begin};
   }
 
   /// What a task waits for on its rank.
@@ -178,7 +191,7 @@ class Walker {
 
 }  // namespace
 
-std::vector<Place> critical_path(const Timeline& timeline, const StepIndex& index) {
+std::vector<PathHop> critical_path(const Timeline& timeline, const StepIndex& index) {
   return Walker(timeline, index).walk();
 }
 

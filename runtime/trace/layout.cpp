@@ -204,8 +204,16 @@ class Builder {
     }
   }
 
+  /// Two threads of the machine, of which one thread did the work when it was recorded: what it took to hand
+  /// the data over is not in the recorded times.
+  static bool newly_shared(const Plan& plan, const SimNode& from, const SimNode& to) {
+    return from.worker != to.worker && from.source_rank == to.source_rank &&
+           plan.owner[from.source_node] == plan.owner[to.source_node];
+  }
+
   void route_messages() {
     out_.incoming.assign(out_.nodes.size(), 0);
+    out_.handed.assign(out_.nodes.size(), 0);
     std::vector<std::vector<SimMessage>> sends(out_.nodes.size());
     const auto ranks = static_cast<std::size_t>(machine_.ranks);
     std::vector<std::uint64_t> up(ranks, 0), down(ranks, 0);
@@ -219,7 +227,12 @@ class Builder {
         } else {
           const std::uint32_t from = group_[place_of(m.from)].new_publish,
                               to = group_[place_of(m.to)].new_glue;
-          if (out_.nodes[from].rank == out_.nodes[to].rank) continue;
+          if (out_.nodes[from].rank == out_.nodes[to].rank) {
+            if (!newly_shared(*plan, out_.nodes[from], out_.nodes[to])) continue;
+            out_.handed[from] += bytes;
+            out_.handed[to] += bytes;
+            continue;
+          }
           sends[from].push_back({to, bytes, message_name(m.from, m.to)});
           ++out_.incoming[to];
         }

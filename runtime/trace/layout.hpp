@@ -37,8 +37,9 @@ struct LoopLayout {
   std::vector<SimMessage> sends;                 ///< of publishes; of the centre of rank 0
   std::vector<SimMessage> to_centre;             ///< per rank: sent by its last publish; rank 0 none
   std::vector<std::uint32_t> publishes;          ///< per rank
-  std::vector<std::uint32_t> incoming;           ///< n: messages that a node takes per exchange
-  std::vector<Plan> plans;                       ///< per rank, as the program would have made them
+  std::vector<std::uint32_t> handed;    ///< n: bytes that a node newly shares with other threads of its rank
+  std::vector<std::uint32_t> incoming;  ///< n: messages that a node takes per exchange
+  std::vector<Plan> plans;              ///< per rank, as the program would have made them
 
   std::span<const std::uint32_t> neighbours(std::uint32_t node) const {
     return std::span(neighbour).subspan(offset[node], offset[node + 1] - offset[node]);

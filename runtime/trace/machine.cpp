@@ -52,6 +52,7 @@ void validate(const Machine& machine, const Trace& trace) {
   demand_not_negative(machine.overhead, "overhead");
   demand_not_negative(machine.node_latency, "node latency");
   demand_positive(machine.node_bandwidth, "node bandwidth");
+  demand_not_negative(machine.line, "line");
   demand_not_negative(machine.noise, "noise");
   demand_positive(machine.speed, "speed");
   demand_positive(machine.contacts, "contacts scale");

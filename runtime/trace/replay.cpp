@@ -128,11 +128,13 @@ class Player {
       const Place part = recorded.part[source.task];
       const double own = stage_.timeline.self(recorded.task[source.task]),
                    inside = stage_.timeline.self(part);
-      const double of_rank = task.task.group >= 0 ? 1
-                             : info.shared        ? share(r, static_cast<std::size_t>(source.rank))
-                                                  : 0;
-      timed.work = of_rank > 0 ? timed.work + of_rank * (own + inside) : std::max(timed.work, own + inside);
-      timed.part += of_rank * inside;
+      if (task.task.group >= 0 || info.shared) {
+        const double of_rank = task.task.group >= 0 ? 1 : share(r, static_cast<std::size_t>(source.rank));
+        timed.work += of_rank * (own + inside);
+        timed.part += of_rank * inside;
+      } else {
+        timed.work = std::max(timed.work, own + inside);
+      }
       if (part.exists()) timed.part_kind = stage_.timeline.record(part).kind();
       timed.calls = std::max(
           timed.calls, trace_.ranks > 1 ? recorded.calls[source.task]

@@ -38,9 +38,11 @@ struct Machine {
   int ranks_per_node = 1;        ///< consecutive ranks; their messages do not use the link
   double node_latency = 5e-7;    ///< inside a node [s]
   double node_bandwidth = 10e9;  ///< inside a node, per message [byte/s]
-  double noise = 0;              ///< each task takes up to this part longer, evenly distributed
-  std::uint64_t seed = 1;        ///< of the noise
-  double speed = 1;              ///< of a core, relative to the recorded one
+  double line = 5e-8;  ///< to hand a cache line of 64 bytes over to another core [s]; paid, half by each
+                       ///< side, for velocities that go between threads of a rank and did not when recorded
+  double noise = 0;    ///< each task takes up to this part longer, evenly distributed
+  std::uint64_t seed = 1;  ///< of the noise
+  double speed = 1;        ///< of a core, relative to the recorded one
   double contacts = 1;  ///< per subdomain, relative to the recorded ones: chunks take longer in proportion,
                         ///< messages grow as the faces, with the power 2/3
   bool late_check =

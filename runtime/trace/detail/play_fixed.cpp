@@ -141,13 +141,13 @@ class FixedLoop {
     Worker& me = workers_[w];
     const SimEpoch& epoch = epochs_[me.epoch];
     const NodeWork recorded = work_of(stage_, index_, layout_.nodes[node], node, epoch, me.epoch);
-    std::uint32_t messages = 0;
+    double exchanged = 0;
     if (epoch.exchange) {
-      messages = layout_.incoming[node] + layout_.send_begin[node + 1] - layout_.send_begin[node];
+      exchanged = exchange_work(stage_, layout_, node);
       arrived_[inbox(node, me.epoch)] = 0;
     }
-    const double end = ready + recorded.work + messages * stage_.network.overhead();
-    if (recorded.recorded || messages > 0) {
+    const double end = ready + recorded.work + exchanged;
+    if (recorded.recorded || exchanged > 0) {
       const std::uint32_t local = node - layout_.rank_begin[me.rank];
       // A centre that its recording did not have is named after what it does: it waits.
       const Kind kind = recorded.recorded ? recorded.kind : kind_receive;

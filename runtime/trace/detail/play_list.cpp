@@ -112,12 +112,12 @@ class ListLoop {
       }
       const SimEpoch& epoch = epochs_[epoch_[n]];
       const NodeWork recorded = work_of(stage_, index_, layout_.nodes[n], n, epoch, epoch_[n]);
-      std::uint32_t messages = 0;
+      double exchanged = 0;
       if (epoch.exchange) {
-        messages = layout_.incoming[n] + layout_.send_begin[n + 1] - layout_.send_begin[n];
+        exchanged = exchange_work(stage_, layout_, n);
         arrived_[inbox(n, epoch_[n])] = 0;
       }
-      const double end = now + recorded.work + messages * stage_.network.overhead();
+      const double end = now + recorded.work + exchanged;
       if (recorded.recorded)
         stage_.log.task(stage_.log.worker(r, thread), now, end, 0, n - layout_.rank_begin[r],
                         static_cast<std::int32_t>(epoch_[n]), recorded.kind);

@@ -33,6 +33,12 @@ NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node
   return {stage.timeline.self(place) * scale, true, stage.timeline.record(place).kind()};
 }
 
+double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
+  const std::uint32_t messages =
+      layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  return messages * stage.network.overhead() + 0.5e9 * stage.machine.line / 64 * layout.handed[node];
+}
+
 double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch) {
   double work = 0;
   for (const StepIndex::Rank& rank : index.ranks)

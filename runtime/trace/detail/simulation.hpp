@@ -94,6 +94,8 @@ struct NodeWork {
 };
 NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node, std::uint32_t number,
                  const SimEpoch& epoch, std::size_t number_of_epoch);
+/// What messages and shared data add to the work of a node in an epoch that exchanges. [ns]
+double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node);
 /// Work of the decision behind an epoch. [ns]
 double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch);
 
