@@ -32,8 +32,8 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_option("--overhead", replay.machine.overhead, "of a thread per message sent or taken [s]")
       ->capture_default_str();
   app.add_option("--ranks-per-node", replay.ranks_per_node, "ranks that share a link [1; all as recorded]");
-  app.add_option("--node-latency", replay.machine.node_latency, "of a message inside a node [s]")
-      ->capture_default_str();
+  app.add_option("--node-latency", replay.node_latency,
+                 "of a message inside a node [s] [as recorded, or 5e-7]");
   app.add_option("--node-bandwidth", replay.machine.node_bandwidth, "of a message inside a node [B/s]")
       ->capture_default_str();
   app.add_option("--line", replay.machine.line, "to hand a cache line to another core [s]")

@@ -84,8 +84,10 @@ int replay_command(ReplayOptions options) {
     trace::Machine machine = options.machine;
     machine.ranks = options.ranks.value_or(recorded.ranks);
     machine.threads = options.threads.value_or(recorded.threads);
-    machine.ranks_per_node = options.ranks_per_node.value_or(
-        machine.ranks == recorded.ranks ? trace::recorded_machine(recorded).ranks_per_node : 1);
+    const trace::Machine there = trace::recorded_machine(recorded);
+    machine.ranks_per_node =
+        options.ranks_per_node.value_or(machine.ranks == recorded.ranks ? there.ranks_per_node : 1);
+    machine.node_latency = options.node_latency.value_or(there.node_latency);
     machine.map = trace::rank_map_named(options.map);
     machine.schedule = trace::schedule_named(options.schedule);
     machine.late_check = !options.blocking_check;

@@ -8,10 +8,11 @@
 namespace talus {
 
 struct ReplayOptions {
-  std::string file;                   ///< a trace
-  std::optional<int> ranks, threads;  ///< empty: as recorded
-  std::optional<int> ranks_per_node;  ///< empty: 1, or all on the recorded machine
-  std::string map = "block";          ///< of subdomains to ranks
+  std::string file;                    ///< a trace
+  std::optional<int> ranks, threads;   ///< empty: as recorded
+  std::optional<int> ranks_per_node;   ///< empty: 1, or all on the recorded machine
+  std::optional<double> node_latency;  ///< [s]; empty: as measured in the trace, if it has messages
+  std::string map = "block";           ///< of subdomains to ranks
   std::string schedule = "fixed";
   trace::Machine machine;       ///< all that has a number
   std::optional<double> steps;  ///< extrapolate to so many steps
