@@ -143,6 +143,16 @@ int main(int argc, char** argv) {
   CLI::App* show_app = trace_app->add_subcommand("show", "say where the time went");
   show_app->add_option("file", show.file, "trace.h5 of a run")->type_name("FILE")->required();
 
+  TraceExportOptions trace_export;
+  CLI::App* export_app =
+      trace_app->add_subcommand("export", "write it for Perfetto or ViTE, or as a picture");
+  export_app->add_option("file", trace_export.file, "trace.h5 of a run")->type_name("FILE")->required();
+  export_app->add_option("--format", trace_export.format, "perfetto, paje or svg")->required();
+  export_app->add_option("--step", trace_export.step, "this step only [svg: the middle one]");
+  export_app->add_option("--iteration", trace_export.iteration, "this iteration of the step only");
+  export_app->add_option("-o,--out", trace_export.out, "file [the trace's name, .pftrace, .paje or .svg]")
+      ->type_name("FILE");
+
   ReplayOptions replay;
   CLI::App* replay_app =
       app.add_subcommand("replay", "play a trace on another machine: what a run there would take");
@@ -168,6 +178,7 @@ int main(int argc, char** argv) {
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
   if (*show_app) return trace_show_command(show);
+  if (*export_app) return trace_export_command(trace_export);
   if (*replay_app) return replay_command(std::move(replay));
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
