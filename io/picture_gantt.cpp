@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <tuple>
 
 #include "io/detail/svg.hpp"
 #include "runtime/trace/analysis.hpp"
@@ -124,29 +125,68 @@ class Gantt {
       }
   }
 
+  /// From where a message was sent to where it was waited for; of a single step also to where it was found
+  /// waiting.
   void draw_messages(Svg& svg) {
+    using Key = std::tuple<std::uint32_t, std::int32_t, std::uint32_t>;
     struct End {
       std::size_t row;
       double time;
     };
-    std::map<std::pair<std::uint32_t, std::pair<std::int32_t, std::uint32_t>>, End> sent;
-    const auto key = [](const Record& r) { return std::pair{r.step(), std::pair{r.epoch, r.node}}; };
-    for (std::size_t k = 0; k < rows_; ++k)
-      for (const Record& record : trace_.lanes[k].records)
-        if (window_.shows(record) && record.kind() == trace::kind_send) sent[key(record)] = {k, record.end()};
-    constexpr std::size_t most_arrows = 400;
-    for (std::size_t k = 0; k < rows_; ++k)
-      for (const Record& record : trace_.lanes[k].records) {
-        if (!window_.shows(record) || record.kind() != trace::kind_receive) continue;
-        const auto from = sent.find(key(record));
-        if (from == sent.end()) continue;
-        if (++arrows_ > most_arrows) continue;
-        const double x1 = x(from->second.time), y1 = y(from->second.row) + 0.5 * height_,
-                     x2 = x(record.end()), y2 = y(k) + 0.5 * height_;
-        svg.line(x1, y1, x2, y2, {.colour = style::ink, .width = 0.6});
-        svg.circle(x2, y2, 1.6, style::ink);
+    std::map<Key, End> sent;
+    const auto key = [](const Record& r) { return Key{r.step(), r.epoch, r.node}; };
+    const auto each = [&](trace::Kind kind, auto&& use) {
+      for (std::size_t k = 0; k < rows_; ++k)
+        for (const Record& record : trace_.lanes[k].records)
+          if (window_.shows(record) && record.kind() == kind) use(k, record);
+    };
+    each(trace::kind_send, [&](std::size_t k, const Record& record) {
+      sent[key(record)] = {k, record.end()};
+    });
+    const auto arrow = [&](const End& from, const End& to, std::string_view colour) {
+      constexpr std::size_t most_arrows = 400;
+      if (++arrows_ > most_arrows) {
+        ++hidden_arrows_;
+        return;
       }
-    hidden_arrows_ = arrows_ > most_arrows ? arrows_ - most_arrows : 0;
+      const double y2 = y(to.row) + 0.5 * height_;
+      svg.line(x(from.time), y(from.row) + 0.5 * height_, x(to.time), y2, {.colour = colour, .width = 0.6});
+      svg.circle(x(to.time), y2, 1.6, colour);
+    };
+    each(trace::kind_receive, [&](std::size_t k, const Record& record) {
+      const auto from = sent.find(key(record));
+      if (from == sent.end()) return;
+      arrow(from->second, {k, record.end()}, style::ink);
+      sent.erase(from);
+    });
+    if (!window_.step) return;
+    const trace::StepIndex index = timeline_.index(*window_.step);
+    for (const auto& [name, from] : sent) {
+      const trace::Place taken = taker(index, static_cast<std::size_t>(std::get<1>(name)), std::get<2>(name));
+      if (!taken.exists() || taken.lane >= rows_) continue;
+      const auto found = static_cast<double>(timeline_.record(taken).begin);
+      if (found >= from.time) arrow(from, {taken.lane, found}, style::soft_ink);
+    }
+  }
+
+  /// The glue or centre that takes a message.
+  static trace::Place taker(const trace::StepIndex& index, std::size_t epoch, std::uint32_t name) {
+    const std::uint32_t from = name >> 16, to = name & 0xffffU;
+    for (const trace::StepIndex::Rank& rank : index.ranks) {
+      if (!rank.plan || epoch >= rank.epochs) continue;
+      const auto& groups = rank.plan->group;
+      const bool here = to == trace::centre_group
+                            ? &rank == &index.ranks.front()
+                            : std::find(groups.begin(), groups.end(), to) != groups.end();
+      if (!here) continue;
+      const bool by_centre = to == trace::centre_group || from == trace::centre_group;
+      for (std::size_t n = 0; n < rank.nodes; ++n) {
+        const auto role = static_cast<trace::Role>(rank.plan->role[n]);
+        if (by_centre ? role == trace::Role::centre : role == trace::Role::glue && groups[n] == to)
+          return rank.at(epoch, n);
+      }
+    }
+    return {};
   }
 
   void draw_path(Svg& svg) const {
