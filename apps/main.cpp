@@ -90,6 +90,8 @@ int main(int argc, char** argv) {
   run_app->add_option("--trace-steps", run.trace_steps, "record these steps only")
       ->type_name("FIRST:LAST")
       ->needs(trace_flag);
+  run_app->add_option("--replay-order", run.replay_order, "begin the loop's tasks in the order of this trace")
+      ->type_name("FILE");
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;

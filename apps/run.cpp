@@ -19,6 +19,7 @@
 #include "io/run_json.hpp"
 #include "io/scene.hpp"
 #include "runtime/step/simulation.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -190,7 +191,8 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
-                     const std::string& directory, io::Recorder* recorder, const graph::Communicator& ranks) {
+                     const std::string& directory, trace::Order* order, io::Recorder* recorder,
+                     const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = bodies.size();
@@ -206,6 +208,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
   graph::Executor executor({.threads = threads, .trace = trace ? &trace->recorder() : nullptr});
   if (trace) trace->start(executor);
   Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
+  if (order) simulation.follow(order);
   std::optional<RecorderFeed> feed;
   if (recorder) feed.emplace(executor, *recorder);
   try {
@@ -294,9 +297,23 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
+int threads_of(const RunOptions& options) {
+  return options.threads > 0 ? options.threads : omp_get_num_procs();
+}
+
+/// The order that the run is to follow. Throws std::invalid_argument when it was recorded on another machine.
+trace::Trace order_of(const RunOptions& options, const graph::Communicator& ranks) {
+  trace::Trace recorded = io::read_trace(options.replay_order);
+  if (recorded.ranks != ranks.ranks() || recorded.threads != threads_of(options))
+    throw std::invalid_argument(fmt::format("{} was recorded on {} ranks x {} threads, this run has {} x {}",
+                                            options.replay_order, recorded.ranks, recorded.threads,
+                                            ranks.ranks(), threads_of(options)));
+  return recorded;
+}
+
+int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies, trace::Order* order,
               const graph::Communicator& ranks) {
-  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  const int threads = threads_of(options);
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();
   provenance.threads = threads;
@@ -324,7 +341,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
   const io::Summary summary =
-      simulate(options, scene, std::move(bodies), threads, directory, recorder.get(), ranks);
+      simulate(options, scene, std::move(bodies), threads, directory, order, recorder.get(), ranks);
   if (recorder) {
     recorder->finish(summary);
     print_end(summary, scene.setup.solver, directory);
@@ -343,9 +360,11 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Bodies bodies;
+  std::optional<trace::Order> order;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+    if (!options.replay_order.empty()) order.emplace(order_of(options, ranks), ranks.rank());
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
@@ -371,7 +390,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(bodies), ranks);
+    return run_scene(options, scene, std::move(bodies), order ? &*order : nullptr, ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <chrono>
 
-#include "runtime/trace/traced.hpp"
-
 namespace talus {
 
 namespace {
@@ -70,15 +68,6 @@ void StepGraph::build() {
                 [this, lane] { measure_lane(lane); });
   graph_.task("sum", {read(bodies), read(contacts)}, [this] { sum_up(); });
   if (executor_.trace()) declare_tasks(*executor_.trace());
-}
-
-void StepGraph::iterate(graph::Worker& worker) {
-  if (!executor_.trace() || !executor_.trace()->active()) {
-    graph::run_epochs(epochs_, worker, iteration_);
-    return;
-  }
-  trace::Traced traced(iteration_, *executor_.trace(), worker.thread());
-  graph::run_epochs(epochs_, worker, traced);
 }
 
 void StepGraph::run() {

@@ -8,6 +8,7 @@
 
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -208,6 +209,7 @@ void StepGraph::plan_iteration() {
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
   iteration_.begin();
   if (!planned_) plan_epochs();
+  followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));
   iterating_ = now();
 }
 
@@ -293,7 +295,7 @@ void StepGraph::plan_epochs() {
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
-  if (executor_.trace()) executor_.trace()->plan(describe_plan({colour, offset, neighbour}, owner));
+  if (executor_.trace() || order_) note_plan({colour, offset, neighbour}, owner);
   planned_ = true;
 }
 

@@ -7,6 +7,7 @@
 
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -80,6 +81,37 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
   }
   plan.messages = iteration_.gluing().message_plan();
   return plan;
+}
+
+void StepGraph::note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) {
+  trace::Plan plan = describe_plan(conflicts, owner);
+  if (order_) order_->check(plan, static_cast<std::uint32_t>(steps_));
+  if (executor_.trace()) executor_.trace()->plan(std::move(plan));
+}
+
+/// What is not asked for is not there: without trace and order the loop runs on the program itself.
+void StepGraph::iterate(graph::Worker& worker) {
+  trace::Recorder* const trace =
+      executor_.trace() && executor_.trace()->active() ? executor_.trace() : nullptr;
+  const auto run = [&](auto& program) {
+    if (!trace) {
+      graph::run_epochs(epochs_, worker, program);
+      return;
+    }
+    trace::Traced traced(program, *trace, worker.thread());
+    graph::run_epochs(epochs_, worker, traced);
+  };
+  if (!followed_) return run(iteration_);
+  trace::Ordered ordered(iteration_, *order_, worker);
+  run(ordered);
+}
+
+void StepGraph::follow(trace::Order* order) {
+  if (order && (order->threads() != executor_.threads() || order->ranks() != ranks_.ranks()))
+    throw std::invalid_argument(
+        fmt::format("the order was recorded on {} ranks x {} threads and cannot be followed on {} x {}",
+                    order->ranks(), order->threads(), ranks_.ranks(), executor_.threads()));
+  order_ = order;
 }
 
 }  // namespace talus

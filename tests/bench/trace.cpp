@@ -45,10 +45,10 @@ double record_time() {
   return median(times);
 }
 
-/// Seconds per block of 32768 records, written and the file closed.
-double block_time(const std::filesystem::path& path) {
+/// Seconds per block of so many records, written and the file closed.
+double block_time(const std::filesystem::path& path, std::size_t records) {
   io::TraceWriter writer(path, 1, 1, false, task_kinds());
-  const trace::Block block{0, 0, std::vector<trace::Record>(1U << 15), std::nullopt};
+  const trace::Block block{0, 0, std::vector<trace::Record>(records), std::nullopt};
   std::vector<double> times;
   for (int repeat = 0; repeat < 31; ++repeat) {
     const double start = now();
@@ -64,7 +64,8 @@ int main(int argc, char** argv) {
   if (argc < 2) {
     const std::filesystem::path file = std::filesystem::temp_directory_path() / "talus_bench_trace.h5";
     fmt::print("record {:.1f} ns\n", 1e9 * record_time());
-    fmt::print("block of 32768 records {:.3f} ms\n", 1e3 * block_time(file));
+    for (std::size_t records : {std::size_t{1}, std::size_t{1} << 15, std::size_t{1} << 17})
+      fmt::print("block of {} records {:.3f} ms\n", records, 1e3 * block_time(file, records));
     std::filesystem::remove(file);
     fmt::print("for the replay of a trace: bench_trace FILE [RANKS THREADS]\n");
     return 0;

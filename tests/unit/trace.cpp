@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -13,6 +14,7 @@
 #include "io/trace_file.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/trace/analysis.hpp"
+#include "runtime/trace/order.hpp"
 #include "runtime/trace/traced.hpp"
 #include "tests/unit/small_trace.hpp"
 
@@ -230,6 +232,52 @@ TEST(Recording, OfALoopHasEachNodeThatDoesSomethingOnce) {
   EXPECT_EQ(records[0].node, 0u);
   EXPECT_EQ(records[3].epoch, 1);
   EXPECT_EQ(records[4].kind(), kind_check);
+}
+
+/// Beginnings of nodes, as they come.
+struct Beginnings {
+  std::atomic<int> count{0};
+  std::vector<int> place = std::vector<int>(8, -1);
+  void node(std::uint32_t node, int) { place[node] = count.fetch_add(1); }
+  bool gate(int) const { return true; }
+  bool decide(int) { return false; }
+  std::optional<Kind> kind(std::uint32_t, int) const { return test::sweep; }
+};
+
+TEST(Orders, AreFollowedByThreadsThatNeedNotWait) {
+  // Eight nodes without conflicts on two threads, begun in turn: 0, 4, 1, 5, 2, 6, 3, 7.
+  const std::vector<std::uint32_t> colour(8, 0), offset(9, 0), neighbour, owner{0, 0, 0, 0, 1, 1, 1, 1};
+  Trace trace = test::one_loop(colour, {}, std::vector<float>(8, 1));
+  trace.threads = 2;
+  trace.plans[0].owner = owner;
+  trace.lanes = {{0, 0, {}}, {0, 1, {}}};
+  for (std::uint32_t n = 0; n < 8; ++n)
+    trace.lanes[n / 4].records.push_back({2 * (n % 4) + n / 4, 1, n, 0, pack(1, test::sweep)});
+  Order order(trace, 0);
+  ASSERT_TRUE(order.begin_step(1));
+  EXPECT_FALSE(Order(trace, 0).begin_step(2));
+  graph::EpochGraph loop;
+  loop.build({colour, offset, neighbour}, owner, 2);
+  Beginnings program;
+  graph::Graph graph;
+  graph.team("loop", {}, [&](graph::Worker& me) {
+    Ordered ordered(program, order, me);
+    graph::run_epochs(loop, me, ordered);
+  });
+  graph::Executor executor({.threads = 2});
+  executor.run(graph);
+  ASSERT_EQ(program.count, 8);
+  // Each takes its place right after its turn: of two neighbours in the order the later may overtake by that
+  // much.
+  for (std::uint32_t n = 0; n < 8; ++n)
+    EXPECT_NEAR(program.place[n], static_cast<int>(2 * (n % 4) + n / 4), 1) << n;
+}
+
+TEST(Orders, OfFreeThreadsAreRefused) {
+  Trace trace = test::one_loop({0, 1}, {}, {1, 1});
+  std::swap(trace.lanes[0].records[1].begin, trace.lanes[0].records[2].begin);
+  sort_lanes(trace);
+  EXPECT_THROW(Order(trace, 0), TraceError);
 }
 
 TEST(Recording, OfAnExecutorHasItsTasks) {

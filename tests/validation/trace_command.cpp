@@ -69,6 +69,21 @@ TEST_F(TraceCommand, RecordingChangesNoBit) {
   EXPECT_FALSE(fs::exists(folder_ / "without" / "trace.h5"));
 }
 
+TEST_F(TraceCommand, ARunFollowsARecordedOrderToTheSameBits) {
+  const std::string trace = recorded("out", 3);
+  const Outcome again = talus(
+      "run scene.toml --out again --threads 3 --steps 5 --trace --set decomposition.subdomains=4 "
+      "--replay-order " +
+      trace);
+  ASSERT_TRUE(again.code == 0 || again.code == 3) << again.messages;
+  EXPECT_EQ(summary(folder_ / "again")["digest"], summary(folder_ / "out")["digest"]);
+  const Outcome threads = talus("run scene.toml --out other --threads 2 --replay-order " + trace);
+  EXPECT_EQ(threads.code, 2) << threads.messages;
+  const Outcome scene = talus("run scene.toml --out third --threads 3 --replay-order " + trace);
+  EXPECT_EQ(scene.code, 1) << scene.messages;  // noticed when the loop is planned
+  EXPECT_NE(scene.messages.find("another loop than the recorded one"), std::string::npos) << scene.messages;
+}
+
 TEST_F(TraceCommand, RanksWriteOneFile) {
   const std::string mpirun =
       "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe --bind-to none -n 3";
