@@ -43,15 +43,18 @@ std::vector<std::uint32_t> steps_of(const Trace& trace) {
   std::vector<std::uint32_t> steps;
   std::vector<char> task(trace.kinds.size(), 0);
   for (std::size_t k = 0; k < task.size(); ++k) task[k] = names_task(trace, static_cast<Kind>(k)) ? 1 : 0;
-  for (const Record& record : trace.lanes.front().records)
-    if (task[static_cast<std::size_t>(record.kind())] && (steps.empty() || steps.back() != record.step()))
-      steps.push_back(record.step());
+  for (int thread = 0; thread < trace.threads; ++thread)
+    for (const Record& record : trace.lane(0, thread).records)
+      if (task[static_cast<std::size_t>(record.kind())] && (steps.empty() || steps.back() != record.step()))
+        steps.push_back(record.step());
   std::sort(steps.begin(), steps.end());
   steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
   return steps;
 }
 
-Timeline::Timeline(const Trace& trace) : trace_(trace), self_(self_times(trace)), steps_(steps_of(trace)) {}
+Timeline::Timeline(const Trace& trace) : trace_(trace), self_(self_times(trace)), steps_(steps_of(trace)) {
+  if (steps_.empty()) throw TraceError("the trace holds no step of a run");
+}
 
 void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) const {
   const auto by_step = [](const Record& record, std::uint32_t step) { return record.step() < step; };

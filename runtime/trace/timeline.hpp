@@ -47,7 +47,7 @@ struct StepIndex {
 /// For all steps, one after the other; keeps what is common.
 class Timeline {
  public:
-  /// Keeps the reference.
+  /// Keeps the reference. Throws TraceError when there is no step.
   explicit Timeline(const Trace& trace);
   const Trace& trace() const { return trace_; }
   const std::vector<std::uint32_t>& steps() const { return steps_; }

@@ -84,6 +84,8 @@ void validate(const Trace& trace) {
     refuse("its kinds of records are not those of this version");
   for (const auto& tasks : trace.tasks) check(tasks, trace.kinds.size());
   for (const Plan& plan : trace.plans) check(plan, trace.ranks);
+  // Every epoch leaves records, so a larger number is a damaged one, and nobody should make room for it.
+  const auto most_epochs = static_cast<std::int64_t>(trace.record_count());
   for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
     const Lane& lane = trace.lanes[k];
     if (lane.rank != static_cast<std::int32_t>(k / threads) ||
@@ -91,7 +93,7 @@ void validate(const Trace& trace) {
       refuse(fmt::format("lane {} is of rank {}, thread {}", k, lane.rank, lane.thread));
     for (const Record& record : lane.records)
       if (static_cast<std::size_t>(record.kind()) >= trace.kinds.size() || record.epoch < -1 ||
-          !std::isfinite(record.duration) || record.duration < 0)
+          record.epoch >= most_epochs || !std::isfinite(record.duration) || record.duration < 0)
         refuse(fmt::format("a record of rank {}, thread {} in step {}: kind {}, epoch {}, duration {}",
                            lane.rank, lane.thread, record.step(), static_cast<int>(record.kind()),
                            record.epoch, record.duration));
