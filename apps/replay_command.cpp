@@ -42,6 +42,10 @@ void report(const ReplayOptions& options, const trace::Timeline& timeline, const
   chain.unbounded = true;
   chain.noise = 0;
   const double longest = trace::replay(timeline, chain, false).makespan;
+  trace::Machine single = machine;
+  single.ranks = single.threads = 1;
+  single.noise = 0;
+  const double alone = trace::replay(timeline, single, false).makespan;
   const double workers = static_cast<double>(machine.ranks) * machine.threads;
   const trace::Summary summary = trace::analyse(played.trace);
   const double recorded_time = recorded_makespan(recorded);
@@ -58,9 +62,8 @@ void report(const ReplayOptions& options, const trace::Timeline& timeline, const
   print("recorded makespan", fmt::format("{}   (replay {:+.1f} %)", seconds(recorded_time),
                                          100 * (played.makespan / recorded_time - 1)));
   print("work of all tasks", seconds(played.work), label);
-  print("speedup over one worker", fmt::format("{:.2f} of {:.0f}", played.work / played.makespan, workers),
-        label);
-  print("efficiency", percent(played.work / (played.makespan * workers)), label);
+  print("speedup over 1 x 1", fmt::format("{:.2f} of {:.0f}", alone / played.makespan, workers), label);
+  print("efficiency", percent(alone / (played.makespan * workers)), label);
   print("exposed messages", percent(summary.exposed / (played.makespan * workers)), label);
   print("waiting and idle", percent(summary.idle / (played.makespan * workers)), label);
   print("bound: longest chain", seconds(longest), label);

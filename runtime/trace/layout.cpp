@@ -141,11 +141,11 @@ class Builder {
     }
   }
 
-  /// Rank 0 is the centre; the others take its answer as late as they can.
+  /// Rank 0 is the centre; the others take its answer as late as they can, and work no more than that.
   SimNode centre_node(std::uint32_t rank, std::uint32_t glue_colour) const {
-    const std::size_t recorded = rank == 0 ? 0 : 1;
+    const std::size_t recorded = rank > 0 && plans_.size() > 1 ? 1 : 0;
     SimNode node{-1, 0, Role::centre, centre_group, rank, 0, glue_colour - 1};
-    if (recorded >= plans_.size()) return node;
+    node.waits_only = rank > 0 && recorded == 0;
     const Plan& plan = *plans_[recorded];
     for (std::uint32_t n = 0; n < plan.size(); ++n)
       if (static_cast<Role>(plan.role[n]) == Role::centre) {

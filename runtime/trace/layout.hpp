@@ -11,13 +11,14 @@ namespace talus::trace {
 
 /// A node of a loop on the machine: what it was in the trace.
 struct SimNode {
-  std::int32_t source_rank = -1;  ///< -1: does nothing but wait (the centre of a rank that had none)
+  std::int32_t source_rank = -1;  ///< -1: nothing was recorded
   std::uint32_t source_node = 0;
   Role role = Role::compute;
   std::uint32_t group = 0;
   std::uint32_t rank = 0;
   std::uint32_t worker = 0;  ///< rank x threads + thread
   std::uint32_t colour = 0;
+  bool waits_only = false;  ///< takes messages, and does none of the recorded work
 };
 
 /// A message of each exchange, to the glue or centre `to`.

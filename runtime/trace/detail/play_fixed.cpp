@@ -147,13 +147,11 @@ class FixedLoop {
       arrived_[inbox(node, me.epoch)] = 0;
     }
     const double end = ready + recorded.work + exchanged;
-    if (recorded.recorded || exchanged > 0) {
-      const std::uint32_t local = node - layout_.rank_begin[me.rank];
-      // A centre that its recording did not have is named after what it does: it waits.
-      const Kind kind = recorded.recorded ? recorded.kind : kind_receive;
-      stage_.log.task(w, me.time, end, ready - me.time, local, static_cast<std::int32_t>(me.epoch), kind);
-      if (ready > me.time && recorded.recorded)
-        stage_.log.span(w, me.time, ready, last_name_, static_cast<std::int32_t>(me.epoch), kind_receive);
+    if (recorded.recorded) {
+      const auto number = static_cast<std::int32_t>(me.epoch);
+      stage_.log.task(w, me.time, end, ready - me.time, node - layout_.rank_begin[me.rank], number,
+                      recorded.kind);
+      if (ready > me.time) stage_.log.span(w, me.time, ready, last_name_, number, kind_receive);
     }
     me.time = end + (recorded.recorded ? stage_.dispatch : 0);
     const bool sends = epoch.exchange &&

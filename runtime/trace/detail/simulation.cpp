@@ -28,6 +28,7 @@ NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node
   const Place place =
       index.ranks[static_cast<std::size_t>(node.source_rank)].at(epoch.source, node.source_node);
   if (!place.exists()) return {};
+  if (node.waits_only) return {0, true, stage.timeline.record(place).kind()};
   const double scale = (node.role == Role::compute ? stage.machine.contacts : 1.0) / stage.machine.speed *
                        stage.stretch(index.step, number, number_of_epoch);
   return {stage.timeline.self(place) * scale, true, stage.timeline.record(place).kind()};
