@@ -47,6 +47,9 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
                  "contacts per subdomain, relative to the recorded ones")
       ->capture_default_str();
   app.add_option("--steps", replay.steps, "extrapolate the makespan to so many steps");
+  app.add_flag(
+      "--typical", replay.machine.typical,
+      "tasks that took over three times their median of the step take the median: for noisy recordings");
   app.add_flag("--blocking-check", replay.blocking_check, "convergence checks wait for their sums");
   app.add_option("-o,--out", replay.out, "write what would have been, as a trace")->type_name("FILE");
 }

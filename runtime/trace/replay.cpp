@@ -43,7 +43,11 @@ class Player {
       : trace_(timeline.trace()),
         machine_(machine),
         groups_(groups_of(trace_)),
-        stage_{timeline, machine_, Network(machine_), Log(machine_, keep ? &out_.trace : nullptr),
+        stage_{timeline,
+               machine_,
+               Network(machine_),
+               Log(machine_, keep ? &out_.trace : nullptr),
+               {},
                trace_.predicted ? 0 : dispatch_time(trace_)} {
     validate(machine_, trace_);
     if (groups_.empty()) groups_.push_back(0);
@@ -62,6 +66,7 @@ class Player {
       const StepIndex index = stage_.timeline.index(step);
       lay_out_step(index);
       stage_.log.begin_step(step);
+      if (machine_.typical) stage_.typical = typical_times(stage_.timeline, index);
       play_step(index, now);
     }
     out_.makespan = *std::max_element(now.begin(), now.end());

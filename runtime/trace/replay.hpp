@@ -43,8 +43,10 @@ struct Machine {
   double noise = 0;    ///< each task takes up to this part longer, evenly distributed
   std::uint64_t seed = 1;  ///< of the noise
   double speed = 1;        ///< of a core, relative to the recorded one
-  double contacts = 1;  ///< per subdomain, relative to the recorded ones: chunks take longer in proportion,
-                        ///< messages grow as the faces, with the power 2/3
+  double contacts = 1;   ///< per subdomain, relative to the recorded ones: chunks take longer in proportion,
+                         ///< messages grow as the faces, with the power 2/3
+  bool typical = false;  ///< a node that took more than three times its median of the step took the median:
+                         ///< the recorded machine was shared with other programs
   bool late_check =
       true;  ///< with several ranks the sums of a convergence check travel behind the next sweep
   bool unbounded =

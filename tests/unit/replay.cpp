@@ -118,6 +118,19 @@ TEST(Replay, OfAReplayIsTheSame) {
   EXPECT_DOUBLE_EQ(makespan(once.trace, machine), once.makespan);
 }
 
+TEST(Replay, TypicalTimesLeaveInterruptionsOut) {
+  // A node of 10 ns in five epochs, once interrupted for 1000 ns.
+  Trace trace = test::one_loop({0}, {}, {10}, 5);
+  for (Record& record : trace.lanes[0].records) {
+    if (record.begin >= 40) record.begin += 990;
+    if (record.epoch == 3 && record.kind() == test::sweep) record.duration = 1000;
+  }
+  Machine machine = bare(1, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 1040);
+  machine.typical = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 50);
+}
+
 TEST(Replay, NoiseIsTheSameForTheSameSeed) {
   const Trace trace = test::two_subdomains(1);
   Machine machine = bare(1, 1);

@@ -1,5 +1,6 @@
 #include "runtime/trace/detail/simulation.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace talus::trace::detail {
@@ -31,7 +32,38 @@ NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node
   if (node.waits_only) return {0, true, stage.timeline.record(place).kind()};
   const double scale = (node.role == Role::compute ? stage.machine.contacts : 1.0) / stage.machine.speed *
                        stage.stretch(index.step, number, number_of_epoch);
-  return {stage.timeline.self(place) * scale, true, stage.timeline.record(place).kind()};
+  const Kind kind = stage.timeline.record(place).kind();
+  double work = stage.timeline.self(place);
+  if (stage.machine.typical) {
+    const auto median = static_cast<double>(
+        stage.typical[static_cast<std::size_t>(node.source_rank)].at(kind)[node.source_node]);
+    if (work > 3 * median) work = median;
+  }
+  return {work * scale, true, kind};
+}
+
+std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
+                                                              const StepIndex& index) {
+  std::vector<std::map<Kind, std::vector<float>>> typical;
+  std::map<Kind, std::vector<float>> times;
+  for (const StepIndex::Rank& rank : index.ranks) {
+    auto& medians = typical.emplace_back();
+    for (std::size_t n = 0; n < rank.nodes; ++n) {
+      for (auto& [kind, list] : times) list.clear();
+      for (std::size_t e = 0; e < rank.epochs; ++e)
+        if (const Place place = rank.at(e, n); place.exists())
+          times[timeline.record(place).kind()].push_back(static_cast<float>(timeline.self(place)));
+      for (auto& [kind, list] : times) {
+        if (list.empty()) continue;
+        const auto middle = list.begin() + static_cast<std::ptrdiff_t>(list.size() / 2);
+        std::nth_element(list.begin(), middle, list.end());
+        auto& of_kind = medians[kind];
+        of_kind.resize(rank.nodes, 0);
+        of_kind[n] = *middle;
+      }
+    }
+  }
+  return typical;
 }
 
 double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {

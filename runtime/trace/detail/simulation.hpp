@@ -3,6 +3,7 @@
 /// What the parts of a replay share: the machine, what was recorded, and what is written down.
 
 #include <cstdint>
+#include <map>
 #include <queue>
 #include <vector>
 
@@ -47,11 +48,17 @@ struct Stage {
   const Machine& machine;
   Network network;
   Log log;
+  /// With Machine::typical, of the step: per recorded rank and kind, the median of each node [ns].
+  std::vector<std::map<Kind, std::vector<float>>> typical{};
   double dispatch = 0;  ///< from the end of one node to the beginning of the next on a thread [ns]
 
   /// Factor on the work of a task, by what it is: the same in every replay of the same seed.
   double stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const;
 };
+
+/// What Stage::typical holds for a step.
+std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
+                                                              const StepIndex& index);
 
 /// An epoch of the loop on the machine.
 struct SimEpoch {
