@@ -13,6 +13,7 @@
 #include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
+#include "apps/trace_feed.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
 #include "io/progress.hpp"
@@ -21,6 +22,7 @@
 #include "io/scene.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -206,7 +208,8 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     const std::string& directory, io::Recorder& recorder, const graph::Communicator& ranks) {
+                     const std::string& directory, trace::Order* order, io::Recorder& recorder,
+                     const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = sample.size();
@@ -217,9 +220,13 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     summary.message = error.what();
     summary.exit_code = exit_failure;
   };
-  graph::Executor executor({.threads = threads});
+  std::optional<TraceFeed> trace;
+  if (options.trace) trace.emplace(directory, parse_steps(options.trace_steps), threads, ranks);
+  graph::Executor executor({.threads = threads, .trace = trace ? &trace->recorder() : nullptr});
+  if (trace) trace->start(executor);
   Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
                         ranks);
+  if (order) simulation.follow(order);
   RecorderFeed feed(executor, recorder, ranks);
   try {
     if (const int signal = advance(simulation, options, scene.output, directory, feed, tally, ranks);
@@ -243,6 +250,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     summary.wall_s = watch.seconds();
     return summary;
   }
+  if (trace) trace->finish(executor);
   const MessageCount& messages = simulation.messages();
   if (ranks.rank() == 0 && messages.messages > 0)
     fmt::print(stderr,
@@ -306,9 +314,23 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
+int threads_of(const RunOptions& options) {
+  return options.threads > 0 ? options.threads : omp_get_num_procs();
+}
+
+/// The order that the run is to follow. Throws std::invalid_argument when it was recorded on another machine.
+trace::Trace order_of(const RunOptions& options, const graph::Communicator& ranks) {
+  trace::Trace recorded = io::read_trace(options.replay_order);
+  if (recorded.ranks != ranks.ranks() || recorded.threads != threads_of(options))
+    throw std::invalid_argument(fmt::format("{} was recorded on {} ranks x {} threads, this run has {} x {}",
+                                            options.replay_order, recorded.ranks, recorded.threads,
+                                            ranks.ranks(), threads_of(options)));
+  return recorded;
+}
+
+int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, trace::Order* order,
               const graph::Communicator& ranks) {
-  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  const int threads = threads_of(options);
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();
   provenance.threads = threads;
@@ -336,7 +358,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
   if (any_failed(refused, ranks)) return exit_bad_input;
   io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
   const io::Summary summary =
-      simulate(options, scene, std::move(sample), threads, directory, recorder, ranks);
+      simulate(options, scene, std::move(sample), threads, directory, order, recorder, ranks);
   recorder.finish(summary);
   if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
@@ -355,11 +377,14 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Sample sample;
+  std::optional<trace::Order> order;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+    if (!options.replay_order.empty()) order.emplace(order_of(options, ranks), ranks.rank());
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
@@ -383,7 +408,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(sample), ranks);
+    return run_scene(options, scene, std::move(sample), order ? &*order : nullptr, ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

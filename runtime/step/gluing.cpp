@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "runtime/graph/worker.hpp"
+#include "runtime/trace/recorder.hpp"
 
 namespace talus {
 
@@ -20,8 +21,9 @@ std::size_t at(std::int32_t k) {
 }
 
 /// Polls, and adds the time it took to `waited`. Ranks that share a core give way to one another.
-void await(Channel& channel, double& waited) {
+void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
   if (channel.done()) return;
+  const trace::Span span(trace, trace::kind_receive, message);
   const auto start = std::chrono::steady_clock::now();
   for (int polls = 0; !channel.done(); ++polls)
     if (polls < 256)
@@ -31,11 +33,17 @@ void await(Channel& channel, double& waited) {
   waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+void start(Channel& channel, trace::Recorder* trace, std::uint32_t message) {
+  const trace::Span span(trace, trace::kind_send, message);
+  channel.start();
+}
+
 /// A message from and to another rank; buffers have one room more than payload, for the time stamp of a
 /// delay.
 struct Link {
   std::vector<double> out, in;
   std::unique_ptr<Channel> sender, receiver;
+  std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
 };
 
 constexpr int centre_tag = 1;
@@ -140,6 +148,10 @@ void Gluing::plan_sides(std::size_t e) {
         ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
     side.link.receiver =
         ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
+    side.link.out_name = trace::message_name(static_cast<std::uint32_t>(interface.subdomain),
+                                             static_cast<std::uint32_t>(neighbour.subdomain));
+    side.link.in_name = trace::message_name(static_cast<std::uint32_t>(neighbour.subdomain),
+                                            static_cast<std::uint32_t>(interface.subdomain));
     side.link.receiver->start();
   }
 }
@@ -196,6 +208,13 @@ void Gluing::plan_centre() {
       link->in.resize(in + 1);
       link->sender = ranks_.open_send(other, centre_tag, link->out);
       link->receiver = ranks_.open_receive(other, centre_tag, link->in);
+      // A rank is named after its first subdomain; 0 is the centre.
+      const int named = is_centre ? other : ranks_.rank();
+      const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), named) -
+                                                    all.rank_of.begin());
+      link->out_name = trace::message_name(first, trace::centre_group);
+      link->in_name = trace::message_name(trace::centre_group, first);
+      if (is_centre) std::swap(link->out_name, link->in_name);
       link->receiver->start();
       return link;
     };
@@ -293,10 +312,10 @@ void Gluing::publish(std::size_t e, Mode mode) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
-    if (side.link.sender) await(*side.link.sender, mine.waited);
+    if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
     for (std::size_t k = 0; k < side.slots.size(); ++k)
       write_velocity(side.slots[k], &side.link.out[k * width_]);
-    if (side.link.sender) side.link.sender->start();
+    if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   }
   for (std::size_t g = 0; g < walls_.size(); ++g) {
     double* sum = &mine.partial[3 * g];
@@ -314,11 +333,11 @@ void Gluing::publish(std::size_t e, Mode mode) {
   if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
   centre_->published.store(0, std::memory_order_relaxed);
   Link& link = *centre_->to_centre;
-  await(*link.sender, centre_->waited);
+  await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
   auto out = link.out.begin();
   for (const Subdomain& subdomain : subdomains_)
     out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  link.sender->start();
+  start(*link.sender, ranks_.trace(), link.out_name);
 }
 
 void Gluing::centre(Mode mode) {
@@ -326,12 +345,12 @@ void Gluing::centre(Mode mode) {
   Centre& centre = *centre_;
   if (centre.to_centre) {
     Link& link = *centre.to_centre;
-    await(*link.receiver, centre.waited);
+    await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);
     std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
     link.receiver->start();
     return;
   }
-  for (const auto& link : centre.links) await(*link->receiver, centre.waited);
+  for (const auto& link : centre.links) await(*link->receiver, centre.waited, ranks_.trace(), link->in_name);
   std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
   const std::size_t at_walls = 3 * walls_.size();
   for (const Centre::Contribution& contribution : centre.contributions) {
@@ -344,12 +363,12 @@ void Gluing::centre(Mode mode) {
   for (std::size_t r = 0; r < centre.links.size(); ++r) {
     Link& link = *centre.links[r];
     link.receiver->start();
-    await(*link.sender, centre.waited);
+    await(*link.sender, centre.waited, ranks_.trace(), link.out_name);
     auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
     for (std::size_t item : centre.items_of_rank[r])
       out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
                         out);
-    link.sender->start();
+    start(*link.sender, ranks_.trace(), link.out_name);
   }
 }
 
@@ -368,7 +387,7 @@ void Gluing::glue(std::size_t e, Mode mode) {
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
   for (Side& side : mine.sides)
-    if (side.link.receiver) await(*side.link.receiver, mine.waited);
+    if (side.link.receiver) await(*side.link.receiver, mine.waited, ranks_.trace(), side.link.in_name);
 
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   const bool schwarz = settings_.coupling == Coupling::schwarz;
@@ -419,6 +438,24 @@ void Gluing::glue(std::size_t e, Mode mode) {
   for (Side& side : mine.sides)
     if (side.link.receiver) side.link.receiver->start();
   if (mode == Mode::measured) jumps_[e] = jump;
+}
+
+std::vector<trace::Message> Gluing::message_plan() const {
+  const Decomposition& all = state_.decomposition;
+  std::vector<trace::Message> plan;
+  const auto add = [&](std::int32_t from, std::int32_t to, std::size_t doubles) {
+    plan.push_back({static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(to),
+                    static_cast<std::uint32_t>(8 * doubles)});
+  };
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
+    const Subdomain& subdomain = subdomains_[e];
+    for (std::size_t n = 0; n < subdomain.sides.size(); ++n)
+      add(all.here[e], all.interfaces[e].neighbours[n].subdomain, subdomain.sides[n].slots.size() * width_);
+    if (subdomain.partial.empty()) continue;
+    add(all.here[e], trace::centre_group, subdomain.partial.size());
+    add(trace::centre_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
+  }
+  return plan;
 }
 
 double Gluing::exposed() const {

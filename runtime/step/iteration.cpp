@@ -1,5 +1,7 @@
 #include "runtime/step/iteration.hpp"
 
+#include "runtime/step/task_kinds.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -229,6 +231,27 @@ void Iteration::node(std::uint32_t node, int epoch) {
     gluing_.centre(mode);
   else
     gluing_.glue(task - here - 1, mode);
+}
+
+std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {
+  const Work now = work(epoch);
+  const std::size_t chunks = state_.chunks.size(), here = state_.decomposition.here.size();
+  if (node >= chunks) {
+    if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
+    const std::size_t task = node - chunks;
+    return kind_of(task < here ? TaskKind::publish : task == here ? TaskKind::centre : TaskKind::glue);
+  }
+  switch (now) {
+    case Work::accumulate:
+      return kind_of(TaskKind::accumulate);
+    case Work::measure:
+      return kind_of(TaskKind::measure);
+    case Work::restore:
+      return kind_of(TaskKind::restore);
+    case Work::sweep:
+      break;
+  }
+  return kind_of(TaskKind::sweep);
 }
 
 double Iteration::impulse_scale() const {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -52,6 +53,8 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
+  std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();

@@ -324,6 +324,10 @@ Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
 
 Simulation::~Simulation() = default;
 
+void Simulation::follow(trace::Order* order) {
+  impl_->graph.follow(order);
+}
+
 const StepReport& Simulation::step() {
   const double start = now();
   impl_->load_walls();

@@ -46,6 +46,8 @@ class Simulation {
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
   ~Simulation();
 
+  /// Steps go by a recorded order, see StepGraph::follow.
+  void follow(trace::Order* order);
   /// Does one time step. Collective. Throws RunawayError, or graph::TaskError when a task failed. Not to be
   /// called when finished.
   const StepReport& step();
