@@ -46,6 +46,42 @@ struct Link {
   std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
 };
 
+template <std::size_t Width>
+void read_velocity(const Velocity& v, double* out) {
+  for (std::size_t k = 0; k < 3; ++k) out[k] = v.u[k];
+  if constexpr (Width == 6)
+    for (std::size_t k = 0; k < 3; ++k) out[k + 3] = v.w[k];
+}
+
+template <std::size_t Width>
+void write_velocities(std::span<const Velocity> velocity, std::span<const std::size_t> slots, double* out) {
+  for (const std::size_t slot : slots) {
+    read_velocity<Width>(velocity[slot], out);
+    out += Width;
+  }
+}
+
+/// NSCDD between two measurements, what most exchanges are: each shared body takes the mean of its copies.
+template <std::size_t Width>
+void take_means(std::span<Velocity> velocity, std::span<const std::size_t> shared,
+                std::span<const std::int32_t> copies_begin, const double* const* sources) {
+  for (std::size_t s = 0; s < shared.size(); ++s) {
+    const auto begin = at(copies_begin[s]), end = at(copies_begin[s + 1]);
+    if (begin == end) continue;  // a hub
+    Velocity& v = velocity[shared[s]];
+    double own[Width], sum[Width] = {};
+    read_velocity<Width>(v, own);
+    for (std::size_t c = begin; c < end; ++c) {
+      const double* const from = sources[c] ? sources[c] : own;
+      for (std::size_t k = 0; k < Width; ++k) sum[k] += from[k];
+    }
+    const auto m = static_cast<double>(end - begin);
+    for (std::size_t k = 0; k < 3; ++k) v.u[k] = sum[k] / m;
+    if constexpr (Width == 6)
+      for (std::size_t k = 0; k < 3; ++k) v.w[k] = sum[k + 3] / m;
+  }
+}
+
 constexpr int centre_tag = 1;
 int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
   return 2 + from * subdomains + to;
@@ -64,7 +100,9 @@ struct Gluing::Side {
 struct Gluing::Subdomain {
   std::vector<Side> sides;
   std::vector<std::size_t> shared;  ///< slots
-  std::vector<double> base;         ///< Schwarz: velocities after the last gluing, per shared body
+  std::vector<const double*>
+      sources;               ///< per copy of `interface.copies`: where it is read; null: the own one
+  std::vector<double> base;  ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
   std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
   std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
@@ -114,6 +152,11 @@ void Gluing::plan(bool rotation) {
       for (const Side& back : subdomains_[at(side.local)].sides)
         if (back.local == e) side.source = back.link.out.data();
     }
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e)
+    for (const CopySource& copy : all.interfaces[e].copies)
+      subdomains_[e].sources.push_back(copy.neighbour < 0 ? nullptr
+                                                          : subdomains_[e].sides[at(copy.neighbour)].source +
+                                                                at(copy.place) * width_);
   plan_centre();
   count_messages();
 }
@@ -303,9 +346,10 @@ std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
 }
 
 void Gluing::write_velocity(std::size_t slot, double* out) const {
-  const Velocity& v = state_.bodies.velocity[slot];
-  std::copy_n(v.u, 3, out);
-  if (width_ == 6) std::copy_n(v.w, 3, out + 3);
+  if (width_ == 6)
+    read_velocity<6>(state_.bodies.velocity[slot], out);
+  else
+    read_velocity<3>(state_.bodies.velocity[slot], out);
 }
 
 void Gluing::publish(std::size_t e, Mode mode) {
@@ -313,8 +357,10 @@ void Gluing::publish(std::size_t e, Mode mode) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
     if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
-    for (std::size_t k = 0; k < side.slots.size(); ++k)
-      write_velocity(side.slots[k], &side.link.out[k * width_]);
+    if (width_ == 6)
+      write_velocities<6>(state_.bodies.velocity, side.slots, side.link.out.data());
+    else
+      write_velocities<3>(state_.bodies.velocity, side.slots, side.link.out.data());
     if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   }
   for (std::size_t g = 0; g < walls_.size(); ++g) {
@@ -418,20 +464,21 @@ void Gluing::glue(std::size_t e, Mode mode) {
     if (width_ == 6) std::copy_n(next.begin() + 3, 3, v.w);
     if (schwarz) std::copy_n(next.begin(), width_, base);
   };
-  for (std::size_t s = 0; s < interface.shared.size(); ++s) {
-    const auto begin = interface.copies_begin[s], end = interface.copies_begin[s + 1];
-    if (begin == end) continue;  // a hub
-    std::array<double, 6> sum{}, own;
-    for (auto c = begin; c < end; ++c) {
-      const CopySource& source = interface.copies[at(c)];
-      const double* from = own.data();
-      if (source.neighbour < 0)
-        write_velocity(mine.shared[s], own.data());
-      else
-        from = mine.sides[at(source.neighbour)].source + at(source.place) * width_;
-      for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
+  if (!schwarz && mode != Mode::measured) {
+    const auto means = width_ == 6 ? take_means<6> : take_means<3>;
+    means(state_.bodies.velocity, mine.shared, interface.copies_begin, mine.sources.data());
+  } else {
+    for (std::size_t s = 0; s < interface.shared.size(); ++s) {
+      const auto begin = at(interface.copies_begin[s]), end = at(interface.copies_begin[s + 1]);
+      if (begin == end) continue;  // a hub
+      std::array<double, 6> sum{}, own;
+      write_velocity(mine.shared[s], own.data());
+      for (std::size_t c = begin; c < end; ++c) {
+        const double* const from = mine.sources[c] ? mine.sources[c] : own.data();
+        for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
+      }
+      settle(s, sum.data());
     }
-    settle(s, sum.data());
   }
   for (std::size_t h = 0; h < interface.hubs.size(); ++h)
     settle(at(interface.hubs[h]), &centre_->sums[3 * walls_.size() + mine.hub_item[h] * width_]);

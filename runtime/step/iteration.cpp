@@ -125,7 +125,7 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   carry_velocities(
       carry, beta,
       std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-      parameters_.turns, state_.bodies.velocity, trail_);
+      state_.bodies.velocity, trail_);
   if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
