@@ -9,6 +9,7 @@
 #include "apps/plan.hpp"
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
+#include "apps/study_error.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
 
@@ -94,6 +95,11 @@ int main(int argc, char** argv) {
   solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file")
       ->type_name("FILE");
 
+  CLI::App* study_app = app.add_subcommand("study", "measure how well and how fast scenes are solved");
+  study_app->require_subcommand(1);
+  StudyErrorOptions study_error;
+  CLI::App* study_error_app = add_study_error(*study_app, study_error);
+
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
 
@@ -112,6 +118,7 @@ int main(int argc, char** argv) {
   if (*plan_app) return plan_command(plan);
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
+  if (*study_error_app) return study_error_command(study_error);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
 }

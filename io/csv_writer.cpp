@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "io/detail/csv_cell.hpp"
 #include "io/error.hpp"
 
 namespace talus::io {
@@ -15,30 +16,7 @@ namespace {
 constexpr std::size_t flush_bytes = 32 * 1024;
 constexpr std::chrono::milliseconds flush_interval{500};
 
-void put(std::string& text, double value) {
-  fmt::format_to(std::back_inserter(text), "{}", value);
-}
-void put(std::string& text, std::int64_t value) {
-  fmt::format_to(std::back_inserter(text), "{}", value);
-}
-void put(std::string& text, int value) {
-  put(text, std::int64_t{value});
-}
-void put(std::string& text, bool value) {
-  text += value ? '1' : '0';
-}
-void put(std::string& text, const std::string& value) {
-  if (value.find_first_of(",\"\r\n") == std::string::npos) {
-    text += value;
-    return;
-  }
-  text += '"';
-  for (const char c : value) {
-    if (c == '"') text += '"';
-    text += c;
-  }
-  text += '"';
-}
+using detail::put;
 
 /// One column: its name and how a row's value is written. The tables below drive both the header and the
 /// rows.
