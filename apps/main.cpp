@@ -48,6 +48,10 @@ int main(int argc, char** argv) {
   run_app->add_option("--set", run.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
+  run_app
+      ->add_option("--error-history", run.error_history,
+                   "steps whose errors go to error_history.csv at every check: 7, 10:20, 1,5,100:120")
+      ->type_name("STEPS");
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;

@@ -11,6 +11,7 @@
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
+#include "apps/step_list.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
 #include "io/progress.hpp"
@@ -66,11 +67,12 @@ class FrameClock {
 /// in batches, since a row is less work than handing it over.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder)
-      : executor_(executor), recorder_(recorder) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, StepList error_steps)
+      : executor_(executor), recorder_(recorder), error_steps_(std::move(error_steps)) {}
 
   void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
-    rows_.push_back({simulation.report(), simulation.walls(), triaxial});
+    rows_.push_back({simulation.report(), simulation.walls(), triaxial, {}});
+    if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
   }
 
@@ -85,7 +87,10 @@ class RecorderFeed {
     since_ = {};
     if (rows_.empty()) return;
     executor_.submit_background("output of steps", [this, rows = std::move(rows_)] {
-      for (const Row& row : rows) recorder_.record_step(row.step, row.walls, row.triaxial);
+      for (const Row& row : rows) {
+        recorder_.record_step(row.step, row.walls, row.triaxial);
+        recorder_.record_errors(row.step.step, row.errors);
+      }
     });
     rows_.clear();
   }
@@ -95,9 +100,11 @@ class RecorderFeed {
     StepReport step;
     std::vector<WallReport> walls;
     std::optional<TriaxialReport> triaxial;
+    std::vector<Iteration::Check> errors;
   };
   graph::Executor& executor_;
   io::Recorder& recorder_;
+  StepList error_steps_;
   std::vector<Row> rows_;
   Stopwatch since_;
 };
@@ -203,7 +210,8 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
   graph::Executor executor({.threads = threads});
   Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
   std::optional<RecorderFeed> feed;
-  if (recorder) feed.emplace(executor, *recorder);
+  const StepList error_steps = options.error_history.empty() ? StepList() : StepList(options.error_history);
+  if (recorder) feed.emplace(executor, *recorder, error_steps);
   try {
     if (const int signal = advance(simulation, options, scene.output, feed ? &*feed : nullptr, tally, ranks);
         signal != 0) {
@@ -342,6 +350,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {

@@ -51,7 +51,7 @@ std::vector<T> or_else(const std::vector<T>& given, std::vector<T> otherwise) {
 
 StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   StudyPlan plan;
-  plan.tolerances = descending(options.tolerances, {1e-1, 1e-2, 1e-3, 1e-4});
+  plan.tolerances = descending(options.tolerances, {1e-2, 1e-3, 1e-4});
   plan.time_steps = descending(options.time_steps, {1});
   plan.at_step = options.at_step;
   plan.steps = options.steps;
@@ -165,7 +165,7 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
       ->type_name("A,B")
       ->delimiter(',');
   app->add_option("--tolerances", options.tolerances,
-                  "on the residual [0.1,0.01,0.001,0.0001; of FCLIB files 1e-4,1e-8]")
+                  "on the residual [0.01,0.001,0.0001; of FCLIB files 1e-4,1e-8]")
       ->type_name("T,..")
       ->delimiter(',')
       ->check(CLI::PositiveNumber);

@@ -15,7 +15,7 @@ struct StudyErrorOptions {
   bool force = false;                  ///< replace an earlier study in `out`
   std::vector<std::string> overrides;  ///< "a.b=c"
   std::vector<std::string> methods;    ///< [all there are]
-  std::vector<double> tolerances;      ///< [1e-1, 1e-2, 1e-3, 1e-4; of FCLIB files 1e-4, 1e-8]
+  std::vector<double> tolerances;      ///< [1e-2, 1e-3, 1e-4; of FCLIB files 1e-4, 1e-8]
   std::vector<double> time_steps;      ///< factors of the scene's time steps [1]
   std::vector<int> subdomains;         ///< [1]
   std::vector<int> threads;            ///< [one per core]

@@ -173,7 +173,7 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyRepor
                                   by_seconds);
   for (io::Chart* of : {&sweeps, &seconds})
     for (const double tolerance : plan.tolerances)
-      of->levels.push_back({tolerance, fmt::format("{:g}", tolerance)});
+      of->levels.push_back({tolerance, fmt::format("tol. {:g}", tolerance)});
   const io::HtmlTable table = times_to_tolerance(seconds.series, sweeps.series, plan);
   add_chart(
       report, std::move(seconds),

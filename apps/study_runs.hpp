@@ -37,10 +37,10 @@ struct RunStudy {
   std::vector<std::vector<std::array<double, 2>>> curves;  ///< per reference: time [s] and q/p
 };
 
-/// Runs the beginning of the scene with every variant of its seed, tolerance and time step, and once with
-/// half the smallest time step and a tenth of the smallest tolerance: the reference. The simulated time is
-/// that of `plan.steps` steps of the first stage, or the scene's. Stages that end after steps end after the
-/// same time. Adds to `study`.
+/// Runs the beginning of the scene with every variant of its seed, tolerance and time step, and once with the
+/// smallest time step, a tenth of the smallest tolerance and four times the sweeps: the reference. The
+/// simulated time is that of `plan.steps` steps of the first stage, or the scene's. Stages that end after
+/// steps end after the same time. Adds to `study`.
 void study_runs(const StudySample& sample, const StudyPlan& plan,
                 const std::function<void(const std::string&)>& say, RunStudy& study);
 

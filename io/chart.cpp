@@ -16,7 +16,7 @@ using detail::Svg;
 namespace style = detail::style;
 using Point = std::array<double, 2>;
 
-constexpr double width = 940, height = 540;
+constexpr double width = 980, height = 540;
 constexpr double left = 96, right = 650, top = 84, bottom = 460;
 
 std::string power_of_ten(int exponent) {
@@ -152,7 +152,7 @@ void draw_series(Svg& svg, const Chart& chart, const ChartSeries& series, const 
 }
 
 void draw_legend(Svg& svg, const Chart& chart) {
-  const double x = right + 110;
+  const double x = right + (chart.levels.empty() ? 28 : 96);
   const double pitch =
       std::min(20.0, (bottom - top) / std::max<double>(1, static_cast<double>(chart.series.size())));
   for (std::size_t k = 0; k < chart.series.size(); ++k) {

@@ -47,7 +47,7 @@ std::string gnuplot_script(std::span<const Chart> charts) {
       "set datafile separator comma\n"
       "set key autotitle columnheader outside right top noenhanced\n"
       "set grid\n"
-      "set terminal svg size 940,540 noenhanced background rgb 'white'\n";
+      "set terminal svg size 980,540 noenhanced background rgb 'white'\n";
   for (const Chart& chart : charts) {
     fmt::format_to(std::back_inserter(out), "\nset output {}\nset title {}\nset xlabel {}\nset ylabel {}\n",
                    quoted(chart.name + ".gnuplot.svg"), quoted(chart.title), quoted(chart.x_label),

@@ -31,6 +31,11 @@ struct WallRow {
   const WallReport& wall;
 };
 
+struct ErrorRow {
+  std::int64_t step;
+  const Iteration::Check& check;
+};
+
 constexpr Column<StepReport> steps_columns[] = {
     {"step", [](std::string& t, const StepReport& r) { put(t, r.step); }},
     {"time", [](std::string& t, const StepReport& r) { put(t, r.time); }},
@@ -83,6 +88,13 @@ constexpr Column<TriaxialReport> triaxial_columns[] = {
     {"coordination", [](std::string& t, const TriaxialReport& r) { put(t, r.coordination); }},
 };
 
+constexpr Column<ErrorRow> error_history_columns[] = {
+    {"step", [](std::string& t, const ErrorRow& r) { put(t, r.step); }},
+    {"iterations", [](std::string& t, const ErrorRow& r) { put(t, r.check.iterations); }},
+    {"seconds", [](std::string& t, const ErrorRow& r) { put(t, r.check.seconds); }},
+    {"error_rms", [](std::string& t, const ErrorRow& r) { put(t, r.check.error_rms); }},
+};
+
 template <class Row>
 std::string header_line(std::span<const Column<Row>> columns) {
   std::string text;
@@ -113,6 +125,9 @@ std::string walls_csv_header() {
 std::string triaxial_csv_header() {
   return header_line<TriaxialReport>(triaxial_columns);
 }
+std::string error_history_csv_header() {
+  return header_line<ErrorRow>(error_history_columns);
+}
 
 void append_steps_row(std::string& text, const StepReport& report) {
   append_line<StepReport>(text, steps_columns, report);
@@ -124,6 +139,10 @@ void append_walls_row(std::string& text, const StepReport& report, const WallRep
 
 void append_triaxial_row(std::string& text, const TriaxialReport& report) {
   append_line<TriaxialReport>(text, triaxial_columns, report);
+}
+
+void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check) {
+  append_line<ErrorRow>(text, error_history_columns, ErrorRow{step, check});
 }
 
 CsvFile::CsvFile(const std::filesystem::path& path, std::string_view header)

@@ -23,6 +23,7 @@
 #include "io/run_json.hpp"
 #include "io/vtk.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/iteration.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::io {
@@ -65,6 +66,9 @@ class Recorder {
   void record_step(const StepReport& report, std::span<const WallReport> walls,
                    const std::optional<TriaxialReport>& triaxial);
 
+  /// A line in error_history.csv per check; the file appears with its first line.
+  void record_errors(std::int64_t step, std::span<const Iteration::Check> checks);
+
   /// Writes a state and lets go of it. Throws std::invalid_argument when its arrays do not fit together.
   void record_frame(Frame&& frame);
 
@@ -84,6 +88,7 @@ class Recorder {
   CsvFile steps_;
   CsvFile wall_rows_;
   std::optional<CsvFile> triaxial_;
+  std::optional<CsvFile> errors_;
   std::optional<ResultsWriter> results_;
   std::vector<FieldFile> grain_files_, force_files_;  ///< paths relative to fields/
   ThinnedCurve curve_;
