@@ -7,7 +7,6 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <memory>
 
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
@@ -18,6 +17,7 @@
 #include "io/recorder.hpp"
 #include "io/run_json.hpp"
 #include "io/scene.hpp"
+#include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -64,13 +64,17 @@ class FrameClock {
 };
 
 /// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go
-/// in batches, since a row is less work than handing it over.
+/// in batches, since a row is less work than handing it over. Frames of several ranks are written by all of
+/// them together, between two steps: messages of a background lane would need an order among those of the
+/// steps.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, StepList error_steps)
-      : executor_(executor), recorder_(recorder), error_steps_(std::move(error_steps)) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks,
+               StepList error_steps)
+      : executor_(executor), recorder_(recorder), ranks_(ranks), error_steps_(std::move(error_steps)) {}
 
   void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+    if (ranks_.rank() != 0) return;
     rows_.push_back({simulation.report(), simulation.walls(), triaxial, {}});
     if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
@@ -78,6 +82,11 @@ class RecorderFeed {
 
   void frame(Frame&& frame) {
     flush();
+    if (ranks_.ranks() > 1) {
+      executor_.drain();
+      recorder_.record_frame(std::move(frame));
+      return;
+    }
     executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
       recorder_.record_frame(std::move(moved));
     });
@@ -104,6 +113,7 @@ class RecorderFeed {
   };
   graph::Executor& executor_;
   io::Recorder& recorder_;
+  const graph::Communicator& ranks_;
   StepList error_steps_;
   std::vector<Row> rows_;
   Stopwatch since_;
@@ -131,14 +141,13 @@ std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-std::string contents(const io::Scene& scene, const Bodies& bodies) {
-  return fmt::format("{}, {}, {}", counted(bodies.size(), "grain"), counted(scene.setup.walls.size(), "wall"),
+std::string contents(const io::Scene& scene, std::size_t grains) {
+  return fmt::format("{}, {}, {}", counted(grains, "grain"), counted(scene.setup.walls.size(), "wall"),
                      counted(scene.setup.stages.size(), "stage"));
 }
 
-void print_start(const io::Scene& scene, const Bodies& bodies, int threads,
-                 const graph::Communicator& ranks) {
-  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, bodies));
+void print_start(const io::Scene& scene, std::size_t grains, int threads, const graph::Communicator& ranks) {
+  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, grains));
   const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
   const int cores = omp_get_num_procs();
   fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n",
@@ -163,22 +172,19 @@ int signal_of(const graph::Communicator& ranks) {
   return static_cast<int>(signal[0]);
 }
 
-/// Runs the steps; returns the signal that stopped them, or 0. `feed` and `progress` on rank 0 only.
+/// Runs the steps; returns the signal that stopped them, or 0.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-            RecorderFeed* feed, Tally& tally, const graph::Communicator& ranks) {
+            RecorderFeed& feed, Tally& tally, const graph::Communicator& ranks) {
   std::optional<io::Progress> progress;
-  if (feed) progress.emplace(io::progress_on_stderr());
+  if (ranks.rank() == 0) progress.emplace(io::progress_on_stderr());
   FrameClock clock(output);
-  const auto write_frame = [&] {
-    Frame frame = simulation.frame(output.contacts);
-    if (feed) feed->frame(std::move(frame));
-  };
+  const auto write_frame = [&] { feed.frame(simulation.frame(output.contacts)); };
   if (output.stage_frames) write_frame();
   while (!simulation.finished()) {
     const StepReport& report = simulation.step();
     tally.add(simulation);
     const std::optional<TriaxialReport> triaxial = simulation.triaxial();
-    if (feed) feed->row(simulation, triaxial);
+    feed.row(simulation, triaxial);
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
@@ -195,11 +201,11 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 }
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
-io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
-                     io::Recorder* recorder, const graph::Communicator& ranks) {
+io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
+                     io::Recorder& recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
-  summary.bodies = bodies.size();
+  summary.bodies = sample.size();
   summary.status = "done";
   Tally tally;
   const auto failed = [&summary](const std::exception& error) {
@@ -208,13 +214,12 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.exit_code = exit_failure;
   };
   graph::Executor executor({.threads = threads});
-  Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
-  std::optional<RecorderFeed> feed;
-  const StepList error_steps = options.error_history.empty() ? StepList() : StepList(options.error_history);
-  if (recorder) feed.emplace(executor, *recorder, error_steps);
+  Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
+                        ranks);
+  RecorderFeed feed(executor, recorder, ranks,
+                    options.error_history.empty() ? StepList() : StepList(options.error_history));
   try {
-    if (const int signal = advance(simulation, options, scene.output, feed ? &*feed : nullptr, tally, ranks);
-        signal != 0) {
+    if (const int signal = advance(simulation, options, scene.output, feed, tally, ranks); signal != 0) {
       summary.status = "stopped";
       summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
       summary.exit_code = exit_failure;
@@ -223,7 +228,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     failed(error);
   }
   try {
-    if (feed) feed->flush();
+    feed.flush();
     executor.drain();
   } catch (const std::exception& error) {
     failed(error);
@@ -297,7 +302,7 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
+int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
               const graph::Communicator& ranks) {
   const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
@@ -310,7 +315,6 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  std::unique_ptr<io::Recorder> recorder;
   bool refused = false;
   if (ranks.rank() == 0) {
     try {
@@ -320,15 +324,15 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
       refused = true;
     }
     if (!refused) {
-      recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
       io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
-      print_start(scene, bodies, threads, ranks);
+      print_start(scene, sample.size(), threads, ranks);
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder.get(), ranks);
-  if (recorder) {
-    recorder->finish(summary);
+  io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
+  const io::Summary summary = simulate(options, scene, std::move(sample), threads, recorder, ranks);
+  recorder.finish(summary);
+  if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
   } else if (summary.status == "failed") {
     fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);
@@ -344,7 +348,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
 
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
-  Bodies bodies;
+  Sample sample;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
@@ -354,13 +358,13 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     scene = io::load_scene(options.scene, options.overrides);
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
-      bodies = build_sample(scene);
-      io::place_walls(scene, bodies);
+      sample = build_sample(scene);
+      io::place_walls(scene, sample);
     }
     if (options.dry_run && ranks.rank() == 0) {
       fmt::print("{}", io::resolved_scene(scene));
       fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n",
-                 options.scene, contents(scene, bodies));
+                 options.scene, contents(scene, sample.size()));
     }
   } catch (const std::exception& error) {
     if (ranks.rank() == 0) fmt::print(stderr, "talus: error: {}\n", error.what());
@@ -373,7 +377,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(bodies), ranks);
+    return run_scene(options, scene, std::move(sample), ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

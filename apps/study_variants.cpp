@@ -14,8 +14,9 @@ StudySample study_sample(const std::string& path, const std::vector<std::string>
   std::vector<std::string> all = overrides;
   all.push_back(fmt::format("seed={}", seed));
   StudySample sample{io::load_scene(path, all), {}};
-  sample.bodies = build_sample(sample.scene);
-  io::place_walls(sample.scene, sample.bodies);
+  const Sample grains = build_sample(sample.scene);
+  io::place_walls(sample.scene, grains);
+  append(grains, sample.bodies);
   return sample;
 }
 

@@ -93,25 +93,31 @@ void prepare_output_directory(const fs::path& directory, bool force, IsOutputNam
   }
 }
 
-void write_whole(const fs::path& path, std::string_view content) {
+void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
   fs::path temporary = path;
   temporary += unfinished;
-  try {
-    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    file.write(content);
-    file.close();
-  } catch (const FileError&) {
+  const auto discard = [&] {
     std::error_code ignored;
     fs::remove(temporary, ignored);
+  };
+  try {
+    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+    content([&](std::string_view text) { file.write(text); });
+    file.close();
+  } catch (...) {
+    discard();
     throw;
   }
   std::error_code error;
   fs::rename(temporary, path, error);
   if (error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
+    discard();
     throw FileError(path.string(), "cannot be replaced: " + error.message());
   }
+}
+
+void write_whole(const fs::path& path, std::string_view content) {
+  write_whole(path, [&](const WriteText& out) { out(content); });
 }
 
 }  // namespace talus::io

@@ -60,6 +60,10 @@ class Recorder {
   /// are those of `setup`.
   Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
            const Provenance& provenance);
+  /// On several ranks, each of which has one. Collective, as are the frames; tables and pictures are rank
+  /// 0's, and the other calls do nothing on others. `ranks` must outlive the recorder.
+  Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
+           const Provenance& provenance, const graph::Communicator& ranks);
 
   /// A line in steps.csv, one per wall in walls.csv, and one in triaxial.csv if there is a report; that file
   /// appears with its first line.
@@ -69,7 +73,8 @@ class Recorder {
   /// A line in error_history.csv per check; the file appears with its first line.
   void record_errors(std::int64_t step, std::span<const Iteration::Check> checks);
 
-  /// Writes a state and lets go of it. Throws std::invalid_argument when its arrays do not fit together.
+  /// Writes a state, of which each rank has its part, and lets go of it. Throws std::invalid_argument when
+  /// its arrays do not fit together.
   void record_frame(Frame&& frame);
 
   /// Completes the tables and pictures and writes run.json with the summary (`frames` is filled in here).
@@ -78,6 +83,7 @@ class Recorder {
 
  private:
   void write_fields(const Frame& frame);
+  void draw_force_picture(const Frame& part) const;
   void draw_triaxial_picture() const;
 
   std::filesystem::path directory_;
@@ -85,8 +91,8 @@ class Recorder {
   std::vector<Wall> walls_;
   std::map<std::string, int> axis_of_stage_;
   Provenance provenance_;
-  CsvFile steps_;
-  CsvFile wall_rows_;
+  const graph::Communicator& ranks_;
+  std::optional<CsvFile> steps_, wall_rows_;  ///< on rank 0
   std::optional<CsvFile> triaxial_;
   std::optional<CsvFile> errors_;
   std::optional<ResultsWriter> results_;

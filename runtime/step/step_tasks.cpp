@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/release.hpp"
 #include "runtime/step/step_graph.hpp"
 
 namespace talus {
@@ -127,7 +128,7 @@ void StepGraph::make_cells() {
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
-  const Bodies& bodies = state_.bodies;
+  Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -138,6 +139,11 @@ void StepGraph::make_cells() {
     state_.wall_then.push_back(wall.point);
     wall_margin_.push_back(half_skin + margin_of(wall));
   }
+  // What the last step found is in the impulses of the candidates; detection works in its room.
+  const auto make_room = [this] {
+    state_.contacts = {};
+    state_.chunks = {};
+  };
   if (state_.decomposition.several()) {
     const bool first = state_.decomposition.interfaces.empty();
     const bool anew = first || partition_due();
@@ -146,11 +152,13 @@ void StepGraph::make_cells() {
       imbalance_then_ = iteration_.imbalance();
       if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
     }
+    make_room();
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
   }
+  make_room();
   state_.x_then = bodies.x;
   state_.reach_then = std::move(reach);
   cells_ = build_cells(state_.x_then, state_.reach_then);
@@ -172,15 +180,15 @@ void StepGraph::make_chunks() {
   Candidates fresh;
   fresh.components = parameters_.friction ? 3 : 1;
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
-  for (auto& part : pairs_) part = {};
+  for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
                                      several ? around_.reach : state_.reach_then, wall_margin_);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
   if (several) {
-    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, fresh, glued, state_.bodies,
-                        state_.candidates);
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
+                        state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
   } else {
