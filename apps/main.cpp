@@ -60,6 +60,7 @@ int main(int argc, char** argv) {
   plan_app->add_option("--threads", plan.threads, "threads [one per core]")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
+  plan_app->add_flag("--measure", plan.measure, "measure what each omission saves, on the scene's sample");
   plan_app->add_option("--set", plan.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
@@ -119,7 +120,10 @@ int main(int argc, char** argv) {
     const graph::Communicator ranks(session, {.delay = delay});
     return run_command(run, ranks);
   }
-  if (*plan_app) return plan_command(plan);
+  if (*plan_app) {
+    const graph::MpiSession session(&argc, &argv, plan.measure);  // what messages cost is measured with MPI
+    return plan_command(plan, graph::Communicator(session));
+  }
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
   if (*study_error_app) return study_error_command(study_error);

@@ -323,9 +323,16 @@ void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
                   .y_column = "solved_part",
                   .series = {}};
   io::HtmlTable table{{"method", "tolerance", "solved", "problems", "geometric mean of the times [s]"}, {}};
+  double slowest = 1;
+  for (const std::string& method : methods)
+    for (const double tolerance : tolerances)
+      for (const auto& point : performance_profile(rows, method, tolerance))
+        slowest = std::max(slowest, point[0]);
   for (const std::string& method : methods)
     for (const double tolerance : tolerances) {
-      const auto points = performance_profile(rows, method, tolerance);
+      auto points = performance_profile(rows, method, tolerance);
+      // All curves are drawn as far as the longest.
+      if (!points.empty() && points.back()[0] < slowest) points.push_back({slowest, points.back()[1]});
       for (const auto& [ratio, part] : points) profile.row(method, tolerance, ratio, part);
       chart.series.push_back({fmt::format("{}, {:g}", method, tolerance),
                               points,

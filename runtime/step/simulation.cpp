@@ -333,7 +333,7 @@ Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
     : Simulation(std::move(setup), std::move(bodies), executor, graph::one_rank()) {}
 
 Simulation::Simulation(Setup setup, const SavedState& from, graph::Executor& executor)
-    : impl_(std::make_unique<Implementation>(std::move(setup), from.bodies, executor, one_rank())) {
+    : impl_(std::make_unique<Implementation>(std::move(setup), from.bodies, executor, graph::one_rank())) {
   impl_->go_on_from(from);
   impl_->pass_ended_stages();
 }
