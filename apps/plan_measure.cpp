@@ -77,7 +77,10 @@ class Forms {
     base_.stages.front().end.steps = 1;
     // One form must not differ from another in what is not its point.
     base_.decomposition.balance = BalanceBy::contacts;
-    for (std::size_t k = 0; k < bodies.size(); ++k) mass_ += bodies.mass(k);
+    for (std::size_t k = 0; k < bodies.size(); ++k) {
+      mass_ += bodies.mass(k);
+      smallest_ = std::min(smallest_, bodies.radius[k]);
+    }
   }
 
   Setup friction(bool in) const {
@@ -98,7 +101,10 @@ class Forms {
     Setup setup = base_;
     const bool any = has_pushed_walls();
     for (Wall& wall : setup.walls) {
-      if (!in && pushed(wall.load)) wall.load = {};
+      // Still pressing, or there would be nothing to solve: a hundredth of the smallest radius in the step.
+      if (!in && pushed(wall.load))
+        wall.load = {.drive = WallDrive::velocity,
+                     .velocity = 0.01 * smallest_ / setup.stages.front().time_step * wall.normal};
       if (in && !any) wall.load = {.drive = WallDrive::force, .force = 9.81 * mass_, .mass = 0.1 * mass_};
     }
     return setup;
@@ -124,7 +130,8 @@ class Forms {
   int several() const { return has_subdomains() ? base_.decomposition.subdomains : subdomains_put_in; }
 
   Setup base_;
-  double mass_ = 0;  ///< of the grains [kg]
+  double mass_ = 0;                                            ///< of the grains [kg]
+  double smallest_ = std::numeric_limits<double>::infinity();  ///< radius [m]
 };
 
 /// Medians of runs in turns, so that a busy moment of the machine meets both.
