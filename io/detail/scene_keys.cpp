@@ -342,6 +342,10 @@ Section<SolverSettings> solver_keys() {
                   "Part of an overlap that a step undoes. 0: overlaps stay, and what the tolerance "
                   "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
                   &SolverSettings::overlap_correction),
+              choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
+                                     "Instructions of the sweeps. All give the same bits; `auto`: the "
+                                     "widest that the processor has.",
+                                     &SolverSettings::simd),
           }};
 }
 
@@ -371,6 +375,10 @@ Section<DecompositionSettings> decomposition_keys() {
           choice<D>("exchange", {"dcs", "ccs"},
                     "`dcs`: between the subdomains that share a body; `ccs`: through one rank.",
                     &D::exchange),
+          choice<D>("mapping", {"block", "cyclic"},
+                    "Subdomains on ranks, `block`: consecutive ones share a rank; `cyclic`: dealt out one by "
+                    "one. No result depends on it.",
+                    &D::mapping),
           key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
                  &D::sweeps_per_exchange),
           choice<D>(

@@ -138,7 +138,7 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
 }  // namespace
 
 int chunk_target(std::size_t candidates) {
-  return static_cast<int>(std::clamp<std::size_t>(candidates / 64, 48, 320));
+  return static_cast<int>(std::clamp<std::size_t>(candidates / 32, 64, 512));
 }
 
 Slot Surroundings::find(std::int64_t id) const {
@@ -173,7 +173,9 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
         ranks.ranks(), subdomains, ranks.ranks()));
   decomposition.partition.subdomains = subdomains;
   for (std::int32_t e = 0; e < subdomains; ++e) {
-    const auto rank = static_cast<std::int32_t>(std::int64_t{e} * ranks.ranks() / subdomains);
+    const std::int32_t rank = settings.mapping == SubdomainMapping::cyclic
+                                  ? e % ranks.ranks()
+                                  : static_cast<std::int32_t>(std::int64_t{e} * ranks.ranks() / subdomains);
     decomposition.rank_of.push_back(rank);
     if (rank == ranks.rank()) decomposition.here.push_back(e);
   }

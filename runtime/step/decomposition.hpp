@@ -42,7 +42,7 @@ struct Decomposition {
   bool several() const { return partition.subdomains > 1; }
 };
 
-/// One subdomain per rank unless the settings say more; consecutive subdomains share a rank.
+/// One subdomain per rank unless the settings say more, laid on the ranks by settings.mapping.
 /// Throws std::invalid_argument when there are more ranks than subdomains.
 Decomposition make_decomposition(const DecompositionSettings& settings, const graph::Communicator& ranks);
 

@@ -43,6 +43,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       settings_(settings),
       decomposition_(decomposition),
       ranks_(ranks),
+      kernels_(settings.simd),
       gluing_(state, decomposition, ranks) {}
 
 void Iteration::plan() {
@@ -133,9 +134,9 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu) {
   const bool damped = !before_.empty() && chunks.boundary[c] != 0;
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
   if (at_wall)
-    sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
+    kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
   else
-    sweep_grains<Friction>(state_.contacts, range, velocity, mu);
+    kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu);
   if (damped)
     relax<Friction>(state_.contacts, range, before_[c], state_.decomposition.multiplicity, velocity,
                     at_wall ? &state_.copies[c] : nullptr);
@@ -167,18 +168,18 @@ void Iteration::chunk(std::size_t c, int epoch) {
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
-        accumulate_wall<Friction>(contacts, range, velocity, copy);
+        kernels_.accumulate_wall<Friction>(contacts, range, velocity, copy);
       } else {
-        accumulate_grains<Friction>(contacts, range, velocity);
+        kernels_.accumulate_grains<Friction>(contacts, range, velocity);
       }
       break;
     }
     case Work::measure:
       sums_[c] = at_wall
-                     ? error_wall<Friction>(contacts, range, velocity, mu, copy,
-                                            state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(),
-                                            multiplicity)
-                     : error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
+                     ? kernels_.error_wall<Friction>(
+                           contacts, range, velocity, mu, copy,
+                           state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(), multiplicity)
+                     : kernels_.error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
       if (ranks_.ranks() > 1) store_impulses(contacts, chunks, c, state_.candidates);
       break;
     case Work::sweep:

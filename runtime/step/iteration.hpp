@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/momentum.hpp"
+#include "kernels/sweep_kernels.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
@@ -115,6 +116,7 @@ class Iteration {
   const SolverSettings& settings_;
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
+  SweepKernels kernels_;
   Gluing gluing_;
   std::vector<ErrorSums> sums_;              ///< per chunk
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]

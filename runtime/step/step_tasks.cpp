@@ -153,8 +153,10 @@ void StepGraph::make_cells() {
       if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
     }
     make_room();
+    const double began = now();
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
+    sums_.times.dealing = now() - began;
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
   }
@@ -186,11 +188,13 @@ void StepGraph::make_chunks() {
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
+  const double began = now();
   if (several) {
     groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
                         state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
+    sums_.times.dealing += now() - began;
   } else {
     match_impulses(state_.candidates, fresh);
     state_.candidates = std::move(fresh);
@@ -198,7 +202,9 @@ void StepGraph::make_chunks() {
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  const double planning = now();
   iteration_.plan();
+  if (several) sums_.times.dealing += now() - planning;
   std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
   ranks_.sum(candidates);
   all_candidates_ = candidates[0];
@@ -440,7 +446,9 @@ void StepGraph::sum_up() {
   for (std::size_t e = 0; e < by_subdomain.size(); ++e)
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
   sums_.candidates = all_candidates_;
-  sums_.times = {iterating_ - started_, iterated_ - iterating_, now() - iterated_};
+  sums_.times.detection = iterating_ - started_;
+  sums_.times.iteration = iterated_ - iterating_;
+  sums_.times.rest = now() - iterated_;
 }
 
 }  // namespace talus

@@ -79,7 +79,7 @@ TEST(FirstStep, OfSeveralSubdomainsMovesAFreeGrainAsOneDoes) {
   sample.x = {Vec3(0, 0, 0), Vec3(1, 0, 0)};
   sample.radius = {0.1, 0.1};
   sample.velocity = {{-3, 0, 1, 0, 0, 0}, {5, 0, 0, 0, 0, 0}};
-  Setup setup;
+  talus::Setup setup;
   Stage stage;
   stage.name = "flight";
   stage.time_step = 1e-3;
