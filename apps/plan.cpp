@@ -110,7 +110,7 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
       print_needs(simulation, scene, threads);
       print_costs(simulation);
     }
-    constexpr int repeats = 5;
+    constexpr int repeats = 3;
     if (options.measure) print_savings(measure_savings(scene, threads, repeats, ranks), threads, repeats);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());

@@ -17,11 +17,11 @@ struct MeasuredSaving {
 
 /// Measures on the scene's own sample what leaving out friction, rotation, pushed walls, subdomains and
 /// messages saves. Each is the same number of plain sweeps over the first step with the part and without it,
-/// in turns; times are medians of `repeats`. Instead of being pushed, walls then move at a given velocity.
-/// Parts that the scene does not have are put in for the comparison: friction of 0.35, walls pushed with the
-/// weight of the sample, eight subdomains. What messages cost is measured with MPI sending to itself, so the
-/// session must have been started; it is the share of the software, without a network. Throws what Simulation
-/// throws.
+/// in turns, `repeats` times; the fastest stretch counts. Instead of being pushed, walls then move at a given
+/// velocity. Parts that the scene does not have are put in for the comparison: friction of 0.35, walls pushed
+/// with the weight of the sample, eight subdomains. What messages cost is measured with MPI sending to
+/// itself, so the session must have been started; it is the share of the software, without a network. Throws
+/// what Simulation throws.
 std::vector<MeasuredSaving> measure_savings(const io::Scene& scene, int threads, int repeats,
                                             const graph::Communicator& ranks);
 

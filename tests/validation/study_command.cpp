@@ -33,9 +33,10 @@ class StudyError : public testing::Test {
 constexpr const char* brief = "study error scene.toml --out s --threads 1 --set stage.press.friction=0.35 ";
 
 TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
+  // Without friction velocities are unique.
   const Outcome outcome =
-      run(std::string(brief) +
-          "--only step --at-step 3 --max-sweeps 3000 --tolerances 1e-2,1e-3 --subdomains 1,3");
+      run("study error scene.toml --out s --threads 1 --only step --at-step 3 --max-sweeps 3000 "
+          "--tolerances 1e-2,1e-4 --subdomains 1,3");
   ASSERT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.messages;
   const Table residual = read_table(at("s/residual.csv")), truth = read_table(at("s/true_error.csv"));
   for (const std::string method : {"auto", "nlgs", "nlgs+momentum", "nncg"})
@@ -47,7 +48,7 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
         const auto checks = rows_where(residual, of), solves = rows_where(truth, of);
         ASSERT_GE(checks.size(), 2U) << method << start << subdomains;
         EXPECT_EQ(residual.number(checks.front(), "sweeps"), 0);
-        EXPECT_LE(residual.number(checks.back(), "error_rms"), 1e-3) << method << start << subdomains;
+        EXPECT_LE(residual.number(checks.back(), "error_rms"), 1e-4) << method << start << subdomains;
         for (std::size_t k = 1; k < checks.size(); ++k) {
           EXPECT_GT(residual.number(checks[k], "sweeps"), residual.number(checks[k - 1], "sweeps"));
           EXPECT_GE(residual.number(checks[k], "seconds"), 0);
