@@ -192,8 +192,8 @@ void print_savings(const std::vector<MeasuredSaving>& savings, int threads, int 
   fmt::print(
       "\nmeasured here: plain sweeps over the first step, {} thread{}, fastest stretch of {} x {} sweeps\n",
       threads, threads == 1 ? "" : "s", repeats, sweeps_measured);
-  fmt::print("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "", "in the", "ns/contact", "", "",
-             "bytes per", "", "");
+  fmt::print("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "", "in the", "ns a", "contact", "",
+             "bytes a", "contact", "");
   fmt::print("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "part", "scene", "with", "without",
              "saved", "with", "without", "saved");
   const auto saved = [](double with, double without) {

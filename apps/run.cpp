@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <functional>
 
+#include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
 #include "apps/step_list.hpp"
@@ -92,6 +95,12 @@ class RecorderFeed {
     });
   }
 
+  /// Anything that writes files: one thread at a time may be inside HDF5.
+  void later(const char* name, std::function<void()> work) {
+    flush();
+    executor_.submit_background(name, std::move(work));
+  }
+
   void flush() {
     since_ = {};
     if (rows_.empty()) return;
@@ -174,7 +183,8 @@ int signal_of(const graph::Communicator& ranks) {
 
 /// Runs the steps; returns the signal that stopped them, or 0.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-            RecorderFeed& feed, Tally& tally, const graph::Communicator& ranks) {
+            const std::string& directory, RecorderFeed& feed, Tally& tally,
+            const graph::Communicator& ranks) {
   std::optional<io::Progress> progress;
   if (ranks.rank() == 0) progress.emplace(io::progress_on_stderr());
   FrameClock clock(output);
@@ -185,6 +195,8 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
     tally.add(simulation);
     const std::optional<TriaxialReport> triaxial = simulation.triaxial();
     feed.row(simulation, triaxial);
+    if (std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
+      feed.later("dump of a contact problem", fclib_dump(simulation, directory));
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
@@ -202,7 +214,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     io::Recorder& recorder, const graph::Communicator& ranks) {
+                     const std::string& directory, io::Recorder& recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = sample.size();
@@ -219,7 +231,8 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   RecorderFeed feed(executor, recorder, ranks,
                     options.error_history.empty() ? StepList() : StepList(options.error_history));
   try {
-    if (const int signal = advance(simulation, options, scene.output, feed, tally, ranks); signal != 0) {
+    if (const int signal = advance(simulation, options, scene.output, directory, feed, tally, ranks);
+        signal != 0) {
       summary.status = "stopped";
       summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
       summary.exit_code = exit_failure;
@@ -331,7 +344,8 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
   io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
-  const io::Summary summary = simulate(options, scene, std::move(sample), threads, recorder, ranks);
+  const io::Summary summary =
+      simulate(options, scene, std::move(sample), threads, directory, recorder, ranks);
   recorder.finish(summary);
   if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
@@ -357,6 +371,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
+    if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
       sample = build_sample(scene);

@@ -12,19 +12,13 @@
 #include "apps/study_variants.hpp"
 #include "io/error.hpp"
 #include "io/fclib.hpp"
-#include "kernels/delassus.hpp"
+#include "kernels/delassus_solve.hpp"
 
 namespace talus {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-struct ProfileMethod {
-  std::string_view name;
-  double momentum;
-};
-constexpr std::array<ProfileMethod, 2> methods_there_are{{{"nlgs", 0}, {"nlgs+momentum", 1}}};
 
 std::vector<fs::path> problems_in(const fs::path& folder) {
   std::vector<fs::path> files;
@@ -38,28 +32,26 @@ std::vector<fs::path> problems_in(const fs::path& folder) {
   return files;
 }
 
-std::vector<ProfileMethod> methods_named(std::span<const std::string> names) {
-  std::vector<ProfileMethod> chosen;
+std::vector<DelassusMethod> methods_named(std::span<const std::string> names) {
+  std::vector<DelassusMethod> chosen;
   for (const std::string& name : names) {
-    const auto found = std::ranges::find(methods_there_are, name, &ProfileMethod::name);
-    if (found == methods_there_are.end())
+    const auto method = delassus_method(name);
+    if (!method)
       throw std::invalid_argument(fmt::format("method '{}' is not known for FCLIB problems; there are {}",
                                               name, fmt::join(profile_methods(), ", ")));
-    chosen.push_back(*found);
+    chosen.push_back(*method);
   }
   return chosen;
 }
 
-ProfileRow solve_once(const DelassusProblem& problem, const ProfileMethod& method, double tolerance,
+ProfileRow solve_once(const DelassusProblem& problem, DelassusMethod method, double tolerance,
                       double max_seconds) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   std::vector<double> r(3 * problem.contacts(), 0.0);
-  const NlgsReport report = solve_nlgs(
-      problem,
-      {.tolerance = tolerance, .momentum = method.momentum, .stop = [&] { return elapsed() > max_seconds; }},
-      r);
+  const DelassusGoal goal{.tolerance = tolerance, .stop = [&] { return elapsed() > max_seconds; }};
+  const DelassusReport report = solve_delassus(problem, method, goal, r);
   ProfileRow row;
   row.seconds = elapsed();
   row.contacts = static_cast<std::int64_t>(problem.contacts());
@@ -74,7 +66,7 @@ ProfileRow solve_once(const DelassusProblem& problem, const ProfileMethod& metho
 
 std::vector<std::string> profile_methods() {
   std::vector<std::string> names;
-  for (const ProfileMethod& method : methods_there_are) names.emplace_back(method.name);
+  for (const DelassusMethod method : all_delassus_methods) names.emplace_back(name_of(method));
   return names;
 }
 
@@ -86,12 +78,12 @@ void check_profile(const fs::path& folder, std::span<const std::string> methods)
 std::vector<ProfileRow> study_profile(const fs::path& folder, std::span<const std::string> methods,
                                       std::span<const double> tolerances, double max_seconds,
                                       const std::function<void(const std::string&)>& say) {
-  const std::vector<ProfileMethod> chosen = methods_named(methods);
+  const std::vector<DelassusMethod> chosen = methods_named(methods);
   const std::vector<fs::path> files = problems_in(folder);
   std::vector<ProfileRow> rows;
   for (std::size_t k = 0; k < files.size(); ++k) {
     const DelassusProblem problem = io::read_fclib(files[k]);
-    for (const ProfileMethod& method : chosen)
+    for (const DelassusMethod method : chosen)
       for (const double tolerance : tolerances) {
         ProfileRow row = solve_once(problem, method, tolerance, max_seconds);
         std::vector<double> seconds{row.seconds};
@@ -99,7 +91,7 @@ std::vector<ProfileRow> study_profile(const fs::path& folder, std::span<const st
           seconds.push_back(solve_once(problem, method, tolerance, max_seconds).seconds);
         row.seconds = median(seconds);
         row.problem = files[k].stem().string();
-        row.method = method.name;
+        row.method = name_of(method);
         row.tolerance = tolerance;
         say(fmt::format("{}/{} {}: {}, tolerance {:.1e}: {} in {:.3g} s, error {:.1e}", k + 1, files.size(),
                         row.problem, row.method, tolerance, row.solved ? "solved" : "NOT solved", row.seconds,

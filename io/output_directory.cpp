@@ -34,6 +34,16 @@ bool is_numbered(std::string_view name, std::string_view prefix, std::string_vie
   return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
+/// fclib_000012.hdf5, or its draft fclib_000012.hdf5.PID.part without the last extension.
+bool is_dump(std::string_view name) {
+  constexpr std::string_view suffix = ".hdf5";
+  const std::size_t end = name.find(suffix);
+  if (end == name.npos) return false;
+  const std::string_view process = name.substr(end + suffix.size());
+  return is_numbered(name.substr(0, end + suffix.size()), "fclib_", suffix) &&
+         std::ranges::all_of(process, [](unsigned char c) { return c == '.' || std::isdigit(c) != 0; });
+}
+
 /// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
 std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
   std::vector<fs::path> found;
@@ -55,7 +65,8 @@ bool is_output_name(const fs::path& relative) {
   std::string_view name = text;
   if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
   return std::ranges::find(fixed_names, name) != fixed_names.end() ||
-         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp");
+         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
+         is_dump(name);
 }
 
 bool is_partition_name(const fs::path& relative) {

@@ -23,6 +23,8 @@ constexpr double most_momentum = 0.9;
 constexpr double hopeless_growth = 4;
 /// With friction momentum gets this far at twice the speed of conjugate gradients, and then falls behind.
 constexpr double momentum_reach = 5e-5;
+/// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
+constexpr int plain_sweeps = 3;
 /// What momentum makes worse shows within as many sweeps.
 constexpr int trusted_sweeps = 25;
 
@@ -98,8 +100,8 @@ void Iteration::begin() {
 double Iteration::beta(int epoch) const {
   const Course& now = course(epoch);
   if (now.method == SolverMethod::nncg) return conjugate_beta_;
-  const int sweep = number(epoch) - now.from;
-  return std::min(now.most, sweep / (sweep + 3.0));
+  const int sweep = number(epoch) - now.from - plain_sweeps;
+  return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
 }
 
 void Iteration::begin_course(SolverMethod method, double most) {

@@ -196,6 +196,9 @@ struct Simulation::Implementation {
       from_walls += wall.impulse;
       impulse_unit = std::max(impulse_unit, wall.impulse.norm());
     }
+    // What rounding leaves of the sample's momentum, at most sqrt(2 E M), is no defect.
+    const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
+    impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * size.total_mass));
     const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
     ++stage_steps;
     ++report.step;

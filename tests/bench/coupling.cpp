@@ -14,8 +14,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -23,70 +21,23 @@
 #include "io/results.hpp"
 #include "io/scene.hpp"
 #include "runtime/step/simulation.hpp"
+#include "tests/bench/packed_scene.hpp"
 
 namespace {
 
 using namespace talus;
-
-struct Packing {
-  double edge = 0;
-  Bodies bodies;
-};
-
-Packing read_packing(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw std::runtime_error("cannot open " + path);
-  Packing packing;
-  std::string line, word;
-  std::getline(file, line);
-  std::istringstream first(line);
-  if (!(first >> word >> word >> packing.edge)) throw std::runtime_error(path + ":1: expected `# L <edge>`");
-  std::getline(file, line);
-  for (int number = 3; std::getline(file, line); ++number) {
-    std::replace(line.begin(), line.end(), ',', ' ');
-    std::istringstream values(line);
-    double x, y, z, r;
-    if (!(values >> x >> y >> z >> r))
-      throw std::runtime_error(fmt::format("{}:{}: expected x,y,z,r", path, number));
-    add_sphere(packing.bodies, BodyId{number - 3}, Vec3(x, y, z), r, 2600);
-  }
-  return packing;
-}
-
-Setup scene(const Packing& packing, bool pile, double tolerance) {
-  Setup setup;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {1.0, -1.0}) {
-      Wall wall;
-      wall.name = std::string(1, "xyz"[axis]) + (side > 0 ? "-" : "+");
-      wall.normal = side * Vec3::Unit(axis);
-      wall.point = Vec3::Unit(axis) * (side > 0 ? 0 : packing.edge);
-      if (pile && wall.name == "z+") continue;
-      setup.walls.push_back(wall);
-    }
-  double mass = 0;
-  for (std::size_t k = 0; k < packing.bodies.size(); ++k) mass += packing.bodies.mass(k);
-  Stage stage;
-  stage.name = pile ? "pile" : "triaxial";
-  stage.time_step = 1e-3;
-  stage.law = {0.35, pile ? 0.35 : 0.0, 0};
-  stage.end.steps = 1;
-  if (pile) stage.gravity = Vec3(0, 0, -9.81);
-  WallLoad load;
-  load.drive = WallDrive::pressure;
-  load.pressure = 9.81 * mass / (packing.edge * packing.edge);  // the weight of the sample on each face
-  load.mass = 0.1 * mass;
-  if (!pile)
-    for (const char* name : {"x+", "y+", "z+"}) stage.loads.push_back({name, load});
-  setup.stages = {stage};
-  setup.solver.tolerance = tolerance;
-  return setup;
-}
+using bench::packed_scene;
+using bench::Packing;
+using bench::read_packing;
 
 /// The last frame of a run, its grains at their speed.
 Bodies read_state(const std::string& path, io::Scene& scene) {
   const Frame frame = io::read_frame(path, io::frame_count(path) - 1);
   Bodies bodies;
+  Sample sample;
+  sample.x = frame.x;
+  sample.radius = frame.radius;
+  sample.density = scene.density;
   for (std::size_t k = 0; k < frame.id.size(); ++k) {
     add_sphere(bodies, BodyId{frame.id[k]}, frame.x[k], frame.radius[k], scene.density);
     Velocity& v = bodies.velocity.back();
@@ -94,7 +45,7 @@ Bodies read_state(const std::string& path, io::Scene& scene) {
     for (std::size_t axis = 0; axis < 3 && !frame.omega.empty(); ++axis)
       v.w[axis] = frame.radius[k] * frame.omega[k][static_cast<Eigen::Index>(axis)];
   }
-  io::place_walls(scene, bodies);
+  io::place_walls(scene, sample);
   for (Wall& wall : scene.setup.walls)
     for (const WallReport& then : frame.walls)
       if (then.name == wall.name) wall.point += (then.position - wall.normal.dot(wall.point)) * wall.normal;
@@ -205,5 +156,5 @@ int main(int argc, char** argv) {
   }
   const Packing packing = read_packing(first);
   for (const bool pile : {false, true})
-    print_table(scene(packing, pile, pile ? 1e-4 : 1e-3), packing.bodies, kind);
+    print_table(packed_scene(packing, pile, pile ? 1e-4 : 1e-3), packing.bodies, kind);
 }

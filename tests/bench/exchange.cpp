@@ -18,6 +18,7 @@
 
 #include "apps/sample_builder.hpp"
 #include "io/scene.hpp"
+#include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace {
@@ -37,10 +38,10 @@ struct Measured {
   std::int64_t broad_phases = 0, migrants = 0;
 };
 
-Measured measure(const Setup& setup, const Bodies& bodies, std::int64_t steps,
+Measured measure(const Setup& setup, const Sample& sample, std::int64_t steps,
                  const graph::Communicator& ranks) {
   graph::Executor executor({.threads = 1});
-  Simulation simulation(setup, bodies, executor, ranks);
+  Simulation simulation(setup, deal_out(sample, setup.decomposition, ranks), executor, ranks);
   Measured result;
   std::vector<double> waited;
   double dealing = 0, detecting = 0, all = 0;
@@ -79,9 +80,9 @@ int main(int argc, char** argv) {
   }
   const std::int64_t steps = argc > 2 ? std::atol(argv[2]) : 10;
   io::Scene scene = io::load_scene(argv[1]);
-  Bodies bodies = build_sample(scene);
-  io::place_walls(scene, bodies);
-  if (ranks.rank() != 0) bodies = {};
+  Sample sample = build_sample(scene);
+  io::place_walls(scene, sample);
+  if (ranks.rank() != 0) sample = {};
   Setup setup = scene.setup;
   setup.stages.resize(1);
   setup.solver.method = SolverMethod::nlgs;
@@ -113,7 +114,7 @@ int main(int argc, char** argv) {
         if (only > 0 && only != setup.decomposition.subdomains) continue;
         setup.decomposition.coupling = coupling;
         setup.decomposition.exchange = exchange;
-        const Measured m = measure(setup, bodies, steps, ranks);
+        const Measured m = measure(setup, sample, steps, ranks);
         const bool in_paper = !(central && coupling == Coupling::schwarz);
         say(fmt::format(
             "| {} | {} | {} | {} | {:.1f} | {} | {:.1f} | {:.1f} % | {} | {:.2f} % | {:.2f} % | {} | {} |\n",

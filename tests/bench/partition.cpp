@@ -27,7 +27,7 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-struct Sample {
+struct Dense {
   std::vector<Vec3> x;
   std::vector<double> radii;
   std::vector<GrainPair> grain_pairs;
@@ -35,7 +35,7 @@ struct Sample {
 };
 
 /// Pairs whose surfaces are nearer than `margin` [m], and those of the walls of the box [low, high].
-void find_contacts(Sample& sample, double margin, const Vec3& low, const Vec3& high) {
+void find_contacts(Dense& sample, double margin, const Vec3& low, const Vec3& high) {
   std::vector<double> reach = sample.radii;
   for (double& r : reach) r += margin / 2;
   const CellGrid grid = build_cells(sample.x, reach);
@@ -53,8 +53,8 @@ void find_contacts(Sample& sample, double margin, const Vec3& low, const Vec3& h
 
 /// A deposited packing cut level at the top, as the lid of a compaction leaves it, with six walls. Pairs
 /// nearer than `margin` of the mean radius count as contacts.
-Sample deposited(std::size_t grains, double margin) {
-  Sample sample;
+Dense deposited(std::size_t grains, double margin) {
+  Dense sample;
   const auto drawn = draw_radii({SizeDistribution::Kind::uniform, 10.0 / 11, 12.0 / 11}, grains * 21 / 20, 1);
   const double length = std::cbrt(static_cast<double>(grains) * 4.18879 / 0.62);
   const auto centres = deposit(drawn, length, length);
@@ -73,9 +73,9 @@ Sample deposited(std::size_t grains, double margin) {
 
 /// The last frame of a run in a box; pairs nearer than a tenth of the smallest radius count as contacts, as
 /// in the run.
-Sample compacted(const std::string& results) {
+Dense compacted(const std::string& results) {
   const Frame frame = io::read_frame(results, io::frame_count(results) - 1);
-  Sample sample;
+  Dense sample;
   sample.x = frame.x;
   sample.radii = frame.radius;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();
@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "200000";
   const auto subdomains = static_cast<std::int32_t>(argc > 2 ? std::stoi(argv[2]) : 96);
   auto begin = std::chrono::steady_clock::now();
-  const Sample sample =
+  const Dense sample =
       what.ends_with(".h5") ? compacted(what) : deposited(static_cast<std::size_t>(std::stol(what)), 0.05);
   const std::size_t contacts = sample.grain_pairs.size() + sample.wall_pairs.size();
   std::printf("# %zu grains, %zu contacts (%zu at walls), sample in %.1f s\n", sample.x.size(), contacts,
