@@ -10,6 +10,7 @@
 #include "apps/replay_command.hpp"
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
+#include "apps/study_error.hpp"
 #include "apps/trace_command.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
@@ -89,6 +90,10 @@ int main(int argc, char** argv) {
       ->type_name("a.b=c")
       ->allow_extra_args(false);
   run_app
+      ->add_option("--error-history", run.error_history,
+                   "steps whose errors go to error_history.csv at every check: 7, 10:20, 1,5,100:120")
+      ->type_name("STEPS");
+  run_app
       ->add_option(
           "--dump-fclib", run.dump_fclib,
           "write the contact problem of this step to fclib_STEP.hdf5 in the results, may be repeated")
@@ -110,6 +115,7 @@ int main(int argc, char** argv) {
   plan_app->add_option("--threads", plan.threads, "threads [one per core]")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
+  plan_app->add_flag("--measure", plan.measure, "measure what each omission saves, on the scene's sample");
   plan_app->add_option("--set", plan.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
@@ -191,6 +197,10 @@ int main(int argc, char** argv) {
       app.add_subcommand("replay", "play a trace on another machine: what a run there would take");
   replay_app->add_option("file", replay.file, "trace.h5 of a run")->type_name("FILE")->required();
   add_machine_options(*replay_app, replay);
+  CLI::App* study_app = app.add_subcommand("study", "measure how well and how fast scenes are solved");
+  study_app->require_subcommand(1);
+  StudyErrorOptions study_error;
+  CLI::App* study_error_app = add_study_error(*study_app, study_error);
 
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
@@ -207,12 +217,16 @@ int main(int argc, char** argv) {
     const graph::Communicator ranks(session, {.delay = delay});
     return run_command(run, ranks);
   }
-  if (*plan_app) return plan_command(plan);
+  if (*plan_app) {
+    const graph::MpiSession session(&argc, &argv, plan.measure);  // what messages cost is measured with MPI
+    return plan_command(plan, graph::Communicator(session));
+  }
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
   if (*show_app) return trace_show_command(show);
   if (*export_app) return trace_export_command(trace_export);
   if (*replay_app) return replay_command(std::move(replay));
+  if (*study_error_app) return study_error_command(study_error);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
 }

@@ -13,6 +13,7 @@
 #include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
+#include "apps/step_list.hpp"
 #include "apps/trace_feed.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
@@ -73,12 +74,14 @@ class FrameClock {
 /// steps.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks)
-      : executor_(executor), recorder_(recorder), ranks_(ranks) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks,
+               StepList error_steps)
+      : executor_(executor), recorder_(recorder), ranks_(ranks), error_steps_(std::move(error_steps)) {}
 
   void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
     if (ranks_.rank() != 0) return;
-    rows_.push_back({simulation.report(), simulation.walls(), triaxial});
+    rows_.push_back({simulation.report(), simulation.walls(), triaxial, {}});
+    if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
   }
 
@@ -104,7 +107,10 @@ class RecorderFeed {
     since_ = {};
     if (rows_.empty()) return;
     executor_.submit_background("output of steps", [this, rows = std::move(rows_)] {
-      for (const Row& row : rows) recorder_.record_step(row.step, row.walls, row.triaxial);
+      for (const Row& row : rows) {
+        recorder_.record_step(row.step, row.walls, row.triaxial);
+        recorder_.record_errors(row.step.step, row.errors);
+      }
     });
     rows_.clear();
   }
@@ -114,10 +120,12 @@ class RecorderFeed {
     StepReport step;
     std::vector<WallReport> walls;
     std::optional<TriaxialReport> triaxial;
+    std::vector<Iteration::Check> errors;
   };
   graph::Executor& executor_;
   io::Recorder& recorder_;
   const graph::Communicator& ranks_;
+  StepList error_steps_;
   std::vector<Row> rows_;
   Stopwatch since_;
 };
@@ -227,7 +235,8 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
                         ranks);
   if (order) simulation.follow(order);
-  RecorderFeed feed(executor, recorder, ranks);
+  RecorderFeed feed(executor, recorder, ranks,
+                    options.error_history.empty() ? StepList() : StepList(options.error_history));
   try {
     if (const int signal = advance(simulation, options, scene.output, directory, feed, tally, ranks);
         signal != 0) {
@@ -385,6 +394,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
+    if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks

@@ -21,9 +21,11 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view unfinished = ".part";
 
-constexpr std::array<std::string_view, 12> fixed_names{
-    "run.json",   "scene.resolved.toml", "steps.csv",         "walls.csv",    "triaxial.csv", "results.h5",
-    "fields.pvd", "fields/grains.pvd",   "fields/forces.pvd", "triaxial.svg", "forces.svg",   "trace.h5"};
+constexpr std::array<std::string_view, 13> fixed_names{
+    "error_history.csv", "run.json",          "scene.resolved.toml", "steps.csv",
+    "walls.csv",         "triaxial.csv",      "results.h5",          "fields.pvd",
+    "fields/grains.pvd", "fields/forces.pvd", "triaxial.svg",        "forces.svg",
+    "trace.h5"};
 
 /// prefix, six digits or more, suffix
 bool is_numbered(std::string_view name, std::string_view prefix, std::string_view suffix) {

@@ -76,6 +76,7 @@ void Iteration::begin() {
                       state_.decomposition.several();
   before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
+  began_ = clock_now();
   impulses_.clear();
   history_.clear();
   result_ = {};
@@ -360,6 +361,7 @@ bool Iteration::decide(int epoch) {
 /// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
 bool Iteration::measured(int epoch) {
   result_.iterations = sweeps_;
+  measured_ = clock_now();
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows = rows_of_subdomains();
   std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
@@ -441,7 +443,7 @@ bool Iteration::judge() {
   result_.jump = jump_.velocity2 > 0 ? std::sqrt(jump_.jump2 / jump_.velocity2) : 0;
   result_.contacts = total.contacts;
   result_.active = total.active;
-  history_.push_back({result_.iterations, result_.error_rms});
+  history_.push_back({result_.iterations, result_.error_rms, measured_ - began_});
   result_.drift = drift();
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.

@@ -68,10 +68,12 @@ class Iteration {
   double imbalance() const { return imbalance_; }
   /// Per subdomain here, with BalanceBy::time: time of its chunks since the plan [s].
   std::vector<double> busy() const;
-  /// error_rms at each check, with the sweeps done.
+  /// error_rms at each check, with the sweeps done and the time that they and the checks took since the
+  /// iterations of the step began.
   struct Check {
     int iterations;
     double error_rms;
+    double seconds;
   };
   const std::vector<Check>& history() const { return history_; }
 
@@ -133,6 +135,7 @@ class Iteration {
   double change2_ = 0;                       ///< NNCG: of all, at the sweep before
   double conjugate_beta_ = 0;                ///< NNCG: of the next sweep
   double first_residual2_ = 0;               ///< at the first check of the step [m^2/s^2]
+  double began_ = 0, measured_ = 0;  ///< clock at begin() and at the last check [s], for history_ only
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment
