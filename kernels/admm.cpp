@@ -1,7 +1,9 @@
 #include "kernels/admm.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "kernels/body_system.hpp"
 #include "kernels/coarse_level.hpp"
@@ -190,6 +192,34 @@ double estimate_stiffness(const BodyProblem& problem) {
   return total > 0 ? sum / total : 0;
 }
 
+namespace {
+
+/// Velocities of the iterate V against those that its impulses give.
+void measure(const BodyProblem& problem, std::span<const Twist> V, std::span<const Vec3> r, double gap,
+             std::span<const std::int32_t> heavy, AdmmResult& result) {
+  std::vector<Twist> gained = velocities_of(problem, r), defect(gained.size());
+  double speed2 = 0;
+  for (std::size_t b = 0; b < gained.size(); ++b) {
+    defect[b].u = gained[b].u - V[b].u;
+    defect[b].w = gained[b].w - V[b].w;
+    gained[b].u -= problem.bodies[b].free.u;
+    gained[b].w -= problem.bodies[b].free.w;
+    speed2 += gained[b].u.squaredNorm();
+  }
+  const double gained2 = kinetic2(problem, gained);
+  result.momentum_defect = gained2 > 0 ? std::sqrt(kinetic2(problem, defect) / gained2) : 0;
+  // Each body counts alike: the heaviest would hide the rest.
+  const double speed = std::sqrt(speed2 / static_cast<double>(gained.size()));
+  result.contact_defect = speed > 0 ? gap / speed : 0;
+  result.heavy_defect = 0;
+  for (std::int32_t b : heavy) {
+    const double own = gained[at(b)].u.norm();
+    if (own > 0) result.heavy_defect = std::max(result.heavy_defect, defect[at(b)].u.norm() / own);
+  }
+}
+
+}  // namespace
+
 AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
   AdmmResult result;
   const std::size_t contacts = problem.contacts.size(), bodies = problem.bodies.size();
@@ -198,8 +228,7 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
     return result;
   }
   double kappa = settings.stiffness;
-  if (kappa <= 0) kappa = std::max(stiffness_of(problem, problem.impulse), estimate_stiffness(problem));
-  if (kappa <= 0) kappa = 1;
+  if (kappa <= 0) kappa = estimate_stiffness(problem);
   std::vector<double> rho(contacts);
   for (std::size_t k = 0; k < contacts; ++k) rho[k] = kappa * effective_mass(problem, problem.contacts[k]);
   LinearSolver linear(problem, rho,
@@ -208,7 +237,10 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
   std::vector<Vec3>& r = problem.impulse;
   std::vector<Vec3> y(contacts);        // aim of the contact velocity, with its shift
   std::vector<double> shift(contacts);  // mu |y_t|
-  std::vector<Twist> V = velocities_of(problem, r), force(bodies), carried(bodies);
+  std::vector<Twist> V = velocities_of(problem, r), force(bodies);
+  const std::vector<std::int32_t> heavy = heavy_unknowns(problem);
+  std::array<double, 8> worst;
+  worst.fill(std::numeric_limits<double>::infinity());
   const auto split = [&](std::size_t k, const Vec3& v) {
     const Vec3& n = problem.contacts[k].normal;
     return Vec3(v - n.dot(v) * n);
@@ -249,23 +281,12 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
       y[k] += (next_shift - shift[k]) * c.normal;
       shift[k] = next_shift;
     }
-    carried = velocities_of(problem, r);
-    double speed2 = 0, mass = 0;
-    for (std::size_t b = 0; b < bodies; ++b) {
-      const BodyUnknown& body = problem.bodies[b];
-      const Vec3 gained = carried[b].u - body.free.u;
-      // Each body counts alike: the heaviest would hide the rest.
-      speed2 += gained.squaredNorm();
-      mass += 1;
-      force[b].u = gained;
-      force[b].w = carried[b].w - body.free.w;
-      carried[b].u -= V[b].u;
-      carried[b].w -= V[b].w;
-    }
-    const double gained2 = kinetic2(problem, force);
-    result.momentum_defect = gained2 > 0 ? std::sqrt(kinetic2(problem, carried) / gained2) : 0;
-    result.contact_defect = speed2 > 0 ? std::sqrt(gap2 / weight / (speed2 / mass)) : 0;
-    if (result.momentum_defect <= settings.tolerance && result.contact_defect <= settings.tolerance) {
+    measure(problem, V, r, std::sqrt(gap2 / weight), heavy, result);
+    worst[static_cast<std::size_t>(result.iterations) % worst.size()] = result.heavy_defect;
+    result.heavy_defect = *std::max_element(worst.begin(), worst.end());
+    const bool balanced = !heavy.empty() && result.heavy_defect <= settings.heavy_tolerance;
+    if (balanced ||
+        (result.momentum_defect <= settings.tolerance && result.contact_defect <= settings.tolerance)) {
       result.converged = true;
       break;
     }

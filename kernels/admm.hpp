@@ -11,21 +11,24 @@
 namespace talus {
 
 struct AdmmSettings {
-  double tolerance = 1e-4;  ///< on both defects of AdmmResult
-  int max_iterations = 200;
-  double relaxation = 1.6;        ///< in [1, 2)
-  double linear_tolerance = 0.1;  ///< of the conjugate gradients, on what is left of the residual
-  int max_linear = 200;           ///< conjugate gradient iterations within one of ADMM
-  int aggregate = 0;              ///< grains per aggregate; 0: aggregate_target
-  double stiffness = 0;           ///< kappa; 0: estimated
+  double tolerance = 1e-4;        ///< on momentum_defect and contact_defect
+  double heavy_tolerance = 5e-3;  ///< on heavy_defect; where heavy bodies are, either is enough
+  int max_iterations = 100;
+  double relaxation = 1.6;         ///< in [1, 2)
+  double linear_tolerance = 0.05;  ///< of the conjugate gradients, on what is left of the residual
+  int max_linear = 100;            ///< conjugate gradient iterations within one of ADMM
+  int aggregate = 0;               ///< grains per aggregate; 0: aggregate_target
+  double stiffness = 0;            ///< kappa; 0: estimate_stiffness
 };
 
 struct AdmmResult {
   int iterations = 0;
   int linear_iterations = 0;   ///< conjugate gradients, all
   double momentum_defect = 0;  ///< |V - V_free - M^-1 H r| / |V - V_free|, kinetic norms
-  double contact_defect = 0;   ///< contact velocities against the law, relative to the velocity scale
-  double stiffness = 0;        ///< kappa at the end: rho over the effective mass of a contact
+  double contact_defect = 0;   ///< contact velocities against the law, over the rms change of velocity
+  double heavy_defect = 0;  ///< the same as momentum_defect for the worst heavy body, the worst of the last
+                            ///< 8 iterations: force carried against force due; 0 without heavy bodies
+  double stiffness = 0;     ///< kappa: rho over the effective mass of a contact
   bool converged = false;
 };
 
@@ -46,8 +49,9 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings);
 /// of N grains: N^2/3; a plate of T grain masses over L layers of c contacts: T L/c. 0 without impulses.
 double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse);
 
-/// The same before any impulse is known: the load of every body is passed on, layer by layer over the
-/// contacts, to the driven walls; or from the heaviest body outwards if there is none.
+/// The same before any impulse is known: the momentum that stops every body at once is passed on, layer by
+/// layer over the contacts, to the driven walls; or from the heaviest body outwards if there is none. Also
+/// about the number of Gauss-Seidel sweeps that the problem needs. 0 without contacts.
 double estimate_stiffness(const BodyProblem& problem);
 
 }  // namespace talus

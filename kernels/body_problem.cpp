@@ -104,4 +104,22 @@ std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec
   return V;
 }
 
+std::vector<std::int32_t> heavy_unknowns(const BodyProblem& problem, double ratio) {
+  std::vector<double> around(problem.bodies.size(), 0);
+  std::vector<int> neighbours(problem.bodies.size(), 0);
+  for (const ContactEquation& c : problem.contacts) {
+    if (c.second < 0) continue;
+    around[at(c.first)] += problem.bodies[at(c.second)].mass;
+    around[at(c.second)] += problem.bodies[at(c.first)].mass;
+    ++neighbours[at(c.first)];
+    ++neighbours[at(c.second)];
+  }
+  std::vector<std::int32_t> heavy;
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+    if (neighbours[b] > 0 &&
+        (problem.bodies[b].wall || problem.bodies[b].mass * neighbours[b] > ratio * around[b]))
+      heavy.push_back(static_cast<std::int32_t>(b));
+  return heavy;
+}
+
 }  // namespace talus

@@ -89,6 +89,10 @@ void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
 /// V = V_free + M^-1 H r, one entry per unknown, summed in order of contact.
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse);
 
+/// Unknowns much heavier than what they touch: walls of finite mass, and bodies of more than `ratio` times
+/// the mean mass of their neighbours; ascending.
+std::vector<std::int32_t> heavy_unknowns(const BodyProblem& problem, double ratio = 10);
+
 /// v - offset: the relative velocity at a contact before drives and bias.
 inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
   const Twist& a = V[static_cast<std::size_t>(c.first)];

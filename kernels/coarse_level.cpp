@@ -41,7 +41,7 @@ Adjacency grain_neighbours(const BodyProblem& problem) {
 }  // namespace
 
 int aggregate_target(std::size_t bodies) {
-  return static_cast<int>(std::clamp<std::size_t>(bodies / 250, 16, 256));
+  return static_cast<int>(std::clamp<std::size_t>(bodies / 125, 16, 256));
 }
 
 Aggregates grow_aggregates(const BodyProblem& problem, int target) {
