@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/balance.hpp"
+
 namespace talus {
 
 std::size_t memory_used(const StepState& state) {
@@ -20,7 +22,8 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       settings_(settings),
       decomposition_(decomposition),
       ranks_(ranks),
-      gluing_(state, decomposition, ranks) {}
+      gluing_(state, decomposition, ranks),
+      admm_(state, parameters, decomposition, ranks) {}
 
 void Iteration::begin() {
   const Chunks& chunks = state_.chunks;
@@ -43,10 +46,13 @@ void Iteration::begin() {
                       state_.decomposition.several();
   before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
+  gained_.assign(chunks.size(), 0);
   impulses_.clear();
   history_.clear();
   result_ = {};
   jump_ = {};
+  history_from_ = 0;
+  sweeps_needed_ = -1;
   sweeps_from_ = segment_ = 0;
 }
 
@@ -80,12 +86,13 @@ void Iteration::chunk(std::size_t c, Work work) {
                                           ? Multiplicities(state_.decomposition.multiplicity)
                                           : Multiplicities();
   WallCopy& copy = state_.copies[c];
+  const auto owned_begin = static_cast<std::size_t>(chunks.owned_begin[c]);
+  const auto owned =
+      std::span(chunks.owned)
+          .subspan(owned_begin, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned_begin);
   switch (work) {
     case Work::accumulate: {
-      const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-      reset_to_free(
-          std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-          state_.free, velocity);
+      reset_to_free(owned, state_.free, velocity);
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
@@ -96,6 +103,10 @@ void Iteration::chunk(std::size_t c, Work work) {
       break;
     }
     case Work::measure:
+      gained_[c] = gained_energy(owned, state_.free, velocity,
+                                 decomposition_.coupling == Coupling::schwarz
+                                     ? Multiplicities(state_.decomposition.multiplicity)
+                                     : Multiplicities());
       sums_[c] = at_wall
                      ? error_wall<Friction>(contacts, range, velocity, mu, copy,
                                             state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(),
@@ -149,7 +160,7 @@ double Iteration::impulse_scale() const {
 double Iteration::drift() const {
   const double scale = impulse_scale();
   if (scale == 0) return 0;
-  std::size_t half = 0;
+  std::size_t half = history_from_;
   while (half + 1 < history_.size() && 2 * history_[half + 1].iterations <= history_.back().iterations)
     ++half;
   double change = 0;
@@ -161,14 +172,16 @@ double Iteration::drift() const {
 /// Per subdomain in order of chunk, then over subdomains in their order: the same sums on any number of
 /// ranks.
 void Iteration::add_up() {
-  constexpr std::size_t head = 9;
+  constexpr std::size_t head = 11;
   const std::size_t walls = state_.walls.size(), width = head + 3 * walls;
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows(all.here.size() * width, 0.0);
   std::vector<ErrorSums> sums(all.here.size());
+  std::vector<double> gained(all.here.size(), 0.0);
   for (std::size_t c = 0; c < sums_.size(); ++c) {
     const auto e = static_cast<std::size_t>(state_.chunks.subdomain[c]);
     sums[e].add(sums_[c]);
+    gained[e] += gained_[c];
     if (state_.chunks.wall[c] < 0) continue;
     double* wall = &rows[e * width + head + 3 * static_cast<std::size_t>(state_.chunks.wall[c])];
     for (std::size_t k = 0; k < 3; ++k) wall[k] += sums_[c].wall_impulse[k];
@@ -183,7 +196,9 @@ void Iteration::add_up() {
                                  static_cast<double>(sums[e].contacts),
                                  static_cast<double>(sums[e].active),
                                  jump.jump2,
-                                 jump.velocity2};
+                                 jump.velocity2,
+                                 sums[e].work,
+                                 gained[e]};
     std::copy_n(values, head, &rows[e * width]);
   }
   rows = ranks_.gather_records(std::span<const double>(rows));
@@ -191,6 +206,7 @@ void Iteration::add_up() {
   for (std::size_t k = 0; k < rows.size(); k += width)
     by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
   total_ = {};
+  total_gained_ = 0;
   jump_ = {};
   std::vector<Vec3> impulses(walls, Vec3::Zero());
   for (const double* row : by_subdomain) {
@@ -201,13 +217,33 @@ void Iteration::add_up() {
     part.velocity2 = row[4];
     part.contacts = static_cast<std::int64_t>(row[5]);
     part.active = static_cast<std::int64_t>(row[6]);
+    part.work = row[9];
+    total_gained_ += row[10];
     total_.add(part);
     jump_.jump2 += row[7];
     jump_.velocity2 += row[8];
     for (std::size_t w = 0; w < walls; ++w) impulses[w] += Eigen::Map<const Vec3>(row + head + 3 * w);
   }
-  for (std::size_t w = 0; w < walls; ++w) state_.wall_states[w].impulse = impulses[w];
+  for (std::size_t w = 0; w < walls; ++w) {
+    state_.wall_states[w].impulse = impulses[w];
+    const double normal = impulses[w].dot(state_.walls[w].normal);
+    total_gained_ += normal * normal * state_.walls[w].inv_mass();
+  }
   impulses_.push_back(std::move(impulses));
+}
+
+/// With `automatic`, ADMM is for problems that sweeps, having had their chance, do not get balanced, and
+/// would not in fewer sweeps than it costs; whatever it left undone may be asked for again after as many.
+bool Iteration::ask_admm() {
+  constexpr int chance = 50, worth = 1000;
+  if (settings_.stiff == StiffSolver::off || !admm_.available()) return false;
+  if (settings_.stiff == StiffSolver::always) return result_.stiff_calls == 0;
+  const bool balanced = std::max(result_.drift, result_.unbalance) <= settings_.balance_tolerance;
+  if (balanced || result_.iterations < chance || result_.stiff_calls == 3) return false;
+  const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
+  if (since < chance * (1 << (2 * result_.stiff_calls))) return false;
+  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
+  return sweeps_needed_ >= worth;
 }
 
 bool Iteration::decide(int epoch) {
@@ -223,20 +259,29 @@ bool Iteration::decide(int epoch) {
   result_.active = total.active;
   history_.push_back({result_.iterations, result_.error_rms});
   result_.drift = drift();
+  result_.unbalance = unbalance(total.work, total_gained_);
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
-  result_.converged =
-      judged && result_.error_rms <= settings_.tolerance && result_.drift <= settings_.balance_tolerance;
+  result_.converged = judged && result_.error_rms <= settings_.tolerance &&
+                      std::max(result_.drift, result_.unbalance) <= settings_.balance_tolerance;
   // A sweep never makes the residual of a step a thousand times worse; an exchange that adds up too much
   // does.
-  if (history_.size() == 1) first_residual2_ = std::max(total.residual2, scale2);
+  if (history_.size() == history_from_ + 1) first_residual2_ = std::max(total.residual2, scale2);
   constexpr double hopeless = 1e3;
   result_.diverged = total.residual2 > hopeless * hopeless * first_residual2_;
   if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
   if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations)
     return false;
+  if (ask_admm()) {
+    result_.stiff = admm_.improve();
+    ++result_.stiff_calls;
+    // What the walls carried before says nothing about the drift of what they carry now.
+    history_from_ = history_.size();
+    segment_ = epoch + 1;
+    return true;
+  }
   const int sweeps = std::min(std::max(settings_.check_every, result_.iterations / 4),
                               settings_.max_iterations - result_.iterations);
   result_.iterations += sweeps;

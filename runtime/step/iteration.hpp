@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "runtime/step/admm.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
@@ -12,7 +13,10 @@ namespace talus {
 struct IterationResult {
   int iterations = 0;  ///< sweeps
   double error_rms = 0, error_max = 0;
-  double jump = 0;   ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
+  double jump = 0;       ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
+  double unbalance = 0;  ///< part of the load that is not carried: kernels/balance.hpp
+  AdmmResult stiff;      ///< of the last call of ADMM in this step
+  int stiff_calls = 0;
   double drift = 0;  ///< change of the wall impulses over the second half of the iterations, relative
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
@@ -66,6 +70,7 @@ class Iteration {
   void add_up();
   double impulse_scale() const;
   double drift() const;
+  bool ask_admm();
 
   StepState& state_;
   const StepParameters& parameters_;
@@ -73,14 +78,19 @@ class Iteration {
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
   Gluing gluing_;
+  Admm admm_;
   std::vector<ErrorSums> sums_;              ///< per chunk
+  std::vector<double> gained_;               ///< per chunk: gained_energy of the bodies it owns [J]
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]
   std::vector<Check> history_;
   IterationResult result_;
   ErrorSums total_;                          ///< of all subdomains, at the last check
+  double total_gained_ = 0;                  ///< likewise, with walls [J]
   JumpSums jump_;                            ///< likewise
   std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
-  double first_residual2_ = 0;               ///< at the first check of the step [m^2/s^2]
+  double sweeps_needed_ = -1;                ///< as ADMM sees it; < 0: not asked
+  double first_residual2_ = 0;               ///< at the first check, or the first since ADMM [m^2/s^2]
+  std::size_t history_from_ = 0;             ///< first check since the impulses were last made by ADMM
   int sweeps_from_ = 0;                      ///< epoch of the first sweep of the segment
   int segment_ = 0;  ///< epoch of the next accumulate; written at gates only, when every thread waits
 };

@@ -48,13 +48,21 @@ struct DetectionSettings {
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
 
+/// ADMM in body space before the sweeps: for long chains and heavy bodies, which sweeps cannot see through.
+enum class StiffSolver {
+  off,
+  automatic,  ///< when the global balance is missed and the problem is one that sweeps take too long for
+  always,     ///< in every step that is not converged to begin with
+};
+
 struct SolverSettings {
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
-      5e-2;                   ///< on balance: drift of the wall forces over the second half of the iterations
+      5e-2;  ///< on balance: drift of the wall forces over the second half of the iterations, and unbalance
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
       10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
+  StiffSolver stiff = StiffSolver::off;
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0

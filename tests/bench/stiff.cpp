@@ -25,6 +25,7 @@
 #include "kernels/admm.hpp"
 #include "kernels/sample.hpp"
 #include "kernels/sweep.hpp"
+#include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace {
@@ -243,6 +244,40 @@ void row(const std::string& what, double seconds, double sweep, const AdmmResult
   fmt::print("  {}\n", error);
 }
 
+/// Steps of the whole program with the plate on the pile, ADMM by itself where it is needed.
+void run_plate(const Packing& packing, int subdomains, int steps, StiffSolver stiff) {
+  Setup setup;
+  setup.walls = plate_scene(packing, 1e6, false).sample.walls;
+  const double free = 0.005 * gravity;
+  Stage stage;
+  stage.name = "plate";
+  stage.time_step = 0.005;
+  stage.gravity = Vec3(0, 0, -gravity);
+  stage.law = {mu, mu, 0};
+  stage.end.steps = steps;
+  setup.stages = {stage};
+  setup.detection.alert = 0.02;
+  setup.solver.max_iterations = 2000;
+  setup.solver.stiff = stiff;
+  setup.decomposition.subdomains = subdomains;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, packing.bodies, executor);
+  fmt::print("plate of 1e6 on 16k, whole steps, {} subdomains\n", subdomains);
+  while (!simulation.finished()) {
+    const StepReport& report = simulation.step();
+    const IterationResult& r = simulation.iterations();
+    const WallReport plate = simulation.walls()[5];
+    fmt::print(
+        "  step {:>2}: {:>5} sweeps, map {:.1e}, unbalance {:.1e}, drift {:.1e}, admm {} x ({} it, {} cg, "
+        "heavy "
+        "{:.1e}), {:.2f} s{}  velocity {:.2e} of g h, force {:.4f} of the weight\n",
+        report.step, report.iterations, r.error_rms, r.unbalance, r.drift, r.stiff_calls, r.stiff.iterations,
+        r.stiff.linear_iterations, r.stiff.heavy_defect, report.wall_s, report.converged ? "" : " MISSED",
+        plate.velocity / free, plate.force.norm() / setup.walls[5].load.force);
+    simulation.begin_next_stage();
+  }
+}
+
 void compare(const std::string& name, const Scene& scene, int sweeps, std::span<const AdmmSettings> settings,
              const std::function<std::string(const Scene&)>& error) {
   const BodyProblem cold = scene.problem();
@@ -293,6 +328,7 @@ int main(int argc, char** argv) {
   }
   if (argc < 2) return 0;
   const Packing packing = read_packing(argv[1]);
+  for (int subdomains : {1, 12, 96}) run_plate(packing, subdomains, 4, StiffSolver::automatic);
   for (bool closed : {true, false}) {
     const Scene scene = plate_scene(packing, 1e6, closed);
     std::vector<AdmmSettings> packings;
