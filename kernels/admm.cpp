@@ -211,11 +211,18 @@ void measure(const BodyProblem& problem, std::span<const Twist> V, std::span<con
   // Each body counts alike: the heaviest would hide the rest.
   const double speed = std::sqrt(speed2 / static_cast<double>(gained.size()));
   result.contact_defect = speed > 0 ? gap / speed : 0;
-  result.heavy_defect = 0;
+  result.balance_defect = 0;
   for (std::int32_t b : heavy) {
     const double own = gained[at(b)].u.norm();
-    if (own > 0) result.heavy_defect = std::max(result.heavy_defect, defect[at(b)].u.norm() / own);
+    if (own > 0) result.balance_defect = std::max(result.balance_defect, defect[at(b)].u.norm() / own);
   }
+  Vec3 sample = Vec3::Zero();
+  double scale = 0;
+  for (std::size_t b = 0; b < gained.size(); ++b) {
+    sample += problem.bodies[b].mass * defect[b].u;
+    scale += problem.bodies[b].mass * gained[b].u.norm();
+  }
+  if (scale > 0) result.balance_defect = std::max(result.balance_defect, sample.norm() / scale);
 }
 
 }  // namespace
@@ -282,9 +289,9 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
       shift[k] = next_shift;
     }
     measure(problem, V, r, std::sqrt(gap2 / weight), heavy, result);
-    worst[static_cast<std::size_t>(result.iterations) % worst.size()] = result.heavy_defect;
-    result.heavy_defect = *std::max_element(worst.begin(), worst.end());
-    const bool balanced = !heavy.empty() && result.heavy_defect <= settings.heavy_tolerance;
+    worst[static_cast<std::size_t>(result.iterations) % worst.size()] = result.balance_defect;
+    result.balance_defect = *std::max_element(worst.begin(), worst.end());
+    const bool balanced = !heavy.empty() && result.balance_defect <= settings.balance_tolerance;
     if (balanced ||
         (result.momentum_defect <= settings.tolerance && result.contact_defect <= settings.tolerance)) {
       result.converged = true;

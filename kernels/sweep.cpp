@@ -147,12 +147,10 @@ inline void add_error(ErrorSums& sums, V3 r, V3 v, V3 n, double bias, double w_n
     const V3 v_hat = v_biased + mu * std::sqrt(dot(v_t, v_t)) * n;
     const V3 miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
     e = w_nn * std::sqrt(dot(miss, miss));
-    sums.work += std::abs(dot(r, v_hat));
   } else {
     const double r_n = dot(r, n);
     e = w_nn * std::abs(r_n - std::max(0.0, r_n - v_n / w_nn));
     v_biased = v_n * n;
-    sums.work += std::abs(r_n * v_n);
   }
   const double r_n = dot(r, n);
   sums.residual2 += e * e;
@@ -252,7 +250,6 @@ void ErrorSums::add(const ErrorSums& other) {
   residual_max = std::max(residual_max, other.residual_max);
   impulse2 += other.impulse2;
   velocity2 += other.velocity2;
-  work += other.work;
   for (int c = 0; c < 3; ++c) wall_impulse[c] += other.wall_impulse[c];
   contacts += other.contacts;
   active += other.active;

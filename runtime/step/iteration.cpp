@@ -46,7 +46,6 @@ void Iteration::begin() {
                       state_.decomposition.several();
   before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
-  gained_.assign(chunks.size(), 0);
   impulses_.clear();
   history_.clear();
   result_ = {};
@@ -103,10 +102,6 @@ void Iteration::chunk(std::size_t c, Work work) {
       break;
     }
     case Work::measure:
-      gained_[c] = gained_energy(owned, state_.free, velocity,
-                                 decomposition_.coupling == Coupling::schwarz
-                                     ? Multiplicities(state_.decomposition.multiplicity)
-                                     : Multiplicities());
       sums_[c] = at_wall
                      ? error_wall<Friction>(contacts, range, velocity, mu, copy,
                                             state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(),
@@ -160,28 +155,28 @@ double Iteration::impulse_scale() const {
 double Iteration::drift() const {
   const double scale = impulse_scale();
   if (scale == 0) return 0;
-  std::size_t half = history_from_;
-  while (half + 1 < history_.size() && 2 * history_[half + 1].iterations <= history_.back().iterations)
-    ++half;
+  // Since ADMM, all that sweeps changed of what it had settled; otherwise the second half of the sweeps.
+  std::size_t from = history_from_;
+  if (result_.stiff_calls == 0)
+    while (from + 1 < history_.size() && 2 * history_[from + 1].iterations <= history_.back().iterations)
+      ++from;
   double change = 0;
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
-    change = std::max(change, (impulses_.back()[w] - impulses_[half][w]).norm());
+    change = std::max(change, (impulses_.back()[w] - impulses_[from][w]).norm());
   return change / scale;
 }
 
 /// Per subdomain in order of chunk, then over subdomains in their order: the same sums on any number of
 /// ranks.
 void Iteration::add_up() {
-  constexpr std::size_t head = 11;
+  constexpr std::size_t head = 9;
   const std::size_t walls = state_.walls.size(), width = head + 3 * walls;
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows(all.here.size() * width, 0.0);
   std::vector<ErrorSums> sums(all.here.size());
-  std::vector<double> gained(all.here.size(), 0.0);
   for (std::size_t c = 0; c < sums_.size(); ++c) {
     const auto e = static_cast<std::size_t>(state_.chunks.subdomain[c]);
     sums[e].add(sums_[c]);
-    gained[e] += gained_[c];
     if (state_.chunks.wall[c] < 0) continue;
     double* wall = &rows[e * width + head + 3 * static_cast<std::size_t>(state_.chunks.wall[c])];
     for (std::size_t k = 0; k < 3; ++k) wall[k] += sums_[c].wall_impulse[k];
@@ -196,9 +191,7 @@ void Iteration::add_up() {
                                  static_cast<double>(sums[e].contacts),
                                  static_cast<double>(sums[e].active),
                                  jump.jump2,
-                                 jump.velocity2,
-                                 sums[e].work,
-                                 gained[e]};
+                                 jump.velocity2};
     std::copy_n(values, head, &rows[e * width]);
   }
   rows = ranks_.gather_records(std::span<const double>(rows));
@@ -206,7 +199,6 @@ void Iteration::add_up() {
   for (std::size_t k = 0; k < rows.size(); k += width)
     by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
   total_ = {};
-  total_gained_ = 0;
   jump_ = {};
   std::vector<Vec3> impulses(walls, Vec3::Zero());
   for (const double* row : by_subdomain) {
@@ -217,33 +209,40 @@ void Iteration::add_up() {
     part.velocity2 = row[4];
     part.contacts = static_cast<std::int64_t>(row[5]);
     part.active = static_cast<std::int64_t>(row[6]);
-    part.work = row[9];
-    total_gained_ += row[10];
     total_.add(part);
     jump_.jump2 += row[7];
     jump_.velocity2 += row[8];
     for (std::size_t w = 0; w < walls; ++w) impulses[w] += Eigen::Map<const Vec3>(row + head + 3 * w);
   }
-  for (std::size_t w = 0; w < walls; ++w) {
-    state_.wall_states[w].impulse = impulses[w];
-    const double normal = impulses[w].dot(state_.walls[w].normal);
-    total_gained_ += normal * normal * state_.walls[w].inv_mass();
-  }
+  for (std::size_t w = 0; w < walls; ++w) state_.wall_states[w].impulse = impulses[w];
   impulses_.push_back(std::move(impulses));
 }
 
-/// With `automatic`, ADMM is for problems that sweeps, having had their chance, do not get balanced, and
-/// would not in fewer sweeps than it costs; whatever it left undone may be asked for again after as many.
+/// About the sweeps that this step's problem takes; looked up once a step, when somebody asks. On several
+/// ranks nobody sees the whole problem, and drift is taken at its word.
+double Iteration::sweeps_needed() {
+  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.available() ? admm_.sweeps_needed() : 0;
+  return sweeps_needed_;
+}
+
+bool Iteration::balanced() {
+  result_.unbalance = result_.drift;
+  if (result_.stiff_calls > 0)
+    result_.unbalance += result_.stiff.balance_defect;
+  else if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
+    result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
+  return result_.unbalance <= settings_.balance_tolerance;
+}
+
+/// With `automatic`, ADMM is for problems that sweeps, having had their chance, did not get balanced, and
+/// would not in fewer sweeps than it costs. Whatever it leaves undone it is asked for again, ever later.
 bool Iteration::ask_admm() {
-  constexpr int chance = 50, worth = 1000;
+  constexpr int chance = 50, worth = 1000, calls = 3;
   if (settings_.stiff == StiffSolver::off || !admm_.available()) return false;
-  if (settings_.stiff == StiffSolver::always) return result_.stiff_calls == 0;
-  const bool balanced = std::max(result_.drift, result_.unbalance) <= settings_.balance_tolerance;
-  if (balanced || result_.iterations < chance || result_.stiff_calls == 3) return false;
+  if (settings_.stiff == StiffSolver::always && result_.stiff_calls == 0) return true;
+  if (result_.stiff_calls == calls || balanced()) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
-  if (since < chance * (1 << (2 * result_.stiff_calls))) return false;
-  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
-  return sweeps_needed_ >= worth;
+  return since >= chance << (2 * result_.stiff_calls) && sweeps_needed() >= worth;
 }
 
 bool Iteration::decide(int epoch) {
@@ -259,8 +258,6 @@ bool Iteration::decide(int epoch) {
   result_.active = total.active;
   history_.push_back({result_.iterations, result_.error_rms});
   result_.drift = drift();
-  result_.unbalance = unbalance(total.work, total_gained_);
-
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
   result_.converged = judged && result_.error_rms <= settings_.tolerance &&

@@ -14,10 +14,11 @@ struct IterationResult {
   int iterations = 0;  ///< sweeps
   double error_rms = 0, error_max = 0;
   double jump = 0;       ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
-  double unbalance = 0;  ///< part of the load that is not carried: kernels/balance.hpp
+  double unbalance = 0;  ///< estimate of the relative error of the forces on walls and heavy bodies
   AdmmResult stiff;      ///< of the last call of ADMM in this step
   int stiff_calls = 0;
-  double drift = 0;  ///< change of the wall impulses over the second half of the iterations, relative
+  double drift =
+      0;  ///< relative change of the wall impulses over the second half of the iterations, or since ADMM
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;  ///< the error grows without bound
@@ -70,6 +71,8 @@ class Iteration {
   void add_up();
   double impulse_scale() const;
   double drift() const;
+  double sweeps_needed();
+  bool balanced();
   bool ask_admm();
 
   StepState& state_;
@@ -80,12 +83,10 @@ class Iteration {
   Gluing gluing_;
   Admm admm_;
   std::vector<ErrorSums> sums_;              ///< per chunk
-  std::vector<double> gained_;               ///< per chunk: gained_energy of the bodies it owns [J]
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]
   std::vector<Check> history_;
   IterationResult result_;
   ErrorSums total_;                          ///< of all subdomains, at the last check
-  double total_gained_ = 0;                  ///< likewise, with walls [J]
   JumpSums jump_;                            ///< likewise
   std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
   double sweeps_needed_ = -1;                ///< as ADMM sees it; < 0: not asked

@@ -58,7 +58,7 @@ enum class StiffSolver {
 struct SolverSettings {
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
-      5e-2;  ///< on balance: drift of the wall forces over the second half of the iterations, and unbalance
+      5e-2;  ///< on balance: estimated error of wall forces and momentum (docs/theory.md, "Error")
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
       10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
