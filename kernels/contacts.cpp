@@ -175,6 +175,22 @@ void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t 
   }
 }
 
+void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
+                      Contacts& contacts) {
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
+  const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  for (std::size_t a = begin; a < end; ++a) {
+    const auto k = static_cast<std::size_t>(contacts.candidate[a]);
+    if (candidates.components == 3) {
+      contacts.rx[a] = candidates.impulse[3 * k];
+      contacts.ry[a] = candidates.impulse[3 * k + 1];
+      contacts.rz[a] = candidates.impulse[3 * k + 2];
+    } else {
+      contacts.rn[a] = candidates.impulse[k];
+    }
+  }
+}
+
 void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
                       std::span<const Wall> walls) {
   if (components == candidates.components) return;

@@ -53,6 +53,10 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
 void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                     Candidates& candidates);
 
+/// The other way: the impulses of a chunk's contacts are those that store_impulses wrote.
+void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
+                      Contacts& contacts);
+
 /// Gives the impulses `components` (3 or 1) when a stage brings friction or drops it: normal parts become
 /// vectors along today's normals, and vectors their normal parts, so that forces outlive the change. x [m] of
 /// all grains.

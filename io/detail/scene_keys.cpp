@@ -317,6 +317,12 @@ Section<SolverSettings> solver_keys() {
   return {"[solver]",
           "When a step counts as solved, and how hard to try.",
           {
+              choice<SolverSettings>(
+                  "method", {"auto", "nlgs", "nlgs+momentum", "nncg"},
+                  "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
+                  "ended; `nncg`: nonsmooth conjugate gradients; `auto`: momentum, or nncg for "
+                  "tight tolerances with friction and where momentum has made it worse.",
+                  &SolverSettings::method),
               key<SolverSettings>("tolerance", "", positive,
                                   "Bound on the relative error of the contact law (error_rms).",
                                   &SolverSettings::tolerance),
@@ -367,12 +373,18 @@ Section<DecompositionSettings> decomposition_keys() {
                     &D::exchange),
           key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
                  &D::sweeps_per_exchange),
+          choice<D>(
+              "balance", {"contacts", "time"},
+              "What subdomains get equal shares of. `time`: measured time of their sweeps, for cores of "
+              "unequal speed; results then differ from run to run.",
+              &D::balance),
           key<D>("repartition_every", "", countable,
                  "Steps after which space is cut anew, with the next broad phase.", &D::repartition_every),
-          key<D>(
-              "max_imbalance", "", positive,
-              "Fullest subdomain over the mean, less 1, beyond which the next broad phase cuts space anew.",
-              &D::max_imbalance),
+          key<D>("max_imbalance", "", positive,
+                 "Contacts of the fullest subdomain over those of the mean one, less 1, beyond which space "
+                 "is cut "
+                 "anew at once.",
+                 &D::max_imbalance),
           key<D>("overlap", "", any, "Sweep inner chunks while messages fly; false shows what that is worth.",
                  &D::overlap),
           key<D>(

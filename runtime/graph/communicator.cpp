@@ -138,6 +138,50 @@ std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) con
   return all;
 }
 
+struct Communicator::PendingGather::Request {
+  MPI_Request handle = MPI_REQUEST_NULL;
+  std::vector<double> part, all;
+  std::vector<int> lengths, begin;
+};
+
+Communicator::PendingGather::PendingGather(std::unique_ptr<Request> request) : request_(std::move(request)) {}
+
+Communicator::PendingGather::~PendingGather() = default;
+
+bool Communicator::PendingGather::done() {
+  if (request_->handle == MPI_REQUEST_NULL) return true;
+  int flag = 0;
+  check(MPI_Test(&request_->handle, &flag, MPI_STATUS_IGNORE), "MPI_Test");
+  return flag != 0;
+}
+
+const std::vector<double>& Communicator::PendingGather::wait() {
+  if (request_->handle != MPI_REQUEST_NULL) check(MPI_Wait(&request_->handle, MPI_STATUS_IGNORE), "MPI_Wait");
+  return request_->all;
+}
+
+std::unique_ptr<Communicator::PendingGather> Communicator::start_gather(
+    std::vector<double> part, std::span<const std::size_t> lengths) const {
+  auto request = std::make_unique<PendingGather::Request>();
+  PendingGather::Request& r = *request;
+  if (ranks_ == 1) {
+    r.all = std::move(part);
+    return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
+  }
+  r.part = std::move(part);
+  int end = 0;
+  for (std::size_t length : lengths) {
+    r.begin.push_back(end);
+    r.lengths.push_back(static_cast<int>(length));
+    end += static_cast<int>(length);
+  }
+  r.all.resize(static_cast<std::size_t>(end));
+  check(MPI_Iallgatherv(r.part.data(), static_cast<int>(r.part.size()), MPI_DOUBLE, r.all.data(),
+                        r.lengths.data(), r.begin.data(), MPI_DOUBLE, MPI_COMM_WORLD, &r.handle),
+        "MPI_Iallgatherv");
+  return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
+}
+
 void Communicator::progress() const {
   int flag = 0;
   MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_COMM_SELF, &flag, MPI_STATUS_IGNORE);

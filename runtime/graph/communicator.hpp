@@ -61,6 +61,11 @@ class Communicator {
   void max(std::span<double> values) const;
   /// The parts of all ranks in order of rank.
   std::vector<std::byte> gather(std::span<const std::byte> part) const;
+  /// The same, begun now and read later (MPI_Iallgatherv): other work goes on in between. `lengths`: how many
+  /// numbers each rank brings.
+  class PendingGather;
+  std::unique_ptr<PendingGather> start_gather(std::vector<double> part,
+                                              std::span<const std::size_t> lengths) const;
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   void progress() const;
@@ -103,6 +108,23 @@ class Communicator::Channel {
   friend class Communicator;
   struct Request;
   explicit Channel(std::unique_ptr<Request> request);
+  std::unique_ptr<Request> request_;
+};
+
+/// See Communicator::start_gather. Must be waited for before it is destroyed, on every rank.
+class Communicator::PendingGather {
+ public:
+  ~PendingGather();
+  PendingGather(const PendingGather&) = delete;
+  PendingGather& operator=(const PendingGather&) = delete;
+  bool done();
+  /// The parts of all ranks in order of rank.
+  const std::vector<double>& wait();
+
+ private:
+  friend class Communicator;
+  struct Request;
+  explicit PendingGather(std::unique_ptr<Request> request);
   std::unique_ptr<Request> request_;
 };
 

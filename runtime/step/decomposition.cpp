@@ -88,8 +88,15 @@ void append(const BodyRecord& record, bool orientation, Bodies& bodies) {
 /// Points to balance: the candidates there are; in the beginning, the bodies.
 PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& bodies,
                               const Candidates& candidates, std::int64_t all_candidates) {
-  if (all_candidates > 0) return candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs);
   PartitionPoints points;
+  if (all_candidates > 0) {
+    points = candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs);
+    // A weight counts in 64ths, so that 2^31 of them are enough for many candidates.
+    for (const Vec3& x : decomposition.cost.empty() ? std::vector<Vec3>() : points.x)
+      points.weight.push_back(static_cast<std::int32_t>(std::lround(
+          64 * std::clamp(decomposition.cost[at(decomposition.partition.subdomain_of(x))], 0.1, 10.0))));
+    return points;
+  }
   for (std::size_t s = 0; s < bodies.size(); ++s)
     if (counts(decomposition, s)) points.x.push_back(bodies.x[s]);
   points.half.assign(points.x.size(), Vec3::Zero());

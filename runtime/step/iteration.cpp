@@ -1,7 +1,9 @@
 #include "runtime/step/iteration.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "kernels/balance.hpp"
 
@@ -15,6 +17,27 @@ std::size_t memory_used(const StepState& state) {
          state.copies.capacity() * sizeof(WallCopy);
 }
 
+namespace {
+
+/// Beyond 0.9 momentum stalls on packings with friction.
+constexpr double most_momentum = 0.9;
+/// Between two checks; what makes it so much worse is no method for this problem.
+constexpr double hopeless_growth = 4;
+/// With friction momentum gets this far at twice the speed of conjugate gradients, and then falls behind.
+constexpr double momentum_reach = 5e-5;
+/// What momentum makes worse shows within as many sweeps.
+constexpr int trusted_sweeps = 25;
+
+double clock_now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+Carry carry_of(SolverMethod method) {
+  return method == SolverMethod::nncg ? Carry::conjugate : Carry::momentum;
+}
+
+}  // namespace
+
 Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
                      const DecompositionSettings& decomposition, const graph::Communicator& ranks)
     : state_(state),
@@ -24,6 +47,11 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       ranks_(ranks),
       gluing_(state, decomposition, ranks),
       admm_(state, parameters, decomposition, ranks) {}
+
+void Iteration::plan() {
+  gluing_.plan(parameters_.turns);
+  busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);
+}
 
 void Iteration::begin() {
   const Chunks& chunks = state_.chunks;
@@ -50,9 +78,56 @@ void Iteration::begin() {
   history_.clear();
   result_ = {};
   jump_ = {};
+  pending_.reset();
+  sweeps_from_ = segment_ = 0;
+  read_at_ = restore_at_ = -1;
+  sweeps_ = before_segment_ = 0;
   history_from_ = 0;
   sweeps_needed_ = -1;
-  sweeps_from_ = segment_ = 0;
+  result_.iterations = -1;  // the first course begins with sweep 0
+  SolverMethod method = settings_.method;
+  if (method == SolverMethod::automatic) {
+    // Damped Schwarz is no descent: what is carried on from it need not go down.
+    const bool far = parameters_.friction && settings_.tolerance < momentum_reach;
+    method = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several()
+                 ? SolverMethod::nlgs
+             : far ? SolverMethod::nncg
+                   : SolverMethod::momentum;
+  }
+  if (method == SolverMethod::admm) method = SolverMethod::nlgs;
+  begin_course(method, most_momentum);
+  result_.iterations = 0;
+}
+
+double Iteration::beta(int epoch) const {
+  const Course& now = course(epoch);
+  if (now.method == SolverMethod::nncg) return conjugate_beta_;
+  const int sweep = number(epoch) - now.from;
+  return std::min(now.most, sweep / (sweep + 3.0));
+}
+
+void Iteration::begin_course(SolverMethod method, double most) {
+  course_before_ = course_;
+  course_ = {method, result_.iterations + 1, most};
+  conjugate_beta_ = change2_ = 0;
+  if (method == SolverMethod::nlgs) return;
+  allocate(trail_, carry_of(method), state_.contacts, state_.bodies.size(), state_.chunks.size());
+  changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
+}
+
+/// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
+/// write, and its wall copy.
+void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
+  const Chunks& chunks = state_.chunks;
+  const Carry carry = carry_of(course(epoch).method);
+  const double beta = this->beta(epoch);
+  carry_impulses(carry, beta, range, state_.contacts, trail_);
+  const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
+  carry_velocities(
+      carry, beta,
+      std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
+      parameters_.turns, state_.bodies.velocity, trail_);
+  if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
 template <bool Friction>
@@ -72,7 +147,8 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu) {
 }
 
 template <bool Friction>
-void Iteration::chunk(std::size_t c, Work work) {
+void Iteration::chunk(std::size_t c, int epoch) {
+  const Work work = this->work(epoch);
   Contacts& contacts = state_.contacts;
   const Chunks& chunks = state_.chunks;
   const auto begin = static_cast<std::size_t>(chunks.begin[c]);
@@ -85,13 +161,14 @@ void Iteration::chunk(std::size_t c, Work work) {
                                           ? Multiplicities(state_.decomposition.multiplicity)
                                           : Multiplicities();
   WallCopy& copy = state_.copies[c];
-  const auto owned_begin = static_cast<std::size_t>(chunks.owned_begin[c]);
-  const auto owned =
-      std::span(chunks.owned)
-          .subspan(owned_begin, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned_begin);
   switch (work) {
+    case Work::restore:
     case Work::accumulate: {
-      reset_to_free(owned, state_.free, velocity);
+      if (work == Work::restore) restore_impulses(state_.candidates, chunks, c, contacts);
+      const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
+      reset_to_free(
+          std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
+          state_.free, velocity);
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
@@ -107,15 +184,26 @@ void Iteration::chunk(std::size_t c, Work work) {
                                             state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(),
                                             multiplicity)
                      : error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
+      if (ranks_.ranks() > 1) store_impulses(contacts, chunks, c, state_.candidates);
       break;
     case Work::sweep:
+      if (course(epoch).method != SolverMethod::nlgs) carry_on(c, range, epoch);
       sweep<Friction>(c, range, mu);
+      if (course(epoch).method == SolverMethod::nncg)
+        changes_[c] = change_squared(range, contacts, velocity, copy.inv_mass, trail_);
       break;
   }
 }
 
+std::vector<double> Iteration::busy() const {
+  std::vector<double> sums(state_.decomposition.here.size(), 0.0);
+  for (std::size_t c = 0; c < busy_.size(); ++c)
+    sums[static_cast<std::size_t>(state_.chunks.subdomain[c])] += busy_[c];
+  return sums;
+}
+
 Gluing::Mode Iteration::gluing_mode(int epoch) const {
-  if (work(epoch) == Work::accumulate) return Gluing::Mode::fresh;
+  if (work(epoch) == Work::accumulate || work(epoch) == Work::restore) return Gluing::Mode::fresh;
   const int sweeps = epoch - sweeps_from_ + 1;
   if (epoch + 1 == segment_) return Gluing::Mode::measured;
   return sweeps % decomposition_.sweeps_per_exchange == 0 ? Gluing::Mode::iterate : Gluing::Mode::local;
@@ -125,10 +213,12 @@ void Iteration::node(std::uint32_t node, int epoch) {
   const Work now = work(epoch);
   const std::size_t chunks = state_.chunks.size();
   if (node < chunks) {
+    const double start = busy_.empty() ? 0 : clock_now();
     if (parameters_.friction)
-      chunk<true>(node, now);
+      chunk<true>(node, epoch);
     else
-      chunk<false>(node, now);
+      chunk<false>(node, epoch);
+    if (!busy_.empty()) busy_[node] += clock_now() - start;
     // Long messages advance only while somebody calls MPI.
     if (ranks_.ranks() > 1 && node % 4 == 0) ranks_.progress();
     return;
@@ -155,7 +245,7 @@ double Iteration::impulse_scale() const {
 double Iteration::drift() const {
   const double scale = impulse_scale();
   if (scale == 0) return 0;
-  // Since ADMM, all that sweeps changed of what it had settled; otherwise the second half of the sweeps.
+  // Since ADMM: all that sweeps changed of what it had settled.
   std::size_t from = history_from_;
   if (result_.stiff_calls == 0)
     while (from + 1 < history_.size() && 2 * history_[from + 1].iterations <= history_.back().iterations)
@@ -166,11 +256,24 @@ double Iteration::drift() const {
   return change / scale;
 }
 
-/// Per subdomain in order of chunk, then over subdomains in their order: the same sums on any number of
-/// ranks.
-void Iteration::add_up() {
-  constexpr std::size_t head = 9;
-  const std::size_t walls = state_.walls.size(), width = head + 3 * walls;
+namespace {
+
+/// Of a subdomain: its number, eight sums and three impulses per wall.
+constexpr std::size_t row_head = 9;
+
+std::vector<const double*> sorted_rows(std::span<const double> rows, std::size_t width,
+                                       std::int32_t subdomains) {
+  std::vector<const double*> sorted(static_cast<std::size_t>(subdomains));
+  for (std::size_t k = 0; k < rows.size(); k += width) sorted[static_cast<std::size_t>(rows[k])] = &rows[k];
+  return sorted;
+}
+
+}  // namespace
+
+/// Per subdomain in order of chunk; add_up adds over subdomains in their order: the same sums on any number
+/// of ranks.
+std::vector<double> Iteration::rows_of_subdomains() const {
+  const std::size_t walls = state_.walls.size(), width = row_head + 3 * walls;
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows(all.here.size() * width, 0.0);
   std::vector<ErrorSums> sums(all.here.size());
@@ -178,30 +281,32 @@ void Iteration::add_up() {
     const auto e = static_cast<std::size_t>(state_.chunks.subdomain[c]);
     sums[e].add(sums_[c]);
     if (state_.chunks.wall[c] < 0) continue;
-    double* wall = &rows[e * width + head + 3 * static_cast<std::size_t>(state_.chunks.wall[c])];
+    double* wall = &rows[e * width + row_head + 3 * static_cast<std::size_t>(state_.chunks.wall[c])];
     for (std::size_t k = 0; k < 3; ++k) wall[k] += sums_[c].wall_impulse[k];
   }
   for (std::size_t e = 0; e < all.here.size(); ++e) {
     const JumpSums jump = gluing_.jumps().empty() ? JumpSums{} : gluing_.jumps()[e];
-    const double values[head] = {static_cast<double>(all.here[e]),
-                                 sums[e].residual2,
-                                 sums[e].residual_max,
-                                 sums[e].impulse2,
-                                 sums[e].velocity2,
-                                 static_cast<double>(sums[e].contacts),
-                                 static_cast<double>(sums[e].active),
-                                 jump.jump2,
-                                 jump.velocity2};
-    std::copy_n(values, head, &rows[e * width]);
+    const double values[row_head] = {static_cast<double>(all.here[e]),
+                                     sums[e].residual2,
+                                     sums[e].residual_max,
+                                     sums[e].impulse2,
+                                     sums[e].velocity2,
+                                     static_cast<double>(sums[e].contacts),
+                                     static_cast<double>(sums[e].active),
+                                     jump.jump2,
+                                     jump.velocity2};
+    std::copy_n(values, row_head, &rows[e * width]);
   }
-  rows = ranks_.gather_records(std::span<const double>(rows));
-  std::vector<const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
-  for (std::size_t k = 0; k < rows.size(); k += width)
-    by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
+  return rows;
+}
+
+void Iteration::add_up(std::span<const double> rows) {
+  const std::size_t walls = state_.walls.size(), width = row_head + 3 * walls;
   total_ = {};
   jump_ = {};
+  std::int64_t fullest = 0;
   std::vector<Vec3> impulses(walls, Vec3::Zero());
-  for (const double* row : by_subdomain) {
+  for (const double* row : sorted_rows(rows, width, state_.decomposition.partition.subdomains)) {
     ErrorSums part;
     part.residual2 = row[1];
     part.residual_max = row[2];
@@ -210,19 +315,115 @@ void Iteration::add_up() {
     part.contacts = static_cast<std::int64_t>(row[5]);
     part.active = static_cast<std::int64_t>(row[6]);
     total_.add(part);
+    fullest = std::max(fullest, part.contacts);
     jump_.jump2 += row[7];
     jump_.velocity2 += row[8];
-    for (std::size_t w = 0; w < walls; ++w) impulses[w] += Eigen::Map<const Vec3>(row + head + 3 * w);
+    for (std::size_t w = 0; w < walls; ++w) impulses[w] += Eigen::Map<const Vec3>(row + row_head + 3 * w);
   }
+  imbalance_ = total_.contacts > 0
+                   ? static_cast<double>(fullest) * state_.decomposition.partition.subdomains /
+                             static_cast<double>(total_.contacts) -
+                         1
+                   : 0;
   for (std::size_t w = 0; w < walls; ++w) state_.wall_states[w].impulse = impulses[w];
   impulses_.push_back(std::move(impulses));
 }
 
-/// About the sweeps that this step's problem takes; looked up once a step, when somebody asks. On several
-/// ranks nobody sees the whole problem, and drift is taken at its word.
+bool Iteration::decide(int epoch) {
+  if (epoch == restore_at_) return false;
+  bool goes_on = true;
+  if (work(epoch) == Work::measure)
+    goes_on = measured(epoch);
+  else
+    goes_on = swept(epoch);
+  return goes_on;
+}
+
+/// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
+bool Iteration::measured(int epoch) {
+  result_.iterations = sweeps_;
+  const Decomposition& all = state_.decomposition;
+  std::vector<double> rows = rows_of_subdomains();
+  std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
+  for (std::int32_t rank : all.rank_of)
+    lengths[static_cast<std::size_t>(rank)] += row_head + 3 * state_.walls.size();
+  pending_ = ranks_.start_gather(std::move(rows), lengths);
+  if (ranks_.ranks() == 1 || sweeps_ >= settings_.max_iterations) {
+    add_up(pending_->wait());
+    if (!judge()) return false;
+    if (ask_admm())
+      call_admm(epoch);
+    else
+      plan_sweeps(epoch);
+    return true;
+  }
+  plan_sweeps(epoch);
+  read_at_ = epoch + 1;
+  return true;
+}
+
+/// Behind a sweep: what was set out before it is read.
+bool Iteration::swept(int epoch) {
+  if (course(epoch).method == SolverMethod::nncg) turn_conjugate();
+  if (epoch != read_at_) return true;
+  read_at_ = -1;
+  add_up(pending_->wait());
+  if (!judge()) restore_at_ = epoch + 1;
+  return true;
+}
+
+void Iteration::plan_sweeps(int epoch) {
+  int sweeps = std::max(settings_.check_every, sweeps_ / 4);
+  if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
+  sweeps = std::min(sweeps, settings_.max_iterations - sweeps_);
+  before_segment_ = sweeps_;
+  sweeps_ += sweeps;
+  sweeps_from_ = epoch + 1;
+  segment_ = epoch + 1 + sweeps;
+}
+
+/// The ratio of Fletcher and Reeves, from what the last two sweeps changed; added up like the error.
+void Iteration::turn_conjugate() {
+  const Decomposition& all = state_.decomposition;
+  std::vector<double> rows(2 * all.here.size(), 0.0);
+  for (std::size_t e = 0; e < all.here.size(); ++e) rows[2 * e] = all.here[e];
+  for (std::size_t c = 0; c < changes_.size(); ++c)
+    rows[2 * static_cast<std::size_t>(state_.chunks.subdomain[c]) + 1] += changes_[c];
+  double change2 = 0;
+  const std::vector<double> everywhere = ranks_.gather_records(std::span<const double>(rows));
+  for (const double* row : sorted_rows(everywhere, 2, all.partition.subdomains)) change2 += row[1];
+  conjugate_beta_ = change2_ > 0 && change2 <= change2_ ? change2 / change2_ : 0;
+  change2_ = change2;
+}
+
+/// After a check: momentum that has made it worse (sliding contacts turn its modes complex, and those grow)
+/// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
+void Iteration::choose_course() {
+  const std::size_t checks = history_.size();
+  if (checks < history_from_ + 2) return;
+  const double growth = history_[checks - 1].error_rms / history_[checks - 2].error_rms;
+  if (course_.method == SolverMethod::momentum && growth > 1) {
+    const double less = 1 - 2 * (1 - course_.most);
+    if (settings_.method == SolverMethod::automatic && growth < hopeless_growth)
+      begin_course(SolverMethod::nncg, 0);
+    else if (less > 0 && growth < hopeless_growth)
+      begin_course(SolverMethod::momentum, less);
+    else
+      begin_course(SolverMethod::nlgs, 0);
+  } else if (course_.method == SolverMethod::nncg && growth > hopeless_growth) {
+    begin_course(SolverMethod::nlgs, 0);
+  }
+}
+
+/// About the sweeps of the present course that this step's problem takes. On several ranks nobody sees the
+/// whole problem, and drift is taken at its word.
 double Iteration::sweeps_needed() {
   if (sweeps_needed_ < 0) sweeps_needed_ = admm_.available() ? admm_.sweeps_needed() : 0;
-  return sweeps_needed_;
+  // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
+  const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
+                       : course_.method == SolverMethod::nncg   ? 40
+                                                                : 1;
+  return sweeps_needed_ / speed;
 }
 
 bool Iteration::balanced() {
@@ -234,19 +435,29 @@ bool Iteration::balanced() {
   return result_.unbalance <= settings_.balance_tolerance;
 }
 
-/// With `automatic`, ADMM is for problems that sweeps, having had their chance, did not get balanced, and
-/// would not in fewer sweeps than it costs. Whatever it leaves undone it is asked for again, ever later.
+/// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
+/// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
 bool Iteration::ask_admm() {
-  constexpr int chance = 50, worth = 1000, calls = 3;
-  if (settings_.stiff == StiffSolver::off || !admm_.available()) return false;
-  if (settings_.stiff == StiffSolver::always && result_.stiff_calls == 0) return true;
+  constexpr int chance = 50, calls = 3;
+  if (!admm_.available()) return false;
+  if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
+  if (settings_.method != SolverMethod::automatic && settings_.method != SolverMethod::admm) return false;
   if (result_.stiff_calls == calls || balanced()) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
-  return since >= chance << (2 * result_.stiff_calls) && sweeps_needed() >= worth;
+  return since >= chance << (2 * result_.stiff_calls) && sweeps_needed() >= stiff;
 }
 
-bool Iteration::decide(int epoch) {
-  add_up();
+void Iteration::call_admm(int epoch) {
+  result_.stiff = admm_.improve();
+  ++result_.stiff_calls;
+  history_from_ = history_.size();
+  begin_course(course_.method, course_.most);
+  before_segment_ = sweeps_;
+  segment_ = epoch + 1;
+}
+
+/// Judges the sums of the check after result_.iterations sweeps. False: the step ends with them.
+bool Iteration::judge() {
   const ErrorSums& total = total_;
 
   const double scale2 = std::max(total.impulse2, total.velocity2);
@@ -258,32 +469,21 @@ bool Iteration::decide(int epoch) {
   result_.active = total.active;
   history_.push_back({result_.iterations, result_.error_rms});
   result_.drift = drift();
+
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
-  result_.converged = judged && result_.error_rms <= settings_.tolerance &&
-                      std::max(result_.drift, result_.unbalance) <= settings_.balance_tolerance;
-  // A sweep never makes the residual of a step a thousand times worse; an exchange that adds up too much
-  // does.
+  result_.converged = judged && result_.error_rms <= settings_.tolerance && balanced();
+  // A plain sweep never makes the residual of a step a thousand times worse; an exchange that adds up too
+  // much does.
   if (history_.size() == history_from_ + 1) first_residual2_ = std::max(total.residual2, scale2);
   constexpr double hopeless = 1e3;
-  result_.diverged = total.residual2 > hopeless * hopeless * first_residual2_;
+  result_.diverged =
+      course_.method == SolverMethod::nlgs && total.residual2 > hopeless * hopeless * first_residual2_;
   if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
   if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations)
     return false;
-  if (ask_admm()) {
-    result_.stiff = admm_.improve();
-    ++result_.stiff_calls;
-    // What the walls carried before says nothing about the drift of what they carry now.
-    history_from_ = history_.size();
-    segment_ = epoch + 1;
-    return true;
-  }
-  const int sweeps = std::min(std::max(settings_.check_every, result_.iterations / 4),
-                              settings_.max_iterations - result_.iterations);
-  result_.iterations += sweeps;
-  sweeps_from_ = epoch + 1;
-  segment_ = epoch + 1 + sweeps;
+  choose_course();
   return true;
 }
 

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
+#include "kernels/momentum.hpp"
 #include "runtime/step/admm.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
@@ -13,12 +16,12 @@ namespace talus {
 struct IterationResult {
   int iterations = 0;  ///< sweeps
   double error_rms = 0, error_max = 0;
-  double jump = 0;       ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
+  double jump = 0;  ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
+  double drift =
+      0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
   double unbalance = 0;  ///< estimate of the relative error of the forces on walls and heavy bodies
   AdmmResult stiff;      ///< of the last call of ADMM in this step
   int stiff_calls = 0;
-  double drift =
-      0;  ///< relative change of the wall impulses over the second half of the iterations, or since ADMM
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;  ///< the error grows without bound
@@ -32,9 +35,17 @@ struct IterationResult {
 ///
 /// `accumulate` makes V afresh from r, so that the error is never that of a drifted V and the step ends on
 /// what was certified. At a gate one thread adds the chunks' sums in order, by subdomain, and decides whether
-/// to go on; the distance n of the gates grows with the iterations done. Nodes 0..k-1 are the chunks; where
-/// something is to be glued (gluing.hpp), publish of every subdomain, the centre, and glue of every subdomain
-/// follow. Publish comes after the boundary chunks and before the inner ones, which hide the messages.
+/// to go on; the distance n of the gates grows with the iterations done.
+///
+/// With several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read
+/// at a gate behind that sweep. If they say that the step was solved, `restore` brings back the impulses that
+/// were certified, so that results are the bits of one rank, where nothing has to be waited for.
+///
+/// Where ADMM is called, the gate's thread does it alone: the next epoch is `accumulate`.
+///
+/// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
+/// centre, and glue of every subdomain follow. Publish comes after the boundary chunks and before the inner
+/// ones, which hide the messages.
 class Iteration {
  public:
   /// References are kept. `state.contacts` holds the narrow phase's contacts.
@@ -42,15 +53,24 @@ class Iteration {
             const DecompositionSettings& decomposition, const graph::Communicator& ranks);
 
   void node(std::uint32_t node, int epoch);
-  bool gate(int epoch) const { return epoch == segment_ + 1; }
+  bool gate(int epoch) const {
+    return epoch == segment_ + 1 || epoch == read_at_ || epoch == restore_at_ ||
+           (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
+  }
   bool decide(int epoch);
 
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();
 
-  Gluing& gluing() { return gluing_; }
+  /// Collective, after the candidates were distributed.
+  void plan();
+
   const Gluing& gluing() const { return gluing_; }
   const IterationResult& result() const { return result_; }
+  /// Contacts of the fullest subdomain over the mean one, less 1, at the last check.
+  double imbalance() const { return imbalance_; }
+  /// Per subdomain here, with BalanceBy::time: time of its chunks since the plan [s].
+  std::vector<double> busy() const;
   /// error_rms at each check, with the sweeps done.
   struct Check {
     int iterations;
@@ -59,21 +79,45 @@ class Iteration {
   const std::vector<Check>& history() const { return history_; }
 
  private:
-  enum class Work { accumulate, measure, sweep };
+  enum class Work { accumulate, measure, sweep, restore };
   Work work(int epoch) const {
-    return epoch < segment_ ? Work::sweep : epoch == segment_ ? Work::accumulate : Work::measure;
+    return epoch == restore_at_ ? Work::restore
+           : epoch < segment_   ? Work::sweep
+           : epoch == segment_  ? Work::accumulate
+                                : Work::measure;
   }
   Gluing::Mode gluing_mode(int epoch) const;
   template <bool Friction>
-  void chunk(std::size_t c, Work work);
+  void chunk(std::size_t c, int epoch);
   template <bool Friction>
   void sweep(std::size_t c, ContactRange range, double mu);
-  void add_up();
+  void carry_on(std::size_t c, ContactRange range, int epoch);
+  /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
+  struct Course {
+    SolverMethod method = SolverMethod::nlgs;  ///< never automatic
+    int from = 0;
+    double most = 0;  ///< of beta, with momentum
+  };
+  /// Of the sweep in this epoch. A course that a check calls for begins behind the sweep that may have been
+  /// made since.
+  const Course& course(int epoch) const { return number(epoch) >= course_.from ? course_ : course_before_; }
+  int number(int epoch) const { return before_segment_ + epoch - sweeps_from_; }
+  double beta(int epoch) const;
+  void begin_course(SolverMethod method, double most);
+  bool measured(int epoch);
+  bool swept(int epoch);
+  std::vector<double> rows_of_subdomains() const;
+  void add_up(std::span<const double> rows);
+  bool judge();
+  void choose_course();
+  void plan_sweeps(int epoch);
+  void turn_conjugate();
   double impulse_scale() const;
   double drift() const;
   double sweeps_needed();
   bool balanced();
   bool ask_admm();
+  void call_admm(int epoch);
 
   StepState& state_;
   const StepParameters& parameters_;
@@ -86,14 +130,27 @@ class Iteration {
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]
   std::vector<Check> history_;
   IterationResult result_;
+  std::vector<double> busy_;  ///< per chunk [s]; empty unless asked for
+  double imbalance_ = 0;
   ErrorSums total_;                          ///< of all subdomains, at the last check
   JumpSums jump_;                            ///< likewise
   std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
-  double sweeps_needed_ = -1;                ///< as ADMM sees it; < 0: not asked
-  double first_residual2_ = 0;               ///< at the first check, or the first since ADMM [m^2/s^2]
-  std::size_t history_from_ = 0;             ///< first check since the impulses were last made by ADMM
-  int sweeps_from_ = 0;                      ///< epoch of the first sweep of the segment
-  int segment_ = 0;  ///< epoch of the next accumulate; written at gates only, when every thread waits
+  Trail trail_;                              ///< empty with plain NLGS
+  std::vector<double> changes_;              ///< NNCG: per chunk, what the last sweep changed [J]
+  double change2_ = 0;                       ///< NNCG: of all, at the sweep before
+  double conjugate_beta_ = 0;                ///< NNCG: of the next sweep
+  double first_residual2_ = 0;    ///< at the first check of the step, or the first since ADMM [m^2/s^2]
+  std::size_t history_from_ = 0;  ///< that check
+  double sweeps_needed_ = -1;     ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  std::unique_ptr<graph::Communicator::PendingGather> pending_;
+  // Written at gates only, when every thread waits:
+  int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment
+  int segment_ = 0;         ///< epoch of the next accumulate
+  int read_at_ = -1;        ///< epoch behind which the sums of the last check are read
+  int restore_at_ = -1;     ///< epoch that ends a step whose sums came behind a sweep
+  int sweeps_ = 0;          ///< done when `segment_` is reached
+  int before_segment_ = 0;  ///< done when it began
+  Course course_, course_before_;
 };
 
 }  // namespace talus

@@ -48,21 +48,24 @@ struct DetectionSettings {
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
 
-/// ADMM in body space before the sweeps: for long chains and heavy bodies, which sweeps cannot see through.
-enum class StiffSolver {
-  off,
-  automatic,  ///< when the global balance is missed and the problem is one that sweeps take too long for
-  always,     ///< in every step that is not converged to begin with
+/// What makes of sweeps a solver.
+enum class SolverMethod {
+  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse;
+              ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
+  nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
+  momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
+  admm,       ///< one call of ADMM in body space (kernels/admm.hpp), then sweeps as they are
+  nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
 };
 
 struct SolverSettings {
+  SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
-      5e-2;  ///< on balance: estimated error of wall forces and momentum (docs/theory.md, "Error")
+      5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/balance.hpp)
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
       10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
-  StiffSolver stiff = StiffSolver::off;
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
@@ -80,6 +83,13 @@ enum class ExchangeScheme {
   ccs,  ///< to one rank and back
 };
 
+/// What subdomains are to have equal shares of.
+enum class BalanceBy {
+  contacts,  ///< candidates
+  time,  ///< measured time of their sweeps: for cores of unequal speed. The partition, and with it the bits
+         ///< of the results, then depends on the machine's day
+};
+
 struct DecompositionSettings {
   Coupling coupling = Coupling::nscdd;
   ExchangeScheme exchange = ExchangeScheme::dcs;
@@ -87,8 +97,10 @@ struct DecompositionSettings {
   int subdomains = 0;                   ///< 0: one per rank
   std::array<std::int64_t, 3> boxes{};  ///< per axis, for the partitioners that cut boxes; zeros: chosen
   int sweeps_per_exchange = 1;          ///< n_GS >= 1
+  BalanceBy balance = BalanceBy::contacts;
   int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
-  double max_imbalance = 0.2;  ///< fullest over mean subdomain, less 1: beyond it the partition is made anew
+  double max_imbalance = 0.2;  ///< contacts of the fullest over those of the mean subdomain, less 1: beyond
+                               ///< it candidates are found and space is cut anew at once
   bool overlap = true;  ///< inner chunks while messages fly; false: after them, to see what that is worth
   bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
 };

@@ -76,6 +76,8 @@ class StepGraph {
   SlotRange slots(std::uint32_t lane) const;
   double margin_of(const Wall& wall) const;
   bool walls_left_margin() const;
+  bool out_of_balance() const;
+  std::vector<double> measured_costs() const;
 
   StepState& state_;
   const StepParameters& parameters_;
@@ -93,6 +95,7 @@ class StepGraph {
   Surroundings around_;                       ///< several subdomains: whom the candidates are found among
   std::int64_t all_candidates_ = 0;           ///< of all ranks
   std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
+  double imbalance_then_ = 0;                 ///< what it was made against
   CellGrid cells_;
   std::vector<double> wall_margin_;  ///< at the last broad phase [m]
   std::vector<char> left_;           ///< per lane: a grain left its margin

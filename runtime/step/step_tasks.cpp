@@ -46,7 +46,43 @@ SlotRange StepGraph::slots(std::uint32_t lane) const {
 }
 
 bool StepGraph::partition_due() const {
-  return state_.decomposition.several() && steps_ - partitioned_ >= decomposition_.repartition_every;
+  return state_.decomposition.several() &&
+         (steps_ - partitioned_ >= decomposition_.repartition_every || out_of_balance());
+}
+
+/// Not if the last partition was made against it in vain: the sample may not be divisible any better.
+bool StepGraph::out_of_balance() const {
+  const double imbalance = iteration_.imbalance();
+  return state_.decomposition.several() && imbalance > decomposition_.max_imbalance &&
+         imbalance > 1.25 * imbalance_then_;
+}
+
+/// Per subdomain: the time of a candidate over the mean, from the time of all ranks since the candidates are
+/// these.
+std::vector<double> StepGraph::measured_costs() const {
+  struct Row {
+    double subdomain, busy, candidates;
+  };
+  const Decomposition& all = state_.decomposition;
+  const std::vector<double> busy = iteration_.busy();
+  std::vector<Row> rows;
+  for (std::size_t e = 0; e < all.here.size(); ++e)
+    rows.push_back({static_cast<double>(all.here[e]), busy[e], 0});
+  for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+    rows[static_cast<std::size_t>(state_.chunks.subdomain[c])].candidates +=
+        state_.chunks.begin[c + 1] - state_.chunks.begin[c];
+  rows = ranks_.gather_records(std::span<const Row>(rows));
+  double time = 0, candidates = 0;
+  for (const Row& row : rows) {
+    time += row.busy;
+    candidates += row.candidates;
+  }
+  if (time == 0 || candidates == 0) return {};
+  std::vector<double> cost(static_cast<std::size_t>(all.partition.subdomains), 1.0);
+  for (const Row& row : rows)
+    if (row.candidates > 0)
+      cost[static_cast<std::size_t>(row.subdomain)] = row.busy / row.candidates * (candidates / time);
+  return cost;
 }
 
 void StepGraph::predict_lane(std::uint32_t lane) {
@@ -78,8 +114,7 @@ bool StepGraph::walls_left_margin() const {
 }
 
 bool StepGraph::needs_broad_phase() {
-  // Several subdomains: candidates are found anew with a new partition as well, when one is due.
-  double needed[1] = {!state_.candidates_valid || walls_left_margin() ||
+  double needed[1] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ||
                               std::any_of(left_.begin(), left_.end(), [](char left) { return left != 0; })
                           ? 1.0
                           : 0.0};
@@ -105,9 +140,12 @@ void StepGraph::make_cells() {
   }
   if (state_.decomposition.several()) {
     const bool first = state_.decomposition.interfaces.empty();
-    const bool anew =
-        first || partition_due() || state_.decomposition.imbalance > decomposition_.max_imbalance;
-    if (anew) partitioned_ = steps_;
+    const bool anew = first || partition_due();
+    if (anew) {
+      partitioned_ = steps_;
+      imbalance_then_ = iteration_.imbalance();
+      if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
+    }
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
     cells_ = build_cells(around_.bodies.x, around_.reach);
@@ -152,7 +190,7 @@ void StepGraph::make_chunks() {
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
-  iteration_.gluing().plan(parameters_.turns);
+  iteration_.plan();
   std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
   ranks_.sum(candidates);
   all_candidates_ = candidates[0];

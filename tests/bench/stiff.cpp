@@ -245,7 +245,7 @@ void row(const std::string& what, double seconds, double sweep, const AdmmResult
 }
 
 /// Steps of the whole program with the plate on the pile, ADMM by itself where it is needed.
-void run_plate(const Packing& packing, int subdomains, int steps, StiffSolver stiff) {
+void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod method) {
   Setup setup;
   setup.walls = plate_scene(packing, 1e6, false).sample.walls;
   const double free = 0.005 * gravity;
@@ -258,7 +258,7 @@ void run_plate(const Packing& packing, int subdomains, int steps, StiffSolver st
   setup.stages = {stage};
   setup.detection.alert = 0.02;
   setup.solver.max_iterations = 2000;
-  setup.solver.stiff = stiff;
+  setup.solver.method = method;
   setup.decomposition.subdomains = subdomains;
   // Neighbours overlap a little, so that nothing is free to fall.
   Bodies bodies = packing.bodies;
@@ -331,7 +331,7 @@ int main(int argc, char** argv) {
   }
   if (argc < 2) return 0;
   const Packing packing = read_packing(argv[1]);
-  for (int subdomains : {1, 12, 96}) run_plate(packing, subdomains, 4, StiffSolver::automatic);
+  for (int subdomains : {1, 12, 96}) run_plate(packing, subdomains, 4, SolverMethod::automatic);
   for (bool closed : {true, false}) {
     const Scene scene = plate_scene(packing, 1e6, closed);
     std::vector<AdmmSettings> packings;

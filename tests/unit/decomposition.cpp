@@ -290,6 +290,40 @@ TEST(Decomposition, BearsSubdomainsWithLittleOrNothingInThem) {
   }
 }
 
+/// Dense below, loose above: a cut into equal numbers of grains leaves the contacts unequal.
+Bodies settled_below() {
+  Bodies bodies = lattice(6, 5);
+  for (std::size_t s = 0; s < bodies.size(); ++s)
+    if (bodies.x[s][2] > 0.063) bodies.x[s][2] += bodies.x[s][2] - 0.063;
+  return bodies;
+}
+
+TEST(Decomposition, CutsSpaceAnewAtOnceWhenContactsAreOutOfBalance) {
+  talus::Setup setup = pressed_box(0.3, 3);
+  setup.walls = test::box_of_walls(0, 0.19);
+  setup.stages[0].gravity = Vec3(0, 0, -9.81);
+  choose(setup, variants[1], 4);
+  setup.decomposition.repartition_every = 1000;
+  setup.decomposition.max_imbalance = 1e9;
+  const double left_alone = run(setup, settled_below()).last.imbalance;
+  setup.decomposition.max_imbalance = 0.1;
+  const double cut_anew = run(setup, settled_below()).last.imbalance;
+  EXPECT_GT(left_alone, 1.2);
+  EXPECT_LT(cut_anew, 1.1);
+}
+
+TEST(Decomposition, BalancesByMeasuredTimeWhenAskedTo) {
+  talus::Setup setup = pressed_box(0.3, 8);
+  choose(setup, variants[1], 4);
+  setup.decomposition.balance = BalanceBy::time;
+  setup.decomposition.repartition_every = 2;
+  setup.solver.tolerance = 1e-4;
+  const Outcome outcome = run(setup, lattice(6, 5));
+  EXPECT_EQ(outcome.unconverged, 0);
+  EXPECT_LT(outcome.last.imbalance, 11);  // every subdomain has its share, if not an equal one
+  EXPECT_GT(outcome.last.contacts, 250);
+}
+
 TEST(Decomposition, CarriesOrientationsAndStagesAlong) {
   talus::Setup setup = pressed_box(0, 10);
   Stage shear = setup.stages[0];

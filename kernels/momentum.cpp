@@ -1,0 +1,130 @@
+#include "kernels/momentum.hpp"
+
+namespace talus {
+
+namespace {
+
+/// One number. With beta = 0 nothing of the past is read: it may be void.
+inline void carry_one(Carry carry, double beta, double& value, double& last, double* step) {
+  if (carry == Carry::momentum) {
+    const double s = value;
+    if (beta != 0) value = s + beta * (s - last);
+    last = s;
+    return;
+  }
+  if (beta != 0) {
+    value += beta * *step;
+    *step = value - last;
+  } else {
+    *step = 0;
+  }
+  last = value;
+}
+
+void carry_values(Carry carry, double beta, ContactRange range, std::vector<double>& values,
+                  std::vector<double>& last, std::vector<double>& step) {
+  double* const v = values.data();
+  double* const l = last.data();
+  double* const p = step.empty() ? nullptr : step.data();
+  if (carry == Carry::momentum && beta != 0) {
+    for (std::size_t k = range.begin; k < range.end; ++k) {
+      const double s = v[k];
+      v[k] = s + beta * (s - l[k]);
+      l[k] = s;
+    }
+    return;
+  }
+  for (std::size_t k = range.begin; k < range.end; ++k)
+    carry_one(carry, beta, v[k], l[k], p ? p + k : nullptr);
+}
+
+template <std::size_t N>
+void carry_numbers(Carry carry, double beta, double* values, std::array<double, N>& last, double* step,
+                   std::size_t count) {
+  for (std::size_t k = 0; k < count; ++k)
+    carry_one(carry, beta, values[k], last[k], step ? step + k : nullptr);
+}
+
+std::size_t bytes(const Trail::Impulses& impulses) {
+  return sizeof(double) *
+         (impulses.x.capacity() + impulses.y.capacity() + impulses.z.capacity() + impulses.n.capacity());
+}
+
+}  // namespace
+
+void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks) {
+  const auto like = [&](Trail::Impulses& impulses, bool wanted) {
+    impulses.x.resize(wanted ? contacts.rx.size() : 0);
+    impulses.y.resize(wanted ? contacts.ry.size() : 0);
+    impulses.z.resize(wanted ? contacts.rz.size() : 0);
+    impulses.n.resize(wanted ? contacts.rn.size() : 0);
+  };
+  const bool conjugate = carry == Carry::conjugate;
+  like(trail.last, true);
+  like(trail.step, conjugate);
+  trail.last_v.resize(bodies);
+  trail.step_v.resize(conjugate ? bodies : 0);
+  trail.last_wall_v.resize(chunks);
+  trail.step_wall_v.resize(conjugate ? chunks : 0);
+}
+
+void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& contacts, Trail& trail) {
+  if (contacts.rx.empty()) {
+    carry_values(carry, beta, range, contacts.rn, trail.last.n, trail.step.n);
+    return;
+  }
+  carry_values(carry, beta, range, contacts.rx, trail.last.x, trail.step.x);
+  carry_values(carry, beta, range, contacts.ry, trail.last.y, trail.step.y);
+  carry_values(carry, beta, range, contacts.rz, trail.last.z, trail.step.z);
+}
+
+void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, bool turns,
+                      std::span<Velocity> velocity, Trail& trail) {
+  for (Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    double* const step = trail.step_v.empty() ? nullptr : trail.step_v[s].data();
+    // u and w stand side by side in the record; without rotation w is not touched.
+    std::array<double, 6> v{velocity[s].u[0], velocity[s].u[1], velocity[s].u[2],
+                            velocity[s].w[0], velocity[s].w[1], velocity[s].w[2]};
+    carry_numbers(carry, beta, v.data(), trail.last_v[s], step, turns ? 6 : 3);
+    for (std::size_t k = 0; k < 3; ++k) {
+      velocity[s].u[k] = v[k];
+      velocity[s].w[k] = v[k + 3];
+    }
+  }
+}
+
+void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail) {
+  carry_numbers(carry, beta, copy.velocity, trail.last_wall_v[chunk],
+                trail.step_wall_v.empty() ? nullptr : trail.step_wall_v[chunk].data(), 3);
+}
+
+double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
+                      double wall_inv_mass, const Trail& trail) {
+  const bool friction = !contacts.rx.empty();
+  double sum = 0;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const Slot second = contacts.second[k];
+    const double w_nn = velocity[static_cast<std::size_t>(contacts.first[k])].inv_mass +
+                        (second < 0 ? wall_inv_mass : velocity[static_cast<std::size_t>(second)].inv_mass);
+    double change2 = 0;
+    if (friction) {
+      const double x = contacts.rx[k] - trail.last.x[k], y = contacts.ry[k] - trail.last.y[k],
+                   z = contacts.rz[k] - trail.last.z[k];
+      change2 = x * x + y * y + z * z;
+    } else {
+      const double n = contacts.rn[k] - trail.last.n[k];
+      change2 = n * n;
+    }
+    sum += w_nn * change2;
+  }
+  return sum;
+}
+
+std::size_t memory_used(const Trail& trail) {
+  return bytes(trail.last) + bytes(trail.step) +
+         sizeof(std::array<double, 6>) * (trail.last_v.capacity() + trail.step_v.capacity()) +
+         sizeof(std::array<double, 3>) * (trail.last_wall_v.capacity() + trail.step_wall_v.capacity());
+}
+
+}  // namespace talus

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies.hpp"
+#include "kernels/contacts.hpp"
+#include "kernels/sweep.hpp"
+
+namespace talus {
+
+/// How a sweep is carried on before the next one begins. With s = sweep(y), the impulses after a sweep that
+/// began from y:
+///   momentum   y+ = s + beta (s - s_before)                            (Nesterov 1983; one trail)
+///   conjugate  y+ = s + beta p, p = y - y_before of the sweep before   (NNCG, Silcowitz-Hansen et al. 2010)
+/// Velocities depend linearly on impulses, and gluing is linear too, so that the same rule keeps V and r
+/// consistent, copy by copy, without a product.
+enum class Carry { momentum, conjugate };
+
+/// What the rule remembers, in the layout of Contacts and Bodies. Empty vectors where a scene has no such
+/// quantity, and `step` empty with momentum.
+struct Trail {
+  struct Impulses {
+    std::vector<double> x, y, z;  ///< with friction [N s]
+    std::vector<double> n;        ///< without [N s]
+  };
+  Impulses last;                                   ///< s_before, or y
+  Impulses step;                                   ///< p
+  std::vector<std::array<double, 6>> last_v;       ///< per slot [m/s]
+  std::vector<std::array<double, 6>> step_v;       ///< per slot [m/s]
+  std::vector<std::array<double, 3>> last_wall_v;  ///< per chunk: of its wall copy [m/s]
+  std::vector<std::array<double, 3>> step_wall_v;
+};
+
+/// Room for the contacts, bodies and chunks of `contacts`; what stood there is void.
+void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
+
+/// Applies the rule to the impulses of a range; beta = 0 begins a new trail.
+void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& contacts, Trail& trail);
+
+/// Applies the rule to the velocities of the slots (`turns`: and to the rotations).
+void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, bool turns,
+                      std::span<Velocity> velocity, Trail& trail);
+
+/// Applies the rule to the wall copy of a chunk.
+void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);
+
+/// Sum of W_nn |s - y|^2 over a range [J]: the square of what the sweep changed, in the metric of the sweep.
+/// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls.
+double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
+                      double wall_inv_mass, const Trail& trail);
+
+std::size_t memory_used(const Trail& trail);
+
+}  // namespace talus
