@@ -1,5 +1,6 @@
 #include "runtime/step/admm.hpp"
 
+#include <cmath>
 #include <unordered_map>
 
 namespace talus {
@@ -42,9 +43,12 @@ double Admm::sweeps_needed() const {
   return estimate_stiffness(gather());
 }
 
-AdmmResult Admm::improve() {
+AdmmResult Admm::improve(int calls) {
   BodyProblem problem = gather();
-  const AdmmResult result = solve_admm(problem, {});
+  AdmmSettings settings;
+  settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
+  settings.balance_tolerance = std::ldexp(settings.balance_tolerance, -2 * calls);
+  const AdmmResult result = solve_admm(problem, settings);
   scatter_impulses(problem, state_.contacts);
   return result;
 }

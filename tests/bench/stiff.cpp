@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
@@ -277,6 +278,7 @@ void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod m
         report.step, report.iterations, r.error_rms, r.unbalance, r.drift, r.stiff_calls, r.stiff.iterations,
         r.stiff.linear_iterations, r.stiff.balance_defect, report.wall_s, report.converged ? "" : " MISSED",
         plate.velocity / free, plate.force.norm() / setup.walls[5].load.force);
+    std::fflush(stdout);
     simulation.begin_next_stage();
   }
 }
@@ -316,6 +318,11 @@ void compare(const std::string& name, const Scene& scene, int sweeps, std::span<
 
 int main(int argc, char** argv) {
   const int sweeps = argc > 2 ? std::atoi(argv[2]) : 0;
+  Packing packing;
+  if (argc > 1) {
+    packing = read_packing(argv[1]);
+    for (int subdomains : {1, 12, 96}) run_plate(packing, subdomains, 2, SolverMethod::automatic);
+  }
   const auto force = [](const Scene& s) { return fmt::format("force error {:.1e}", column_error(s)); };
   std::vector<AdmmSettings> chains;
   for (double tolerance : {1e-2, 1e-5}) {
@@ -330,8 +337,6 @@ int main(int argc, char** argv) {
             force);
   }
   if (argc < 2) return 0;
-  const Packing packing = read_packing(argv[1]);
-  for (int subdomains : {1, 12, 96}) run_plate(packing, subdomains, 4, SolverMethod::automatic);
   for (bool closed : {true, false}) {
     const Scene scene = plate_scene(packing, 1e6, closed);
     std::vector<AdmmSettings> packings;
