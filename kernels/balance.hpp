@@ -9,7 +9,7 @@
 namespace talus {
 
 /// Problems of fewer sweeps are none that sweeps cannot see through.
-constexpr double stiff = 300;
+constexpr double stiff = 1000;
 
 /// Estimate of the relative error of the forces that the walls carry, from their relative `change` over the
 /// second half of `sweeps` sweeps in a problem that takes about `sweeps_needed` of them (estimate_stiffness).

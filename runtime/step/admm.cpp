@@ -1,5 +1,6 @@
 #include "runtime/step/admm.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <unordered_map>
 
@@ -43,11 +44,11 @@ double Admm::sweeps_needed() const {
   return estimate_stiffness(gather());
 }
 
-AdmmResult Admm::improve(int calls) {
+AdmmResult Admm::improve(double tolerance, int calls) {
   BodyProblem problem = gather();
   AdmmSettings settings;
   settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
-  settings.balance_tolerance = std::ldexp(settings.balance_tolerance, -2 * calls);
+  settings.balance_tolerance = std::ldexp(std::min(settings.balance_tolerance, 0.1 * tolerance), -2 * calls);
   const AdmmResult result = solve_admm(problem, settings);
   scatter_impulses(problem, state_.contacts);
   return result;

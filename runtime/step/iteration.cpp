@@ -448,7 +448,7 @@ bool Iteration::ask_admm() {
 }
 
 void Iteration::call_admm(int epoch) {
-  result_.stiff = admm_.improve(result_.stiff_calls++);
+  result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
   begin_course(course_.method, course_.most);
   before_segment_ = sweeps_;
