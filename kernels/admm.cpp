@@ -201,7 +201,7 @@ namespace {
 
 /// Velocities of the iterate V against those that its impulses give.
 void measure(const BodyProblem& problem, std::span<const Twist> V, std::span<const Vec3> r, double gap,
-             std::span<const std::int32_t> heavy, AdmmResult& result) {
+             std::span<const std::int32_t> heavy, BodyAdmmResult& result) {
   std::vector<Twist> gained = velocities_of(problem, r), defect(gained.size());
   double speed2 = 0;
   for (std::size_t b = 0; b < gained.size(); ++b) {
@@ -233,8 +233,8 @@ void measure(const BodyProblem& problem, std::span<const Twist> V, std::span<con
 
 }  // namespace
 
-AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
-  AdmmResult result;
+BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings) {
+  BodyAdmmResult result;
   const std::size_t contacts = problem.contacts.size(), bodies = problem.bodies.size();
   if (contacts == 0) {
     result.converged = true;

@@ -10,7 +10,7 @@
 
 namespace talus {
 
-struct AdmmSettings {
+struct BodyAdmmSettings {
   double tolerance = 1e-3;          ///< on momentum_defect and contact_defect
   double balance_tolerance = 2e-3;  ///< on balance_defect; where there are heavy bodies, this is enough
   int max_iterations = 100;
@@ -21,7 +21,7 @@ struct AdmmSettings {
   double stiffness = 0;            ///< kappa; 0: estimate_stiffness
 };
 
-struct AdmmResult {
+struct BodyAdmmResult {
   int iterations = 0;
   int linear_iterations = 0;   ///< conjugate gradients, all
   double momentum_defect = 0;  ///< |V - V_free - M^-1 H r| / |V - V_free|, kinetic norms
@@ -43,7 +43,7 @@ struct AdmmResult {
 ///
 /// with the De Saxce shift of the last y (Boyd et al. 2011; Acary et al. 2018 for the shift). rho = kappa /
 /// W_nn: see `estimate_stiffness`. Deterministic, one thread.
-AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings);
+BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings);
 
 /// kappa of rho = kappa/W_nn from impulses that carry the load: sum W_nn r^2 / |M^-1/2 H r|^2, about the
 /// inverse of the smallest eigenvalue of W that the load excites, in effective masses of a contact. A column

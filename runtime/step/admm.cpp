@@ -44,12 +44,12 @@ double Admm::sweeps_needed() const {
   return estimate_stiffness(gather());
 }
 
-AdmmResult Admm::improve(double tolerance, int calls) {
+BodyAdmmResult Admm::improve(double tolerance, int calls) {
   BodyProblem problem = gather();
-  AdmmSettings settings;
+  BodyAdmmSettings settings;
   settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
   settings.balance_tolerance = std::ldexp(std::min(settings.balance_tolerance, 0.1 * tolerance), -2 * calls);
-  const AdmmResult result = solve_admm(problem, settings);
+  const BodyAdmmResult result = solve_admm(problem, settings);
   scatter_impulses(problem, state_.contacts);
   return result;
 }

@@ -26,7 +26,7 @@ class Admm {
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
   /// exact as the last, as that was not enough.
-  AdmmResult improve(double tolerance, int calls);
+  BodyAdmmResult improve(double tolerance, int calls);
 
  private:
   BodyProblem gather() const;

@@ -208,7 +208,7 @@ double sweep_time(Scene scene, int sweeps) {
   return times[2];
 }
 
-void row(const std::string& what, double seconds, double sweep, const AdmmResult* result,
+void row(const std::string& what, double seconds, double sweep, const BodyAdmmResult* result,
          const std::string& error) {
   fmt::print("  {:<34}{:>9.3f} s{:>9.0f} sweeps", what, seconds, seconds / sweep);
   if (result)
@@ -256,7 +256,8 @@ void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod m
   }
 }
 
-void compare(const std::string& name, const Scene& scene, int sweeps, std::span<const AdmmSettings> settings,
+void compare(const std::string& name, const Scene& scene, int sweeps,
+             std::span<const BodyAdmmSettings> settings,
              const std::function<std::string(const Scene&)>& error) {
   const BodyProblem cold = scene.problem();
   const double sweep = sweep_time(scene, std::max(1, sweeps / 100));
@@ -272,11 +273,11 @@ void compare(const std::string& name, const Scene& scene, int sweeps, std::span<
     row(fmt::format("nlgs, {} sweeps", sweeps), seconds, sweep, nullptr,
         fmt::format("{} map {:.1e}", error(plain), plain.residual()));
   }
-  for (const AdmmSettings& s : settings) {
+  for (const BodyAdmmSettings& s : settings) {
     Scene stiff = scene;
     const double start = cpu_now();
     BodyProblem problem = stiff.problem();
-    const AdmmResult result = solve_admm(problem, s);
+    const BodyAdmmResult result = solve_admm(problem, s);
     scatter_impulses(problem, stiff.sample.contacts);
     stiff.refresh();
     stiff.sweep(10);
@@ -292,9 +293,9 @@ void compare(const std::string& name, const Scene& scene, int sweeps, std::span<
 int main(int argc, char** argv) {
   const int sweeps = argc > 2 ? std::atoi(argv[2]) : 0;
   const auto force = [](const Scene& s) { return fmt::format("force error {:.1e}", column_error(s)); };
-  std::vector<AdmmSettings> chains;
+  std::vector<BodyAdmmSettings> chains;
   for (double tolerance : {1e-2, 1e-5}) {
-    AdmmSettings s;
+    BodyAdmmSettings s;
     s.tolerance = tolerance;
     s.balance_tolerance = 0;
     chains.push_back(s);
@@ -308,9 +309,9 @@ int main(int argc, char** argv) {
   const Packing packing = bench::read_packing(argv[1]);
   for (bool closed : {true, false}) {
     const Scene scene = plate_scene(packing, 1e6, closed);
-    std::vector<AdmmSettings> packings;
+    std::vector<BodyAdmmSettings> packings;
     for (double heavy : {5e-3, 2e-3, 1e-3}) {
-      AdmmSettings s;
+      BodyAdmmSettings s;
       s.balance_tolerance = heavy;
       packings.push_back(s);
     }

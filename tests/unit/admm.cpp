@@ -58,7 +58,7 @@ TEST(Admm, CarriesTheWeightOfALongColumn) {
       BodyProblem rough = column_problem(100, mu, top), fine = rough;
       EXPECT_TRUE(solve_admm(rough, {}).converged);
       EXPECT_LT(column_error(rough), 1e-3) << "mu " << mu << ", top " << top;
-      const AdmmResult result = solve_admm(fine, {.tolerance = 1e-5, .balance_tolerance = 1e-7});
+      const BodyAdmmResult result = solve_admm(fine, {.tolerance = 1e-5, .balance_tolerance = 1e-7});
       EXPECT_LT(column_error(fine), 1e-6) << "mu " << mu << ", top " << top;
       EXPECT_LT(result.iterations, 100);
     }
@@ -74,7 +74,7 @@ TEST(Admm, StartsFromTheImpulsesThatItIsGiven) {
 
 TEST(Admm, ScalesWithTheUnits) {
   BodyProblem plain = column_problem(30, 0.35, 100);
-  const AdmmResult expected = solve_admm(plain, {});
+  const BodyAdmmResult expected = solve_admm(plain, {});
   // Powers of two scale without rounding: the same bits.
   for (const Units& units : {Units{0x1p20, 1, 1}, Units{0x1p-20, 1, 1}, Units{1, 0x1p20, 1},
                              Units{1, 0x1p-20, 1}, Units{1, 1, 0x1p20}, Units{0x1p-20, 0x1p20, 0x1p-20}}) {
@@ -90,7 +90,7 @@ TEST(Admm, HasNothingToDoWithoutContacts) {
   BodyProblem problem = column_problem(3, 0.35);
   problem.contacts.clear();
   problem.impulse.clear();
-  const AdmmResult result = solve_admm(problem, {});
+  const BodyAdmmResult result = solve_admm(problem, {});
   EXPECT_TRUE(result.converged);
   EXPECT_EQ(result.iterations, 0);
   BodyProblem empty;
