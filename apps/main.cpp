@@ -7,13 +7,55 @@
 #include "apps/exit_codes.hpp"
 #include "apps/partition_command.hpp"
 #include "apps/plan.hpp"
+#include "apps/replay_command.hpp"
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
+#include "apps/study_error.hpp"
+#include "apps/trace_command.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
 
 #include <cstdio>
 #include <cstdlib>
+
+namespace {
+
+void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
+  app.add_option("--ranks", replay.ranks, "ranks [as recorded]")->type_name("R");
+  app.add_option("--threads", replay.threads, "threads of a rank [as recorded]")->type_name("T");
+  app.add_option("--map", replay.map, "subdomains to ranks: block, cyclic or weight")->capture_default_str();
+  app.add_option("--schedule", replay.schedule, "fixed, as the program does it, or list")
+      ->capture_default_str();
+  app.add_option("--latency", replay.machine.latency, "of a message between nodes [s]")
+      ->capture_default_str();
+  app.add_option("--bandwidth", replay.machine.bandwidth, "of a node's link, each way [B/s]")
+      ->capture_default_str();
+  app.add_option("--overhead", replay.machine.overhead, "of a thread per message sent or taken [s]")
+      ->capture_default_str();
+  app.add_option("--ranks-per-node", replay.ranks_per_node, "ranks that share a link [1; all as recorded]");
+  app.add_option("--node-latency", replay.node_latency,
+                 "of a message inside a node [s] [as recorded, or 5e-7]");
+  app.add_option("--node-bandwidth", replay.machine.node_bandwidth, "of a message inside a node [B/s]")
+      ->capture_default_str();
+  app.add_option("--line", replay.machine.line, "to hand a cache line to another core [s]")
+      ->capture_default_str();
+  app.add_option("--noise", replay.machine.noise, "each task takes up to this part longer")
+      ->capture_default_str();
+  app.add_option("--seed", replay.machine.seed, "of the noise")->capture_default_str();
+  app.add_option("--speed", replay.machine.speed, "of a core, relative to the recorded one")
+      ->capture_default_str();
+  app.add_option("--contacts-scale", replay.machine.contacts,
+                 "contacts per subdomain, relative to the recorded ones")
+      ->capture_default_str();
+  app.add_option("--steps", replay.steps, "extrapolate the makespan to so many steps");
+  app.add_flag(
+      "--typical", replay.machine.typical,
+      "tasks that took over three times their median of the step take the median: for noisy recordings");
+  app.add_flag("--blocking-check", replay.blocking_check, "convergence checks wait for their sums");
+  app.add_option("-o,--out", replay.out, "write what would have been, as a trace")->type_name("FILE");
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace talus;
@@ -48,12 +90,23 @@ int main(int argc, char** argv) {
       ->type_name("a.b=c")
       ->allow_extra_args(false);
   run_app
+      ->add_option("--error-history", run.error_history,
+                   "steps whose errors go to error_history.csv at every check: 7, 10:20, 1,5,100:120")
+      ->type_name("STEPS");
+  run_app
       ->add_option(
           "--dump-fclib", run.dump_fclib,
           "write the contact problem of this step to fclib_STEP.hdf5 in the results, may be repeated")
       ->type_name("STEP")
       ->allow_extra_args(false)
       ->check(CLI::PositiveNumber);
+  CLI::Option* const trace_flag = run_app->add_flag(
+      "--trace", run.trace, "record every task into trace.h5 (`talus trace`, `talus replay`)");
+  run_app->add_option("--trace-steps", run.trace_steps, "record these steps only")
+      ->type_name("FIRST:LAST")
+      ->needs(trace_flag);
+  run_app->add_option("--replay-order", run.replay_order, "begin the loop's tasks in the order of this trace")
+      ->type_name("FILE");
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;
@@ -62,6 +115,7 @@ int main(int argc, char** argv) {
   plan_app->add_option("--threads", plan.threads, "threads [one per core]")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
+  plan_app->add_flag("--measure", plan.measure, "measure what each omission saves, on the scene's sample");
   plan_app->add_option("--set", plan.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
@@ -122,6 +176,32 @@ int main(int argc, char** argv) {
   solve_app->add_option("--profile", solve.profile, "write the performance profile of the methods to a file")
       ->type_name("FILE");
 
+  TraceShowOptions show;
+  CLI::App* trace_app = app.add_subcommand("trace", "look at what `talus run --trace` recorded");
+  trace_app->require_subcommand(1);
+  CLI::App* show_app = trace_app->add_subcommand("show", "say where the time went");
+  show_app->add_option("file", show.file, "trace.h5 of a run")->type_name("FILE")->required();
+
+  TraceExportOptions trace_export;
+  CLI::App* export_app =
+      trace_app->add_subcommand("export", "write it for Perfetto or ViTE, or as a picture");
+  export_app->add_option("file", trace_export.file, "trace.h5 of a run")->type_name("FILE")->required();
+  export_app->add_option("--format", trace_export.format, "perfetto, paje or svg")->required();
+  export_app->add_option("--step", trace_export.step, "this step only [svg: the middle one]");
+  export_app->add_option("--iteration", trace_export.iteration, "this iteration of the step only");
+  export_app->add_option("-o,--out", trace_export.out, "file [the trace's name, .pftrace, .paje or .svg]")
+      ->type_name("FILE");
+
+  ReplayOptions replay;
+  CLI::App* replay_app =
+      app.add_subcommand("replay", "play a trace on another machine: what a run there would take");
+  replay_app->add_option("file", replay.file, "trace.h5 of a run")->type_name("FILE")->required();
+  add_machine_options(*replay_app, replay);
+  CLI::App* study_app = app.add_subcommand("study", "measure how well and how fast scenes are solved");
+  study_app->require_subcommand(1);
+  StudyErrorOptions study_error;
+  CLI::App* study_error_app = add_study_error(*study_app, study_error);
+
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
 
@@ -137,9 +217,16 @@ int main(int argc, char** argv) {
     const graph::Communicator ranks(session, {.delay = delay});
     return run_command(run, ranks);
   }
-  if (*plan_app) return plan_command(plan);
+  if (*plan_app) {
+    const graph::MpiSession session(&argc, &argv, plan.measure);  // what messages cost is measured with MPI
+    return plan_command(plan, graph::Communicator(session));
+  }
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
+  if (*show_app) return trace_show_command(show);
+  if (*export_app) return trace_export_command(trace_export);
+  if (*replay_app) return replay_command(std::move(replay));
+  if (*study_error_app) return study_error_command(study_error);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
 }

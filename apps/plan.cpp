@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "apps/exit_codes.hpp"
+#include "apps/plan_measure.hpp"
 #include "apps/sample_builder.hpp"
 #include "io/scene.hpp"
 #include "runtime/step/simulation.hpp"
@@ -82,7 +83,7 @@ void print_costs(const Simulation& simulation) {
 
 }  // namespace
 
-int plan_command(const PlanOptions& options) {
+int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
   try {
     io::Scene scene = io::load_scene(options.scene, options.overrides);
     Bodies bodies;
@@ -109,6 +110,8 @@ int plan_command(const PlanOptions& options) {
       print_needs(simulation, scene, threads);
       print_costs(simulation);
     }
+    constexpr int repeats = 3;
+    if (options.measure) print_savings(measure_savings(scene, threads, repeats, ranks), threads, repeats);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;

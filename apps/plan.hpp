@@ -3,16 +3,19 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/communicator.hpp"
+
 namespace talus {
 
 struct PlanOptions {
   std::string scene;
-  int threads = 0;  ///< 0: one per core this process may use
+  int threads = 0;       ///< 0: one per core this process may use
+  bool measure = false;  ///< also what each omission saves, by a benchmark of some seconds
   std::vector<std::string> overrides;
 };
 
 /// `talus plan`: builds the sample, finds its contacts, and prints what the scene needs, what was left out,
 /// and bytes and tasks. Nothing is written. Returns an ExitCode.
-int plan_command(const PlanOptions& options);
+int plan_command(const PlanOptions& options, const graph::Communicator& ranks);
 
 }  // namespace talus

@@ -13,6 +13,8 @@
 #include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
+#include "apps/step_list.hpp"
+#include "apps/trace_feed.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
 #include "io/progress.hpp"
@@ -21,6 +23,7 @@
 #include "io/scene.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -71,12 +74,14 @@ class FrameClock {
 /// steps.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks)
-      : executor_(executor), recorder_(recorder), ranks_(ranks) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks,
+               StepList error_steps)
+      : executor_(executor), recorder_(recorder), ranks_(ranks), error_steps_(std::move(error_steps)) {}
 
   void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
     if (ranks_.rank() != 0) return;
-    rows_.push_back({simulation.report(), simulation.walls(), triaxial});
+    rows_.push_back({simulation.report(), simulation.walls(), triaxial, {}});
+    if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
   }
 
@@ -102,7 +107,10 @@ class RecorderFeed {
     since_ = {};
     if (rows_.empty()) return;
     executor_.submit_background("output of steps", [this, rows = std::move(rows_)] {
-      for (const Row& row : rows) recorder_.record_step(row.step, row.walls, row.triaxial);
+      for (const Row& row : rows) {
+        recorder_.record_step(row.step, row.walls, row.triaxial);
+        recorder_.record_errors(row.step.step, row.errors);
+      }
     });
     rows_.clear();
   }
@@ -112,10 +120,12 @@ class RecorderFeed {
     StepReport step;
     std::vector<WallReport> walls;
     std::optional<TriaxialReport> triaxial;
+    std::vector<Iteration::Check> errors;
   };
   graph::Executor& executor_;
   io::Recorder& recorder_;
   const graph::Communicator& ranks_;
+  StepList error_steps_;
   std::vector<Row> rows_;
   Stopwatch since_;
 };
@@ -206,7 +216,8 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     const std::string& directory, io::Recorder& recorder, const graph::Communicator& ranks) {
+                     const std::string& directory, trace::Order* order, io::Recorder& recorder,
+                     const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
   summary.bodies = sample.size();
@@ -217,10 +228,15 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     summary.message = error.what();
     summary.exit_code = exit_failure;
   };
-  graph::Executor executor({.threads = threads});
+  std::optional<TraceFeed> trace;
+  if (options.trace) trace.emplace(directory, parse_steps(options.trace_steps), threads, ranks);
+  graph::Executor executor({.threads = threads, .trace = trace ? &trace->recorder() : nullptr});
+  if (trace) trace->start(executor);
   Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
                         ranks);
-  RecorderFeed feed(executor, recorder, ranks);
+  if (order) simulation.follow(order);
+  RecorderFeed feed(executor, recorder, ranks,
+                    options.error_history.empty() ? StepList() : StepList(options.error_history));
   try {
     if (const int signal = advance(simulation, options, scene.output, directory, feed, tally, ranks);
         signal != 0) {
@@ -243,6 +259,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     summary.wall_s = watch.seconds();
     return summary;
   }
+  if (trace) trace->finish(executor);
   const MessageCount& messages = simulation.messages();
   if (ranks.rank() == 0 && messages.messages > 0)
     fmt::print(stderr,
@@ -306,9 +323,23 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
+int threads_of(const RunOptions& options) {
+  return options.threads > 0 ? options.threads : omp_get_num_procs();
+}
+
+/// The order that the run is to follow. Throws std::invalid_argument when it was recorded on another machine.
+trace::Trace order_of(const RunOptions& options, const graph::Communicator& ranks) {
+  trace::Trace recorded = io::read_trace(options.replay_order);
+  if (recorded.ranks != ranks.ranks() || recorded.threads != threads_of(options))
+    throw std::invalid_argument(fmt::format("{} was recorded on {} ranks x {} threads, this run has {} x {}",
+                                            options.replay_order, recorded.ranks, recorded.threads,
+                                            ranks.ranks(), threads_of(options)));
+  return recorded;
+}
+
+int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, trace::Order* order,
               const graph::Communicator& ranks) {
-  const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+  const int threads = threads_of(options);
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();
   provenance.threads = threads;
@@ -336,7 +367,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
   if (any_failed(refused, ranks)) return exit_bad_input;
   io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
   const io::Summary summary =
-      simulate(options, scene, std::move(sample), threads, directory, recorder, ranks);
+      simulate(options, scene, std::move(sample), threads, directory, order, recorder, ranks);
   recorder.finish(summary);
   if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
@@ -355,11 +386,15 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Sample sample;
+  std::optional<trace::Order> order;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+    if (!options.replay_order.empty()) order.emplace(order_of(options, ranks), ranks.rank());
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+    if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
+    if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
@@ -383,7 +418,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(sample), ranks);
+    return run_scene(options, scene, std::move(sample), order ? &*order : nullptr, ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

@@ -16,7 +16,11 @@ struct RunOptions {
   std::optional<std::int64_t> steps;      ///< stop after so many steps
   int threads = 0;                        ///< 0: one per core this process may use
   std::vector<std::string> overrides;     ///< "a.b=c"
+  std::string error_history;              ///< steps whose checks go to error_history.csv (StepList)
   std::vector<std::int64_t> dump_fclib;   ///< steps whose contact problem is written to fclib_STEP.hdf5
+  bool trace = false;                     ///< record the tasks into trace.h5
+  std::string trace_steps;                ///< "first:last", recorded alone; empty: all
+  std::string replay_order;               ///< a trace whose order of tasks is to be followed; empty: none
   bool dry_run = false;                   ///< read, build, place and check; write nothing
   std::vector<std::string> command_line;  ///< for run.json
 };

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "io/detail/csv_cell.hpp"
 #include "io/error.hpp"
 
 namespace talus::io {
@@ -15,30 +16,7 @@ namespace {
 constexpr std::size_t flush_bytes = 32 * 1024;
 constexpr std::chrono::milliseconds flush_interval{500};
 
-void put(std::string& text, double value) {
-  fmt::format_to(std::back_inserter(text), "{}", value);
-}
-void put(std::string& text, std::int64_t value) {
-  fmt::format_to(std::back_inserter(text), "{}", value);
-}
-void put(std::string& text, int value) {
-  put(text, std::int64_t{value});
-}
-void put(std::string& text, bool value) {
-  text += value ? '1' : '0';
-}
-void put(std::string& text, const std::string& value) {
-  if (value.find_first_of(",\"\r\n") == std::string::npos) {
-    text += value;
-    return;
-  }
-  text += '"';
-  for (const char c : value) {
-    if (c == '"') text += '"';
-    text += c;
-  }
-  text += '"';
-}
+using detail::put;
 
 /// One column: its name and how a row's value is written. The tables below drive both the header and the
 /// rows.
@@ -51,6 +29,11 @@ struct Column {
 struct WallRow {
   const StepReport& step;
   const WallReport& wall;
+};
+
+struct ErrorRow {
+  std::int64_t step;
+  const Iteration::Check& check;
 };
 
 constexpr Column<StepReport> steps_columns[] = {
@@ -105,6 +88,13 @@ constexpr Column<TriaxialReport> triaxial_columns[] = {
     {"coordination", [](std::string& t, const TriaxialReport& r) { put(t, r.coordination); }},
 };
 
+constexpr Column<ErrorRow> error_history_columns[] = {
+    {"step", [](std::string& t, const ErrorRow& r) { put(t, r.step); }},
+    {"iterations", [](std::string& t, const ErrorRow& r) { put(t, r.check.iterations); }},
+    {"seconds", [](std::string& t, const ErrorRow& r) { put(t, r.check.seconds); }},
+    {"error_rms", [](std::string& t, const ErrorRow& r) { put(t, r.check.error_rms); }},
+};
+
 template <class Row>
 std::string header_line(std::span<const Column<Row>> columns) {
   std::string text;
@@ -135,6 +125,9 @@ std::string walls_csv_header() {
 std::string triaxial_csv_header() {
   return header_line<TriaxialReport>(triaxial_columns);
 }
+std::string error_history_csv_header() {
+  return header_line<ErrorRow>(error_history_columns);
+}
 
 void append_steps_row(std::string& text, const StepReport& report) {
   append_line<StepReport>(text, steps_columns, report);
@@ -146,6 +139,10 @@ void append_walls_row(std::string& text, const StepReport& report, const WallRep
 
 void append_triaxial_row(std::string& text, const TriaxialReport& report) {
   append_line<TriaxialReport>(text, triaxial_columns, report);
+}
+
+void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check) {
+  append_line<ErrorRow>(text, error_history_columns, ErrorRow{step, check});
 }
 
 CsvFile::CsvFile(const std::filesystem::path& path, std::string_view header)

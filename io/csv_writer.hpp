@@ -1,6 +1,7 @@
 #pragma once
 
-/// The tables of a run: steps.csv, walls.csv, triaxial.csv (columns and units: docs/formats.md).
+/// The tables of a run: steps.csv, walls.csv, triaxial.csv, error_history.csv (columns and units:
+/// docs/formats.md).
 
 #include <chrono>
 #include <filesystem>
@@ -9,6 +10,7 @@
 
 #include "io/detail/descriptor.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/iteration.hpp"
 
 namespace talus::io {
 
@@ -16,12 +18,14 @@ namespace talus::io {
 std::string steps_csv_header();
 std::string walls_csv_header();
 std::string triaxial_csv_header();
+std::string error_history_csv_header();
 
 /// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true
 /// and false are 1 and 0; names are quoted only where they must be (RFC 4180).
 void append_steps_row(std::string& text, const StepReport& report);
 void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall);
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
+void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check);
 
 /// A file that grows by whole lines.
 /// commit() hands lines to the system when half a second has passed since the last time, or 32 KiB have

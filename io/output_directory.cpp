@@ -21,9 +21,11 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view unfinished = ".part";
 
-constexpr std::array<std::string_view, 11> fixed_names{
-    "run.json",   "scene.resolved.toml", "steps.csv",         "walls.csv",    "triaxial.csv", "results.h5",
-    "fields.pvd", "fields/grains.pvd",   "fields/forces.pvd", "triaxial.svg", "forces.svg"};
+constexpr std::array<std::string_view, 13> fixed_names{
+    "error_history.csv", "run.json",          "scene.resolved.toml", "steps.csv",
+    "walls.csv",         "triaxial.csv",      "results.h5",          "fields.pvd",
+    "fields/grains.pvd", "fields/forces.pvd", "triaxial.svg",        "forces.svg",
+    "trace.h5"};
 
 /// prefix, six digits or more, suffix
 bool is_numbered(std::string_view name, std::string_view prefix, std::string_view suffix) {
@@ -65,7 +67,7 @@ bool is_output_name(const fs::path& relative) {
   if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
   return std::ranges::find(fixed_names, name) != fixed_names.end() ||
          is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
-         is_dump(name);
+         is_numbered(name, "trace_rank_", ".h5") || is_dump(name);
 }
 
 bool is_partition_name(const fs::path& relative) {

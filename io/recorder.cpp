@@ -80,6 +80,13 @@ void Recorder::record_step(const StepReport& report, std::span<const WallReport>
   if (options_.pictures) curve_.add(*triaxial);
 }
 
+void Recorder::record_errors(std::int64_t step, std::span<const Iteration::Check> checks) {
+  if (checks.empty() || ranks_.rank() != 0) return;
+  if (!errors_) errors_.emplace(directory_ / "error_history.csv", error_history_csv_header());
+  for (const Iteration::Check& check : checks) append_error_history_row(errors_->pending(), step, check);
+  errors_->commit();
+}
+
 void Recorder::record_frame(Frame&& frame) {
   const Frame state = [&] {
     Frame taken = std::move(frame);
@@ -99,6 +106,7 @@ void Recorder::finish(Summary summary) {
   steps_->close();
   wall_rows_->close();
   if (triaxial_) triaxial_->close();
+  if (errors_) errors_->close();
   draw_triaxial_picture();
   summary.frames = frames_;
   write_run_json(directory_ / "run.json", provenance_, summary);

@@ -23,6 +23,7 @@
 #include "io/run_json.hpp"
 #include "io/vtk.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/iteration.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::io {
@@ -69,6 +70,9 @@ class Recorder {
   void record_step(const StepReport& report, std::span<const WallReport> walls,
                    const std::optional<TriaxialReport>& triaxial);
 
+  /// A line in error_history.csv per check; the file appears with its first line.
+  void record_errors(std::int64_t step, std::span<const Iteration::Check> checks);
+
   /// Writes a state, of which each rank has its part, and lets go of it. Throws std::invalid_argument when
   /// its arrays do not fit together.
   void record_frame(Frame&& frame);
@@ -90,6 +94,7 @@ class Recorder {
   const graph::Communicator& ranks_;
   std::optional<CsvFile> steps_, wall_rows_;  ///< on rank 0
   std::optional<CsvFile> triaxial_;
+  std::optional<CsvFile> errors_;
   std::optional<ResultsWriter> results_;
   std::vector<FieldFile> grain_files_, force_files_;  ///< paths relative to fields/
   ThinnedCurve curve_;

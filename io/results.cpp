@@ -7,16 +7,23 @@
 #include <span>
 #include <stdexcept>
 
-#include "io/detail/hdf5.hpp"
+#include "io/detail/hdf5_write.hpp"
 #include "io/error.hpp"
 #include "io/version.hpp"
 
 namespace talus::io {
 namespace {
 
+using detail::close_file;
+using detail::create_group;
 using detail::demand;
+using detail::element_types;
+using detail::file_access;
 using detail::Hdf5Object;
 using detail::hold;
+using detail::Place;
+using detail::write_attribute;
+using detail::write_names;
 
 constexpr std::int64_t format_version = 1;
 
@@ -25,36 +32,6 @@ static_assert(sizeof(Vec3) == 3 * sizeof(double), "a vector of Vec3 is written a
 std::string frame_name(std::size_t index) {
   return fmt::format("{:06}", index);
 }
-
-/// `together`: the file is opened by all ranks at once.
-Hdf5Object file_access(const std::string& file, bool together) {
-  Hdf5Object access = hold(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, file, "preparing HDF5");
-  demand(H5Pset_file_locking(access.id(), false, true), file, "preparing HDF5");
-  // Metadata leave the cache when the file is closed and not before, so that a kill while the arrays of a
-  // frame are being written finds the directory of the file as it was.
-  H5AC_cache_config_t cache{};
-  cache.version = H5AC__CURR_CACHE_CONFIG_VERSION;
-  demand(H5Pget_mdc_config(access.id(), &cache), file, "preparing HDF5");
-  cache.evictions_enabled = false;
-  cache.incr_mode = H5C_incr__off;
-  cache.flash_incr_mode = H5C_flash_incr__off;
-  cache.decr_mode = H5C_decr__off;
-#ifdef H5_HAVE_PARALLEL
-  if (together) {
-    demand(H5Pset_fapl_mpio(access.id(), MPI_COMM_WORLD, MPI_INFO_NULL), file, "preparing HDF5 for MPI");
-  }
-#else
-  if (together) throw FileError(file, "cannot be written by several ranks: this HDF5 is built without MPI");
-#endif
-  demand(H5Pset_mdc_config(access.id(), &cache), file, "preparing HDF5");
-  return access;
-}
-
-/// The group and the file that every write or read needs.
-struct Place {
-  hid_t group;
-  const std::string& file;
-};
 
 /// The rows of this rank among those of all.
 struct Rows {
@@ -90,40 +67,6 @@ void in_step(const Sharing& sharing, const std::string& file, const Work& work) 
   sharing.ranks.max(failed);
   if (failure) std::rethrow_exception(failure);
   if (failed[0] > 0) throw FileError(file, "another rank could not write its part");
-}
-
-void write_attribute(Place place, const char* name, hid_t file_type, hid_t memory_type, const void* value) {
-  const std::string action = fmt::format("writing attribute '{}'", name);
-  const Hdf5Object space = hold(H5Screate(H5S_SCALAR), H5Sclose, place.file, action);
-  const Hdf5Object attribute =
-      hold(H5Acreate2(place.group, name, file_type, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
-           place.file, action);
-  demand(H5Awrite(attribute.id(), memory_type, value), place.file, action);
-}
-
-void write_attribute(Place place, const char* name, std::int64_t value) {
-  write_attribute(place, name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value);
-}
-
-void write_attribute(Place place, const char* name, double value) {
-  write_attribute(place, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &value);
-}
-
-void write_attribute(Place place, const char* name, const std::string& value) {
-  const Hdf5Object type = detail::text_type(place.file);
-  const char* text = value.c_str();
-  write_attribute(place, name, type.id(), type.id(), &text);
-}
-
-struct ElementTypes {
-  hid_t file;
-  hid_t memory;
-};
-ElementTypes element_types(const double*) {
-  return {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE};
-}
-ElementTypes element_types(const std::int64_t*) {
-  return {H5T_STD_I64LE, H5T_NATIVE_INT64};
 }
 
 /// A dataset of `rows` x columns numbers; one column makes a one-dimensional dataset.
@@ -204,11 +147,6 @@ class ArrayWriter {
   Rows rows_;
 };
 
-Hdf5Object create_group(Place place, const std::string& name) {
-  return hold(H5Gcreate2(place.group, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose,
-              place.file, fmt::format("creating group '{}'", name));
-}
-
 void write_bodies(const ArrayWriter& write, const Frame& part, bool omega, bool orientation) {
   write("id", "1", part.id);
   write("x", "m", part.x);
@@ -240,27 +178,6 @@ void write_walls(const Sharing& sharing, Place place, const Frame& frame) {
   write("position", "m", position);
   write("velocity", "m/s", velocity);
   write("force", "N", force);
-}
-
-void write_names(Place place, const char* name, const std::vector<std::string>& values) {
-  const std::string action = fmt::format("writing '{}'", name);
-  const Hdf5Object type = detail::text_type(place.file);
-  const hsize_t extent = values.size();
-  const Hdf5Object space = hold(H5Screate_simple(1, &extent, nullptr), H5Sclose, place.file, action);
-  const Hdf5Object dataset =
-      hold(H5Dcreate2(place.group, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
-           H5Dclose, place.file, action);
-  std::vector<const char*> texts;
-  for (const std::string& value : values) texts.push_back(value.c_str());
-  if (!texts.empty()) {
-    demand(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), place.file,
-           action);
-  }
-}
-
-/// Closing is when a full disk shows.
-void close_file(Hdf5Object& file, const std::string& path) {
-  demand(H5Fclose(file.release()), path, "writing to disk");
 }
 
 void demand_same_length(std::size_t length, std::size_t expected, const char* name) {

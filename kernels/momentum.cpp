@@ -1,5 +1,7 @@
 #include "kernels/momentum.hpp"
 
+#include <bit>
+
 namespace talus {
 
 namespace {
@@ -78,19 +80,33 @@ void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& cont
   carry_values(carry, beta, range, contacts.rz, trail.last.z, trail.step.z);
 }
 
-void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, bool turns,
-                      std::span<Velocity> velocity, Trail& trail) {
-  for (Slot slot : slots) {
+void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std::span<Velocity> velocity,
+                      Trail& trail) {
+  constexpr std::size_t numbers = sizeof(Velocity) / sizeof(double);
+  using Record = std::array<double, numbers>;
+  for (const Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);
-    double* const step = trail.step_v.empty() ? nullptr : trail.step_v[s].data();
-    // u and w stand side by side in the record; without rotation w is not touched.
-    std::array<double, 6> v{velocity[s].u[0], velocity[s].u[1], velocity[s].u[2],
-                            velocity[s].w[0], velocity[s].w[1], velocity[s].w[2]};
-    carry_numbers(carry, beta, v.data(), trail.last_v[s], step, turns ? 6 : 3);
-    for (std::size_t k = 0; k < 3; ++k) {
-      velocity[s].u[k] = v[k];
-      velocity[s].w[k] = v[k + 3];
+    const auto now = std::bit_cast<Record>(velocity[s]);
+    if (beta == 0) {
+      trail.last_v[s] = velocity[s];
+      if (carry == Carry::conjugate) trail.step_v[s] = std::bit_cast<Velocity>(Record{});
+      continue;
     }
+    const auto last = std::bit_cast<Record>(trail.last_v[s]);
+    Record next;
+    if (carry == Carry::momentum) {
+      for (std::size_t k = 0; k < numbers; ++k) next[k] = now[k] + beta * (now[k] - last[k]);
+      trail.last_v[s] = velocity[s];
+    } else {
+      auto step = std::bit_cast<Record>(trail.step_v[s]);
+      for (std::size_t k = 0; k < numbers; ++k) {
+        next[k] = now[k] + beta * step[k];
+        step[k] = next[k] - last[k];
+      }
+      trail.step_v[s] = std::bit_cast<Velocity>(step);
+      trail.last_v[s] = std::bit_cast<Velocity>(next);
+    }
+    velocity[s] = std::bit_cast<Velocity>(next);
   }
 }
 
@@ -123,7 +139,7 @@ double change_squared(ContactRange range, const Contacts& contacts, std::span<co
 
 std::size_t memory_used(const Trail& trail) {
   return bytes(trail.last) + bytes(trail.step) +
-         sizeof(std::array<double, 6>) * (trail.last_v.capacity() + trail.step_v.capacity()) +
+         sizeof(Velocity) * (trail.last_v.capacity() + trail.step_v.capacity()) +
          sizeof(std::array<double, 3>) * (trail.last_wall_v.capacity() + trail.step_wall_v.capacity());
 }
 

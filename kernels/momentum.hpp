@@ -25,10 +25,10 @@ struct Trail {
     std::vector<double> x, y, z;  ///< with friction [N s]
     std::vector<double> n;        ///< without [N s]
   };
-  Impulses last;                                   ///< s_before, or y
-  Impulses step;                                   ///< p
-  std::vector<std::array<double, 6>> last_v;       ///< per slot [m/s]
-  std::vector<std::array<double, 6>> step_v;       ///< per slot [m/s]
+  Impulses last;                 ///< s_before, or y
+  Impulses step;                 ///< p
+  std::vector<Velocity> last_v;  ///< per slot; whole records, so that eight numbers are carried at once
+  std::vector<Velocity> step_v;
   std::vector<std::array<double, 3>> last_wall_v;  ///< per chunk: of its wall copy [m/s]
   std::vector<std::array<double, 3>> step_wall_v;
 };
@@ -39,9 +39,9 @@ void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t b
 /// Applies the rule to the impulses of a range; beta = 0 begins a new trail.
 void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& contacts, Trail& trail);
 
-/// Applies the rule to the velocities of the slots (`turns`: and to the rotations).
-void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, bool turns,
-                      std::span<Velocity> velocity, Trail& trail);
+/// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
+void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std::span<Velocity> velocity,
+                      Trail& trail);
 
 /// Applies the rule to the wall copy of a chunk.
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);

@@ -9,8 +9,6 @@
 #include <utility>
 
 namespace talus::io::detail {
-namespace {
-
 std::string escaped(std::string_view content) {
   std::string result;
   for (const char c : content) {
@@ -33,6 +31,8 @@ std::string escaped(std::string_view content) {
   }
   return result;
 }
+
+namespace {
 
 std::string attributes(const Stroke& stroke) {
   std::string text = fmt::format(R"(stroke="{}" stroke-width="{:.2f}")", stroke.colour, stroke.width);

@@ -19,6 +19,9 @@ inline constexpr std::string_view grain_fill = "#f1f4f7";
 inline constexpr std::string_view grain_edge = "#a9b4bf";
 }  // namespace style
 
+/// The text with the characters that mean something to XML and HTML replaced.
+std::string escaped(std::string_view content);
+
 struct Stroke {
   std::string_view colour = style::ink;
   double width = 1;

@@ -10,6 +10,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "runtime/trace/recorder.hpp"
+
 namespace talus::graph {
 
 namespace {
@@ -87,6 +89,7 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
   const auto n = static_cast<std::size_t>(ranks_), own = static_cast<std::size_t>(rank_);
   if (to.size() != n) throw std::invalid_argument("Communicator::exchange wants one part per rank");
   if (n == 1) return;
+  const trace::Span span(trace_, trace::kind_collective);
   std::vector<std::uint64_t> out_bytes(n, 0), in_bytes(n);
   for (std::size_t r = 0; r < n; ++r)
     if (r != own) out_bytes[r] = to[r].size();
@@ -112,6 +115,7 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
 
 void Communicator::sum(std::span<std::int64_t> values) const {
   if (ranks_ == 1) return;
+  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_INT64_T, MPI_SUM,
                       MPI_COMM_WORLD),
         "MPI_Allreduce");
@@ -119,6 +123,7 @@ void Communicator::sum(std::span<std::int64_t> values) const {
 
 void Communicator::max(std::span<double> values) const {
   if (ranks_ == 1) return;
+  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX,
                       MPI_COMM_WORLD),
         "MPI_Allreduce");
@@ -126,6 +131,7 @@ void Communicator::max(std::span<double> values) const {
 
 std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) const {
   if (ranks_ == 1) return {part.begin(), part.end()};
+  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(part.size()));
   const auto n = static_cast<std::size_t>(ranks_);
   const int own = static_cast<int>(part.size());
   std::vector<int> bytes(n), begin(n + 1, 0);
@@ -171,6 +177,7 @@ struct Communicator::PendingGather::Request {
   MPI_Request handle = MPI_REQUEST_NULL;
   std::vector<double> part, all;
   std::vector<int> lengths, begin;
+  trace::Recorder* trace = nullptr;
 };
 
 Communicator::PendingGather::PendingGather(std::unique_ptr<Request> request) : request_(std::move(request)) {}
@@ -185,7 +192,9 @@ bool Communicator::PendingGather::done() {
 }
 
 const std::vector<double>& Communicator::PendingGather::wait() {
-  if (request_->handle != MPI_REQUEST_NULL) check(MPI_Wait(&request_->handle, MPI_STATUS_IGNORE), "MPI_Wait");
+  if (request_->handle == MPI_REQUEST_NULL) return request_->all;
+  const trace::Span span(request_->trace, trace::kind_collective);
+  check(MPI_Wait(&request_->handle, MPI_STATUS_IGNORE), "MPI_Wait");
   return request_->all;
 }
 
@@ -198,6 +207,7 @@ std::unique_ptr<Communicator::PendingGather> Communicator::start_gather(
     return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
   }
   r.part = std::move(part);
+  r.trace = trace_;
   int end = 0;
   for (std::size_t length : lengths) {
     r.begin.push_back(end);

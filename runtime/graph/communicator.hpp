@@ -15,6 +15,10 @@
 #include <type_traits>
 #include <vector>
 
+namespace talus::trace {
+class Recorder;
+}
+
 namespace talus::graph {
 
 /// Starts MPI for the life of the object when the process was started by mpirun or srun (or `always`), and
@@ -55,6 +59,9 @@ class Communicator {
   bool any_thread() const noexcept { return any_thread_; }
   /// Ranks on this machine.
   int ranks_on_node() const noexcept { return ranks_on_node_; }
+  /// Collective calls and channels leave spans in `trace` from now on; null: no more. It must outlive them.
+  void record_to(trace::Recorder* trace) const { trace_ = trace; }
+  trace::Recorder* trace() const { return trace_; }
 
   // Collective: every rank calls, in the same order.
   /// Sends to[r] to rank r. `room(r, bytes)` gives the place for what rank r sends here, and is not asked for
@@ -102,6 +109,7 @@ class Communicator {
  private:
   int rank_ = 0, ranks_ = 1, ranks_on_node_ = 1;
   bool any_thread_ = true;
+  mutable trace::Recorder* trace_ = nullptr;  ///< watches; changes nothing of what is sent
   CommunicatorOptions options_;
 };
 

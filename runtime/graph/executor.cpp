@@ -82,14 +82,21 @@ void Executor::run_inline(const Graph& graph) {
   for (std::uint32_t i = 0; i < graph.size(); ++i) {
     const TaskId task{i};
     try {
-      if (graph.is_team(task))
-        graph.run(task, worker);
-      else
-        graph.run(task);
+      run_task(graph, task, worker);
     } catch (...) {
       rethrow_as_task_error(graph.name(task), std::current_exception());
     }
   }
+}
+
+void Executor::run_task(const Graph& graph, TaskId task, Worker& worker) {
+  trace::Recorder* const trace = options_.trace && options_.trace->active() ? options_.trace : nullptr;
+  const std::int64_t begin = trace ? trace->now() : 0;
+  if (graph.is_team(task))
+    graph.run(task, worker);
+  else
+    graph.run(task);
+  if (trace) trace->task(worker.thread(), static_cast<std::uint32_t>(task), begin);
 }
 
 void Executor::prepare(const Graph& graph) {
@@ -137,10 +144,7 @@ void Executor::serve(const Graph& graph, int thread) noexcept {
     const TaskId task{next};
     try {
       worker.delay();
-      if (graph.is_team(task))
-        graph.run(task, worker);
-      else
-        graph.run(task);
+      run_task(graph, task, worker);
     } catch (...) {
       stop_.raise();  // at once: others may be waiting for this thread in the same team
       failure = std::current_exception();

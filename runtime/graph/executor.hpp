@@ -23,6 +23,7 @@
 #include "runtime/graph/graph.hpp"
 #include "runtime/graph/task_error.hpp"
 #include "runtime/graph/worker.hpp"
+#include "runtime/trace/recorder.hpp"
 
 namespace talus::graph {
 
@@ -32,6 +33,8 @@ struct ExecutorOptions {
       0;  ///< not 0: before each task and loop node spin a pseudo-random time (tests of order)
   std::size_t background_capacity =
       4;  ///< >= 1: background tasks that may be outstanding before submit_background blocks
+  trace::Recorder* trace =
+      nullptr;  ///< takes down each task, if given; of as many threads, outlives the executor
 };
 
 class Executor {
@@ -40,6 +43,7 @@ class Executor {
   explicit Executor(ExecutorOptions options);
 
   int threads() const noexcept { return options_.threads; }
+  trace::Recorder* trace() const noexcept { return options_.trace; }
 
   /// Runs all tasks of the graph in an order that its edges allow; returns when all have ended. With one
   /// thread they run inline, in the order of submission, without locks or atomics. When a task throws, no
@@ -58,6 +62,7 @@ class Executor {
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   void run_inline(const Graph& graph);
+  void run_task(const Graph& graph, TaskId task, Worker& worker);
   void prepare(const Graph& graph);
   void serve(const Graph& graph, int thread) noexcept;
   std::uint32_t take(int thread);

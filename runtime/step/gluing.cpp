@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "runtime/graph/worker.hpp"
+#include "runtime/trace/recorder.hpp"
 
 namespace talus {
 
@@ -20,8 +21,9 @@ std::size_t at(std::int32_t k) {
 }
 
 /// Polls, and adds the time it took to `waited`. Ranks that share a core give way to one another.
-void await(Channel& channel, double& waited) {
+void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
   if (channel.done()) return;
+  const trace::Span span(trace, trace::kind_receive, message);
   const auto start = std::chrono::steady_clock::now();
   for (int polls = 0; !channel.done(); ++polls)
     if (polls < 256)
@@ -31,12 +33,54 @@ void await(Channel& channel, double& waited) {
   waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+void start(Channel& channel, trace::Recorder* trace, std::uint32_t message) {
+  const trace::Span span(trace, trace::kind_send, message);
+  channel.start();
+}
+
 /// A message from and to another rank; buffers have one room more than payload, for the time stamp of a
 /// delay.
 struct Link {
   std::vector<double> out, in;
   std::unique_ptr<Channel> sender, receiver;
+  std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
 };
+
+template <std::size_t Width>
+void read_velocity(const Velocity& v, double* out) {
+  for (std::size_t k = 0; k < 3; ++k) out[k] = v.u[k];
+  if constexpr (Width == 6)
+    for (std::size_t k = 0; k < 3; ++k) out[k + 3] = v.w[k];
+}
+
+template <std::size_t Width>
+void write_velocities(std::span<const Velocity> velocity, std::span<const std::size_t> slots, double* out) {
+  for (const std::size_t slot : slots) {
+    read_velocity<Width>(velocity[slot], out);
+    out += Width;
+  }
+}
+
+/// NSCDD between two measurements, what most exchanges are: each shared body takes the mean of its copies.
+template <std::size_t Width>
+void take_means(std::span<Velocity> velocity, std::span<const std::size_t> shared,
+                std::span<const std::int32_t> copies_begin, const double* const* sources) {
+  for (std::size_t s = 0; s < shared.size(); ++s) {
+    const auto begin = at(copies_begin[s]), end = at(copies_begin[s + 1]);
+    if (begin == end) continue;  // a hub
+    Velocity& v = velocity[shared[s]];
+    double own[Width], sum[Width] = {};
+    read_velocity<Width>(v, own);
+    for (std::size_t c = begin; c < end; ++c) {
+      const double* const from = sources[c] ? sources[c] : own;
+      for (std::size_t k = 0; k < Width; ++k) sum[k] += from[k];
+    }
+    const auto m = static_cast<double>(end - begin);
+    for (std::size_t k = 0; k < 3; ++k) v.u[k] = sum[k] / m;
+    if constexpr (Width == 6)
+      for (std::size_t k = 0; k < 3; ++k) v.w[k] = sum[k + 3] / m;
+  }
+}
 
 constexpr int centre_tag = 1;
 int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
@@ -56,7 +100,9 @@ struct Gluing::Side {
 struct Gluing::Subdomain {
   std::vector<Side> sides;
   std::vector<std::size_t> shared;  ///< slots
-  std::vector<double> base;         ///< Schwarz: velocities after the last gluing, per shared body
+  std::vector<const double*>
+      sources;               ///< per copy of `interface.copies`: where it is read; null: the own one
+  std::vector<double> base;  ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
   std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
   std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
@@ -106,6 +152,11 @@ void Gluing::plan(bool rotation) {
       for (const Side& back : subdomains_[at(side.local)].sides)
         if (back.local == e) side.source = back.link.out.data();
     }
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e)
+    for (const CopySource& copy : all.interfaces[e].copies)
+      subdomains_[e].sources.push_back(copy.neighbour < 0 ? nullptr
+                                                          : subdomains_[e].sides[at(copy.neighbour)].source +
+                                                                at(copy.place) * width_);
   plan_centre();
   count_messages();
 }
@@ -140,6 +191,10 @@ void Gluing::plan_sides(std::size_t e) {
         ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
     side.link.receiver =
         ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
+    side.link.out_name = trace::message_name(static_cast<std::uint32_t>(interface.subdomain),
+                                             static_cast<std::uint32_t>(neighbour.subdomain));
+    side.link.in_name = trace::message_name(static_cast<std::uint32_t>(neighbour.subdomain),
+                                            static_cast<std::uint32_t>(interface.subdomain));
     side.link.receiver->start();
   }
 }
@@ -196,6 +251,13 @@ void Gluing::plan_centre() {
       link->in.resize(in + 1);
       link->sender = ranks_.open_send(other, centre_tag, link->out);
       link->receiver = ranks_.open_receive(other, centre_tag, link->in);
+      // A rank is named after its first subdomain; 0 is the centre.
+      const int named = is_centre ? other : ranks_.rank();
+      const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), named) -
+                                                    all.rank_of.begin());
+      link->out_name = trace::message_name(first, trace::centre_group);
+      link->in_name = trace::message_name(trace::centre_group, first);
+      if (is_centre) std::swap(link->out_name, link->in_name);
       link->receiver->start();
       return link;
     };
@@ -284,19 +346,22 @@ std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
 }
 
 void Gluing::write_velocity(std::size_t slot, double* out) const {
-  const Velocity& v = state_.bodies.velocity[slot];
-  std::copy_n(v.u, 3, out);
-  if (width_ == 6) std::copy_n(v.w, 3, out + 3);
+  if (width_ == 6)
+    read_velocity<6>(state_.bodies.velocity[slot], out);
+  else
+    read_velocity<3>(state_.bodies.velocity[slot], out);
 }
 
 void Gluing::publish(std::size_t e, Mode mode) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
-    if (side.link.sender) await(*side.link.sender, mine.waited);
-    for (std::size_t k = 0; k < side.slots.size(); ++k)
-      write_velocity(side.slots[k], &side.link.out[k * width_]);
-    if (side.link.sender) side.link.sender->start();
+    if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
+    if (width_ == 6)
+      write_velocities<6>(state_.bodies.velocity, side.slots, side.link.out.data());
+    else
+      write_velocities<3>(state_.bodies.velocity, side.slots, side.link.out.data());
+    if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   }
   for (std::size_t g = 0; g < walls_.size(); ++g) {
     double* sum = &mine.partial[3 * g];
@@ -314,11 +379,11 @@ void Gluing::publish(std::size_t e, Mode mode) {
   if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
   centre_->published.store(0, std::memory_order_relaxed);
   Link& link = *centre_->to_centre;
-  await(*link.sender, centre_->waited);
+  await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
   auto out = link.out.begin();
   for (const Subdomain& subdomain : subdomains_)
     out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  link.sender->start();
+  start(*link.sender, ranks_.trace(), link.out_name);
 }
 
 void Gluing::centre(Mode mode) {
@@ -326,12 +391,12 @@ void Gluing::centre(Mode mode) {
   Centre& centre = *centre_;
   if (centre.to_centre) {
     Link& link = *centre.to_centre;
-    await(*link.receiver, centre.waited);
+    await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);
     std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
     link.receiver->start();
     return;
   }
-  for (const auto& link : centre.links) await(*link->receiver, centre.waited);
+  for (const auto& link : centre.links) await(*link->receiver, centre.waited, ranks_.trace(), link->in_name);
   std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
   const std::size_t at_walls = 3 * walls_.size();
   for (const Centre::Contribution& contribution : centre.contributions) {
@@ -344,12 +409,12 @@ void Gluing::centre(Mode mode) {
   for (std::size_t r = 0; r < centre.links.size(); ++r) {
     Link& link = *centre.links[r];
     link.receiver->start();
-    await(*link.sender, centre.waited);
+    await(*link.sender, centre.waited, ranks_.trace(), link.out_name);
     auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
     for (std::size_t item : centre.items_of_rank[r])
       out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
                         out);
-    link.sender->start();
+    start(*link.sender, ranks_.trace(), link.out_name);
   }
 }
 
@@ -368,7 +433,7 @@ void Gluing::glue(std::size_t e, Mode mode) {
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
   for (Side& side : mine.sides)
-    if (side.link.receiver) await(*side.link.receiver, mine.waited);
+    if (side.link.receiver) await(*side.link.receiver, mine.waited, ranks_.trace(), side.link.in_name);
 
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   const bool schwarz = settings_.coupling == Coupling::schwarz;
@@ -399,26 +464,45 @@ void Gluing::glue(std::size_t e, Mode mode) {
     if (width_ == 6) std::copy_n(next.begin() + 3, 3, v.w);
     if (schwarz) std::copy_n(next.begin(), width_, base);
   };
-  for (std::size_t s = 0; s < interface.shared.size(); ++s) {
-    const auto begin = interface.copies_begin[s], end = interface.copies_begin[s + 1];
-    if (begin == end) continue;  // a hub
-    std::array<double, 6> sum{}, own;
-    for (auto c = begin; c < end; ++c) {
-      const CopySource& source = interface.copies[at(c)];
-      const double* from = own.data();
-      if (source.neighbour < 0)
-        write_velocity(mine.shared[s], own.data());
-      else
-        from = mine.sides[at(source.neighbour)].source + at(source.place) * width_;
-      for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
+  if (!schwarz && mode != Mode::measured) {
+    const auto means = width_ == 6 ? take_means<6> : take_means<3>;
+    means(state_.bodies.velocity, mine.shared, interface.copies_begin, mine.sources.data());
+  } else {
+    for (std::size_t s = 0; s < interface.shared.size(); ++s) {
+      const auto begin = at(interface.copies_begin[s]), end = at(interface.copies_begin[s + 1]);
+      if (begin == end) continue;  // a hub
+      std::array<double, 6> sum{}, own;
+      write_velocity(mine.shared[s], own.data());
+      for (std::size_t c = begin; c < end; ++c) {
+        const double* const from = mine.sources[c] ? mine.sources[c] : own.data();
+        for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
+      }
+      settle(s, sum.data());
     }
-    settle(s, sum.data());
   }
   for (std::size_t h = 0; h < interface.hubs.size(); ++h)
     settle(at(interface.hubs[h]), &centre_->sums[3 * walls_.size() + mine.hub_item[h] * width_]);
   for (Side& side : mine.sides)
     if (side.link.receiver) side.link.receiver->start();
   if (mode == Mode::measured) jumps_[e] = jump;
+}
+
+std::vector<trace::Message> Gluing::message_plan() const {
+  const Decomposition& all = state_.decomposition;
+  std::vector<trace::Message> plan;
+  const auto add = [&](std::int32_t from, std::int32_t to, std::size_t doubles) {
+    plan.push_back({static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(to),
+                    static_cast<std::uint32_t>(8 * doubles)});
+  };
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
+    const Subdomain& subdomain = subdomains_[e];
+    for (std::size_t n = 0; n < subdomain.sides.size(); ++n)
+      add(all.here[e], all.interfaces[e].neighbours[n].subdomain, subdomain.sides[n].slots.size() * width_);
+    if (subdomain.partial.empty()) continue;
+    add(all.here[e], trace::centre_group, subdomain.partial.size());
+    add(trace::centre_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
+  }
+  return plan;
 }
 
 double Gluing::exposed() const {

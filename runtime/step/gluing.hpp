@@ -9,6 +9,7 @@
 
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/trace/trace.hpp"
 
 namespace talus {
 
@@ -65,6 +66,8 @@ class Gluing {
 
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
   const MessageCount& messages() const { return messages_; }
+  /// What each subdomain here sends, and gets from the centre, as if alone on its rank; of an exchange.
+  std::vector<trace::Message> message_plan() const;
   /// Time that tasks of this rank waited for messages since begin() [s]; 0 with one rank.
   double exposed() const;
 

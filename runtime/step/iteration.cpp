@@ -1,5 +1,7 @@
 #include "runtime/step/iteration.hpp"
 
+#include "runtime/step/task_kinds.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -77,6 +79,7 @@ void Iteration::begin() {
                       state_.decomposition.several();
   before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
+  began_ = clock_now();
   impulses_.clear();
   history_.clear();
   result_ = {};
@@ -129,7 +132,7 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   carry_velocities(
       carry, beta,
       std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-      parameters_.turns, state_.bodies.velocity, trail_);
+      state_.bodies.velocity, trail_);
   if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
@@ -235,6 +238,27 @@ void Iteration::node(std::uint32_t node, int epoch) {
     gluing_.centre(mode);
   else
     gluing_.glue(task - here - 1, mode);
+}
+
+std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {
+  const Work now = work(epoch);
+  const std::size_t chunks = state_.chunks.size(), here = state_.decomposition.here.size();
+  if (node >= chunks) {
+    if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
+    const std::size_t task = node - chunks;
+    return kind_of(task < here ? TaskKind::publish : task == here ? TaskKind::centre : TaskKind::glue);
+  }
+  switch (now) {
+    case Work::accumulate:
+      return kind_of(TaskKind::accumulate);
+    case Work::measure:
+      return kind_of(TaskKind::measure);
+    case Work::restore:
+      return kind_of(TaskKind::restore);
+    case Work::sweep:
+      break;
+  }
+  return kind_of(TaskKind::sweep);
 }
 
 double Iteration::impulse_scale() const {
@@ -345,6 +369,7 @@ bool Iteration::decide(int epoch) {
 /// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
 bool Iteration::measured(int epoch) {
   result_.iterations = sweeps_;
+  measured_ = clock_now();
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows = rows_of_subdomains();
   std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
@@ -469,7 +494,7 @@ bool Iteration::judge() {
   result_.jump = jump_.velocity2 > 0 ? std::sqrt(jump_.jump2 / jump_.velocity2) : 0;
   result_.contacts = total.contacts;
   result_.active = total.active;
-  history_.push_back({result_.iterations, result_.error_rms});
+  history_.push_back({result_.iterations, result_.error_rms, measured_ - began_});
   result_.drift = drift();
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.

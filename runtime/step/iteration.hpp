@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -59,6 +60,8 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
+  std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();
@@ -72,10 +75,12 @@ class Iteration {
   double imbalance() const { return imbalance_; }
   /// Per subdomain here, with BalanceBy::time: time of its chunks since the plan [s].
   std::vector<double> busy() const;
-  /// error_rms at each check, with the sweeps done.
+  /// error_rms at each check, with the sweeps done and the time that they and the checks took since the
+  /// iterations of the step began.
   struct Check {
     int iterations;
     double error_rms;
+    double seconds;
   };
   const std::vector<Check>& history() const { return history_; }
 
@@ -141,9 +146,10 @@ class Iteration {
   std::vector<double> changes_;              ///< NNCG: per chunk, what the last sweep changed [J]
   double change2_ = 0;                       ///< NNCG: of all, at the sweep before
   double conjugate_beta_ = 0;                ///< NNCG: of the next sweep
-  double first_residual2_ = 0;    ///< at the first check of the step, or the first since ADMM [m^2/s^2]
-  std::size_t history_from_ = 0;  ///< that check
-  double sweeps_needed_ = -1;     ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  double first_residual2_ = 0;       ///< at the first check of the step, or the first since ADMM [m^2/s^2]
+  std::size_t history_from_ = 0;     ///< that check
+  double sweeps_needed_ = -1;        ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  double began_ = 0, measured_ = 0;  ///< clock at begin() and at the last check [s], for history_ only
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment

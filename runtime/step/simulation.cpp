@@ -54,6 +54,19 @@ struct Simulation::Implementation {
     begin_stage();
   }
 
+  void go_on_from(const SavedState& from) {
+    // As they were saved: the candidates name slots.
+    state.bodies = from.bodies;
+    state.walls = from.walls;
+    stage_index = from.stage_index;
+    begin_stage();
+    state.walls = from.walls;
+    state.candidates = from.candidates;
+    report = from.report;
+    stage_steps = from.steps_of_stage;
+    lengths_at_start = from.lengths_of_box;
+  }
+
   static StepState start(const Setup& setup, Bodies bodies, const graph::Communicator& ranks) {
     validate(setup);
     validate(bodies);
@@ -322,7 +335,24 @@ Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
 Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
     : Simulation(std::move(setup), std::move(bodies), executor, graph::one_rank()) {}
 
+Simulation::Simulation(Setup setup, const SavedState& from, graph::Executor& executor)
+    : impl_(std::make_unique<Implementation>(std::move(setup), from.bodies, executor, graph::one_rank())) {
+  impl_->go_on_from(from);
+  impl_->pass_ended_stages();
+}
+
 Simulation::~Simulation() = default;
+
+void Simulation::follow(trace::Order* order) {
+  impl_->graph.follow(order);
+}
+
+SavedState Simulation::save() const {
+  if (impl_->state.decomposition.several())
+    throw std::logic_error("a state is saved from one subdomain; this simulation has several");
+  return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
+          impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start};
+}
 
 const StepReport& Simulation::step() {
   const double start = now();

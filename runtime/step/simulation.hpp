@@ -23,6 +23,18 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What a simulation goes on from between two steps, as one subdomain on one rank has it. Loads and
+/// velocities in force are in the walls; the impulses of the last step, if there was one, in the candidates.
+struct SavedState {
+  Bodies bodies;
+  std::vector<Wall> walls;
+  Candidates candidates;
+  StepReport report;
+  std::size_t stage_index = 0;
+  std::int64_t steps_of_stage = 0;
+  Vec3 lengths_of_box = Vec3::Zero();  ///< at the beginning of the stage [m]
+};
+
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
 /// step").
 ///
@@ -44,8 +56,14 @@ class Simulation {
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks);
   /// On one rank.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
+  /// Goes on from a saved state, on one rank. Walls, stages and grains are those of the simulation that was
+  /// saved; solver, subdomains and threads need not be: so one step can be solved in many ways. The next step
+  /// finds its candidates anew.
+  Simulation(Setup setup, const SavedState& from, graph::Executor& executor);
   ~Simulation();
 
+  /// Steps go by a recorded order, see StepGraph::follow.
+  void follow(trace::Order* order);
   /// Does one time step. Collective. Throws RunawayError, or graph::TaskError when a task failed. Not to be
   /// called when finished.
   const StepReport& step();
@@ -53,6 +71,9 @@ class Simulation {
   /// After a step, and after its results were read: goes to the next stage when this one has ended (true), or
   /// finishes.
   bool begin_next_stage();
+
+  /// The state after the last step and begin_next_stage(). Throws std::logic_error with several subdomains.
+  SavedState save() const;
 
   bool finished() const;
   /// Part of the current stage that is done, in [0, 1], by its nearest end condition.

@@ -57,7 +57,7 @@ void StepGraph::build() {
                 [this, lane] { narrow_lane(lane); });
   graph_.task("plan", {read(contacts), write(loop)}, [this] { plan_iteration(); });
   graph_.team("iterate", {write(loop), write(bodies), write(contacts)},
-              [this](graph::Worker& worker) { graph::run_epochs(epochs_, worker, iteration_); });
+              [this](graph::Worker& worker) { iterate(worker); });
   for (std::uint32_t lane = 0; lane < lanes_; ++lane)
     graph_.task(fmt::format("finish[{}]", lane), {read(loop), write(bodies[lane])},
                 [this, lane] { finish_lane(lane); });
@@ -67,13 +67,17 @@ void StepGraph::build() {
     graph_.task(fmt::format("measure[{}]", lane), {read(bodies), read(walls), write(contacts[lane])},
                 [this, lane] { measure_lane(lane); });
   graph_.task("sum", {read(bodies), read(contacts)}, [this] { sum_up(); });
+  if (executor_.trace()) declare_tasks(*executor_.trace());
 }
 
 void StepGraph::run() {
   sums_ = {};
   ++steps_;
   started_ = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  trace::Recorder* const trace = executor_.trace();
+  if (trace) trace->begin_step(static_cast<std::uint32_t>(steps_));
   executor_.run(graph_);
+  if (trace) trace->end_step();
 }
 
 }  // namespace talus

@@ -8,6 +8,11 @@
 #include "runtime/graph/graph.hpp"
 #include "runtime/step/iteration.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/trace/recorder.hpp"
+
+namespace talus::trace {
+class Order;
+}
 
 namespace talus {
 
@@ -51,6 +56,10 @@ class StepGraph {
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
   void run();
 
+  /// From now on nodes of the loop begin in the order of `order`, in the steps that it holds; null: no more.
+  /// Throws std::invalid_argument when it is of other ranks x threads. It must outlive the steps.
+  void follow(trace::Order* order);
+
   const StepSums& sums() const { return sums_; }
   const Iteration& iteration() const { return iteration_; }
   /// True when this step's candidates were found anew and dealt out by a new partition.
@@ -69,6 +78,10 @@ class StepGraph {
   void narrow_lane(std::uint32_t lane);
   void plan_iteration();
   void plan_epochs();
+  void iterate(graph::Worker& worker);
+  void declare_tasks(trace::Recorder& recorder) const;
+  void note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner);
+  trace::Plan describe_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) const;
   void finish_lane(std::uint32_t lane);
   void finish_walls();
   void measure_lane(std::uint32_t lane);
@@ -91,6 +104,8 @@ class StepGraph {
   graph::Graph graph_;
   Iteration iteration_;
   graph::EpochGraph epochs_;
+  trace::Order* order_ = nullptr;
+  bool followed_ = false;                              ///< this step goes by order_
   bool planned_ = false;                               ///< false: the chunks are new
   double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at the seams of the step [s]
   Surroundings around_;                       ///< several subdomains: whom the candidates are found among

@@ -8,6 +8,8 @@
 
 #include "kernels/release.hpp"
 #include "runtime/step/step_graph.hpp"
+#include "runtime/step/task_kinds.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -154,8 +156,10 @@ void StepGraph::make_cells() {
     }
     make_room();
     const double began = now();
+    trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
+    span.end();
     sums_.times.dealing = now() - began;
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
@@ -190,6 +194,7 @@ void StepGraph::make_chunks() {
   std::vector<CandidateGroup> groups;
   const double began = now();
   if (several) {
+    const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
                         state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
@@ -256,6 +261,7 @@ void StepGraph::plan_iteration() {
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
   iteration_.begin();
   if (!planned_) plan_epochs();
+  followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));
   iterating_ = now();
 }
 
@@ -341,6 +347,7 @@ void StepGraph::plan_epochs() {
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
+  if (executor_.trace() || order_) note_plan({colour, offset, neighbour}, owner);
   planned_ = true;
 }
 

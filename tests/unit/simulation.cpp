@@ -151,7 +151,7 @@ TEST(Simulation, OfNoBodiesRunsItsSteps) {
   graph::Executor executor({.threads = 2});
   talus::Setup setup = falling(3);
   setup.walls = box(1, 1, 1);
-  Simulation simulation(setup, {}, executor);
+  Simulation simulation(setup, Bodies{}, executor);
   while (!simulation.finished()) {
     EXPECT_TRUE(simulation.step().converged);
     simulation.begin_next_stage();
@@ -210,7 +210,7 @@ TEST(Stages, EndByStepsByTimeAndByStrain) {
   squeeze.velocity = Vec3(0, -2, 0);
   by_strain.loads = {{"y+", squeeze}};
   setup.stages = {by_steps, by_time, by_strain, stage("nothing", 0), stage("last", 2)};
-  Simulation simulation(setup, {}, executor);
+  Simulation simulation(setup, Bodies{}, executor);
   std::vector<std::int64_t> steps(setup.stages.size(), 0);
   int begun = 0;
   while (!simulation.finished()) {

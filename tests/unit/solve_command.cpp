@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -180,6 +181,39 @@ TEST_F(SolveCommand, ReturnsTwoForBadInputWithoutALineOrAFile) {
     EXPECT_EQ(outcome.output, "") << arguments;
   }
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+}
+
+/// `talus study error FOLDER`.
+TEST_F(SolveCommand, StudyOfAFolderHoldsEveryMethodAgainstTheFastest) {
+  const fs::path problems = folder_ / "problems";
+  fs::create_directories(problems);
+  write_chain(problems / "short.hdf5", 4);
+  write_chain(problems / "long.hdf5", 60);
+  const std::string out = (folder_ / "out").string();
+  const Outcome outcome = talus(
+      "study error " + problems.string() + " --out " + out + " --tolerances 1e-4,1e-6 --max-seconds 5", true);
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  std::ifstream solves(out + "/solves.csv"), profile(out + "/profile.csv");
+  std::string line;
+  int rows = 0;
+  for (std::getline(solves, line); std::getline(solves, line); ++rows)
+    EXPECT_TRUE(line.ends_with(",1")) << line;
+  EXPECT_EQ(rows % 4, 0) << "two problems at two tolerances, by every method";
+  EXPECT_GE(rows, 8);
+  double fastest = 0;
+  for (std::getline(profile, line); std::getline(profile, line);) {
+    std::array<std::string, 4> cells;
+    std::stringstream stream(line);
+    for (std::string& cell : cells) std::getline(stream, cell, ',');
+    const double ratio = std::stod(cells[2]), part = std::stod(cells[3]);
+    EXPECT_GE(ratio, 1);
+    EXPECT_TRUE(part == 0.5 || part == 1) << line;
+    if (ratio == 1 && cells[1] == "0.0001") fastest += part;
+  }
+  EXPECT_GE(fastest, 1) << "each problem has a fastest method";
+  for (const char* name : {"profile.svg", "plot.gp", "report.html"})
+    EXPECT_TRUE(fs::exists(fs::path(out) / name));
+  EXPECT_EQ(talus("study error " + problems.string() + " --methods sorcery --out " + out + "2").code, 2);
 }
 
 }  // namespace

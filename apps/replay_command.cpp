@@ -1,0 +1,107 @@
+#include "apps/replay_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "apps/exit_codes.hpp"
+#include "io/detail/svg.hpp"
+#include "io/trace_file.hpp"
+#include "runtime/trace/analysis.hpp"
+
+namespace talus {
+
+namespace {
+
+void print(const char* name, const std::string& value, const char* label = "") {
+  fmt::print("{:<28} {}{}{}\n", name, value, *label ? "   " : "", label);
+}
+
+std::string seconds(double ns) {
+  return io::detail::with_unit(1e-9 * ns, "s");
+}
+
+std::string percent(double part) {
+  return fmt::format("{:.1f} %", 100 * part);
+}
+
+/// Makespan of the recording itself [ns].
+double recorded_makespan(const trace::Trace& trace) {
+  return trace::analyse(trace).makespan;
+}
+
+void report(const ReplayOptions& options, const trace::Timeline& timeline, const trace::Machine& machine) {
+  const trace::Trace& recorded = timeline.trace();
+  const bool same = machine.ranks == recorded.ranks && machine.threads == recorded.threads &&
+                    machine.map == trace::RankMap::block && machine.schedule == trace::Schedule::fixed &&
+                    machine.speed == 1 && machine.contacts == 1 && machine.noise == 0 && !machine.typical;
+  const char* label = same ? "" : "predicted";
+  const trace::Replay played = trace::replay(timeline, machine, true);
+  trace::Machine chain = machine;
+  chain.unbounded = true;
+  chain.noise = 0;
+  const double longest = trace::replay(timeline, chain, false).makespan;
+  trace::Machine single = machine;
+  single.ranks = single.threads = 1;
+  single.noise = 0;
+  const double alone = trace::replay(timeline, single, false).makespan;
+  const double workers = static_cast<double>(machine.ranks) * machine.threads;
+  const trace::Summary summary = trace::analyse(played.trace);
+  const double recorded_time = recorded_makespan(recorded);
+
+  fmt::print("{}: {} ranks x {} threads, {} steps, {} tasks\n", options.file, recorded.ranks,
+             recorded.threads, timeline.steps().size(), played.tasks);
+  fmt::print(
+      "machine: {} ranks x {} threads, map {}, schedule {}, latency {}, bandwidth {}, overhead {}, {} ranks "
+      "a node\n",
+      machine.ranks, machine.threads, options.map, options.schedule,
+      io::detail::with_unit(machine.latency, "s"), io::detail::with_unit(machine.bandwidth, "B/s"),
+      io::detail::with_unit(machine.overhead, "s"), machine.ranks_per_node);
+  print("makespan", seconds(played.makespan), label);
+  print("recorded makespan", fmt::format("{}   (replay {:+.1f} %)", seconds(recorded_time),
+                                         100 * (played.makespan / recorded_time - 1)));
+  print("work of all tasks", seconds(played.work), label);
+  print("speedup over 1 x 1", fmt::format("{:.2f} of {:.0f}", alone / played.makespan, workers), label);
+  print("efficiency", percent(alone / (played.makespan * workers)), label);
+  print("exposed messages", percent(summary.exposed / (played.makespan * workers)), label);
+  print("waiting and idle", percent(summary.idle / (played.makespan * workers)), label);
+  print("bound: longest chain", seconds(longest), label);
+  print("bound: work / workers", seconds(played.work / workers), label);
+  if (options.steps)
+    print(
+        "for all steps",
+        fmt::format("{}   ({:.0f} steps like the mean of these)",
+                    seconds(played.makespan * *options.steps / static_cast<double>(timeline.steps().size())),
+                    *options.steps),
+        "predicted");
+  fmt::print("\n{}", trace::describe(summary));
+  if (!options.out.empty()) io::write_trace(options.out, played.trace);
+}
+
+}  // namespace
+
+int replay_command(ReplayOptions options) {
+  try {
+    const trace::Trace recorded = io::read_trace(options.file);
+    trace::Machine machine = options.machine;
+    machine.ranks = options.ranks.value_or(recorded.ranks);
+    machine.threads = options.threads.value_or(recorded.threads);
+    const trace::Machine there = trace::recorded_machine(recorded);
+    machine.ranks_per_node =
+        options.ranks_per_node.value_or(machine.ranks == recorded.ranks ? there.ranks_per_node : 1);
+    machine.node_latency = options.node_latency.value_or(there.node_latency);
+    machine.map = trace::rank_map_named(options.map);
+    machine.schedule = trace::schedule_named(options.schedule);
+    machine.late_check = !options.blocking_check;
+    validate(machine, recorded);
+    const trace::Timeline timeline(recorded);
+    report(options, timeline, machine);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
+  return exit_done;
+}
+
+}  // namespace talus

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/study_variants.hpp"
+
+namespace talus {
+
+/// A check of a solve.
+struct ResidualRow {
+  StudyVariant variant;
+  bool warm = false;  ///< begun from the impulses of the step before
+  int sweeps = 0;
+  double seconds = 0;    ///< of the iterations up to the check, median of the repetitions [s]
+  double error_rms = 0;  ///< natural map, relative (docs/theory.md, "Error")
+};
+
+/// What a solve that was stopped after `sweeps` hands back, against the reference.
+struct TrueErrorRow {
+  StudyVariant variant;
+  bool warm = false;
+  int sweeps = 0;
+  double seconds = 0;
+  double error_rms = 0;
+  double velocity_error = 0;  ///< |V - V_ref| in the kinetic norm, over the larger of |V_ref| and what the
+                              ///< contacts gave, |V_ref - V_free|
+  double wall_force_error =
+      0;                   ///< largest |F - F_ref| of the walls over the largest |F_ref|; NaN without walls
+  bool converged = false;  ///< as a run would call it
+};
+
+/// The solution that all others are held against, one per seed.
+struct ProblemReference {
+  std::uint64_t seed = 1;
+  std::string method;
+  std::int64_t step = 0, bodies = 0, contacts = 0;
+  int sweeps = 0;
+  double error_rms = 0, tolerance = 0;
+  bool converged = false;
+};
+
+struct ProblemStudy {
+  std::vector<ResidualRow> residual;  ///< rows of a solve follow one another
+  std::vector<TrueErrorRow> truth;    ///< likewise
+  std::vector<ProblemReference> references;
+};
+
+/// Takes the sample through `plan.at_step` steps as its scene says, and then solves the next step with every
+/// variant of that seed, from no impulses and from those of the step before, to the smallest tolerance. The
+/// same step is solved with doubled numbers of sweeps, so that what a solve has reached is known on its way;
+/// each solve that is cheap is timed three times. Adds its rows to `study`. `say` takes lines of progress.
+/// Throws std::invalid_argument when the scene ends before the step; what Simulation throws.
+void study_problem(const StudySample& sample, const StudyPlan& plan,
+                   const std::function<void(const std::string&)>& say, ProblemStudy& study);
+
+}  // namespace talus

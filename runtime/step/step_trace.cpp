@@ -1,0 +1,117 @@
+/// What a trace needs to know of a step's tasks and of its loop.
+
+#include <fmt/format.h>
+
+#include <string_view>
+#include <utility>
+
+#include "runtime/step/step_graph.hpp"
+#include "runtime/step/task_kinds.hpp"
+#include "runtime/trace/order.hpp"
+
+namespace talus {
+
+namespace {
+
+trace::Kind kind_of_task(std::string_view name, bool team) {
+  using enum TaskKind;
+  static constexpr std::pair<std::string_view, TaskKind> kinds[] = {
+      {"predict", predict}, {"cells", cells},   {"pairs", pairs}, {"chunks", chunks},  {"narrow", narrow},
+      {"plan", plan},       {"finish", finish}, {"walls", walls}, {"measure", report}, {"sum", sum}};
+  const std::string_view base = name.substr(0, name.find('['));
+  for (const auto& [known, kind] : kinds)
+    if (base == known) return kind_of(kind);
+  if (!team) throw std::logic_error(fmt::format("task '{}' has no kind for traces", name));
+  return trace::kind_team;
+}
+
+}  // namespace
+
+void StepGraph::declare_tasks(trace::Recorder& recorder) const {
+  std::vector<trace::Task> tasks;
+  for (std::uint32_t i = 0; i < graph_.size(); ++i) {
+    const graph::TaskId id{i};
+    trace::Task& task = tasks.emplace_back();
+    task.name = graph_.name(id);
+    task.team = graph_.is_team(id);
+    task.kind = kind_of_task(task.name, task.team);
+    // Lanes are shares of the rank's cells and chunks, which stand by subdomain, or of one subdomain's
+    // bodies.
+    if (const std::size_t bracket = task.name.find('['); bracket != std::string::npos) {
+      const std::uint32_t lane = static_cast<std::uint32_t>(std::stoul(task.name.substr(bracket + 1)));
+      task.group = state_.decomposition.here[lane / lanes_per_subdomain_];
+    }
+    for (graph::TaskId before : graph_.predecessors(id))
+      task.predecessors.push_back(static_cast<std::uint32_t>(before));
+  }
+  recorder.declare(std::move(tasks));
+}
+
+trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
+                                     std::span<const std::uint32_t> owner) const {
+  const Chunks& chunks = state_.chunks;
+  const std::vector<std::int32_t>& here = state_.decomposition.here;
+  const std::size_t nodes = conflicts.colour.size(), count = chunks.size();
+  trace::Plan plan;
+  plan.colour.assign(conflicts.colour.begin(), conflicts.colour.end());
+  plan.offset.assign(conflicts.offset.begin(), conflicts.offset.end());
+  plan.neighbour.assign(conflicts.neighbour.begin(), conflicts.neighbour.end());
+  plan.owner.assign(owner.begin(), owner.end());
+  for (std::size_t node = 0; node < nodes; ++node) {
+    if (node < count) {
+      plan.role.push_back(static_cast<std::uint8_t>(trace::Role::compute));
+      plan.group.push_back(
+          static_cast<std::uint32_t>(here[static_cast<std::size_t>(chunks.subdomain[node])]));
+      plan.weight.push_back(1 + static_cast<std::uint32_t>(state_.contacts.count[node]));
+      plan.place.push_back(
+          static_cast<std::uint32_t>(chunks.bodies[static_cast<std::size_t>(chunks.body_begin[node])]));
+      continue;
+    }
+    const std::size_t task = node - count;
+    const bool centre = task == here.size();
+    const trace::Role role = centre               ? trace::Role::centre
+                             : task < here.size() ? trace::Role::publish
+                                                  : trace::Role::glue;
+    plan.role.push_back(static_cast<std::uint8_t>(role));
+    plan.group.push_back(
+        centre ? trace::centre_group
+               : static_cast<std::uint32_t>(here[task - (task < here.size() ? 0 : here.size() + 1)]));
+    plan.weight.push_back(0);
+    plan.place.push_back(0);
+  }
+  plan.messages = iteration_.gluing().message_plan();
+  return plan;
+}
+
+void StepGraph::note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) {
+  trace::Plan plan = describe_plan(conflicts, owner);
+  if (order_) order_->check(plan, static_cast<std::uint32_t>(steps_));
+  if (executor_.trace()) executor_.trace()->plan(std::move(plan));
+}
+
+/// What is not asked for is not there: without trace and order the loop runs on the program itself.
+void StepGraph::iterate(graph::Worker& worker) {
+  trace::Recorder* const trace =
+      executor_.trace() && executor_.trace()->active() ? executor_.trace() : nullptr;
+  const auto run = [&](auto& program) {
+    if (!trace) {
+      graph::run_epochs(epochs_, worker, program);
+      return;
+    }
+    trace::Traced traced(program, *trace, worker.thread());
+    graph::run_epochs(epochs_, worker, traced);
+  };
+  if (!followed_) return run(iteration_);
+  trace::Ordered ordered(iteration_, *order_, worker);
+  run(ordered);
+}
+
+void StepGraph::follow(trace::Order* order) {
+  if (order && (order->threads() != executor_.threads() || order->ranks() != ranks_.ranks()))
+    throw std::invalid_argument(
+        fmt::format("the order was recorded on {} ranks x {} threads and cannot be followed on {} x {}",
+                    order->ranks(), order->threads(), ranks_.ranks(), executor_.threads()));
+  order_ = order;
+}
+
+}  // namespace talus

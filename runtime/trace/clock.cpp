@@ -1,0 +1,67 @@
+#include "runtime/trace/clock.hpp"
+
+#include <limits>
+#include <thread>
+#include <vector>
+
+namespace talus::trace {
+namespace {
+
+constexpr int tag = 0;  ///< below those of the gluing
+constexpr int rounds = 32;
+
+/// Two numbers each way; one more for the time stamp of channels that delay.
+struct Line {
+  Line(const graph::Communicator& ranks, int other)
+      : sender(ranks.open_send(other, tag, out)), receiver(ranks.open_receive(other, tag, in)) {}
+  void send(double first, double second) {
+    wait(*sender);
+    out[0] = first;
+    out[1] = second;
+    sender->start();
+  }
+  void receive() {
+    receiver->start();
+    wait(*receiver);
+  }
+  static void wait(graph::Communicator::Channel& channel) {
+    while (!channel.done()) std::this_thread::yield();
+  }
+  std::vector<double> out = std::vector<double>(3), in = std::vector<double>(3);
+  std::unique_ptr<graph::Communicator::Channel> sender, receiver;
+};
+
+}  // namespace
+
+ClockReading read_clock(const graph::Communicator& ranks, const Recorder& recorder) {
+  const auto now = [&] { return static_cast<double>(recorder.now()); };
+  if (ranks.rank() != 0) {
+    Line line(ranks, 0);
+    for (int round = 0; round < rounds; ++round) {
+      line.receive();
+      line.send(now(), 0);
+    }
+    line.receive();
+    Line::wait(*line.sender);
+    return {line.in[0], line.in[1]};
+  }
+  for (int other = 1; other < ranks.ranks(); ++other) {
+    Line line(ranks, other);
+    double shortest = std::numeric_limits<double>::infinity();
+    ClockReading best;
+    for (int round = 0; round < rounds; ++round) {
+      const double asked = now();
+      line.send(asked, 0);
+      line.receive();
+      const double took = now() - asked;
+      if (took >= shortest) continue;
+      shortest = took;
+      best = {line.in[0], asked + took / 2 - line.in[0]};
+    }
+    line.send(best.time, best.offset);
+    Line::wait(*line.sender);
+  }
+  return {now(), 0};
+}
+
+}  // namespace talus::trace

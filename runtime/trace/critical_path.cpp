@@ -1,0 +1,198 @@
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/trace/analysis.hpp"
+
+namespace talus::trace {
+namespace {
+
+/// A thread that did not wait is back at work within so many ns.
+constexpr double no_wait = 300;
+
+class Walker {
+ public:
+  Walker(const Timeline& timeline, const StepIndex& index) : timeline_(timeline), index_(index) {}
+
+  std::vector<PathHop> walk() {
+    std::vector<PathHop> path;
+    Place at = last();
+    double until = at.exists() ? record(at).end() : 0;
+    // Each hop goes back in time, or to a rank that came later to the same call: never more than all records.
+    for (std::size_t hops = timeline_.trace().record_count(); at.exists() && hops > 0; --hops) {
+      const Cause cause = cause_of(at);
+      path.push_back({at, std::min(cause.known, until), until});
+      if (!cause.place.exists()) break;
+      until = std::min(cause.left, path.back().from);
+      at = cause.place;
+    }
+    return path;
+  }
+
+ private:
+  /// What a record waited for: until when that was at work, and when the record could go on.
+  struct Cause {
+    Place place;
+    double left = 0, known = 0;
+  };
+
+  const Record& record(Place place) const { return timeline_.record(place); }
+  std::size_t rank_of(Place place) const {
+    return static_cast<std::size_t>(timeline_.trace().lanes[place.lane].rank);
+  }
+  void keep_later(Place& best, Place other, double limit) const {
+    if (!other.exists() || record(other).end() > limit) return;
+    if (!best.exists() || record(other).end() > record(best).end()) best = other;
+  }
+
+  Place last() const {
+    Place best;
+    for (const StepIndex::Rank& rank : index_.ranks)
+      for (const Place& place : rank.task) keep_later(best, place, INFINITY);
+    return best;
+  }
+
+  /// The task before on the same thread.
+  Place previous(Place place) const {
+    const Lane& lane = timeline_.trace().lanes[place.lane];
+    for (std::uint32_t i = place.record; i-- > 0;) {
+      const Record& other = lane.records[i];
+      const Kind kind = other.kind();
+      if (other.step() != index_.step) return {};
+      if (kind == kind_team || kind == kind_send || kind == kind_receive || kind == kind_collective) continue;
+      if (other.end() > static_cast<double>(record(place).begin)) continue;
+      if (other.epoch < 0 && kind != kind_outside && !is_task(place.lane, i)) continue;
+      return {place.lane, i};
+    }
+    return {};
+  }
+  bool is_task(std::uint32_t lane, std::uint32_t i) const {
+    const Lane& of = timeline_.trace().lanes[lane];
+    const auto& tasks = timeline_.trace().tasks[static_cast<std::size_t>(of.rank)];
+    const Record& r = of.records[i];
+    return r.node < tasks.size() && tasks[r.node].kind == r.kind();
+  }
+
+  /// The longest wait within a task, or none.
+  Place longest_wait(Place place) const {
+    const Lane& lane = timeline_.trace().lanes[place.lane];
+    Place best;
+    for (std::uint32_t i = place.record + 1; i < lane.records.size(); ++i) {
+      const Record& inside = lane.records[i];
+      if (static_cast<double>(inside.begin) >= record(place).end()) break;
+      if (inside.kind() != kind_receive && inside.kind() != kind_collective) continue;
+      if (!best.exists() || inside.duration > record(best).duration) best = {place.lane, i};
+    }
+    return best;
+  }
+
+  Cause cause_of(Place at) const {
+    const auto begin = static_cast<double>(record(at).begin);
+    if (const Place wait = longest_wait(at);
+        wait.exists() && static_cast<double>(record(wait).duration) > no_wait) {
+      const bool message = record(wait).kind() == kind_receive;
+      const Place cause = message ? sender_of(wait) : last_to_come(at);
+      if (cause.exists() && !(cause.lane == at.lane && cause.record == at.record)) {
+        const double left =
+            message ? record(cause).end() : static_cast<double>(record(cause).begin) + timeline_.self(cause);
+        return {cause, left, record(wait).end()};
+      }
+    }
+    Place best = previous(at);
+    if (!best.exists() || record(best).end() + no_wait < begin)
+      for (const Place cause : causes(at)) keep_later(best, cause, begin + no_wait);
+    return {best, best.exists() ? record(best).end() : begin, begin};
+  }
+
+  /// What a task waits for on its rank.
+  std::vector<Place> causes(Place at) const {
+    const Record& task = record(at);
+    const StepIndex::Rank& rank = index_.ranks[rank_of(at)];
+    const auto& tasks = timeline_.trace().tasks[rank_of(at)];
+    std::vector<Place> list;
+    if (task.kind() == kind_outside) return list;
+    if (task.epoch < 0) {
+      for (std::uint32_t before : tasks[task.node].predecessors)
+        if (!tasks[before].team)
+          list.push_back(rank.task[before]);
+        else if (rank.epochs > 0)
+          list.push_back(rank.check.back());
+      list.push_back(rank.outside);
+      return list;
+    }
+    const auto epoch = static_cast<std::size_t>(task.epoch);
+    if (task.kind() == kind_check) {
+      for (std::size_t n = 0; n < rank.nodes; ++n) list.push_back(rank.at(epoch, n));
+      return list;
+    }
+    for (std::uint32_t other : rank.plan->neighbours(task.node)) {
+      if (rank.plan->colour[other] < rank.plan->colour[task.node])
+        list.push_back(rank.at(epoch, other));
+      else if (epoch > 0)
+        list.push_back(rank.at(epoch - 1, other));
+    }
+    if (epoch > 0) list.push_back(rank.check[epoch - 1]);
+    for (std::size_t i = 0; i < tasks.size() && !tasks[i].team; ++i) list.push_back(rank.task[i]);
+    return list;
+  }
+
+  /// The task that sent what was waited for.
+  Place sender_of(Place wait) const {
+    const Record& received = record(wait);
+    const std::uint32_t from = received.node >> 16, to = received.node & 0xffffU;
+    const auto epoch = static_cast<std::size_t>(received.epoch);
+    Place best;
+    for (const StepIndex::Rank& rank : index_.ranks) {
+      if (!rank.plan || epoch >= rank.epochs) continue;
+      if (from == centre_group && &rank != &index_.ranks.front()) continue;
+      const bool has = from == centre_group || std::find(rank.plan->group.begin(), rank.plan->group.end(),
+                                                         from) != rank.plan->group.end();
+      if (!has) continue;
+      for (std::size_t n = 0; n < rank.nodes; ++n) {
+        const Role role = static_cast<Role>(rank.plan->role[n]);
+        const bool sends = from == centre_group
+                               ? role == Role::centre
+                               : role == Role::publish && (to == centre_group || rank.plan->group[n] == from);
+        if (sends) keep_later(best, rank.at(epoch, n), received.end());
+      }
+    }
+    return best;
+  }
+
+  /// The same task on the rank that came to its collective call last.
+  Place last_to_come(Place at) const {
+    const Record& task = record(at);
+    Place best;
+    double latest = -INFINITY;
+    for (std::size_t r = 0; r < index_.ranks.size(); ++r) {
+      const StepIndex::Rank& rank = index_.ranks[r];
+      Place there;
+      if (task.kind() == kind_check) {
+        if (static_cast<std::size_t>(task.epoch) < rank.epochs)
+          there = rank.check[static_cast<std::size_t>(task.epoch)];
+      } else if (task.kind() == kind_outside) {
+        there = rank.outside;
+      } else {
+        const auto& tasks = timeline_.trace().tasks[r];
+        for (std::size_t i = 0; i < tasks.size(); ++i)
+          if (tasks[i].kind == task.kind()) there = rank.task[i];
+      }
+      if (!there.exists()) continue;
+      const double came = static_cast<double>(record(there).begin) + timeline_.self(there);
+      if (came <= latest) continue;
+      latest = came;
+      best = there;
+    }
+    return best;
+  }
+
+  const Timeline& timeline_;
+  const StepIndex& index_;
+};
+
+}  // namespace
+
+std::vector<PathHop> critical_path(const Timeline& timeline, const StepIndex& index) {
+  return Walker(timeline, index).walk();
+}
+
+}  // namespace talus::trace

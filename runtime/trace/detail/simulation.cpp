@@ -1,0 +1,82 @@
+#include "runtime/trace/detail/simulation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace talus::trace::detail {
+
+void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
+               Kind kind) {
+  if (!trace_) return;
+  trace_->lanes[worker].records.push_back(
+      {std::llround(begin), static_cast<float>(end - begin), node, epoch, pack(step_, kind)});
+}
+
+double Stage::stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const {
+  if (machine.noise == 0) return 1;
+  // splitmix64 (Steele, Lea, Flood 2014) of the task's name.
+  std::uint64_t z = machine.seed * 0x9e3779b97f4a7c15ULL + step * 0xd1342543de82ef95ULL +
+                    worker * 0x2545f4914f6cdd1dULL + what * 0x9fb21c651e98df25ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  z ^= z >> 31;
+  return 1 + machine.noise * static_cast<double>(z >> 11) * 0x1p-53;
+}
+
+NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node, std::uint32_t number,
+                 const SimEpoch& epoch, std::size_t number_of_epoch) {
+  if (node.source_rank < 0) return {};
+  const Place place =
+      index.ranks[static_cast<std::size_t>(node.source_rank)].at(epoch.source, node.source_node);
+  if (!place.exists()) return {};
+  if (node.waits_only) return {0, true, stage.timeline.record(place).kind()};
+  const double scale = (node.role == Role::compute ? stage.machine.contacts : 1.0) / stage.machine.speed *
+                       stage.stretch(index.step, number, number_of_epoch);
+  const Kind kind = stage.timeline.record(place).kind();
+  double work = stage.timeline.self(place);
+  if (stage.machine.typical) {
+    const auto median = static_cast<double>(
+        stage.typical[static_cast<std::size_t>(node.source_rank)].at(kind)[node.source_node]);
+    if (work > 3 * median) work = median;
+  }
+  return {work * scale, true, kind};
+}
+
+std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
+                                                              const StepIndex& index) {
+  std::vector<std::map<Kind, std::vector<float>>> typical;
+  std::map<Kind, std::vector<float>> times;
+  for (const StepIndex::Rank& rank : index.ranks) {
+    auto& medians = typical.emplace_back();
+    for (std::size_t n = 0; n < rank.nodes; ++n) {
+      for (auto& [kind, list] : times) list.clear();
+      for (std::size_t e = 0; e < rank.epochs; ++e)
+        if (const Place place = rank.at(e, n); place.exists())
+          times[timeline.record(place).kind()].push_back(static_cast<float>(timeline.self(place)));
+      for (auto& [kind, list] : times) {
+        if (list.empty()) continue;
+        const auto middle = list.begin() + static_cast<std::ptrdiff_t>(list.size() / 2);
+        std::nth_element(list.begin(), middle, list.end());
+        auto& of_kind = medians[kind];
+        of_kind.resize(rank.nodes, 0);
+        of_kind[n] = *middle;
+      }
+    }
+  }
+  return typical;
+}
+
+double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
+  const std::uint32_t messages =
+      layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  return messages * stage.network.overhead() + 0.5e9 * stage.machine.line / 64 * layout.handed[node];
+}
+
+double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch) {
+  double work = 0;
+  for (const StepIndex::Rank& rank : index.ranks)
+    work = std::max(work, stage.timeline.self(rank.check[epoch.source]));
+  return work / stage.machine.speed;
+}
+
+}  // namespace talus::trace::detail

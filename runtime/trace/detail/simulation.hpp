@@ -1,0 +1,155 @@
+#pragma once
+
+/// What the parts of a replay share: the machine, what was recorded, and what is written down.
+
+#include <cstdint>
+#include <map>
+#include <queue>
+#include <vector>
+
+#include "runtime/trace/layout.hpp"
+#include "runtime/trace/network.hpp"
+#include "runtime/trace/replay.hpp"
+#include "runtime/trace/timeline.hpp"
+
+namespace talus::trace::detail {
+
+/// Writes down what happens on the machine, and adds it up.
+class Log {
+ public:
+  Log(const Machine& machine, Trace* trace)
+      : threads_(static_cast<std::uint32_t>(machine.threads)), trace_(trace) {}
+  void begin_step(std::uint32_t step) { step_ = step; }
+  /// [begin, end) of a task, of which `waited` was waiting. [ns]
+  void task(std::uint32_t worker, double begin, double end, double waited, std::uint32_t node,
+            std::int32_t epoch, Kind kind) {
+    work_ += end - begin - waited;
+    ++tasks_;
+    span(worker, begin, end, node, epoch, kind);
+  }
+  /// A part of a task, or a thread's stay in a team.
+  void span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
+            Kind kind);
+  double work() const { return work_; }
+  std::size_t tasks() const { return tasks_; }
+  std::uint32_t worker(std::uint32_t rank, std::uint32_t thread) const { return rank * threads_ + thread; }
+
+ private:
+  std::uint32_t threads_;
+  Trace* trace_;  ///< null: nothing is kept
+  std::uint32_t step_ = 0;
+  double work_ = 0;
+  std::size_t tasks_ = 0;
+};
+
+/// Everything that lasts for the whole replay.
+struct Stage {
+  const Timeline& timeline;
+  const Machine& machine;
+  Network network;
+  Log log;
+  /// With Machine::typical, of the step: per recorded rank and kind, the median of each node [ns].
+  std::vector<std::map<Kind, std::vector<float>>> typical{};
+  double dispatch = 0;  ///< from the end of one node to the beginning of the next on a thread [ns]
+
+  /// Factor on the work of a task, by what it is: the same in every replay of the same seed.
+  double stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const;
+};
+
+/// What Stage::typical holds for a step.
+std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
+                                                              const StepIndex& index);
+
+/// An epoch of the loop on the machine.
+struct SimEpoch {
+  std::size_t source = 0;  ///< recorded epoch whose work it has
+  bool gate = false;       ///< a decision behind it
+  bool posts = false;      ///< the sums of the rank leave at that decision
+  bool reads = false;      ///< and it waits for those that all ranks have posted
+  bool exchange = false;   ///< copies are glued
+  std::size_t exchanges_before = 0;
+  std::size_t reads_before = 0, posts_before = 0;
+};
+
+/// The loop of one step: epochs of `layout` from `start` [ns], per rank; returns when each rank has left it.
+std::vector<double> play_fixed(Stage& stage, const StepIndex& index, const LoopLayout& layout,
+                               const std::vector<SimEpoch>& epochs, const std::vector<double>& start);
+std::vector<double> play_list(Stage& stage, const StepIndex& index, const LoopLayout& layout,
+                              const std::vector<SimEpoch>& epochs, const std::vector<double>& start);
+
+/// A task of the step on a rank.
+struct TimedTask {
+  double work = 0;  ///< [ns]
+  double part = 0;  ///< of it, in a span of kind `part_kind` [ns]
+  Kind part_kind{};
+  int calls = 0;  ///< of all ranks
+};
+
+/// Tasks [begin[r], end[r]) of each rank from `start`, each thread taking the ready task that was submitted
+/// first; returns when all tasks of a rank have ended. `first_free` gets, per worker, when it has nothing
+/// more to do.
+std::vector<double> play_tasks(Stage& stage, const std::vector<std::vector<SimTask>>& tasks,
+                               const std::vector<std::vector<TimedTask>>& timed,
+                               const std::vector<std::size_t>& begin, const std::vector<std::size_t>& end,
+                               const std::vector<double>& start);
+
+/// Work and kind of a node in an epoch; no work and no kind where nothing was recorded.
+struct NodeWork {
+  double work = 0;  ///< [ns]
+  bool recorded = false;
+  Kind kind{};
+};
+NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node, std::uint32_t number,
+                 const SimEpoch& epoch, std::size_t number_of_epoch);
+/// What messages and shared data add to the work of a node in an epoch that exchanges. [ns]
+double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node);
+/// Work of the decision behind an epoch. [ns]
+double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch);
+
+/// Things that happen, in order of time, then of their making.
+struct Event {
+  double time;
+  std::uint64_t order;
+  std::uint32_t what, a, b;
+  bool operator>(const Event& other) const {
+    return time != other.time ? time > other.time : order > other.order;
+  }
+};
+class Agenda {
+ public:
+  void add(double time, std::uint32_t what, std::uint32_t a, std::uint32_t b = 0) {
+    events_.push({time, order_++, what, a, b});
+  }
+  bool empty() const { return events_.empty(); }
+  Event next() {
+    const Event event = events_.top();
+    events_.pop();
+    return event;
+  }
+
+ private:
+  std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
+  std::uint64_t order_ = 0;
+};
+
+/// Sums that all ranks post and read, one round per check.
+class Rounds {
+ public:
+  Rounds(int ranks, const std::vector<SimEpoch>& epochs, double cost)
+      : ranks_(ranks), cost_(cost), posted_(epochs.back().posts_before + 1), at_(posted_.size(), 0) {}
+  /// True when this was the last rank.
+  bool post(std::size_t round, double time) {
+    at_[round] = std::max(at_[round], time);
+    return ++posted_[round] == ranks_;
+  }
+  bool complete(std::size_t round) const { return posted_[round] == ranks_; }
+  double known(std::size_t round) const { return at_[round] + cost_; }
+
+ private:
+  int ranks_;
+  double cost_;
+  std::vector<int> posted_;
+  std::vector<double> at_;
+};
+
+}  // namespace talus::trace::detail

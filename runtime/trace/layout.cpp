@@ -1,0 +1,391 @@
+#include "runtime/trace/layout.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "runtime/graph/epoch_graph.hpp"
+
+namespace talus::trace {
+namespace {
+
+constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+std::uint32_t scaled_bytes(std::uint32_t bytes, double factor) {
+  return static_cast<std::uint32_t>(std::min(4e9, std::round(factor * bytes)));
+}
+
+/// Builds a LoopLayout; the steps of build() say what comes after what.
+class Builder {
+ public:
+  Builder(const std::vector<const Plan*>& plans, const std::vector<std::uint32_t>& groups,
+          const std::vector<std::uint32_t>& rank_of, const Machine& machine)
+      : plans_(plans),
+        groups_(groups),
+        rank_of_(rank_of),
+        machine_(machine),
+        faces_(std::pow(machine.contacts, 2.0 / 3)) {}
+
+  LoopLayout build() {
+    find_group_nodes();
+    for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) add_rank(r);
+    out_.rank_begin.push_back(static_cast<std::uint32_t>(out_.nodes.size()));
+    connect();
+    route_messages();
+    sort_walks();
+    describe_plans();
+    return std::move(out_);
+  }
+
+ private:
+  struct Group {
+    std::int32_t source = -1;           ///< recorded rank
+    std::vector<std::uint32_t> chunks;  ///< recorded nodes
+    std::uint32_t publish = none, glue = none;
+    std::uint32_t new_publish = none, new_glue = none;
+  };
+
+  std::size_t place_of(std::uint32_t group) const {
+    const auto at = std::lower_bound(groups_.begin(), groups_.end(), group);
+    if (at == groups_.end() || *at != group)
+      throw TraceError(fmt::format("no plan has a subdomain {}", group));
+    return static_cast<std::size_t>(at - groups_.begin());
+  }
+
+  void find_group_nodes() {
+    group_.resize(groups_.size());
+    for (std::size_t s = 0; s < plans_.size(); ++s) {
+      const Plan& plan = *plans_[s];
+      for (std::uint32_t n = 0; n < plan.size(); ++n) {
+        const Role role = static_cast<Role>(plan.role[n]);
+        if (role == Role::centre) continue;
+        Group& group = group_[place_of(plan.group[n])];
+        group.source = static_cast<std::int32_t>(s);
+        if (role == Role::compute) group.chunks.push_back(n);
+        if (role == Role::publish) group.publish = n;
+        if (role == Role::glue) group.glue = n;
+      }
+    }
+  }
+
+  std::uint32_t add_node(std::uint32_t rank, std::int32_t source, std::uint32_t n) {
+    const Plan& plan = *plans_[static_cast<std::size_t>(source)];
+    out_.nodes.push_back(
+        {source, n, static_cast<Role>(plan.role[n]), plan.group[n], rank, 0, plan.colour[n]});
+    return static_cast<std::uint32_t>(out_.nodes.size() - 1);
+  }
+
+  /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues; and their owners.
+  void add_rank(std::uint32_t rank) {
+    const auto first = static_cast<std::uint32_t>(out_.nodes.size());
+    out_.rank_begin.push_back(first);
+    std::vector<std::size_t> mine;
+    for (std::size_t g = 0; g < groups_.size(); ++g)
+      if (rank_of_[g] == rank) mine.push_back(g);
+    struct Chunk {
+      std::size_t group;
+      std::uint32_t place, weight, node;
+    };
+    std::vector<Chunk> chunks;
+    for (std::size_t g : mine)
+      for (std::uint32_t n : group_[g].chunks) {
+        const Plan& plan = *plans_[static_cast<std::size_t>(group_[g].source)];
+        chunks.push_back({g, plan.place[n], plan.weight[n], add_node(rank, group_[g].source, n)});
+      }
+    std::stable_sort(chunks.begin(), chunks.end(), [](const Chunk& a, const Chunk& b) {
+      return a.group != b.group ? a.group < b.group : a.place < b.place;
+    });
+    std::vector<std::uint32_t> weight, owner(chunks.size());
+    for (const Chunk& chunk : chunks) weight.push_back(chunk.weight);
+    graph::assign_owners(weight, machine_.threads, owner);
+    const auto worker = [&](std::uint32_t thread) {
+      return rank * static_cast<std::uint32_t>(machine_.threads) + thread;
+    };
+    std::map<std::size_t, std::uint32_t> first_owner;
+    for (std::size_t k = 0; k < chunks.size(); ++k) {
+      out_.nodes[chunks[k].node].worker = worker(owner[k]);
+      first_owner.try_emplace(chunks[k].group, owner[k]);
+    }
+    const auto owner_of = [&](std::size_t g) {
+      const auto found = first_owner.find(g);
+      return worker(found == first_owner.end() ? 0 : found->second);
+    };
+    std::uint32_t glue_colour = 0, publishes = 0;
+    bool glued = false;
+    for (std::size_t g : mine) {
+      if (group_[g].publish == none) continue;
+      group_[g].new_publish = add_node(rank, group_[g].source, group_[g].publish);
+      out_.nodes.back().worker = owner_of(g);
+      ++publishes;
+      const Plan& plan = *plans_[static_cast<std::size_t>(group_[g].source)];
+      glue_colour = std::max(glue_colour, plan.colour[group_[g].glue]);
+      glued = true;
+    }
+    out_.publishes.push_back(publishes);
+    centre_.push_back(none);
+    if (!glued) return;
+    centre_.back() = static_cast<std::uint32_t>(out_.nodes.size());
+    out_.nodes.push_back(centre_node(rank, glue_colour));
+    out_.nodes.back().worker = worker(0);
+    for (std::size_t g : mine) {
+      if (group_[g].glue == none) continue;
+      group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);
+      out_.nodes.back().worker = owner_of(g);
+      // Colours of different recorded ranks mean the same order, but not the same numbers.
+      out_.nodes.back().colour = glue_colour;
+    }
+  }
+
+  /// Rank 0 is the centre; the others take its answer as late as they can, and work no more than that.
+  SimNode centre_node(std::uint32_t rank, std::uint32_t glue_colour) const {
+    const std::size_t recorded = rank > 0 && plans_.size() > 1 ? 1 : 0;
+    SimNode node{-1, 0, Role::centre, centre_group, rank, 0, glue_colour - 1};
+    node.waits_only = rank > 0 && recorded == 0;
+    const Plan& plan = *plans_[recorded];
+    for (std::uint32_t n = 0; n < plan.size(); ++n)
+      if (static_cast<Role>(plan.role[n]) == Role::centre) {
+        node.source_rank = static_cast<std::int32_t>(recorded);
+        node.source_node = n;
+        if (rank == 0) node.colour = std::min(plan.colour[n], glue_colour - 1);
+      }
+    return node;
+  }
+
+  void connect() {
+    std::vector<std::vector<std::uint32_t>> place(plans_.size());  // recorded node -> node
+    for (std::size_t s = 0; s < plans_.size(); ++s) place[s].resize(plans_[s]->size(), none);
+    for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
+      const SimNode& node = out_.nodes[n];
+      if (node.role != Role::centre) place[static_cast<std::size_t>(node.source_rank)][node.source_node] = n;
+    }
+    std::vector<std::vector<std::uint32_t>> extra(out_.nodes.size());
+    const auto join = [&](std::uint32_t a, std::uint32_t b) {
+      extra[a].push_back(b);
+      extra[b].push_back(a);
+    };
+    for (const Group& group : group_) {
+      if (group.new_publish == none) continue;
+      join(group.new_publish, group.new_glue);
+      const std::uint32_t centre = centre_[out_.nodes[group.new_publish].rank];
+      join(group.new_publish, centre);
+      join(group.new_glue, centre);
+    }
+    for (const Plan* plan : plans_)
+      for (const Message& m : plan->messages) {
+        if (m.from == centre_group || m.to == centre_group) continue;
+        const Group &from = group_[place_of(m.from)], &to = group_[place_of(m.to)];
+        if (from.new_publish == none || to.new_glue == none)
+          throw TraceError("a message between subdomains without gluing");
+        if (out_.nodes[from.new_publish].rank == out_.nodes[to.new_glue].rank)
+          join(from.new_publish, to.new_glue);
+      }
+    out_.offset.push_back(0);
+    for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
+      const SimNode& node = out_.nodes[n];
+      if (node.role != Role::centre) {
+        const auto source = static_cast<std::size_t>(node.source_rank);
+        for (std::uint32_t other : plans_[source]->neighbours(node.source_node)) {
+          const std::uint32_t there = place[source][other];
+          // Edges of the gluing follow from the messages; those of chunks are kept.
+          if (there == none || out_.nodes[there].rank != node.rank) continue;
+          if (node.role == Role::compute || out_.nodes[there].role == Role::compute)
+            out_.neighbour.push_back(there);
+        }
+      }
+      std::sort(extra[n].begin(), extra[n].end());
+      extra[n].erase(std::unique(extra[n].begin(), extra[n].end()), extra[n].end());
+      out_.neighbour.insert(out_.neighbour.end(), extra[n].begin(), extra[n].end());
+      out_.offset.push_back(static_cast<std::uint32_t>(out_.neighbour.size()));
+    }
+  }
+
+  /// Two threads of the machine, of which one thread did the work when it was recorded: what it took to hand
+  /// the data over is not in the recorded times.
+  static bool newly_shared(const Plan& plan, const SimNode& from, const SimNode& to) {
+    return from.worker != to.worker && from.source_rank == to.source_rank &&
+           plan.owner[from.source_node] == plan.owner[to.source_node];
+  }
+
+  void route_messages() {
+    out_.incoming.assign(out_.nodes.size(), 0);
+    out_.handed.assign(out_.nodes.size(), 0);
+    std::vector<std::vector<SimMessage>> sends(out_.nodes.size());
+    const auto ranks = static_cast<std::size_t>(machine_.ranks);
+    std::vector<std::uint64_t> up(ranks, 0), down(ranks, 0);
+    for (const Plan* plan : plans_)
+      for (const Message& m : plan->messages) {
+        const std::uint32_t bytes = scaled_bytes(m.bytes, faces_);
+        if (m.to == centre_group) {
+          up[rank_of_[place_of(m.from)]] += bytes;
+        } else if (m.from == centre_group) {
+          down[rank_of_[place_of(m.to)]] += bytes;
+        } else {
+          const std::uint32_t from = group_[place_of(m.from)].new_publish,
+                              to = group_[place_of(m.to)].new_glue;
+          if (out_.nodes[from].rank == out_.nodes[to].rank) {
+            if (!newly_shared(*plan, out_.nodes[from], out_.nodes[to])) continue;
+            out_.handed[from] += bytes;
+            out_.handed[to] += bytes;
+            continue;
+          }
+          sends[from].push_back({to, bytes, message_name(m.from, m.to)});
+          ++out_.incoming[to];
+        }
+      }
+    out_.to_centre.resize(ranks);
+    for (std::uint32_t r = 1; r < ranks; ++r) {
+      if (up[r] == 0 || centre_[r] == none || centre_[0] == none) continue;
+      const auto first =
+          static_cast<std::uint32_t>(std::find(rank_of_.begin(), rank_of_.end(), r) - rank_of_.begin());
+      const auto named = [](std::uint64_t bytes) {
+        return static_cast<std::uint32_t>(std::min<std::uint64_t>(bytes, none));
+      };
+      out_.to_centre[r] = {centre_[0], named(up[r]), message_name(groups_[first], centre_group)};
+      ++out_.incoming[centre_[0]];
+      sends[centre_[0]].push_back({centre_[r], named(down[r]), message_name(centre_group, groups_[first])});
+      ++out_.incoming[centre_[r]];
+    }
+    for (const auto& of_node : sends) {
+      out_.send_begin.push_back(static_cast<std::uint32_t>(out_.sends.size()));
+      out_.sends.insert(out_.sends.end(), of_node.begin(), of_node.end());
+    }
+    out_.send_begin.push_back(static_cast<std::uint32_t>(out_.sends.size()));
+  }
+
+  void sort_walks() {
+    out_.walk.resize(out_.nodes.size());
+    std::iota(out_.walk.begin(), out_.walk.end(), 0U);
+    std::stable_sort(out_.walk.begin(), out_.walk.end(), [&](std::uint32_t a, std::uint32_t b) {
+      const SimNode &x = out_.nodes[a], &y = out_.nodes[b];
+      return x.worker != y.worker ? x.worker < y.worker : x.colour < y.colour;
+    });
+    out_.walk_begin.assign(
+        static_cast<std::size_t>(machine_.ranks) * static_cast<std::size_t>(machine_.threads) + 1, 0);
+    for (const SimNode& node : out_.nodes) ++out_.walk_begin[node.worker + 1];
+    std::partial_sum(out_.walk_begin.begin(), out_.walk_begin.end(), out_.walk_begin.begin());
+  }
+
+  void describe_plans() {
+    out_.plans.resize(static_cast<std::size_t>(machine_.ranks));
+    for (std::size_t r = 0; r < out_.plans.size(); ++r) {
+      Plan& plan = out_.plans[r];
+      plan.rank = static_cast<std::int32_t>(r);
+      plan.offset.push_back(0);
+      for (std::uint32_t n = out_.rank_begin[r]; n < out_.rank_begin[r + 1]; ++n) {
+        const SimNode& node = out_.nodes[n];
+        plan.colour.push_back(node.colour);
+        plan.group.push_back(node.group);
+        plan.role.push_back(static_cast<std::uint8_t>(node.role));
+        const Plan* source =
+            node.source_rank >= 0 ? plans_[static_cast<std::size_t>(node.source_rank)] : nullptr;
+        plan.weight.push_back(source ? source->weight[node.source_node] : 0);
+        plan.place.push_back(source ? source->place[node.source_node] : 0);
+        plan.owner.push_back(node.worker % static_cast<std::uint32_t>(machine_.threads));
+        for (std::uint32_t other : out_.neighbours(n)) plan.neighbour.push_back(other - out_.rank_begin[r]);
+        plan.offset.push_back(static_cast<std::uint32_t>(plan.neighbour.size()));
+      }
+    }
+    for (const Plan* plan : plans_)
+      for (const Message& m : plan->messages) {
+        const std::uint16_t group = m.from == centre_group ? m.to : m.from;
+        out_.plans[rank_of_[place_of(group)]].messages.push_back(
+            {m.from, m.to, scaled_bytes(m.bytes, faces_)});
+      }
+  }
+
+  const std::vector<const Plan*>& plans_;
+  const std::vector<std::uint32_t>& groups_;
+  const std::vector<std::uint32_t>& rank_of_;
+  const Machine& machine_;
+  const double faces_;
+  std::vector<Group> group_;           ///< like groups_
+  std::vector<std::uint32_t> centre_;  ///< per rank
+  LoopLayout out_;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> groups_of(const Trace& trace) {
+  std::set<std::uint32_t> groups;
+  for (const Plan& plan : trace.plans)
+    for (std::uint32_t group : plan.group)
+      if (group != centre_group) groups.insert(group);
+  for (const auto& tasks : trace.tasks)
+    for (const Task& task : tasks)
+      if (task.group >= 0) groups.insert(static_cast<std::uint32_t>(task.group));
+  return {groups.begin(), groups.end()};
+}
+
+std::vector<std::uint32_t> map_groups(const std::vector<std::uint64_t>& weight, const Machine& machine) {
+  const std::size_t groups = weight.size();
+  const auto ranks = static_cast<std::size_t>(machine.ranks);
+  std::vector<std::uint32_t> rank_of(groups);
+  if (machine.map == RankMap::weight) {
+    const std::uint64_t most = std::max<std::uint64_t>(1, *std::max_element(weight.begin(), weight.end()));
+    std::vector<std::uint32_t> small;
+    for (std::uint64_t w : weight) small.push_back(static_cast<std::uint32_t>(1 + w * 1000000 / most));
+    graph::assign_owners(small, machine.ranks, rank_of);
+    // No rank may be left without: the last groups move up.
+    for (std::size_t g = groups; g-- > 0;) {
+      const auto at_most = static_cast<std::uint32_t>(std::min(ranks - 1, g));
+      const auto at_least = static_cast<std::uint32_t>(ranks - std::min(ranks, groups - g));
+      rank_of[g] = std::clamp(rank_of[g], std::min(at_least, at_most), at_most);
+    }
+    for (std::size_t g = 1; g < groups; ++g) rank_of[g] = std::min(rank_of[g], rank_of[g - 1] + 1);
+    return rank_of;
+  }
+  for (std::size_t g = 0; g < groups; ++g)
+    rank_of[g] = static_cast<std::uint32_t>(machine.map == RankMap::cyclic ? g % ranks : g * ranks / groups);
+  return rank_of;
+}
+
+LoopLayout lay_out(const std::vector<const Plan*>& plans, const std::vector<std::uint32_t>& groups,
+                   const std::vector<std::uint32_t>& rank_of, const Machine& machine) {
+  return Builder(plans, groups, rank_of, machine).build();
+}
+
+std::vector<std::vector<SimTask>> lay_out_tasks(const Trace& trace, const std::vector<std::uint32_t>& groups,
+                                                const std::vector<std::uint32_t>& rank_of, int ranks) {
+  std::vector<std::vector<SimTask>> all(static_cast<std::size_t>(ranks));
+  for (std::uint32_t r = 0; r < all.size(); ++r) {
+    std::set<std::int32_t> mine;
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      if (rank_of[g] == r) mine.insert(static_cast<std::int32_t>(groups[g]));
+    std::vector<SimTask>& tasks = all[r];
+    std::map<std::pair<std::size_t, std::uint32_t>, std::uint32_t> place;  // recorded (rank, task) -> task
+    // All recorded ranks have the same kinds in the same order, each with its own subdomains' lanes.
+    std::vector<std::size_t> next(trace.tasks.size(), 0);
+    while (next[0] < trace.tasks[0].size()) {
+      const Kind kind = trace.tasks[0][next[0]].kind;
+      for (std::size_t s = 0; s < trace.tasks.size(); ++s)
+        for (const auto& recorded = trace.tasks[s];
+             next[s] < recorded.size() && recorded[next[s]].kind == kind; ++next[s]) {
+          const Task& task = recorded[next[s]];
+          if (task.group >= 0 && !mine.count(task.group)) continue;
+          const bool merged = task.group < 0 && !tasks.empty() && tasks.back().task.kind == kind &&
+                              tasks.back().task.group < 0;
+          if (!merged) {
+            tasks.push_back({{task.name, kind, task.group, task.team, {}}, {}});
+          }
+          tasks.back().sources.push_back({static_cast<std::int32_t>(s), static_cast<std::uint32_t>(next[s])});
+          place[{s, static_cast<std::uint32_t>(next[s])}] = static_cast<std::uint32_t>(tasks.size() - 1);
+        }
+    }
+    for (SimTask& task : tasks) {
+      std::set<std::uint32_t> before;
+      for (const SimTask::Source& source : task.sources)
+        for (std::uint32_t p : trace.tasks[static_cast<std::size_t>(source.rank)][source.task].predecessors)
+          if (const auto found = place.find({static_cast<std::size_t>(source.rank), p}); found != place.end())
+            before.insert(found->second);
+      task.task.predecessors.assign(before.begin(), before.end());
+    }
+  }
+  return all;
+}
+
+}  // namespace talus::trace

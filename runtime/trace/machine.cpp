@@ -1,0 +1,109 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "runtime/trace/replay.hpp"
+
+namespace talus::trace {
+namespace {
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw std::invalid_argument("the machine of a replay: " + what);
+}
+
+void demand_positive(double value, const char* name) {
+  if (!(value > 0) || !std::isfinite(value)) refuse(fmt::format("{} must be above 0, got {}", name, value));
+}
+
+void demand_not_negative(double value, const char* name) {
+  if (!(value >= 0) || !std::isfinite(value))
+    refuse(fmt::format("{} must not be negative, got {}", name, value));
+}
+
+/// Median time from the start of a message to its arrival, of those that somebody was waiting for: only then
+/// is the arrival seen at once. 0 without any. [ns]
+double median_delay(const Trace& trace) {
+  struct Sent {
+    std::uint64_t step_epoch;
+    std::uint32_t name;
+    double at;
+    bool operator<(const Sent& other) const {
+      return step_epoch != other.step_epoch ? step_epoch < other.step_epoch : name < other.name;
+    }
+  };
+  const auto sent_of = [](const Record& record, double at) {
+    return Sent{std::uint64_t{record.step()} << 32 | static_cast<std::uint32_t>(record.epoch), record.node,
+                at};
+  };
+  std::vector<Sent> sends;
+  for (const Lane& lane : trace.lanes)
+    for (const Record& record : lane.records)
+      if (record.kind() == kind_send) sends.push_back(sent_of(record, record.end()));
+  std::sort(sends.begin(), sends.end());
+  std::vector<double> delays;
+  for (const Lane& lane : trace.lanes)
+    for (const Record& record : lane.records) {
+      if (record.kind() != kind_receive) continue;
+      const Sent wanted = sent_of(record, 0);
+      const auto sent = std::lower_bound(sends.begin(), sends.end(), wanted);
+      if (sent == sends.end() || wanted < *sent || sent->at < static_cast<double>(record.begin)) continue;
+      delays.push_back(std::max(0.0, record.end() - sent->at));
+    }
+  if (delays.empty()) return 0;
+  const auto middle = delays.begin() + static_cast<std::ptrdiff_t>(delays.size() / 2);
+  std::nth_element(delays.begin(), middle, delays.end());
+  return *middle;
+}
+
+}  // namespace
+
+RankMap rank_map_named(std::string_view name) {
+  if (name == "block") return RankMap::block;
+  if (name == "cyclic") return RankMap::cyclic;
+  if (name == "weight") return RankMap::weight;
+  throw std::invalid_argument(fmt::format("there is no map '{}': block, cyclic or weight", name));
+}
+
+Schedule schedule_named(std::string_view name) {
+  if (name == "fixed") return Schedule::fixed;
+  if (name == "list") return Schedule::list;
+  throw std::invalid_argument(fmt::format("there is no schedule '{}': fixed or list", name));
+}
+
+void validate(const Machine& machine, const Trace& trace) {
+  const auto groups = static_cast<int>(groups_of(trace).size());
+  if (machine.ranks < 1 || machine.threads < 1 || machine.ranks_per_node < 1)
+    refuse(fmt::format("{} ranks with {} threads, {} ranks on a node", machine.ranks, machine.threads,
+                       machine.ranks_per_node));
+  if (machine.ranks > std::max(1, groups))
+    refuse(
+        fmt::format("{} ranks for {} subdomains: each rank needs one. Record a run with more of them "
+                    "(decomposition.subdomains)",
+                    machine.ranks, groups));
+  demand_not_negative(machine.latency, "latency");
+  demand_positive(machine.bandwidth, "bandwidth");
+  demand_not_negative(machine.overhead, "overhead");
+  demand_not_negative(machine.node_latency, "node latency");
+  demand_positive(machine.node_bandwidth, "node bandwidth");
+  demand_not_negative(machine.line, "line");
+  demand_not_negative(machine.noise, "noise");
+  demand_positive(machine.speed, "speed");
+  demand_positive(machine.contacts, "contacts scale");
+}
+
+Machine recorded_machine(const Trace& trace) {
+  Machine machine;
+  machine.ranks = trace.ranks;
+  machine.threads = trace.threads;
+  // Processes of one machine, which most recordings of several ranks are; of many, the median is theirs as
+  // well.
+  machine.ranks_per_node = trace.ranks;
+  if (const double delay = median_delay(trace); delay > 0) machine.node_latency = 1e-9 * delay;
+  return machine;
+}
+
+}  // namespace talus::trace

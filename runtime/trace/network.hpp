@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "runtime/trace/replay.hpp"
+
+namespace talus::trace {
+
+/// When messages arrive. A message leaves through the link of its node when those before it have left, is
+/// under way for the latency, and takes the link of the other node in turn: alone on the network it needs
+/// latency + bytes/bandwidth. Inside a node nothing is shared.
+class Network {
+ public:
+  explicit Network(const Machine& machine);
+  /// `now` must not decrease from call to call. [ns]
+  double arrival(std::uint32_t from_rank, std::uint32_t to_rank, std::uint32_t bytes, double now);
+  /// What all ranks need from when the last has come to know the sum: a tree of messages. [ns]
+  double collective() const { return collective_; }
+  /// Of a thread, per message. [ns]
+  double overhead() const { return overhead_; }
+
+ private:
+  std::size_t node_of(std::uint32_t rank) const { return rank / ranks_per_node_; }
+  std::uint32_t ranks_per_node_;
+  double latency_, per_byte_, node_latency_, node_per_byte_, overhead_, collective_;
+  std::vector<double> out_free_, in_free_;  ///< per node: when its link is free again
+};
+
+}  // namespace talus::trace

@@ -1,0 +1,297 @@
+#include "runtime/trace/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "runtime/trace/detail/simulation.hpp"
+
+namespace talus::trace {
+namespace {
+
+using namespace detail;
+
+/// What a thread needs between two nodes of its walk when it need not wait: the mean of the gaps that are too
+/// short for a wait. [ns]
+double dispatch_time(const Trace& trace) {
+  constexpr double longest = 1000;
+  double sum = 0;
+  std::size_t count = 0;
+  for (const Lane& lane : trace.lanes) {
+    const Record* last = nullptr;
+    for (const Record& record : lane.records) {
+      const Kind kind = record.kind();
+      if (record.epoch < 0 || kind == kind_send || kind == kind_receive || kind == kind_collective) continue;
+      if (last && last->epoch == record.epoch && last->step() == record.step()) {
+        const double gap = static_cast<double>(record.begin) - last->end();
+        if (gap >= 0 && gap < longest) {
+          sum += gap;
+          ++count;
+        }
+      }
+      last = &record;
+    }
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+class Player {
+ public:
+  Player(const Timeline& timeline, const Machine& machine, bool keep)
+      : trace_(timeline.trace()),
+        machine_(machine),
+        groups_(groups_of(trace_)),
+        stage_{timeline,
+               machine_,
+               Network(machine_),
+               Log(machine_, keep ? &out_.trace : nullptr),
+               {},
+               trace_.predicted ? 0 : dispatch_time(trace_)} {
+    validate(machine_, trace_);
+    if (groups_.empty()) groups_.push_back(0);
+    out_.trace.ranks = machine.ranks;
+    out_.trace.threads = machine.threads;
+    out_.trace.predicted = true;
+    out_.trace.kinds = trace_.kinds;
+    if (!keep) return;
+    for (std::int32_t r = 0; r < machine.ranks; ++r)
+      for (std::int32_t t = 0; t < machine.threads; ++t) out_.trace.lanes.push_back({r, t, {}});
+  }
+
+  Replay play() {
+    std::vector<double> now(static_cast<std::size_t>(machine_.ranks), 0);
+    for (std::uint32_t step : stage_.timeline.steps()) {
+      const StepIndex index = stage_.timeline.index(step);
+      lay_out_step(index);
+      stage_.log.begin_step(step);
+      if (machine_.typical) stage_.typical = typical_times(stage_.timeline, index);
+      play_step(index, now);
+    }
+    out_.makespan = *std::max_element(now.begin(), now.end());
+    out_.work = stage_.log.work();
+    out_.tasks = stage_.log.tasks();
+    if (!out_.trace.lanes.empty()) {
+      for (const auto& rank : tasks_) {
+        std::vector<Task>& tasks = out_.trace.tasks.emplace_back();
+        for (const SimTask& task : rank) tasks.push_back(task.task);
+      }
+      sort_lanes(out_.trace);
+    }
+    return std::move(out_);
+  }
+
+ private:
+  void lay_out_step(const StepIndex& index) {
+    std::vector<const Plan*> plans;
+    for (const StepIndex::Rank& rank : index.ranks) {
+      if (!rank.plan) throw TraceError(fmt::format("step {} has no plan of its loop", index.step));
+      plans.push_back(rank.plan);
+    }
+    if (plans == plans_) return;
+    plans_ = plans;
+    weight_.assign(groups_.size(), 0);
+    source_.assign(groups_.size(), 0);
+    for (std::size_t s = 0; s < plans.size(); ++s)
+      for (std::size_t n = 0; n < plans[s]->size(); ++n) {
+        const auto at =
+            std::lower_bound(groups_.begin(), groups_.end(), plans[s]->group[n]) - groups_.begin();
+        if (at == static_cast<std::ptrdiff_t>(groups_.size())) continue;  // the centre
+        weight_[static_cast<std::size_t>(at)] += plans[s]->weight[n];
+        source_[static_cast<std::size_t>(at)] = s;
+      }
+    // Where subdomains are is settled once, as in a run; only the program's own tasks depend on it.
+    if (rank_of_.empty()) {
+      rank_of_ = map_groups(weight_, machine_);
+      tasks_ = lay_out_tasks(trace_, groups_, rank_of_, machine_.ranks);
+    }
+    layout_ = lay_out(plans_, groups_, rank_of_, machine_);
+    if (out_.trace.lanes.empty()) return;
+    for (Plan plan : layout_.plans) {
+      plan.step = index.step;
+      out_.trace.plans.push_back(std::move(plan));
+    }
+  }
+
+  /// Part of the work of recorded rank `source` that rank r has.
+  double share(std::size_t r, std::size_t source) const {
+    double whole = 0, mine = 0;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      if (source_[g] != source) continue;
+      whole += static_cast<double>(weight_[g]);
+      if (rank_of_[g] == r) mine += static_cast<double>(weight_[g]);
+    }
+    return whole > 0 ? mine / whole : 1.0 / machine_.ranks;
+  }
+
+  TimedTask time_task(const StepIndex& index, std::size_t r, const SimTask& task, std::size_t number) const {
+    TimedTask timed;
+    const KindInfo& info = trace_.info(task.task.kind);
+    for (const SimTask::Source& source : task.sources) {
+      const StepIndex::Rank& recorded = index.ranks[static_cast<std::size_t>(source.rank)];
+      const Place part = recorded.part[source.task];
+      const double own = stage_.timeline.self(recorded.task[source.task]),
+                   inside = stage_.timeline.self(part);
+      if (task.task.group >= 0 || info.shared) {
+        const double of_rank = task.task.group >= 0 ? 1 : share(r, static_cast<std::size_t>(source.rank));
+        timed.work += of_rank * (own + inside);
+        timed.part += of_rank * inside;
+      } else {
+        timed.work = std::max(timed.work, own + inside);
+      }
+      if (part.exists()) timed.part_kind = stage_.timeline.record(part).kind();
+      timed.calls = std::max(
+          timed.calls, trace_.ranks > 1 ? recorded.calls[source.task]
+                                        : info.collectives +
+                                              (part.exists() ? trace_.info(timed.part_kind).collectives : 0));
+    }
+    const double scale =
+        machine_.contacts / machine_.speed * stage_.stretch(index.step, r, ~std::uint64_t{number});
+    timed.work *= scale;
+    timed.part *= scale;
+    return timed;
+  }
+
+  void play_step(const StepIndex& index, std::vector<double>& now) {
+    const std::size_t ranks = now.size();
+    go_between_steps(index, now);
+    std::vector<std::vector<TimedTask>> timed(ranks);
+    std::vector<std::size_t> none(ranks, 0), loop(ranks), behind(ranks), all(ranks);
+    for (std::size_t r = 0; r < ranks; ++r) {
+      for (std::size_t i = 0; i < tasks_[r].size(); ++i) {
+        timed[r].push_back(tasks_[r][i].task.team ? TimedTask{} : time_task(index, r, tasks_[r][i], i));
+        if (tasks_[r][i].task.team) loop[r] = i;
+      }
+      all[r] = tasks_[r].size();
+      behind[r] = std::min(loop[r] + 1, all[r]);
+    }
+    now = play_tasks(stage_, tasks_, timed, none, loop, now);
+    if (const std::vector<SimEpoch> epochs = epochs_of(index); !epochs.empty()) {
+      const std::vector<double> begun = now;
+      now = machine_.schedule == Schedule::list || machine_.unbounded
+                ? play_list(stage_, index, layout_, epochs, begun)
+                : play_fixed(stage_, index, layout_, epochs, begun);
+      for (std::uint32_t r = 0; r < ranks; ++r)
+        for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(machine_.threads); ++t)
+          stage_.log.span(stage_.log.worker(r, t), begun[r], now[r], static_cast<std::uint32_t>(loop[r]), -1,
+                          kind_team);
+    }
+    now = play_tasks(stage_, tasks_, timed, behind, all, now);
+  }
+
+  /// What the program does outside of the graph; all ranks meet there, if only to hear of signals.
+  void go_between_steps(const StepIndex& index, std::vector<double>& now) {
+    bool any = false;
+    std::vector<double> worked = now;
+    for (std::size_t r = 0; r < now.size(); ++r)
+      for (std::size_t s = 0; s < index.ranks.size(); ++s) {
+        if (!index.ranks[s].outside.exists()) continue;
+        worked[r] +=
+            share(r, s) * stage_.timeline.self(index.ranks[s].outside) * machine_.contacts / machine_.speed;
+        any = true;
+      }
+    if (!any) return;
+    const double last = *std::max_element(worked.begin(), worked.end());
+    for (std::uint32_t r = 0; r < now.size(); ++r) {
+      const double end = now.size() > 1 ? last + stage_.network.collective() : worked[r];
+      stage_.log.task(stage_.log.worker(r, 0), now[r], end, end - worked[r], 0, -1, kind_outside);
+      if (end > worked[r]) stage_.log.span(stage_.log.worker(r, 0), worked[r], end, 0, -1, kind_collective);
+      now[r] = end;
+    }
+  }
+
+  bool exchanges(const StepIndex& index, std::size_t epoch) const {
+    for (const StepIndex::Rank& rank : index.ranks)
+      for (std::size_t n = 0; n < rank.nodes; ++n)
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(Role::publish) && rank.at(epoch, n).exists())
+          return true;
+    return false;
+  }
+
+  /// The recorded epochs, with decisions as the machine needs them: a run of one rank reads its sums at once;
+  /// a run of several posts them and reads them a sweep later, so it has one sweep more in the end, and
+  /// undoes it (runtime/step/iteration.hpp).
+  std::vector<SimEpoch> epochs_of(const StepIndex& index) const {
+    const StepIndex::Rank& recorded = index.ranks[0];
+    for (const StepIndex::Rank& rank : index.ranks)
+      if (rank.epochs != recorded.epochs)
+        throw TraceError(fmt::format("step {} has {} epochs on one rank and {} on another", index.step,
+                                     recorded.epochs, rank.epochs));
+    const bool late = machine_.ranks > 1 && trace_.ranks == 1 && machine_.late_check;
+    std::vector<SimEpoch> epochs;
+    bool read_next = false;
+    std::size_t unread = 0;  // posted, not read: of a recording of several ranks
+    for (std::size_t e = 0; e < recorded.epochs; ++e) {
+      SimEpoch epoch;
+      epoch.source = e;
+      epoch.gate = recorded.check[e].exists();
+      epoch.exchange = exchanges(index, e);
+      if (machine_.ranks > 1 && epoch.gate) {
+        if (trace_.ranks > 1) {
+          epoch.reads = recorded.awaited[e] != 0;
+          epoch.posts = epoch.reads && unread == 0;
+          if (epoch.reads) unread = 0;
+          // A gate that waits for nobody posts what the next one that does reads.
+          if (!epoch.reads && unread == 0 && next_reads(recorded, e)) {
+            epoch.posts = true;
+            unread = 1;
+          }
+        } else {
+          epoch.posts = true;
+          epoch.reads = !late;
+        }
+      }
+      if (read_next) {
+        epoch.gate = epoch.reads = true;
+        read_next = false;
+      }
+      read_next = late && recorded.check[e].exists();
+      epochs.push_back(epoch);
+    }
+    if (late && !epochs.empty()) {
+      const std::size_t last = epochs.size() - 1;
+      SimEpoch sweep = epochs[last >= 2 ? last - 2 : 0], undo = epochs[last >= 1 ? last - 1 : 0];
+      sweep.posts = undo.posts = undo.reads = false;
+      sweep.gate = sweep.reads = undo.gate = true;
+      epochs.push_back(sweep);
+      epochs.push_back(undo);
+    }
+    std::size_t exchanged = 0, posted = 0, read = 0;
+    for (SimEpoch& epoch : epochs) {
+      epoch.exchanges_before = exchanged;
+      epoch.posts_before = posted;
+      epoch.reads_before = read;
+      exchanged += epoch.exchange ? 1 : 0;
+      posted += epoch.posts ? 1 : 0;
+      read += epoch.reads ? 1 : 0;
+    }
+    return epochs;
+  }
+
+  static bool next_reads(const StepIndex::Rank& recorded, std::size_t epoch) {
+    for (std::size_t e = epoch + 1; e < recorded.epochs; ++e)
+      if (recorded.check[e].exists()) return recorded.awaited[e] != 0;
+    return false;
+  }
+
+  const Trace& trace_;
+  const Machine machine_;
+  std::vector<std::uint32_t> groups_;
+  Replay out_;
+  Stage stage_;
+  std::vector<const Plan*> plans_;
+  std::vector<std::uint64_t> weight_;   ///< per group
+  std::vector<std::size_t> source_;     ///< per group: the rank it was recorded on
+  std::vector<std::uint32_t> rank_of_;  ///< per group
+  std::vector<std::vector<SimTask>> tasks_;
+  LoopLayout layout_;
+};
+
+}  // namespace
+
+Replay replay(const Timeline& timeline, const Machine& machine, bool keep) {
+  return Player(timeline, machine, keep).play();
+}
+
+}  // namespace talus::trace

@@ -1,0 +1,132 @@
+#include "runtime/trace/timeline.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace talus::trace {
+namespace {
+
+/// Kinds that some task of the step, or the loop's nodes, may have: all that are no spans.
+bool names_task(const Trace& trace, Kind kind) {
+  for (const auto& tasks : trace.tasks)
+    for (const Task& task : tasks)
+      if (task.kind == kind) return true;
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::vector<float>> self_times(const Trace& trace) {
+  std::vector<std::vector<float>> all(trace.lanes.size());
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
+    const std::vector<Record>& records = trace.lanes[k].records;
+    std::vector<float>& self = all[k];
+    self.resize(records.size());
+    open.clear();
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      self[i] = records[i].duration;
+      while (!open.empty() && records[open.back()].end() <= static_cast<double>(records[i].begin))
+        open.pop_back();
+      if (!open.empty()) {
+        float& around = self[open.back()];
+        around = std::max(0.0F, around - records[i].duration);
+      }
+      open.push_back(i);
+    }
+  }
+  return all;
+}
+
+std::vector<std::uint32_t> steps_of(const Trace& trace) {
+  std::vector<std::uint32_t> steps;
+  std::vector<char> task(trace.kinds.size(), 0);
+  for (std::size_t k = 0; k < task.size(); ++k) task[k] = names_task(trace, static_cast<Kind>(k)) ? 1 : 0;
+  for (int thread = 0; thread < trace.threads; ++thread)
+    for (const Record& record : trace.lane(0, thread).records)
+      if (task[static_cast<std::size_t>(record.kind())] && (steps.empty() || steps.back() != record.step()))
+        steps.push_back(record.step());
+  std::sort(steps.begin(), steps.end());
+  steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
+  return steps;
+}
+
+Timeline::Timeline(const Trace& trace) : trace_(trace), self_(self_times(trace)), steps_(steps_of(trace)) {
+  if (steps_.empty()) throw TraceError("the trace holds no step of a run");
+}
+
+void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) const {
+  const auto by_step = [](const Record& record, std::uint32_t step) { return record.step() < step; };
+  const auto first = std::lower_bound(lane.records.begin(), lane.records.end(), index.step, by_step);
+  StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(lane.rank)];
+  const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(lane.rank)];
+  Place last_task, last_check;
+  for (auto it = first; it != lane.records.end() && it->step() == index.step; ++it) {
+    const Place place{number, static_cast<std::uint32_t>(it - lane.records.begin())};
+    const Kind kind = it->kind();
+    if (kind == kind_team || kind == kind_send || kind == kind_receive) continue;
+    if (kind == kind_outside) {
+      rank.outside = place;
+    } else if (kind == kind_collective) {
+      if (last_check.exists() && it->end() <= record(last_check).end())
+        rank.awaited[static_cast<std::size_t>(record(last_check).epoch)] = 1;
+      else if (last_task.exists() && it->end() <= record(last_task).end())
+        ++rank.calls[record(last_task).node];
+    } else if (kind == kind_check) {
+      const auto epoch = static_cast<std::size_t>(it->epoch);
+      if (rank.check.size() <= epoch) rank.check.resize(epoch + 1), rank.awaited.resize(epoch + 1, 0);
+      rank.check[epoch] = last_check = place;
+    } else if (it->epoch >= 0) {
+      if (it->node >= rank.nodes)
+        throw TraceError(fmt::format("step {}: node {} of a plan of {} on rank {}", index.step, it->node,
+                                     rank.nodes, lane.rank));
+      const auto epoch = static_cast<std::size_t>(it->epoch);
+      if (rank.epochs <= epoch) {
+        rank.epochs = epoch + 1;
+        rank.node.resize(rank.epochs * rank.nodes);
+      }
+      rank.node[epoch * rank.nodes + it->node] = place;
+    } else if (it->node < tasks.size() && tasks[it->node].kind == kind && !tasks[it->node].team) {
+      rank.task[it->node] = last_task = place;
+    } else if (last_task.exists() && it->end() <= record(last_task).end()) {
+      rank.part[record(last_task).node] = place;
+    }
+  }
+}
+
+StepIndex Timeline::index(std::uint32_t step) const {
+  StepIndex index;
+  index.step = step;
+  index.ranks.resize(static_cast<std::size_t>(trace_.ranks));
+  for (int r = 0; r < trace_.ranks; ++r) {
+    StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(r)];
+    rank.plan = plan_of(trace_, r, step);
+    rank.nodes = rank.plan ? rank.plan->size() : 0;
+    rank.task.resize(trace_.tasks[static_cast<std::size_t>(r)].size());
+    rank.calls.resize(rank.task.size(), 0);
+    rank.part.resize(rank.task.size());
+  }
+  for (std::uint32_t k = 0; k < trace_.lanes.size(); ++k) add(trace_.lanes[k], k, index);
+  for (int r = 0; r < trace_.ranks; ++r) {
+    StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(r)];
+    rank.check.resize(rank.epochs);
+    rank.awaited.resize(rank.epochs, 0);
+    const auto incomplete = [&](const std::string& what) {
+      throw TraceError(fmt::format(
+          "step {} was recorded in part: {} of rank {} is missing. Choose whole steps, or record anew", step,
+          what, r));
+    };
+    const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(r)];
+    for (std::size_t i = 0; i < tasks.size(); ++i)
+      if (!tasks[i].team && !rank.task[i].exists()) incomplete("task " + tasks[i].name);
+    if (rank.epochs > 0 && !rank.check.back().exists()) incomplete("the last decision");
+    for (std::size_t e = 0; e < rank.epochs; ++e)
+      for (std::size_t n = 0; n < rank.nodes; ++n)
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(Role::compute) && !rank.at(e, n).exists())
+          incomplete(fmt::format("node {} in epoch {}", n, e));
+  }
+  return index;
+}
+
+}  // namespace talus::trace

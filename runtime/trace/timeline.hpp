@@ -1,0 +1,70 @@
+#pragma once
+
+/// A step of a trace, by what ran instead of by when: which record is node 17 in epoch 4, and how long did it
+/// work.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "runtime/trace/trace.hpp"
+
+namespace talus::trace {
+
+/// Per lane and record: its duration without that of the spans within it [ns]. Records must be sorted as Lane
+/// says. Cost: every record once.
+std::vector<std::vector<float>> self_times(const Trace& trace);
+
+/// Steps that hold tasks, ascending.
+std::vector<std::uint32_t> steps_of(const Trace& trace);
+
+/// Where a record stands: trace.lanes[lane].records[record].
+struct Place {
+  std::uint32_t lane = 0xffffffffU, record = 0;
+  bool exists() const { return lane != 0xffffffffU; }
+};
+
+/// One step on all ranks.
+struct StepIndex {
+  struct Rank {
+    const Plan* plan = nullptr;  ///< null when the step has no loop
+    std::size_t nodes = 0;
+    std::size_t epochs = 0;
+    std::vector<Place> node;    ///< epochs x nodes; absent where a node did nothing
+    std::vector<Place> check;   ///< per epoch; absent where nothing was decided
+    std::vector<Place> task;    ///< per task of the step, absent for teams
+    std::vector<int> calls;     ///< per task: collective calls within
+    std::vector<char> awaited;  ///< per epoch: its check waited for other ranks
+    Place outside;              ///< before the step; absent for the first of a trace
+    std::vector<Place> part;    ///< per task: a span within that is no wait, or absent
+
+    Place at(std::size_t epoch, std::size_t n) const { return node[epoch * nodes + n]; }
+  };
+  std::uint32_t step = 0;
+  std::vector<Rank> ranks;
+};
+
+/// For all steps, one after the other; keeps what is common.
+class Timeline {
+ public:
+  /// Keeps the reference. Throws TraceError when there is no step.
+  explicit Timeline(const Trace& trace);
+  const Trace& trace() const { return trace_; }
+  const std::vector<std::uint32_t>& steps() const { return steps_; }
+  /// Throws TraceError when the step was recorded in part only.
+  StepIndex index(std::uint32_t step) const;
+  const Record& record(Place place) const { return trace_.lanes[place.lane].records[place.record]; }
+  /// [ns]; 0 where nothing was recorded.
+  double self(Place place) const {
+    return place.exists() ? static_cast<double>(self_[place.lane][place.record]) : 0.0;
+  }
+  const std::vector<std::vector<float>>& self() const { return self_; }
+
+ private:
+  void add(const Lane& lane, std::uint32_t number, StepIndex& index) const;
+  const Trace& trace_;
+  std::vector<std::vector<float>> self_;
+  std::vector<std::uint32_t> steps_;
+};
+
+}  // namespace talus::trace

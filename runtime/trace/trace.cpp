@@ -1,0 +1,129 @@
+#include "runtime/trace/trace.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace talus::trace {
+namespace {
+
+[[noreturn]] void refuse(const std::string& reason) {
+  throw TraceError("the trace makes no sense: " + reason);
+}
+
+void check(const Plan& plan, int ranks) {
+  const std::size_t n = plan.size();
+  const std::string where = fmt::format("the plan of rank {} from step {}", plan.rank, plan.step);
+  if (plan.rank < 0 || plan.rank >= ranks) refuse(fmt::format("{} in a trace of {} ranks", where, ranks));
+  if (plan.group.size() != n || plan.role.size() != n || plan.weight.size() != n || plan.place.size() != n ||
+      plan.owner.size() != n || plan.offset.size() != n + 1)
+    refuse(where + ": arrays of different lengths");
+  if (plan.offset.front() != 0 || plan.offset.back() != plan.neighbour.size() ||
+      !std::is_sorted(plan.offset.begin(), plan.offset.end()))
+    refuse(where + ": offsets do not rise from 0 to the number of neighbours");
+  for (std::uint32_t other : plan.neighbour)
+    if (other >= n) refuse(fmt::format("{}: a conflict with node {} of {}", where, other, n));
+  for (std::uint8_t role : plan.role)
+    if (role > static_cast<std::uint8_t>(Role::glue)) refuse(fmt::format("{}: role {}", where, role));
+}
+
+void check(const std::vector<Task>& tasks, std::size_t kinds) {
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    if (static_cast<std::size_t>(tasks[i].kind) >= kinds)
+      refuse(fmt::format("task '{}' is of a kind that has no name", tasks[i].name));
+    for (std::uint32_t before : tasks[i].predecessors)
+      if (before >= i) refuse(fmt::format("task '{}' comes after a later one", tasks[i].name));
+  }
+}
+
+}  // namespace
+
+const char* name_of(Phase phase) {
+  switch (phase) {
+    case Phase::partitioning:
+      return "partitioning";
+    case Phase::detection:
+      return "contact detection";
+    case Phase::sweeps:
+      return "inloop 1: sweeps, gluing";
+    case Phase::exchange:
+      return "inloop 2: exchange";
+    case Phase::update:
+      return "update";
+    case Phase::waiting:
+      return "waiting for threads";
+    case Phase::outside:
+      return "between steps";
+  }
+  return "?";
+}
+
+std::vector<KindInfo> runtime_kinds() {
+  return {{"team", Phase::waiting, false, false, 0},       {"outside", Phase::outside, false, true, 0},
+          {"collective", Phase::exchange, true, false, 0}, {"receive", Phase::exchange, true, false, 0},
+          {"send", Phase::exchange, false, false, 0},      {"check", Phase::exchange, false, false, 1}};
+}
+
+std::size_t Trace::record_count() const {
+  std::size_t sum = 0;
+  for (const Lane& lane : lanes) sum += lane.records.size();
+  return sum;
+}
+
+void validate(const Trace& trace) {
+  if (trace.ranks < 1 || trace.threads < 1)
+    refuse(fmt::format("{} ranks with {} threads", trace.ranks, trace.threads));
+  const auto ranks = static_cast<std::size_t>(trace.ranks), threads = static_cast<std::size_t>(trace.threads);
+  if (trace.lanes.size() != ranks * threads || trace.tasks.size() != ranks)
+    refuse(fmt::format("{} lanes and tasks of {} ranks for {} ranks with {} threads", trace.lanes.size(),
+                       trace.tasks.size(), ranks, threads));
+  const std::vector<KindInfo> own = runtime_kinds();
+  if (trace.kinds.size() < own.size() || trace.kinds.size() > 256 ||
+      !std::equal(own.begin(), own.end(), trace.kinds.begin()))
+    refuse("its kinds of records are not those of this version");
+  for (const auto& tasks : trace.tasks) check(tasks, trace.kinds.size());
+  for (const Plan& plan : trace.plans) check(plan, trace.ranks);
+  // Every epoch leaves records, so a larger number is a damaged one, and nobody should make room for it.
+  const auto most_epochs = static_cast<std::int64_t>(trace.record_count());
+  for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
+    const Lane& lane = trace.lanes[k];
+    if (lane.rank != static_cast<std::int32_t>(k / threads) ||
+        lane.thread != static_cast<std::int32_t>(k % threads))
+      refuse(fmt::format("lane {} is of rank {}, thread {}", k, lane.rank, lane.thread));
+    for (const Record& record : lane.records)
+      if (static_cast<std::size_t>(record.kind()) >= trace.kinds.size() || record.epoch < -1 ||
+          record.epoch >= most_epochs || !std::isfinite(record.duration) || record.duration < 0)
+        refuse(fmt::format("a record of rank {}, thread {} in step {}: kind {}, epoch {}, duration {}",
+                           lane.rank, lane.thread, record.step(), static_cast<int>(record.kind()),
+                           record.epoch, record.duration));
+  }
+}
+
+void sort_lanes(Trace& trace) {
+  // A task is written when it ends, hence after the spans within it.
+  const auto before = [](const Record& a, const Record& b) {
+    return a.begin != b.begin ? a.begin < b.begin : a.duration > b.duration;
+  };
+  for (Lane& lane : trace.lanes)
+    if (!std::is_sorted(lane.records.begin(), lane.records.end(), before))
+      std::stable_sort(lane.records.begin(), lane.records.end(), before);
+}
+
+const Plan* plan_of(const Trace& trace, int rank, std::uint32_t step) {
+  const Plan* last = nullptr;
+  for (const Plan& plan : trace.plans)
+    if (plan.rank == rank && plan.step <= step && (!last || plan.step >= last->step)) last = &plan;
+  return last;
+}
+
+std::size_t memory_used(const Trace& trace) {
+  std::size_t sum = 0;
+  for (const Lane& lane : trace.lanes) sum += lane.records.capacity() * sizeof(Record);
+  for (const Plan& plan : trace.plans)
+    sum += (6 * plan.size() + plan.neighbour.size()) * sizeof(std::uint32_t) + plan.role.size() +
+           plan.messages.size() * sizeof(Message);
+  return sum;
+}
+
+}  // namespace talus::trace

@@ -1,0 +1,164 @@
+#pragma once
+
+/// What a trace holds. Everything that follows from the plan of the loop (colours, conflicts, owners,
+/// messages) is stored once per plan; a task that ran leaves one record of 24 bytes that points into it.
+/// Example: record {begin 1200, duration 7300, node 17, epoch 4, step 3, kind "sweep"} on lane (rank 0,
+/// thread 1): at 1.2 us this thread began to work on node 17 of the plan of step 3, in epoch 4, and had
+/// finished 7.3 us later. It could begin because the nodes that conflict with node 17 and have lower colours
+/// had ended epoch 4, those with higher colours epoch 3.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace talus::trace {
+
+/// Place of a kind in Trace::kinds.
+enum class Kind : std::uint8_t {};
+
+/// Where the time of a kind belongs; the first five are the columns of Table 3 of Visseq, Alart and
+/// Dureisseix (2013).
+enum class Phase : std::uint8_t {
+  partitioning,
+  detection,
+  sweeps,    ///< "Inloop 1": Gauss-Seidel and what glues the copies
+  exchange,  ///< "Inloop 2": messages of the iterations, packing and waiting included
+  update,
+  waiting,  ///< for other threads, inside the loop
+  outside,  ///< between steps
+};
+inline constexpr std::size_t phase_count = 7;
+const char* name_of(Phase phase);
+
+/// What kinds of records there are is up to the program that is traced.
+struct KindInfo {
+  std::string name;
+  Phase phase = Phase::outside;
+  bool blocked = false;  ///< waits for messages and does no work of its own
+  bool shared = false;   ///< a task that a rank does once, and whose work grows with the rank's part
+  int collectives = 0;   ///< calls in which all ranks take part, in one such task
+  bool operator==(const KindInfo&) const = default;
+};
+
+/// Kinds that the runtime itself records, which every trace has first.
+inline constexpr Kind kind_team{0};        ///< one thread's stay in a team task
+inline constexpr Kind kind_outside{1};     ///< from the end of one step to the beginning of the next
+inline constexpr Kind kind_collective{2};  ///< inside a call of all ranks; node = bytes
+inline constexpr Kind kind_receive{3};     ///< waits for a message; node = message_name
+inline constexpr Kind kind_send{4};        ///< starts a message; node = message_name
+inline constexpr Kind kind_check{5};       ///< decides after an epoch; node = 0
+std::vector<KindInfo> runtime_kinds();
+
+/// One task, or one span within a task (then it lies within the task's time, on the same lane).
+struct Record {
+  std::int64_t begin = 0;   ///< [ns] on the clock of the rank, from the beginning of the trace
+  float duration = 0;       ///< [ns]; exact to the ns below 16 ms
+  std::uint32_t node = 0;   ///< of the plan, in the loop; of the step's tasks else
+  std::int32_t epoch = -1;  ///< in the loop, from 0; -1 outside
+  std::uint32_t step_and_kind = 0;
+
+  std::uint32_t step() const { return step_and_kind >> 8; }  ///< from 1
+  Kind kind() const { return static_cast<Kind>(step_and_kind & 0xffU); }
+  double end() const { return static_cast<double>(begin) + static_cast<double>(duration); }
+};
+static_assert(sizeof(Record) == 24, "records are written to files as they are");
+
+inline constexpr std::uint32_t largest_step = 0xffffffU;
+inline std::uint32_t pack(std::uint32_t step, Kind kind) {
+  return step << 8 | static_cast<std::uint32_t>(kind);
+}
+
+/// What a node of the loop does for the messages.
+enum class Role : std::uint8_t {
+  compute,  ///< nothing
+  publish,  ///< sends what its group shows to others
+  centre,   ///< once a rank: what goes through one rank
+  glue,     ///< takes what others have published
+};
+
+/// Names the centre as the end of a message.
+inline constexpr std::uint16_t centre_group = 0xffffU;
+
+/// Sent in each epoch that exchanges, from the publish of one group to the glue of another (`from` to `to`),
+/// or to and from the centre. Groups on one rank need no message.
+struct Message {
+  std::uint16_t from = 0, to = 0;
+  std::uint32_t bytes = 0;
+};
+inline std::uint32_t message_name(std::uint32_t from, std::uint32_t to) {
+  return from << 16 | to;
+}
+
+/// The loop of one rank, from step `step` until the next plan of that rank: n nodes.
+struct Plan {
+  std::int32_t rank = 0;
+  std::uint32_t step = 0;
+  std::vector<std::uint32_t> colour;     ///< n
+  std::vector<std::uint32_t> group;      ///< n: subdomain among all; of the centre 0xffff
+  std::vector<std::uint8_t> role;        ///< n: of Role
+  std::vector<std::uint32_t> weight;     ///< n: expected work, in contacts; 0 for what no work is planned for
+  std::vector<std::uint32_t> place;      ///< n: order in space within the rank, for owners
+  std::vector<std::uint32_t> owner;      ///< n: thread
+  std::vector<std::uint32_t> offset;     ///< n + 1, into neighbour
+  std::vector<std::uint32_t> neighbour;  ///< conflicting nodes
+  std::vector<Message> messages;         ///< that leave a group of this rank, and those from the centre
+
+  std::size_t size() const { return colour.size(); }
+  std::span<const std::uint32_t> neighbours(std::size_t node) const {
+    return std::span(neighbour).subspan(offset[node], offset[node + 1] - offset[node]);
+  }
+};
+
+/// A task of every step of one rank.
+struct Task {
+  std::string name;
+  Kind kind{};
+  std::int32_t group = -1;                  ///< subdomain whose work it is, -1: the rank's
+  bool team = false;                        ///< the loop
+  std::vector<std::uint32_t> predecessors;  ///< earlier tasks of the rank
+};
+
+/// What one thread of one rank did, in order of begin; a span within a task comes after it.
+struct Lane {
+  std::int32_t rank = 0, thread = 0;
+  std::vector<Record> records;
+};
+
+struct Trace {
+  int ranks = 1, threads = 1;
+  bool predicted = false;  ///< by replay; else recorded
+  std::vector<KindInfo> kinds;
+  std::vector<std::vector<Task>> tasks;  ///< per rank
+  std::vector<Plan> plans;               ///< of every rank, ascending steps within a rank
+  std::vector<Lane> lanes;               ///< ranks x threads, rank by rank
+
+  const Lane& lane(int rank, int thread) const {
+    return lanes[static_cast<std::size_t>(rank) * static_cast<std::size_t>(threads) +
+                 static_cast<std::size_t>(thread)];
+  }
+  const KindInfo& info(Kind kind) const { return kinds[static_cast<std::size_t>(kind)]; }
+  std::size_t record_count() const;
+};
+
+/// A trace that makes no sense: not a trace, cut off, or steps that were recorded in part only.
+class TraceError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws TraceError when sizes do not match, or an index points at nothing. Cost: every number once.
+void validate(const Trace& trace);
+
+/// Sorts the records of all lanes as Lane wants them. Cost: nothing for what is sorted.
+void sort_lanes(Trace& trace);
+
+/// The plan that `rank` ran in `step`; null before its first.
+const Plan* plan_of(const Trace& trace, int rank, std::uint32_t step);
+
+/// Bytes held.
+std::size_t memory_used(const Trace& trace);
+
+}  // namespace talus::trace

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <optional>
+
+#include "runtime/graph/epoch_loop.hpp"
+#include "runtime/trace/recorder.hpp"
+
+namespace talus::trace {
+
+/// A program of the epoch loop that can say what its nodes do.
+template <class Program>
+concept NamedProgram = graph::EpochProgram<Program> &&
+    requires(const Program& program, std::uint32_t node, int epoch) {
+  /// Nothing: the node does nothing in this epoch, and leaves no record.
+  { program.kind(node, epoch) } -> std::convertible_to<std::optional<Kind>>;
+};
+
+/// One thread's view of a program of the epoch loop that records each node: the loop itself stays as it is,
+/// so a run without a trace has not one instruction more per node.
+template <NamedProgram Program>
+class Traced {
+ public:
+  Traced(Program& program, Recorder& recorder, int thread)
+      : program_(program), recorder_(recorder), lane_(recorder.lane(thread)) {}
+  ~Traced() { lane_.at_epoch(-1); }
+  Traced(const Traced&) = delete;
+  Traced& operator=(const Traced&) = delete;
+
+  void node(std::uint32_t node, int epoch) {
+    const std::optional<Kind> kind = program_.kind(node, epoch);
+    if (!kind) return program_.node(node, epoch);
+    const std::int64_t begin = recorder_.now();
+    program_.node(node, epoch);
+    lane_.add(begin, recorder_.now(), node, epoch, *kind);
+  }
+  bool gate(int epoch) {
+    lane_.at_epoch(epoch);
+    return program_.gate(epoch);
+  }
+  bool decide(int epoch) {
+    const std::int64_t begin = recorder_.now();
+    const bool goes_on = program_.decide(epoch);
+    lane_.add(begin, recorder_.now(), 0, epoch, kind_check);
+    return goes_on;
+  }
+
+ private:
+  Program& program_;
+  Recorder& recorder_;
+  Recorder::Lane& lane_;
+};
+
+}  // namespace talus::trace

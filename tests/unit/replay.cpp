@@ -1,0 +1,188 @@
+#include "runtime/trace/replay.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "runtime/trace/analysis.hpp"
+#include "runtime/trace/network.hpp"
+#include "tests/unit/small_trace.hpp"
+
+namespace talus::trace {
+namespace {
+
+/// Nothing costs anything but what a test sets.
+Machine bare(int ranks, int threads) {
+  Machine machine;
+  machine.ranks = ranks;
+  machine.threads = threads;
+  machine.latency = 0;
+  machine.overhead = 0;
+  machine.bandwidth = 1e30;
+  machine.line = 0;
+  machine.late_check = false;
+  return machine;
+}
+
+double makespan(const Trace& trace, const Machine& machine) {
+  return replay(Timeline(trace), machine, false).makespan;
+}
+
+TEST(Replay, OfAChainIsItsSumOnAnyNumberOfThreads) {
+  const Trace chain = test::one_loop({0, 1, 2, 3}, {{0, 1}, {1, 2}, {2, 3}}, {10, 20, 30, 40});
+  for (int threads : {1, 2, 3}) EXPECT_DOUBLE_EQ(makespan(chain, bare(1, threads)), 100) << threads;
+}
+
+TEST(Replay, OfAForkIsTheLongestBranchWithEnoughThreads) {
+  // One node, then three beside each other: 10 + 40 with a thread for each.
+  const Trace fork = test::one_loop({0, 1, 1, 1}, {{0, 1}, {0, 2}, {0, 3}}, {10, 20, 30, 40});
+  EXPECT_DOUBLE_EQ(makespan(fork, bare(1, 1)), 100);
+  Machine machine = bare(1, 4);
+  EXPECT_DOUBLE_EQ(makespan(fork, machine), 50);
+  machine.unbounded = true;
+  EXPECT_DOUBLE_EQ(makespan(fork, machine), 50);
+}
+
+TEST(Replay, OwnersAreThoseOfTheProgram) {
+  // Four equal nodes without conflicts: two halves, 10 + 20 and 30 + 40. Free threads do better.
+  const Trace apart = test::one_loop({0, 0, 0, 0}, {}, {10, 20, 30, 40});
+  Machine machine = bare(1, 2);
+  EXPECT_DOUBLE_EQ(makespan(apart, machine), 70);
+  machine.schedule = Schedule::list;
+  EXPECT_DOUBLE_EQ(makespan(apart, machine), 60);  // 10 + 30 and 20 + 40
+}
+
+TEST(Replay, EpochsOverlapWhereNothingConflicts) {
+  // Two nodes on two threads for three epochs: no barrier between epochs, so each thread just goes on.
+  const Trace loop = test::one_loop({0, 0}, {}, {10, 30}, 3);
+  EXPECT_DOUBLE_EQ(makespan(loop, bare(1, 2)), 90);
+  // With a conflict they alternate.
+  const Trace tied = test::one_loop({0, 1}, {{0, 1}}, {10, 30}, 3);
+  EXPECT_DOUBLE_EQ(makespan(tied, bare(1, 2)), 120);
+}
+
+TEST(Replay, HidesAMessageBehindTheInnerSweep) {
+  // Two ranks; per epoch 100 (boundary) + 10 (publish) + 50 (inner) + 20 (glue). A message that needs less
+  // than 50 ns is hidden, of one that needs more the rest is seen, in each of the two epochs.
+  const Trace trace = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.latency = 30e-9;
+  const double check = 30;  // one level of the tree of the decision, blocking
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + check);
+  machine.latency = 80e-9;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (180 + 30) + 80);
+}
+
+TEST(Replay, BytesTakeTheirTimeOnTheLink) {
+  const Trace trace = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.bandwidth = 1000 / 70e-9;  // the message of 1000 bytes takes 70 ns
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (180 + 20));
+  machine.contacts = 8;  // sweeps grow with the volume, messages with the faces
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (8 * 150 + 10 + 20));
+}
+
+TEST(Replay, OverheadIsPaidBySenderAndTaker) {
+  const Trace trace = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.overhead = 5e-9;
+  // Publish and glue take 5 ns more; so do both ends of the decision's message.
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (180 + 10) + 10);
+}
+
+TEST(Replay, OfTwoRecordedRanksOnOneAddsThemUp) {
+  const Trace two = test::two_subdomains(2);
+  EXPECT_DOUBLE_EQ(makespan(two, bare(1, 1)), 2 * 2 * 180);
+  EXPECT_DOUBLE_EQ(makespan(two, bare(2, 1)), 2 * 180);
+}
+
+TEST(Replay, WaitsAreRecordedAsWaits) {
+  const Trace trace = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.latency = 80e-9;
+  const Replay played = replay(Timeline(trace), machine, true);
+  const Summary sum = analyse(played.trace);
+  EXPECT_TRUE(sum.predicted);
+  EXPECT_DOUBLE_EQ(played.work, 2 * 2 * 180);
+  EXPECT_NEAR(sum.work, played.work, 1e-3);  // records are single precision
+  EXPECT_NEAR(sum.exposed, 2 * (2 * 30 + 80), 1e-3);
+  EXPECT_EQ(sum.messages, 4u);
+}
+
+TEST(Replay, OfAReplayIsTheSame) {
+  const Trace trace = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.latency = 30e-9;
+  const Replay once = replay(Timeline(trace), machine, true);
+  EXPECT_NO_THROW(validate(once.trace));
+  EXPECT_DOUBLE_EQ(makespan(once.trace, machine), once.makespan);
+}
+
+TEST(Replay, TypicalTimesLeaveInterruptionsOut) {
+  // A node of 10 ns in five epochs, once interrupted for 1000 ns.
+  Trace trace = test::one_loop({0}, {}, {10}, 5);
+  for (Record& record : trace.lanes[0].records) {
+    if (record.begin >= 40) record.begin += 990;
+    if (record.epoch == 3 && record.kind() == test::sweep) record.duration = 1000;
+  }
+  Machine machine = bare(1, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 1040);
+  machine.typical = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 50);
+}
+
+TEST(Replay, NoiseIsTheSameForTheSameSeed) {
+  const Trace trace = test::two_subdomains(1);
+  Machine machine = bare(1, 1);
+  machine.noise = 0.5;
+  const double once = makespan(trace, machine);
+  EXPECT_EQ(makespan(trace, machine), once);
+  EXPECT_GT(once, 720);
+  EXPECT_LT(once, 1.5 * 720);
+  machine.seed = 2;
+  EXPECT_NE(makespan(trace, machine), once);
+}
+
+TEST(Replay, NoMachineBeatsItsBounds) {
+  const Trace trace =
+      test::one_loop({0, 1, 0, 1, 2}, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}}, {13, 7, 29, 3, 17}, 5);
+  Machine chain = bare(1, 1);
+  chain.unbounded = true;
+  const double longest = makespan(trace, chain);
+  const double work = makespan(trace, bare(1, 1));
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list})
+    for (int threads : {1, 2, 3, 5}) {
+      Machine machine = bare(1, threads);
+      machine.schedule = schedule;
+      EXPECT_GE(makespan(trace, machine), longest) << threads;
+      EXPECT_GE(makespan(trace, machine), work / threads) << threads;
+    }
+}
+
+TEST(Replay, RefusesMachinesThatMakeNoSense) {
+  const Trace trace = test::two_subdomains(1);
+  EXPECT_THROW(makespan(trace, bare(3, 1)), std::invalid_argument);  // more ranks than subdomains
+  EXPECT_THROW(makespan(trace, bare(1, 0)), std::invalid_argument);
+  Machine slow = bare(1, 1);
+  slow.bandwidth = 0;
+  EXPECT_THROW(makespan(trace, slow), std::invalid_argument);
+  EXPECT_THROW(rank_map_named("random"), std::invalid_argument);
+}
+
+TEST(Network, MessagesOfOneNodeShareItsLink) {
+  Machine machine;
+  machine.ranks = 4;
+  machine.ranks_per_node = 2;
+  machine.latency = 100e-9;
+  machine.bandwidth = 1e9;  // a byte a ns
+  machine.node_latency = 10e-9;
+  machine.node_bandwidth = 2e9;
+  Network network(machine);
+  EXPECT_DOUBLE_EQ(network.arrival(0, 2, 50, 0), 150);
+  EXPECT_DOUBLE_EQ(network.arrival(1, 3, 50, 0), 200);      // leaves behind the first
+  EXPECT_DOUBLE_EQ(network.arrival(0, 1, 50, 0), 35);       // inside the node
+  EXPECT_DOUBLE_EQ(network.arrival(0, 2, 50, 1000), 1150);  // the link is free again
+}
+
+}  // namespace
+}  // namespace talus::trace

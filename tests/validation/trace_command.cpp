@@ -1,0 +1,132 @@
+/// Traces of the command: what is recorded, shown, played again; and what is refused.
+
+#include <fmt/format.h>
+
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus::test {
+namespace {
+
+class TraceCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("talus_trace_command_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    write(folder_ / "scene.toml", pressed_box);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Outcome talus(const std::string& arguments, const std::string& before = "") const {
+    return run(folder_, arguments, before);
+  }
+  /// A trace of a few steps with four subdomains.
+  std::string recorded(const std::string& out, int threads, const std::string& more = "") const {
+    const Outcome outcome =
+        talus(fmt::format("run scene.toml --out {} --threads {} --steps 5 --trace --set "
+                          "decomposition.subdomains=4 {}",
+                          out, threads, more));
+    EXPECT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.messages;
+    return out + "/trace.h5";
+  }
+  /// The number behind a name in what `talus replay` prints, and whether it is called predicted.
+  static bool predicted(const std::string& output, const std::string& name) {
+    const std::size_t at = output.find(name);
+    EXPECT_NE(at, std::string::npos) << output;
+    return output.substr(at, output.find('\n', at) - at).find("predicted") != std::string::npos;
+  }
+  fs::path folder_;
+};
+
+TEST_F(TraceCommand, RecordsShowsExportsAndReplays) {
+  const std::string trace = recorded("out", 2);
+  const Outcome show = talus("trace show " + trace);
+  ASSERT_EQ(show.code, 0) << show.messages;
+  for (const char* word :
+       {"partitioning", "contact detection", "inloop 1", "inloop 2", "update", "exposed messages",
+        "load imbalance", "critical path", "sweep of subdomain", "efficiency"})
+    EXPECT_NE(show.output.find(word), std::string::npos) << word << " is missing in\n" << show.output;
+  for (const char* format : {"perfetto", "paje", "svg"}) {
+    const Outcome exported =
+        talus(fmt::format("trace export {} --format {} --step 3 -o picture.{}", trace, format, format));
+    EXPECT_EQ(exported.code, 0) << exported.messages;
+    EXPECT_GT(fs::file_size(folder_ / (std::string("picture.") + format)), 1000u);
+  }
+  const Outcome same = talus("replay " + trace);
+  ASSERT_EQ(same.code, 0) << same.messages;
+  EXPECT_FALSE(predicted(same.output, "makespan"));
+  const Outcome other = talus("replay " + trace + " --ranks 4 --threads 1 -o other.h5");
+  ASSERT_EQ(other.code, 0) << other.messages;
+  EXPECT_TRUE(predicted(other.output, "makespan"));
+  EXPECT_TRUE(predicted(other.output, "bound: longest chain"));
+  EXPECT_EQ(talus("trace show other.h5").output.find("recorded:"), std::string::npos);
+}
+
+TEST_F(TraceCommand, RecordingChangesNoBit) {
+  recorded("with", 2);
+  const Outcome without =
+      talus("run scene.toml --out without --threads 2 --steps 5 --set decomposition.subdomains=4");
+  EXPECT_EQ(summary(folder_ / "with")["digest"], summary(folder_ / "without")["digest"]) << without.messages;
+  EXPECT_FALSE(fs::exists(folder_ / "without" / "trace.h5"));
+}
+
+TEST_F(TraceCommand, ARunFollowsARecordedOrderToTheSameBits) {
+  const std::string trace = recorded("out", 3);
+  const Outcome again = talus(
+      "run scene.toml --out again --threads 3 --steps 5 --trace --set decomposition.subdomains=4 "
+      "--replay-order " +
+      trace);
+  ASSERT_TRUE(again.code == 0 || again.code == 3) << again.messages;
+  EXPECT_EQ(summary(folder_ / "again")["digest"], summary(folder_ / "out")["digest"]);
+  const Outcome threads = talus("run scene.toml --out other --threads 2 --replay-order " + trace);
+  EXPECT_EQ(threads.code, 2) << threads.messages;
+  const Outcome scene = talus("run scene.toml --out third --threads 3 --replay-order " + trace);
+  EXPECT_EQ(scene.code, 1) << scene.messages;  // noticed when the loop is planned
+  EXPECT_NE(scene.messages.find("another loop than the recorded one"), std::string::npos) << scene.messages;
+}
+
+TEST_F(TraceCommand, RanksWriteOneFile) {
+  const std::string mpirun =
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe --bind-to none -n 3";
+  const Outcome outcome = talus(
+      "run scene.toml --out ranks --threads 1 --steps 3 --trace --set decomposition.subdomains=4", mpirun);
+  ASSERT_TRUE(outcome.code == 0 || outcome.code == 3) << outcome.messages;
+  EXPECT_FALSE(fs::exists(folder_ / "ranks" / "trace_rank_000001.h5"));
+  const Outcome show = talus("trace show ranks/trace.h5");
+  ASSERT_EQ(show.code, 0) << show.messages;
+  EXPECT_NE(show.output.find("3 ranks x 1 threads, 3 steps"), std::string::npos) << show.output;
+  const Outcome played = talus("replay ranks/trace.h5 --ranks 2 --threads 2");
+  EXPECT_EQ(played.code, 0) << played.messages;
+}
+
+TEST_F(TraceCommand, HoldsTheStepsAskedFor) {
+  const std::string trace = recorded("some", 1, "--trace-steps 2:3");
+  EXPECT_NE(talus("trace show " + trace).output.find("1 threads, 2 steps"), std::string::npos);
+  EXPECT_EQ(talus("run scene.toml --out bad --trace --trace-steps 3:2").code, 2);
+  EXPECT_FALSE(fs::exists(folder_ / "bad"));
+}
+
+TEST_F(TraceCommand, RefusesWhatIsNoTrace) {
+  write(folder_ / "text.h5", "not a trace");
+  for (const char* command : {"trace show", "replay", "trace export --format svg"}) {
+    const Outcome missing = talus(std::string(command) + " nothing.h5");
+    EXPECT_EQ(missing.code, 2) << command;
+    EXPECT_NE(missing.messages.find("nothing.h5"), std::string::npos) << missing.messages;
+    EXPECT_EQ(talus(std::string(command) + " text.h5").code, 2) << command;
+  }
+  const std::string trace = recorded("out", 1);
+  EXPECT_EQ(talus("replay out/results.h5").code, 2);  // HDF5, but no trace
+  fs::resize_file(folder_ / trace, fs::file_size(folder_ / trace) * 2 / 3);
+  EXPECT_EQ(talus("trace show " + trace).code, 2);
+}
+
+TEST_F(TraceCommand, RefusesMachinesThatMakeNoSense) {
+  const std::string trace = recorded("out", 1);
+  const Outcome many = talus("replay " + trace + " --ranks 5");
+  EXPECT_EQ(many.code, 2);
+  EXPECT_NE(many.messages.find("5 ranks for 4 subdomains"), std::string::npos) << many.messages;
+  EXPECT_EQ(talus("replay " + trace + " --map random").code, 2);
+  EXPECT_EQ(talus("replay " + trace + " --bandwidth 0").code, 2);
+}
+
+}  // namespace
+}  // namespace talus::test
