@@ -12,7 +12,7 @@ namespace talus {
 
 struct BodyAdmmSettings {
   double tolerance = 1e-3;          ///< on momentum_defect and contact_defect
-  double balance_tolerance = 2e-3;  ///< on balance_defect; where there are heavy bodies, this is enough
+  double balance_tolerance = 1e-3;  ///< on balance_defect; where there are heavy bodies, this is enough
   int max_iterations = 100;
   double relaxation = 1.6;         ///< in [1, 2)
   double linear_tolerance = 0.05;  ///< of the conjugate gradients, on what is left of the residual
