@@ -9,11 +9,13 @@
 #include "apps/plan.hpp"
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
+#include "apps/study_stability.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
 
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 
 int main(int argc, char** argv) {
   using namespace talus;
@@ -94,6 +96,29 @@ int main(int argc, char** argv) {
   solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file")
       ->type_name("FILE");
 
+  CLI::App* study_app = app.add_subcommand("study", "measure Talus itself");
+  study_app->require_subcommand(1);
+  StabilityOptions stability;
+  CLI::App* stability_app = study_app->add_subcommand(
+      "stability", "stiff and extreme scenes with known answers: true errors against certificates");
+  stability_app->add_option("--only", stability.only, "scenes with this in their name, may be repeated [all]")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  stability_app->add_option("--method", stability.method, "solver.method of every scene")
+      ->type_name("auto|nlgs|nlgs+momentum|nncg")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, SolverMethod>{{"auto", SolverMethod::automatic},
+                                              {"nlgs", SolverMethod::nlgs},
+                                              {"nlgs+momentum", SolverMethod::momentum},
+                                              {"nncg", SolverMethod::nncg}}));
+  stability_app->add_option("--seconds", stability.seconds, "a scene is stopped after so many seconds")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  stability_app->add_option("--out", stability.out, "directory of the files [out/study-stability]")
+      ->type_name("DIR");
+  stability_app->add_flag("--force", stability.force, "replace earlier results in the directory");
+  stability_app->add_flag("--list", stability.list, "print the names of the scenes, run nothing");
+
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
 
@@ -112,6 +137,7 @@ int main(int argc, char** argv) {
   if (*plan_app) return plan_command(plan);
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);
+  if (*stability_app) return stability_command(stability);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
 }
