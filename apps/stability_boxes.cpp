@@ -105,7 +105,7 @@ Problem pressed_cube(double pressure, int subdomains) {
 Problem tripod(double ratio) {
   Problem made = problem(natural_dt, {0, 0, -earth}, 0.5);
   add_wall(made, "floor", Vec3::Zero(), Vec3::UnitZ());
-  const double r = radius, large = ratio * radius, tilt = 0.3;
+  const double r = radius, large = ratio * radius, tilt = 0.15;
   const double arm = (large + r) * std::sin(tilt);
   for (int k = 0; k < 3; ++k) {
     const double angle = 2.0943951023931953 * k;

@@ -105,11 +105,8 @@ bool finite(const StepReport& report, const Frame& frame) {
          all_finite(frame.contact_force);
 }
 
-/// What the true error of a certified step may reach. Rounding is not in the certificate.
-double bound(const Problem& problem, const StepReport& report) {
-  constexpr double rounding = 1e-9;
-  if (problem.allowed > 0) return problem.allowed;
-  return 2 * std::max(report.error_rms, report.balance) + rounding;
+double certificate(const StepReport& report) {
+  return std::max(report.error_rms, report.balance);
 }
 
 void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
@@ -119,7 +116,7 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
   EnergyLedger energy(simulation);
   Frame before = simulation.frame(false);
   bool judged_any = false, stopped = false;
-  double worst = 0;
+  double worst = 0, certified_before = 0;
   while (outcome.steps < problem.steps && !stopped) {
     const StepReport& report = simulation.step();
     const Frame after = simulation.frame();
@@ -136,7 +133,11 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
     std::optional<double> error;
     if (problem.truth && (problem.truth_from_any_state || outcome.missed == 0))
       error = problem.truth({simulation, before, after});
-    const double share = error ? *error / bound(problem, report) : 0;
+    const double bound = problem.allowed > 0 ? problem.allowed
+                                             : 2 * std::max(certificate(report) + certified_before,
+                                                            problem.setup.solver.tolerance);
+    if (!problem.truth_from_any_state) certified_before = certificate(report);
+    const double share = error ? *error / bound : 0;
     const bool judged = error && report.converged;
     if (!(share <= worst) || (judged && !judged_any) || (!judged_any && !judged)) {
       worst = share;
@@ -148,7 +149,7 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
     if (judged && !(share <= 1)) {
       outcome.verdict = Verdict::wrong;
       return say(outcome, fmt::format("step {} is certified at {:.1e} and its error is {:.1e}", outcome.steps,
-                                      std::max(report.error_rms, report.balance), *error));
+                                      certificate(report), *error));
     }
     judged_any = judged_any || judged;
     before = simulation.frame(false);
@@ -166,12 +167,17 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
 
 }  // namespace
 
-Outcome run_scene(const Scene& scene, SolverMethod method, double seconds) {
+Outcome run_scene(const Scene& scene, const RunSettings& settings) {
   Outcome outcome;
   try {
     Problem problem = scene.build();
-    if (method != SolverMethod::automatic) problem.setup.solver.method = method;
-    run_steps(problem, seconds, outcome);
+    SolverSettings& solver = problem.setup.solver;
+    if (settings.method != SolverMethod::automatic) solver.method = settings.method;
+    if (settings.tolerance > 0 && solver.tolerance == SolverSettings{}.tolerance) {
+      solver.tolerance = settings.tolerance;
+      solver.balance_tolerance = 50 * settings.tolerance;
+    }
+    run_steps(problem, settings.seconds, outcome);
   } catch (const std::invalid_argument& error) {
     outcome.verdict = Verdict::refused;
     say(outcome, error.what());
@@ -185,21 +191,21 @@ Outcome run_scene(const Scene& scene, SolverMethod method, double seconds) {
   return outcome;
 }
 
-Outcome run_scene_apart(const Scene& scene, SolverMethod method, double seconds) {
+Outcome run_scene_apart(const Scene& scene, const RunSettings& settings) {
   int ends[2];
   if (pipe(ends) != 0) throw std::runtime_error("no pipe to the process of a scene");
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("no process for a scene");
   if (child == 0) {
     close(ends[0]);
-    const Outcome outcome = run_scene(scene, method, seconds);
+    const Outcome outcome = run_scene(scene, settings);
     const ssize_t written = write(ends[1], &outcome, sizeof outcome);  // below PIPE_BUF: whole or not at all
     _exit(written == static_cast<ssize_t>(sizeof outcome) ? 0 : 1);
   }
   close(ends[1]);
   Outcome outcome;
   pollfd answer{ends[0], POLLIN, 0};
-  const double patience = 2 * seconds + 10;
+  const double patience = 2 * settings.seconds + 10;
   const bool answered = poll(&answer, 1, static_cast<int>(1e3 * patience)) > 0;
   if (!answered) {
     kill(child, SIGKILL);

@@ -9,12 +9,16 @@
 
 namespace talus::stability {
 
+/// The bound of a certified step is twice what its certificate says (the larger of error_rms and balance),
+/// but at least twice the tolerance asked for, below which nothing is claimed. Where the truth holds for a
+/// sample at rest, the certificate of the step before is added: what that left over must be stopped in this
+/// one.
 enum class Verdict {
-  right,      ///< every step certified, and the true error is at most twice what the certificate says
+  right,      ///< every step certified, and the true error is within its bound
   certified,  ///< every step certified, the truth is not known
   honest,     ///< some step missed its tolerance, or time ran out, and it says so
   refused,    ///< an error that names its cause
-  wrong,      ///< a step is certified, and its true error is more than twice what the certificate says
+  wrong,      ///< a step is certified, and its true error is beyond its bound
   failed,     ///< not a number, an unforeseen error, a crash or a hang
 };
 std::string_view name_of(Verdict verdict);
@@ -34,10 +38,17 @@ struct Outcome {
   std::array<char, 400> why{};  ///< for verdicts that need it, one line
 };
 
-/// In this process. `method` replaces the scene's unless it is automatic. Throws nothing.
-Outcome run_scene(const Scene& scene, SolverMethod method, double seconds);
+struct RunSettings {
+  SolverMethod method = SolverMethod::automatic;  ///< replaces the scene's unless automatic
+  double tolerance = 0;                           ///< > 0: of error_rms; on balance 50 times as much
+  double seconds = 30;                            ///< a scene is stopped between two steps after so many
+};
 
-/// In a process of its own, so that a crash or a hang is a row like any other. No thread may be running.
-Outcome run_scene_apart(const Scene& scene, SolverMethod method, double seconds);
+/// In this process. Throws nothing.
+Outcome run_scene(const Scene& scene, const RunSettings& settings);
+
+/// In a process of its own, so that a crash or a hang (twice the seconds, and 10 more) is a row like any
+/// other. No thread may be running. Throws std::runtime_error when the system grants no process.
+Outcome run_scene_apart(const Scene& scene, const RunSettings& settings);
 
 }  // namespace talus::stability

@@ -125,8 +125,6 @@ Problem walls_cross() {
   add_wall(made, "floor", Vec3::Zero(), Vec3::UnitZ());
   add_wall(made, "lid", {0, 0, radius}, -Vec3::UnitZ()).load = {
       .drive = WallDrive::force, .force = 1e3, .mass = 1};
-  add_grain(made, {10 * radius, 0, 0.5 * radius}, 0.4 * radius, sphere_mass(0.4 * radius));
-  made.bodies.x.back()[2] = 0.4 * radius;
   made.steps = 40;
   made.truth = [](const StepView& step) -> std::optional<double> {
     const double lid = -step.simulation.walls()[1].position;
