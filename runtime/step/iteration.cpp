@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "kernels/balance.hpp"
+
 namespace talus {
 
 std::size_t memory_used(const StepState& state) {
@@ -43,7 +45,8 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       settings_(settings),
       decomposition_(decomposition),
       ranks_(ranks),
-      gluing_(state, decomposition, ranks) {}
+      gluing_(state, decomposition, ranks),
+      admm_(state, parameters, decomposition, ranks) {}
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
@@ -79,6 +82,8 @@ void Iteration::begin() {
   sweeps_from_ = segment_ = 0;
   read_at_ = restore_at_ = -1;
   sweeps_ = before_segment_ = 0;
+  history_from_ = 0;
+  sweeps_needed_ = -1;
   result_.iterations = -1;  // the first course begins with sweep 0
   SolverMethod method = settings_.method;
   if (method == SolverMethod::automatic) {
@@ -89,6 +94,7 @@ void Iteration::begin() {
              : far ? SolverMethod::nncg
                    : SolverMethod::momentum;
   }
+  if (method == SolverMethod::admm) method = SolverMethod::nlgs;
   begin_course(method, most_momentum);
   result_.iterations = 0;
 }
@@ -239,12 +245,14 @@ double Iteration::impulse_scale() const {
 double Iteration::drift() const {
   const double scale = impulse_scale();
   if (scale == 0) return 0;
-  std::size_t half = 0;
-  while (half + 1 < history_.size() && 2 * history_[half + 1].iterations <= history_.back().iterations)
-    ++half;
+  // Since ADMM: all that sweeps changed of what it had settled.
+  std::size_t from = history_from_;
+  if (result_.stiff_calls == 0)
+    while (from + 1 < history_.size() && 2 * history_[from + 1].iterations <= history_.back().iterations)
+      ++from;
   double change = 0;
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
-    change = std::max(change, (impulses_.back()[w] - impulses_[half][w]).norm());
+    change = std::max(change, (impulses_.back()[w] - impulses_[from][w]).norm());
   return change / scale;
 }
 
@@ -343,7 +351,10 @@ bool Iteration::measured(int epoch) {
   if (ranks_.ranks() == 1 || sweeps_ >= settings_.max_iterations) {
     add_up(pending_->wait());
     if (!judge()) return false;
-    plan_sweeps(epoch);
+    if (ask_admm())
+      call_admm(epoch);
+    else
+      plan_sweeps(epoch);
     return true;
   }
   plan_sweeps(epoch);
@@ -389,7 +400,7 @@ void Iteration::turn_conjugate() {
 /// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
 void Iteration::choose_course() {
   const std::size_t checks = history_.size();
-  if (checks < 2) return;
+  if (checks < history_from_ + 2) return;
   const double growth = history_[checks - 1].error_rms / history_[checks - 2].error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
@@ -402,6 +413,47 @@ void Iteration::choose_course() {
   } else if (course_.method == SolverMethod::nncg && growth > hopeless_growth) {
     begin_course(SolverMethod::nlgs, 0);
   }
+}
+
+/// About the sweeps of the present course that this step's problem takes. On several ranks nobody sees the
+/// whole problem, and drift is taken at its word.
+double Iteration::sweeps_needed() {
+  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.available() ? admm_.sweeps_needed() : 0;
+  // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
+  const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
+                       : course_.method == SolverMethod::nncg   ? 40
+                                                                : 1;
+  return sweeps_needed_ / speed;
+}
+
+bool Iteration::balanced() {
+  result_.unbalance = result_.drift;
+  if (result_.stiff_calls > 0)
+    result_.unbalance += result_.stiff.balance_defect;
+  else if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
+    result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
+  return result_.unbalance <= settings_.balance_tolerance;
+}
+
+/// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
+/// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
+bool Iteration::ask_admm() {
+  constexpr int chance = 50, calls = 3;
+  if (!admm_.available()) return false;
+  if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
+  if (settings_.method != SolverMethod::automatic && settings_.method != SolverMethod::admm) return false;
+  if (result_.stiff_calls == calls || balanced()) return false;
+  const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
+  return since >= chance << (2 * result_.stiff_calls) && sweeps_needed() >= stiff;
+}
+
+void Iteration::call_admm(int epoch) {
+  result_.stiff = admm_.improve();
+  ++result_.stiff_calls;
+  history_from_ = history_.size();
+  begin_course(course_.method, course_.most);
+  before_segment_ = sweeps_;
+  segment_ = epoch + 1;
 }
 
 /// Judges the sums of the check after result_.iterations sweeps. False: the step ends with them.
@@ -420,11 +472,10 @@ bool Iteration::judge() {
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
-  result_.converged =
-      judged && result_.error_rms <= settings_.tolerance && result_.drift <= settings_.balance_tolerance;
+  result_.converged = judged && result_.error_rms <= settings_.tolerance && balanced();
   // A plain sweep never makes the residual of a step a thousand times worse; an exchange that adds up too
   // much does.
-  if (history_.size() == 1) first_residual2_ = std::max(total.residual2, scale2);
+  if (history_.size() == history_from_ + 1) first_residual2_ = std::max(total.residual2, scale2);
   constexpr double hopeless = 1e3;
   result_.diverged =
       course_.method == SolverMethod::nlgs && total.residual2 > hopeless * hopeless * first_residual2_;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/momentum.hpp"
+#include "runtime/step/admm.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
@@ -15,8 +16,12 @@ namespace talus {
 struct IterationResult {
   int iterations = 0;  ///< sweeps
   double error_rms = 0, error_max = 0;
-  double jump = 0;   ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
-  double drift = 0;  ///< change of the wall impulses over the second half of the iterations, relative
+  double jump = 0;  ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
+  double drift =
+      0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
+  double unbalance = 0;  ///< estimate of the relative error of the forces on walls and heavy bodies
+  AdmmResult stiff;      ///< of the last call of ADMM in this step
+  int stiff_calls = 0;
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;  ///< the error grows without bound
@@ -35,6 +40,8 @@ struct IterationResult {
 /// With several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read
 /// at a gate behind that sweep. If they say that the step was solved, `restore` brings back the impulses that
 /// were certified, so that results are the bits of one rank, where nothing has to be waited for.
+///
+/// Where ADMM is called, the gate's thread does it alone: the next epoch is `accumulate`.
 ///
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
 /// centre, and glue of every subdomain follow. Publish comes after the boundary chunks and before the inner
@@ -107,6 +114,10 @@ class Iteration {
   void turn_conjugate();
   double impulse_scale() const;
   double drift() const;
+  double sweeps_needed();
+  bool balanced();
+  bool ask_admm();
+  void call_admm(int epoch);
 
   StepState& state_;
   const StepParameters& parameters_;
@@ -114,6 +125,7 @@ class Iteration {
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
   Gluing gluing_;
+  Admm admm_;
   std::vector<ErrorSums> sums_;              ///< per chunk
   std::vector<std::vector<Vec3>> impulses_;  ///< per check: impulse of every wall [N s]
   std::vector<Check> history_;
@@ -127,7 +139,9 @@ class Iteration {
   std::vector<double> changes_;              ///< NNCG: per chunk, what the last sweep changed [J]
   double change2_ = 0;                       ///< NNCG: of all, at the sweep before
   double conjugate_beta_ = 0;                ///< NNCG: of the next sweep
-  double first_residual2_ = 0;               ///< at the first check of the step [m^2/s^2]
+  double first_residual2_ = 0;    ///< at the first check of the step, or the first since ADMM [m^2/s^2]
+  std::size_t history_from_ = 0;  ///< that check
+  double sweeps_needed_ = -1;     ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment

@@ -50,9 +50,11 @@ struct DetectionSettings {
 
 /// What makes of sweeps a solver.
 enum class SolverMethod {
-  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse
+  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse;
+              ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
   nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
   momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
+  admm,       ///< one call of ADMM in body space (kernels/admm.hpp), then sweeps as they are
   nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
 };
 
@@ -60,7 +62,7 @@ struct SolverSettings {
   SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
-      5e-2;                   ///< on balance: drift of the wall forces over the second half of the iterations
+      5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/balance.hpp)
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
       10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1

@@ -216,7 +216,7 @@ struct Simulation::Implementation {
     report.iterations = result.iterations;
     report.error_rms = result.error_rms;
     report.error_max = result.error_max;
-    report.balance = std::max(result.drift, defect);
+    report.balance = std::max({result.drift, result.unbalance, defect});
     report.jump = result.jump;
     report.migrants = sums.migrants;
     report.imbalance = 1 + state.decomposition.imbalance;
@@ -391,6 +391,9 @@ const std::vector<Iteration::Check>& Simulation::error_history() const {
 }
 const StepReport& Simulation::report() const {
   return impl_->report;
+}
+const IterationResult& Simulation::iterations() const {
+  return impl_->graph.iteration().result();
 }
 const StepSums& Simulation::sums() const {
   return impl_->graph.sums();

@@ -66,6 +66,8 @@ class Simulation {
   const StepParameters& parameters() const;
   const std::vector<Iteration::Check>& error_history() const;
   const StepReport& report() const;
+  /// How the last step's iterations ended.
+  const IterationResult& iterations() const;
   /// What the last step's tasks summed up: sums over bodies and contacts, times of the parts.
   const StepSums& sums() const;
   const graph::Graph& step_graph() const;

@@ -1,0 +1,122 @@
+#pragma once
+
+/// The contact problem of one step over bodies, each once: what solvers in body space see.
+///
+///   min 1/2 (V - V_free)^T M (V - V_free),   H^T V + b n + mu |v_t| n  in  K_mu*  at every contact
+///
+/// (design.md §4). Unknowns are the grains, 6 numbers each, then the walls of finite mass, 1 each along its
+/// normal. Driven walls are data. Copies of a body in several subdomains are one unknown.
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies.hpp"
+#include "kernels/chunks.hpp"
+#include "kernels/contacts.hpp"
+#include "kernels/motion.hpp"
+
+namespace talus {
+
+/// Velocity u [m/s] and R omega [m/s] of a body; or momentum [N s] and its dual.
+struct Twist {
+  Vec3 u = Vec3::Zero();
+  Vec3 w = Vec3::Zero();
+};
+
+inline double dot(const Twist& a, const Twist& b) {
+  return a.u.dot(b.u) + a.w.dot(b.w);
+}
+
+/// One body. A wall turns never and moves along `axis` only; its part of a Twist is (velocity x axis, 0).
+struct BodyUnknown {
+  double mass = 0;           ///< [kg] > 0
+  double spin_mass = 0;      ///< I/R^2 [kg]; 0: does not turn
+  Vec3 x = Vec3::Zero();     ///< centre [m]
+  double radius = 0;         ///< [m]
+  Vec3 axis = Vec3::Zero();  ///< of a wall: its normal, unit
+  bool wall = false;
+  Twist free;  ///< velocity without contacts
+};
+
+/// One contact: v = u_first - u_second + n x (w_first + w_second) - drive, the second missing at a driven
+/// wall.
+struct ContactEquation {
+  Vec3 normal;  ///< unit, to the first body
+  Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
+  double mu = 0;
+  std::int32_t first = -1;   ///< unknown
+  std::int32_t second = -1;  ///< unknown; -1 at a driven wall
+  std::int32_t place = -1;   ///< in `Contacts`
+};
+
+struct BodyProblem {
+  std::vector<BodyUnknown> bodies;
+  std::vector<ContactEquation> contacts;
+  std::vector<Vec3> impulse;  ///< r on the first body [N s], one per contact
+  std::size_t grains = 0;     ///< unknowns before the first wall
+};
+
+/// A wall as the problem sees it; `inv_mass` [1/kg] is 0 when it is driven.
+struct WallMotion {
+  Vec3 normal;
+  Vec3 free_velocity;  ///< [m/s]
+  double inv_mass = 0;
+};
+
+/// Where the problem stands in the arrays of a step.
+struct BodyProblemSource {
+  std::span<const Vec3> x;             ///< [m]
+  std::span<const double> radius;      ///< [m]
+  std::span<const Velocity> velocity;  ///< masses and spin mobilities; velocities are not read
+  const FreeVelocity& free;
+  std::span<const WallMotion> walls;
+  const Chunks& chunks;
+  const Contacts& contacts;
+  double mu_grains = 0;
+  double mu_walls = 0;
+  Multiplicities multiplicity;    ///< of the slots when copies carry M/m; empty when they carry M
+  std::span<const Slot> unknown;  ///< per slot: its unknown, ascending where first met; empty: the slot
+};
+
+/// Gathers the problem, contacts in order of chunk, with the impulses that `contacts` hold.
+BodyProblem gather_problem(const BodyProblemSource& source);
+
+/// Writes the impulses back.
+void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
+
+/// V = V_free + M^-1 H r, one entry per unknown, summed in order of contact.
+std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse);
+
+/// Unknowns much heavier than what they touch: walls of finite mass, and bodies of more than `ratio` times
+/// the mean mass of their neighbours; ascending.
+std::vector<std::int32_t> heavy_unknowns(const BodyProblem& problem, double ratio = 10);
+
+/// v - offset: the relative velocity at a contact before drives and bias.
+inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
+  const Twist& a = V[static_cast<std::size_t>(c.first)];
+  if (c.second < 0) return a.u + c.normal.cross(a.w);
+  const Twist& b = V[static_cast<std::size_t>(c.second)];
+  return a.u - b.u + c.normal.cross(a.w + b.w);
+}
+
+/// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_axis`.
+inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
+  Twist& a = F[static_cast<std::size_t>(c.first)];
+  const Vec3 turn = c.normal.cross(r);
+  a.u += r;
+  a.w -= turn;
+  if (c.second < 0) return;
+  Twist& b = F[static_cast<std::size_t>(c.second)];
+  b.u -= r;
+  b.w -= turn;
+}
+
+/// Drops what cannot move a body: of walls all but the part along the axis, of bodies that do not turn w.
+inline void restrict_to_freedoms(const BodyUnknown& body, Twist& f) {
+  if (body.wall) f.u = body.axis.dot(f.u) * body.axis;
+  if (body.wall || body.spin_mass == 0) f.w.setZero();
+}
+
+}  // namespace talus

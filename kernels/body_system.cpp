@@ -1,0 +1,157 @@
+#include "kernels/body_system.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+namespace talus {
+
+namespace {
+
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+Eigen::Matrix3d cross_matrix(const Vec3& n) {
+  Eigen::Matrix3d N;
+  N << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
+  return N;
+}
+
+/// rho H_i H_i^T of one contact.
+Eigen::Matrix<double, 6, 6> own_block(const Vec3& m, double rho, bool slick) {
+  Eigen::Matrix<double, 3, 6> transposed;
+  transposed << Eigen::Matrix3d::Identity(), cross_matrix(m);
+  if (slick) transposed = (m * (m.transpose() * transposed)).eval();
+  return rho * transposed.transpose() * transposed;
+}
+
+}  // namespace
+
+/// f += or -= the row's part from the other body.
+template <bool Add>
+inline void BodySystem::couple(const Edge& edge, const Twist& x, Twist& f) {
+  Vec3 v = edge.m.cross(x.w) - x.u;
+  if (edge.slick) v = edge.m.dot(v) * edge.m;
+  v *= Add ? edge.rho : -edge.rho;
+  f.u += v;
+  f.w -= edge.m.cross(v);
+}
+
+BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
+    : problem_(problem),
+      begin_(problem.bodies.size() + 1, 0),
+      middle_(problem.bodies.size(), 0),
+      diagonal_(problem.bodies.size(), Matrix6::Zero()),
+      inverse_(problem.bodies.size()) {
+  const auto& contacts = problem.contacts;
+  for (const ContactEquation& c : contacts) {
+    if (c.second < 0) continue;
+    ++begin_[at(c.first) + 1];
+    ++begin_[at(c.second) + 1];
+  }
+  for (std::size_t b = 0; b < size(); ++b) begin_[b + 1] += begin_[b];
+  edges_.resize(begin_.back());
+  // Lower unknowns first, in order of contact: two passes.
+  std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+  for (const bool lower : {true, false}) {
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      const ContactEquation& c = contacts[k];
+      if (c.second < 0) continue;
+      const std::int32_t slick = c.mu == 0 ? 1 : 0;
+      if ((c.second < c.first) == lower) edges_[next[at(c.first)]++] = {c.normal, rho[k], c.second, slick};
+      if ((c.first < c.second) == lower) edges_[next[at(c.second)]++] = {-c.normal, rho[k], c.first, slick};
+    }
+    if (lower) middle_ = next;
+  }
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const ContactEquation& c = contacts[k];
+    diagonal_[at(c.first)] += own_block(c.normal, rho[k], c.mu == 0);
+    if (c.second >= 0) diagonal_[at(c.second)] += own_block(-c.normal, rho[k], c.mu == 0);
+  }
+  invert_diagonal();
+}
+
+void BodySystem::scale(double factor) {
+  for (Edge& edge : edges_) edge.rho *= factor;
+  for (Matrix6& block : diagonal_) block *= factor;
+  invert_diagonal();
+}
+
+void BodySystem::invert_diagonal() {
+  for (std::size_t b = 0; b < size(); ++b) {
+    const BodyUnknown& body = problem_.bodies[b];
+    Matrix6 inverse = Matrix6::Zero();
+    if (body.wall) {
+      const double stiffness = body.mass + body.axis.dot(diagonal_[b].topLeftCorner<3, 3>() * body.axis);
+      inverse.topLeftCorner<3, 3>() = body.axis * body.axis.transpose() / stiffness;
+    } else if (body.spin_mass == 0) {
+      Eigen::Matrix3d block = diagonal_[b].topLeftCorner<3, 3>();
+      block.diagonal().array() += body.mass;
+      inverse.topLeftCorner<3, 3>() = block.llt().solve(Eigen::Matrix3d::Identity());
+    } else {
+      Matrix6 block = diagonal_[b];
+      block.diagonal().head<3>().array() += body.mass;
+      block.diagonal().tail<3>().array() += body.spin_mass;
+      inverse = block.llt().solve(Matrix6::Identity());
+    }
+    inverse_[b] = 0.5 * (inverse + inverse.transpose());
+  }
+}
+
+namespace {
+
+inline Vector6 vector_of(const Twist& t) {
+  Vector6 v;
+  v << t.u, t.w;
+  return v;
+}
+
+inline Twist times(const Eigen::Matrix<double, 6, 6>& A, const Twist& x) {
+  const Vector6 v = A * vector_of(x);
+  return {v.head<3>(), v.tail<3>()};
+}
+
+}  // namespace
+
+void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
+  for (std::size_t b = 0; b < size(); ++b) {
+    const BodyUnknown& body = problem_.bodies[b];
+    Twist sum = times(diagonal_[b], x[b]);
+    sum.u += body.mass * x[b].u;
+    sum.w += body.spin_mass * x[b].w;
+    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e)
+      couple<true>(edges_[e], x[at(edges_[e].other)], sum);
+    restrict_to_freedoms(body, sum);
+    y[b] = sum;
+  }
+}
+
+void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x, std::span<Twist> rest) const {
+  for (std::size_t b = 0; b < size(); ++b) {
+    Twist sum = f[b];
+    for (std::size_t e = begin_[b]; e < middle_[b]; ++e)
+      couple<false>(edges_[e], x[at(edges_[e].other)], sum);
+    x[b] = times(inverse_[b], sum);
+  }
+  // f - (D + L + U) x = -U x.
+  for (std::size_t b = 0; b < size(); ++b) {
+    Twist sum;
+    for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e)
+      couple<false>(edges_[e], x[at(edges_[e].other)], sum);
+    restrict_to_freedoms(problem_.bodies[b], sum);
+    rest[b] = sum;
+  }
+}
+
+void BodySystem::smooth_backward(std::span<const Twist> f, std::span<Twist> x) const {
+  for (std::size_t b = size(); b-- > 0;) {
+    Twist sum = f[b];
+    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e)
+      couple<false>(edges_[e], x[at(edges_[e].other)], sum);
+    x[b] = times(inverse_[b], sum);
+  }
+}
+
+}  // namespace talus

@@ -1,0 +1,52 @@
+#include "runtime/step/admm.hpp"
+
+#include <unordered_map>
+
+namespace talus {
+
+namespace {
+
+/// Unknown of every slot, counted where a body is first met; empty when each body has one slot.
+std::vector<Slot> number_bodies(const Bodies& bodies, const Decomposition& decomposition) {
+  std::vector<Slot> unknown;
+  if (!decomposition.several()) return unknown;
+  std::unordered_map<std::int64_t, Slot> of_body;
+  of_body.reserve(bodies.size());
+  unknown.reserve(bodies.size());
+  for (const BodyId id : bodies.id)
+    unknown.push_back(
+        of_body.try_emplace(static_cast<std::int64_t>(id), static_cast<Slot>(of_body.size())).first->second);
+  return unknown;
+}
+
+}  // namespace
+
+Admm::Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
+           const graph::Communicator& ranks)
+    : state_(state), parameters_(parameters), decomposition_(decomposition), ranks_(ranks) {}
+
+BodyProblem Admm::gather() const {
+  std::vector<WallMotion> walls;
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    walls.push_back(
+        {state_.walls[w].normal, state_.wall_states[w].free_velocity, state_.walls[w].inv_mass()});
+  const std::vector<Slot> unknown = number_bodies(state_.bodies, state_.decomposition);
+  const bool split = decomposition_.coupling == Coupling::nscdd && state_.decomposition.several();
+  return gather_problem({state_.bodies.x, state_.bodies.radius, state_.bodies.velocity, state_.free, walls,
+                         state_.chunks, state_.contacts, parameters_.law.mu_grains, parameters_.law.mu_walls,
+                         split ? Multiplicities(state_.decomposition.multiplicity) : Multiplicities(),
+                         unknown});
+}
+
+double Admm::sweeps_needed() const {
+  return estimate_stiffness(gather());
+}
+
+AdmmResult Admm::improve() {
+  BodyProblem problem = gather();
+  const AdmmResult result = solve_admm(problem, {});
+  scatter_impulses(problem, state_.contacts);
+  return result;
+}
+
+}  // namespace talus

@@ -1,0 +1,353 @@
+/// Error of forces and velocities against time on stiff scenes: ADMM in body space beside plain sweeps of the
+/// same program.
+///
+///   bench_stiff [SPHERES.csv] [SWEEPS]
+///
+/// Columns have exact forces: the weight above. The heavy plate, 10^6 grain masses on a pile of 16,000
+/// spheres, has to come to rest, and the force on it is its weight. Times are thread CPU seconds of one
+/// thread, and the number of plain scalar sweeps of the same contacts that fit into them (measured in the
+/// same run). SPHERES.csv as for bench_sweep; SWEEPS of plain Gauss-Seidel to compare with, default 10000 on
+/// columns and 1000 on the pile.
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <numeric>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+
+#include "kernels/admm.hpp"
+#include "kernels/sample.hpp"
+#include "kernels/sweep.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/dense_sample.hpp"
+
+namespace {
+
+using namespace talus;
+
+constexpr double gravity = 9.81, mu = 0.35;
+
+double cpu_now() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// One step's problem and plain Gauss-Seidel on it.
+struct Scene {
+  test::Sample sample;
+  FreeVelocity free;
+  std::vector<WallMotion> walls;
+  std::vector<WallCopy> copies;
+  std::vector<std::vector<std::int32_t>> copies_of;  ///< per wall
+  double time_step = 1e-3;
+
+  void prepare(double alert, bool closed) {
+    sample.candidates = test::find_candidates(sample.bodies, sample.walls, alert, true);
+    sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
+    allocate(sample.contacts, sample.candidates, sample.chunks, true);
+    const NarrowPhase in{
+        sample.bodies.x,     sample.bodies.radius, sample.bodies.velocity, sample.walls, time_step, alert, 0,
+        Vec3(0, 0, -gravity)};
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+      narrow_chunk(in, sample.candidates, sample.chunks, c, sample.contacts);
+    if (closed) std::fill(sample.contacts.bias.begin(), sample.contacts.bias.end(), 0.0);
+    free.u.resize(sample.bodies.size());
+    free.w.resize(sample.bodies.size());
+    free_velocities({0, sample.bodies.size()}, sample.bodies.velocity, time_step, Vec3(0, 0, -gravity), free);
+    for (const Wall& wall : sample.walls)
+      walls.push_back(
+          {wall.normal, Vec3(time_step * wall.load.force * wall.inv_mass() * wall.normal), wall.inv_mass()});
+    copies.assign(sample.chunks.size(), {});
+    copies_of.resize(walls.size());
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+      if (const std::int32_t w = sample.chunks.wall[c]; w >= 0 && sample.contacts.count[c] > 0)
+        copies_of[static_cast<std::size_t>(w)].push_back(static_cast<std::int32_t>(c));
+    for (std::size_t w = 0; w < walls.size(); ++w)
+      for (std::int32_t c : copies_of[w])
+        copies[static_cast<std::size_t>(c)].inv_mass =
+            static_cast<double>(copies_of[w].size()) * walls[w].inv_mass;
+  }
+
+  void refresh() {
+    std::vector<Slot> all(sample.bodies.size());
+    std::iota(all.begin(), all.end(), 0);
+    reset_to_free(all, free, sample.bodies.velocity);
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+      const std::int32_t w = sample.chunks.wall[c];
+      if (w < 0) {
+        accumulate_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity);
+      } else {
+        std::copy_n(walls[static_cast<std::size_t>(w)].free_velocity.data(), 3, copies[c].velocity);
+        accumulate_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, copies[c]);
+      }
+    }
+    glue();
+  }
+  void glue() {
+    for (std::size_t w = 0; w < walls.size(); ++w)
+      if (walls[w].inv_mass > 0) glue_copies(copies, copies_of[w]);
+  }
+  void sweep(int count) {
+    for (int k = 0; k < count; ++k) {
+      for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+        if (sample.chunks.wall[c] < 0)
+          sweep_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu);
+        else
+          sweep_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu, copies[c]);
+      glue();
+    }
+  }
+  double residual() const {
+    ErrorSums sums;
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+      const std::int32_t w = sample.chunks.wall[c];
+      sums.add(w < 0 ? error_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu)
+                     : error_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu,
+                                        copies[c], walls[static_cast<std::size_t>(w)].inv_mass));
+    }
+    return std::sqrt(sums.residual2 / std::max(sums.impulse2, sums.velocity2));
+  }
+  BodyProblem problem() const {
+    return gather_problem({sample.bodies.x,
+                           sample.bodies.radius,
+                           sample.bodies.velocity,
+                           free,
+                           walls,
+                           sample.chunks,
+                           sample.contacts,
+                           mu,
+                           mu,
+                           {},
+                           {}});
+  }
+};
+
+/// Radius 1 cm, density 2600, on a floor; the top one `top` times as heavy.
+Scene column_scene(int grains, double top) {
+  Scene scene;
+  const std::vector<double> radii(static_cast<std::size_t>(grains), 0.01);
+  const std::vector<Vec3> x = column(radii, Vec3::Zero());
+  for (std::size_t k = 0; k < x.size(); ++k)
+    add_sphere(scene.sample.bodies, BodyId{static_cast<std::int64_t>(k)}, x[k], radii[k],
+               k + 1 == x.size() ? 2600 * top : 2600);
+  Wall floor;
+  floor.name = "floor";
+  scene.sample.walls = {floor};
+  scene.prepare(1e-3, false);
+  return scene;
+}
+
+/// Largest error of a normal force over the largest exact one.
+double column_error(const Scene& scene) {
+  const test::Sample& s = scene.sample;
+  double error = 0, most = 0;
+  for (std::size_t c = 0; c < s.chunks.size(); ++c)
+    for (std::size_t k = s.range(c).begin; k < s.range(c).end; ++k) {
+      // Bodies stand in the order of height.
+      const auto upper = static_cast<std::size_t>(std::max(s.contacts.first[k], s.contacts.second[k]));
+      double weight = 0;
+      for (std::size_t b = upper; b < s.bodies.size(); ++b) weight += s.bodies.mass(b);
+      const double exact = weight * gravity * scene.time_step;
+      const double sign = s.contacts.second[k] < 0 || s.contacts.first[k] > s.contacts.second[k] ? 1 : -1;
+      error = std::max(error, std::abs(sign * s.contacts.rz[k] - exact));
+      most = std::max(most, exact);
+    }
+  return error / most;
+}
+
+struct Packing {
+  double edge = 0;
+  Bodies bodies;
+};
+
+Packing read_packing(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error("cannot open " + path);
+  Packing packing;
+  std::string line, word;
+  std::getline(file, line);
+  std::istringstream first(line);
+  if (!(first >> word >> word >> packing.edge)) throw std::runtime_error(path + ":1: expected `# L <edge>`");
+  std::getline(file, line);
+  for (int number = 3; std::getline(file, line); ++number) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream values(line);
+    double x, y, z, r;
+    if (!(values >> x >> y >> z >> r))
+      throw std::runtime_error(fmt::format("{}:{}: expected x,y,z,r", path, number));
+    add_sphere(packing.bodies, BodyId{number - 3}, Vec3(x, y, z), r, 1.0);
+  }
+  return packing;
+}
+
+/// The pile in its box; the lid is a plate of `plate` mean grain masses with nothing but its weight on it.
+Scene plate_scene(const Packing& packing, double plate, bool closed) {
+  Scene scene;
+  scene.time_step = 0.005;
+  scene.sample.bodies = packing.bodies;
+  reorder(scene.sample.bodies, morton_order(scene.sample.bodies));
+  scene.sample.walls = test::box_of_walls(0, packing.edge);
+  double mass = 0;
+  for (std::size_t b = 0; b < packing.bodies.size(); ++b) mass += packing.bodies.mass(b);
+  WallLoad& load = scene.sample.walls[5].load;
+  load.drive = WallDrive::force;
+  load.mass = plate * mass / static_cast<double>(packing.bodies.size());
+  load.force = load.mass * gravity;
+  scene.prepare(0.02, closed);
+  return scene;
+}
+
+struct PlateError {
+  double velocity, force;  ///< over free fall, and over the weight
+};
+PlateError plate_error(const Scene& scene) {
+  const WallMotion& plate = scene.walls[5];
+  const double free = plate.free_velocity.norm();
+  if (scene.copies_of[5].empty()) return {1, 1};
+  const WallCopy& copy = scene.copies[static_cast<std::size_t>(scene.copies_of[5].front())];
+  const double now = Eigen::Map<const Vec3>(copy.velocity).norm();
+  double force = 0;
+  for (std::int32_t c : scene.copies_of[5]) {
+    const ContactRange range = scene.sample.range(static_cast<std::size_t>(c));
+    for (std::size_t k = range.begin; k < range.end; ++k) force -= scene.sample.contacts.rz[k];
+  }
+  return {now / free, std::abs(force * plate.inv_mass / free - 1)};
+}
+
+double sweep_time(Scene scene, int sweeps) {
+  scene.refresh();
+  std::vector<double> times;
+  for (int k = 0; k < 5; ++k) {
+    const double start = cpu_now();
+    scene.sweep(sweeps);
+    times.push_back((cpu_now() - start) / sweeps);
+  }
+  std::nth_element(times.begin(), times.begin() + 2, times.end());
+  return times[2];
+}
+
+void row(const std::string& what, double seconds, double sweep, const AdmmResult* result,
+         const std::string& error) {
+  fmt::print("  {:<34}{:>9.3f} s{:>9.0f} sweeps", what, seconds, seconds / sweep);
+  if (result)
+    fmt::print("  {:>4} it {:>5} cg  kappa {:.1e} defects {:.1e} {:.1e} {:.1e}", result->iterations,
+               result->linear_iterations, result->stiffness, result->momentum_defect, result->contact_defect,
+               result->balance_defect);
+  fmt::print("  {}\n", error);
+}
+
+/// Steps of the whole program with the plate on the pile, ADMM by itself where it is needed.
+void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod method) {
+  Setup setup;
+  setup.walls = plate_scene(packing, 1e6, false).sample.walls;
+  const double free = 0.005 * gravity;
+  Stage stage;
+  stage.name = "plate";
+  stage.time_step = 0.005;
+  stage.gravity = Vec3(0, 0, -gravity);
+  stage.law = {mu, mu, 0};
+  stage.end.steps = steps;
+  setup.stages = {stage};
+  setup.detection.alert = 0.02;
+  setup.solver.max_iterations = 2000;
+  setup.solver.method = method;
+  setup.decomposition.subdomains = subdomains;
+  // Neighbours overlap a little, so that nothing is free to fall.
+  Bodies bodies = packing.bodies;
+  for (double& radius : bodies.radius) radius *= 1.008;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, bodies, executor);
+  fmt::print("plate of 1e6 on 16k, whole steps, {} subdomains\n", subdomains);
+  while (!simulation.finished()) {
+    const StepReport& report = simulation.step();
+    const IterationResult& r = simulation.iterations();
+    const WallReport plate = simulation.walls()[5];
+    fmt::print(
+        "  step {:>2}: {:>5} sweeps, map {:.1e}, unbalance {:.1e}, drift {:.1e}, admm {} x ({} it, {} cg, "
+        "heavy "
+        "{:.1e}), {:.2f} s{}  velocity {:.2e} of g h, force {:.4f} of the weight\n",
+        report.step, report.iterations, r.error_rms, r.unbalance, r.drift, r.stiff_calls, r.stiff.iterations,
+        r.stiff.linear_iterations, r.stiff.balance_defect, report.wall_s, report.converged ? "" : " MISSED",
+        plate.velocity / free, plate.force.norm() / setup.walls[5].load.force);
+    simulation.begin_next_stage();
+  }
+}
+
+void compare(const std::string& name, const Scene& scene, int sweeps, std::span<const AdmmSettings> settings,
+             const std::function<std::string(const Scene&)>& error) {
+  const BodyProblem cold = scene.problem();
+  const double sweep = sweep_time(scene, std::max(1, sweeps / 100));
+  fmt::print("{}: {} bodies, {} contacts, sweep {:.1f} us, estimated kappa {:.2g}\n", name,
+             cold.bodies.size(), cold.contacts.size(), 1e6 * sweep, estimate_stiffness(cold));
+  {
+    Scene plain = scene;
+    plain.refresh();
+    const double start = cpu_now();
+    plain.sweep(sweeps);
+    const double seconds = cpu_now() - start;
+    plain.refresh();
+    row(fmt::format("nlgs, {} sweeps", sweeps), seconds, sweep, nullptr,
+        fmt::format("{} map {:.1e}", error(plain), plain.residual()));
+  }
+  for (const AdmmSettings& s : settings) {
+    Scene stiff = scene;
+    const double start = cpu_now();
+    BodyProblem problem = stiff.problem();
+    const AdmmResult result = solve_admm(problem, s);
+    scatter_impulses(problem, stiff.sample.contacts);
+    stiff.refresh();
+    stiff.sweep(10);
+    const double seconds = cpu_now() - start;
+    stiff.refresh();
+    row(fmt::format("admm to {:.0e}, heavy {:.0e}", s.tolerance, s.balance_tolerance), seconds, sweep,
+        &result, fmt::format("{} map {:.1e}", error(stiff), stiff.residual()));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int sweeps = argc > 2 ? std::atoi(argv[2]) : 0;
+  const auto force = [](const Scene& s) { return fmt::format("force error {:.1e}", column_error(s)); };
+  std::vector<AdmmSettings> chains;
+  for (double tolerance : {1e-2, 1e-5}) {
+    AdmmSettings s;
+    s.tolerance = tolerance;
+    s.balance_tolerance = 0;
+    chains.push_back(s);
+  }
+  for (const auto& [grains, top] : {std::pair{100, 1.0}, {1000, 1.0}, {100, 1e6}, {1000, 1e6}}) {
+    const Scene scene = column_scene(grains, top);
+    compare(fmt::format("column of {}, top {:g}", grains, top), scene, sweeps > 0 ? sweeps : 10000, chains,
+            force);
+  }
+  if (argc < 2) return 0;
+  const Packing packing = read_packing(argv[1]);
+  for (int subdomains : {1, 12, 96}) run_plate(packing, subdomains, 4, SolverMethod::automatic);
+  for (bool closed : {true, false}) {
+    const Scene scene = plate_scene(packing, 1e6, closed);
+    std::vector<AdmmSettings> packings;
+    for (double heavy : {2e-2, 1e-2, 5e-3}) {
+      AdmmSettings s;
+      s.balance_tolerance = heavy;
+      packings.push_back(s);
+    }
+    compare(closed ? "plate of 1e6 on 16k, touching" : "plate of 1e6 on 16k", scene,
+            sweeps > 0 ? sweeps : 1000, packings, [](const Scene& s) {
+              const PlateError e = plate_error(s);
+              double v2 = 0;
+              for (const Velocity& v : s.sample.bodies.velocity)
+                v2 += v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2];
+              return fmt::format("velocity {:.2e} force {:.2e} rms {:.1e}", e.velocity, e.force,
+                                 std::sqrt(v2 / 16000) / 0.005 / 9.81);
+            });
+  }
+}
