@@ -104,14 +104,20 @@ int main(int argc, char** argv) {
   stability_app->add_option("--only", stability.only, "scenes with this in their name, may be repeated [all]")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  stability_app->add_option("--method", stability.method, "solver.method of every scene")
+  stability_app->add_option("--method", stability.settings.method, "solver.method of every scene")
       ->type_name("auto|nlgs|nlgs+momentum|nncg")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, SolverMethod>{{"auto", SolverMethod::automatic},
                                               {"nlgs", SolverMethod::nlgs},
                                               {"nlgs+momentum", SolverMethod::momentum},
                                               {"nncg", SolverMethod::nncg}}));
-  stability_app->add_option("--seconds", stability.seconds, "a scene is stopped after so many seconds")
+  stability_app
+      ->add_option("--tolerance", stability.settings.tolerance,
+                   "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
+      ->type_name("T")
+      ->check(CLI::PositiveNumber);
+  stability_app
+      ->add_option("--seconds", stability.settings.seconds, "a scene is stopped after so many seconds")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   stability_app->add_option("--out", stability.out, "directory of the files [out/study-stability]")

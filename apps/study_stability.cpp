@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "apps/exit_codes.hpp"
-#include "apps/stability_run.hpp"
+
 #include "io/output_directory.hpp"
 
 namespace talus {
@@ -181,7 +181,7 @@ int stability_command(const StabilityOptions& options) {
     fmt::print("{}", table_head());
     for (const Scene& scene : scenes) {
       std::fflush(nullptr);  // the process of the scene must not print again what waits here
-      rows.push_back({scene, run_scene_apart(scene, options.method, options.seconds)});
+      rows.push_back({scene, run_scene_apart(scene, options.settings)});
       fmt::print("{}", table_line(rows.back()));
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

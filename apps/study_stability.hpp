@@ -3,19 +3,17 @@
 #include <string>
 #include <vector>
 
-#include "runtime/step/setup.hpp"
+#include "apps/stability_run.hpp"
 
 namespace talus {
 
 /// `talus study stability`: many small scenes that are hard for a reason, each in a process of its own.
 struct StabilityOptions {
   std::vector<std::string> only;  ///< parts of names; empty: all scenes
-  SolverMethod method = SolverMethod::automatic;
-  double seconds = 30;  ///< a scene is stopped between two steps after so many, and ended by force after
-                        ///< twice as many and 10 more: then it hangs
-  std::string out;      ///< directory of stability.csv and stability.html; empty: out/study-stability
-  bool force = false;   ///< replace earlier results in it
-  bool list = false;    ///< print the names and what each asks, run nothing
+  stability::RunSettings settings;
+  std::string out;     ///< directory of stability.csv and stability.html; empty: out/study-stability
+  bool force = false;  ///< replace earlier results in it
+  bool list = false;   ///< print the names and what each asks, run nothing
 };
 
 /// Prints a row per scene as it ends, then writes both files. Returns the exit code: 0 when nothing is wrong
