@@ -20,7 +20,9 @@ struct Contacts {
   std::vector<double> rn;           ///< normal impulse [N s]; empty with friction
   std::vector<Slot> first, second;  ///< second is -1 at a wall
   std::vector<std::int32_t> candidate;
-  std::vector<std::int32_t> count;  ///< per chunk
+  std::vector<std::int32_t> count;   ///< per chunk
+  std::vector<std::int32_t> passed;  ///< per chunk: pairs that went through one another on their way to x, or
+                                     ///< in by more than half the smaller radius: the time step is too long
 };
 
 /// Room for the contacts of `chunks`; `friction` decides which impulses exist.

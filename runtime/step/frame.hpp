@@ -23,7 +23,9 @@ struct StepReport {
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale
   double balance = 0;  ///< drift of the wall forces, or momentum defect of the sample, whichever is larger
   double jump = 0;     ///< interface jump (several subdomains)
-  double penetration_mean = 0, penetration_max = 0;      ///< over smallest radius, at the end of the step
+  double penetration_mean = 0, penetration_max = 0;  ///< over smallest radius, at the end of the step
+  std::int64_t passed = 0;  ///< pairs that went through one another, or deep into one another, within the
+                            ///< step: it is too long for them, and not converged
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
   double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   std::int64_t migrants = 0;
