@@ -111,7 +111,6 @@ Problem bullet(bool at_wall, double distance) {
   else
     push(add_grain(made, {0, 0, -radius - distance}, radius, sphere_mass(radius)), {0, 0, speed});
   made.steps = 4;
-  made.truth_from_any_state = true;
   made.truth = [speed](const StepView& step) -> std::optional<double> {
     return std::max(0.0, radius - step.after.x[0][2]) / (step.time_step() * speed);
   };

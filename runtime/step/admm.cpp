@@ -1,5 +1,6 @@
 #include "runtime/step/admm.hpp"
 
+#include <cmath>
 #include <unordered_map>
 
 namespace talus {
@@ -52,6 +53,7 @@ AdmmResult Admm::improve() {
     scatter_impulses(problem, state_.contacts);
   else
     result.balance_defect = 1;
+  if (!std::isfinite(result.balance_defect)) result.balance_defect = 1;  // too few iterations to know it
   return result;
 }
 

@@ -251,10 +251,12 @@ double Iteration::drift() const {
       ++from;
     return from;
   };
+  // Largest distance on the way: what swings may just pass where it came from.
   const auto change = [&](std::size_t from, std::size_t to) {
     double largest = 0;
-    for (std::size_t w = 0; w < state_.walls.size(); ++w)
-      largest = std::max(largest, (impulses_[to][w] - impulses_[from][w]).norm());
+    for (std::size_t k = from; k < to; ++k)
+      for (std::size_t w = 0; w < state_.walls.size(); ++w)
+        largest = std::max(largest, (impulses_[to][w] - impulses_[k][w]).norm());
     return largest / scale;
   };
   const std::size_t last = history_.size() - 1;
