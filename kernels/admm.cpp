@@ -34,6 +34,11 @@ Vec3 project(const Vec3& z, const Vec3& n, double mu) {
   return r_n * n + (mu * r_n / length) * t;
 }
 
+/// What counts of a vector at a contact: without friction its normal part.
+Vec3 constrained(const ContactEquation& c, const Vec3& v) {
+  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
+}
+
 double dot(std::span<const Twist> a, std::span<const Twist> b) {
   double sum = 0;
   for (std::size_t k = 0; k < a.size(); ++k) sum += talus::dot(a[k], b[k]);
@@ -159,7 +164,7 @@ double estimate_stiffness(const BodyProblem& problem) {
     std::size_t heaviest = 0;
     for (std::size_t b = 1; b < count; ++b)
       if (problem.bodies[b].mass > problem.bodies[heaviest].mass) heaviest = b;
-    reach(heaviest, 0);
+    reach(heaviest, 0);  // what the others come to rest on
   }
   for (std::size_t head = 0; head < queue.size(); ++head) {
     const std::size_t b = at(queue[head]);
@@ -169,7 +174,7 @@ double estimate_stiffness(const BodyProblem& problem) {
   std::vector<double> load(count, 0), parts(count, 0);
   double total = 0;
   for (std::size_t b = 0; b < count; ++b)
-    if (depth[b] >= 0) total += load[b] = problem.bodies[b].mass;
+    if (depth[b] >= 1) total += load[b] = problem.bodies[b].mass;
   const auto below = [&](std::int32_t from, std::int32_t to) {
     return to < 0 ? depth[at(from)] == 1 : depth[at(to)] == depth[at(from)] - 1;
   };
@@ -255,7 +260,7 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
   for (std::size_t k = 0; k < contacts; ++k) {
     const ContactEquation& c = problem.contacts[k];
     r[k] = project(r[k], c.normal, c.mu);
-    const Vec3 v = relative_velocity(c, V) + c.offset;
+    const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
     shift[k] = c.mu * split(k, v).norm();
     y[k] = v + shift[k] * c.normal + project(-v, c.normal, c.mu);
   }
@@ -263,7 +268,7 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
     for (std::size_t b = 0; b < bodies; ++b) force[b] = Twist{};
     for (std::size_t k = 0; k < contacts; ++k) {
       const ContactEquation& c = problem.contacts[k];
-      add_force(c, r[k] + rho[k] * (y[k] - shift[k] * c.normal - c.offset), force);
+      add_force(c, constrained(c, r[k] + rho[k] * (y[k] - shift[k] * c.normal - c.offset)), force);
     }
     for (std::size_t b = 0; b < bodies; ++b) {
       restrict_to_freedoms(problem.bodies[b], force[b]);
@@ -276,7 +281,7 @@ AdmmResult solve_admm(BodyProblem& problem, const AdmmSettings& settings) {
     double gap2 = 0, weight = 0;
     for (std::size_t k = 0; k < contacts; ++k) {
       const ContactEquation& c = problem.contacts[k];
-      const Vec3 v = relative_velocity(c, V) + c.offset + shift[k] * c.normal;
+      const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset) + shift[k] * c.normal;
       const Vec3 x = settings.relaxation * v + (1 - settings.relaxation) * y[k];
       const Vec3 r_new = project(r[k] - rho[k] * x, c.normal, c.mu);
       y[k] = x + (r_new - r[k]) / rho[k];

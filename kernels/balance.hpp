@@ -10,7 +10,7 @@
 namespace talus {
 
 /// Problems of fewer sweeps are none that sweeps cannot see through.
-constexpr double stiff = 300;
+constexpr double stiff = 1000;
 
 /// What is left of a change when it goes on as it went: the larger of `change`, over the second half of the
 /// sweeps, and its extrapolation from the change `before`, over the second quarter. An error that decays as

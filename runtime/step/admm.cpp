@@ -1,5 +1,6 @@
 #include "runtime/step/admm.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <unordered_map>
 
@@ -43,9 +44,12 @@ double Admm::sweeps_needed() const {
   return estimate_stiffness(gather());
 }
 
-AdmmResult Admm::improve() {
+AdmmResult Admm::improve(double tolerance, int calls) {
   BodyProblem problem = gather();
-  AdmmResult result = solve_admm(problem, {});
+  AdmmSettings settings;
+  settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
+  settings.balance_tolerance = std::ldexp(std::min(settings.balance_tolerance, 0.1 * tolerance), -2 * calls);
+  AdmmResult result = solve_admm(problem, settings);
   // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped,
   // and the step is not balanced by it. The comparison is false for NaN.
   constexpr double sound = 1;

@@ -458,8 +458,7 @@ bool Iteration::ask_admm() {
 }
 
 void Iteration::call_admm(int epoch) {
-  result_.stiff = admm_.improve();
-  ++result_.stiff_calls;
+  result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
   begin_course(course_.method, course_.most);
   before_segment_ = sweeps_;
@@ -482,7 +481,12 @@ bool Iteration::judge() {
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = result_.iterations > 0 || total.residual2 == 0;
-  result_.converged = judged && result_.error_rms <= settings_.tolerance && balanced();
+  const bool small = judged && result_.error_rms <= settings_.tolerance;
+  const bool last = result_.iterations >= settings_.max_iterations;
+  result_.unbalance = result_.drift;
+  // Looking at the whole problem costs as much as a few sweeps: where it is needed only.
+  const bool balance = (small || last) && balanced();
+  result_.converged = small && balance;
   // A plain sweep never makes the residual of a step a thousand times worse; an exchange that adds up too
   // much does.
   if (history_.size() == history_from_ + 1) first_residual2_ = std::max(total.residual2, scale2);
@@ -491,8 +495,7 @@ bool Iteration::judge() {
       course_.method == SolverMethod::nlgs && total.residual2 > hopeless * hopeless * first_residual2_;
   if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
-  if (result_.converged || std::isnan(result_.error_rms) || result_.iterations >= settings_.max_iterations)
-    return false;
+  if (result_.converged || std::isnan(result_.error_rms) || last) return false;
   choose_course();
   return true;
 }
