@@ -105,12 +105,13 @@ int main(int argc, char** argv) {
       ->type_name("NAME")
       ->allow_extra_args(false);
   stability_app->add_option("--method", stability.settings.method, "solver.method of every scene")
-      ->type_name("auto|nlgs|nlgs+momentum|nncg")
+      ->type_name("auto|nlgs|nlgs+momentum|nncg|admm")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, SolverMethod>{{"auto", SolverMethod::automatic},
                                               {"nlgs", SolverMethod::nlgs},
                                               {"nlgs+momentum", SolverMethod::momentum},
-                                              {"nncg", SolverMethod::nncg}}));
+                                              {"nncg", SolverMethod::nncg},
+                                              {"admm", SolverMethod::admm}}));
   stability_app
       ->add_option("--tolerance", stability.settings.tolerance,
                    "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")

@@ -30,7 +30,7 @@ inline double left_over(double change, double before) {
 /// of it only, and a plate that sweeps leave falling looks still: 10^6 grain masses on a pile, k = 8e4; after
 /// 1000 sweeps the force is 0.7 % of the weight, its change 0.5, and the estimate 80.
 inline double unbalance(double change, int sweeps, double sweeps_needed) {
-  if (sweeps_needed < stiff || sweeps == 0) return change;
+  if (sweeps == 0 || sweeps >= sweeps_needed) return change;
   return change * std::max(1.0, 2 * sweeps_needed / sweeps);
 }
 

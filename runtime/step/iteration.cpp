@@ -263,7 +263,11 @@ double Iteration::drift() const {
   // Since ADMM: all that sweeps changed of what it had settled.
   if (result_.stiff_calls > 0) return change(history_from_, last);
   const std::size_t half = last_check_in(2), quarter = last_check_in(4);
-  return half > quarter ? left_over(change(half, last), change(quarter, half)) : change(half, last);
+  if (half == quarter) return change(half, last);
+  // The checks do not stand at halves and quarters.
+  const double second_quarter = 0.25 * history_[last].iterations;
+  const int between = history_[half].iterations - history_[quarter].iterations;
+  return left_over(change(half, last), change(quarter, half) * second_quarter / between);
 }
 
 namespace {
