@@ -221,6 +221,7 @@ void measure(const BodyProblem& problem, std::span<const Twist> V, std::span<con
     const double own = gained[at(b)].u.norm();
     if (own > 0) result.balance_defect = std::max(result.balance_defect, defect[at(b)].u.norm() / own);
   }
+  if (!heavy.empty()) return;
   Vec3 sample = Vec3::Zero();
   double scale = 0;
   for (std::size_t b = 0; b < gained.size(); ++b) {

@@ -12,7 +12,7 @@ namespace talus {
 
 struct AdmmSettings {
   double tolerance = 1e-3;          ///< on momentum_defect and contact_defect
-  double balance_tolerance = 5e-3;  ///< on balance_defect; where there are heavy bodies, this is enough
+  double balance_tolerance = 2e-3;  ///< on balance_defect; where there are heavy bodies, this is enough
   int max_iterations = 100;
   double relaxation = 1.6;         ///< in [1, 2)
   double linear_tolerance = 0.05;  ///< of the conjugate gradients, on what is left of the residual
@@ -26,8 +26,8 @@ struct AdmmResult {
   int linear_iterations = 0;   ///< conjugate gradients, all
   double momentum_defect = 0;  ///< |V - V_free - M^-1 H r| / |V - V_free|, kinetic norms
   double contact_defect = 0;   ///< contact velocities against the law, over the rms change of velocity
-  /// Force carried against force due: the same as momentum_defect for the worst of the heavy bodies and for
-  /// the momentum of the whole sample; the worst of the last 8 iterations.
+  /// Force carried against force due: the same as momentum_defect for the worst of the heavy bodies; where
+  /// there are none, for the momentum of the whole sample. The worst of the last 8 iterations.
   double balance_defect = 0;
   double stiffness = 0;  ///< kappa: rho over the effective mass of a contact
   bool converged = false;

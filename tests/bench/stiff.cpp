@@ -336,7 +336,7 @@ int main(int argc, char** argv) {
   for (bool closed : {true, false}) {
     const Scene scene = plate_scene(packing, 1e6, closed);
     std::vector<AdmmSettings> packings;
-    for (double heavy : {2e-2, 1e-2, 5e-3}) {
+    for (double heavy : {5e-3, 2e-3, 1e-3}) {
       AdmmSettings s;
       s.balance_tolerance = heavy;
       packings.push_back(s);
