@@ -176,7 +176,8 @@ Outcome run_scene(const Scene& scene, const RunSettings& settings) {
     Problem problem = scene.build();
     SolverSettings& solver = problem.setup.solver;
     if (settings.method != SolverMethod::automatic) solver.method = settings.method;
-    if (settings.tolerance > 0 && solver.tolerance == SolverSettings{}.tolerance) {
+    // A truth that was computed with the scene's own settings holds for those.
+    if (settings.tolerance > 0 && problem.allowed == 0 && solver.tolerance == SolverSettings{}.tolerance) {
       solver.tolerance = settings.tolerance;
       solver.balance_tolerance = 50 * settings.tolerance;
     }

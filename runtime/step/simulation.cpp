@@ -220,6 +220,10 @@ struct Simulation::Implementation {
       from_walls += wall.impulse;
       impulse_unit = std::max(impulse_unit, wall.impulse.norm());
     }
+    // What contacts pass on by rounding alone has no direction to be judged by.
+    constexpr double rounding = 1e-12;
+    impulse_unit =
+        std::max(impulse_unit, rounding * std::sqrt(2 * size.total_mass * sums.motion.energy_free));
     const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
     ++stage_steps;
     ++report.step;

@@ -107,7 +107,8 @@ TEST(StabilityScenes, PressureOverTwelveDecadesIsCarried) {
 }
 
 TEST(StabilityScenes, HeavyPlatesOnColumnsAreCarriedOrNotCertified) {
-  expect_all("plate-columns", {Verdict::right, Verdict::honest});
+  for (const char* part : {"plate-columns-1e+02", "plate-columns-1e+04", "plate-columns-1e+06"})
+    expect_all(part, {Verdict::right, Verdict::honest});
 }
 
 TEST(StabilityScenes, WedgesArchesAndCornersCarryTheirForces) {
