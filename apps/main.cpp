@@ -49,6 +49,13 @@ int main(int argc, char** argv) {
   run_app->add_option("--set", run.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
+  run_app
+      ->add_option(
+          "--dump-fclib", run.dump_fclib,
+          "write the contact problem of this step to fclib_STEP.hdf5 in the results, may be repeated")
+      ->type_name("STEP")
+      ->allow_extra_args(false)
+      ->check(CLI::PositiveNumber);
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;
@@ -85,15 +92,36 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
 
   SolveOptions solve;
-  CLI::App* solve_app = app.add_subcommand("solve", "solve a contact problem of an FCLIB file");
-  solve_app->add_option("file", solve.path, "HDF5 file with /fclib_local")->type_name("FILE")->required();
-  solve_app->add_option("--tol", solve.tol, "tolerance on the error of fc3d_compute_error")
+  CLI::App* solve_app =
+      app.add_subcommand("solve", "solve contact problems of FCLIB files: a line, or a table for a folder");
+  solve_app
+      ->add_option("file", solve.path, "HDF5 file with /fclib_local or /fclib_global, or a folder of them")
+      ->type_name("FILE|DIR")
+      ->required();
+  solve_app
+      ->add_option("--method", solve.method, "nlgs, nlgs+momentum, nncg, admm, newton, auto, or all of them")
+      ->type_name("NAME")
+      ->capture_default_str();
+  solve_app->add_option("--tol", solve.tol, "tolerance on the error")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  solve_app->add_option("--max-seconds", solve.max_seconds, "give up after so many seconds")
+  solve_app
+      ->add_option(
+          "--measure", solve.measure,
+          "error that --tol is asked of: siconos (fc3d_compute_error), scaled (free of units), or the "
+          "larger of the two")
+      ->type_name("NAME")
+      ->capture_default_str();
+  solve_app->add_option("--max-seconds", solve.max_seconds, "give a solve up after so many seconds")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  solve_app->add_option("--out", solve.out, "write /solution/{r,u} into a copy of the file")
+  solve_app->add_option("--repeat", solve.repeat, "solve each problem so often and tell the median time")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  solve_app->add_option("--out", solve.out, "write /solution into a copy of the file")->type_name("FILE");
+  solve_app->add_option("--csv", solve.csv, "write the table to a file")->type_name("FILE");
+  solve_app->add_option("--profile", solve.profile, "write the performance profile of the methods to a file")
       ->type_name("FILE");
 
   CLI::App* study_app = app.add_subcommand("study", "measure Talus itself");

@@ -149,8 +149,9 @@ int partition_command(const PartitionCommandOptions& options) {
   try {
     kinds = kinds_of(options.partitioners);
     scene = io::load_scene(options.scene, options.overrides);
-    bodies = build_sample(scene);
-    io::place_walls(scene, bodies);
+    const Sample sample = build_sample(scene);
+    io::place_walls(scene, sample);
+    append(sample, bodies);
     if (directory.empty()) directory = "out/partition-" + scene.name;
     io::prepare_output_directory(directory, options.force, io::is_partition_name);
   } catch (const std::exception& error) {

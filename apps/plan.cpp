@@ -85,8 +85,12 @@ void print_costs(const Simulation& simulation) {
 int plan_command(const PlanOptions& options) {
   try {
     io::Scene scene = io::load_scene(options.scene, options.overrides);
-    Bodies bodies = build_sample(scene);
-    io::place_walls(scene, bodies);
+    Bodies bodies;
+    {
+      const Sample sample = build_sample(scene);
+      io::place_walls(scene, sample);
+      append(sample, bodies);
+    }
     scene.setup.solver.max_iterations = 1;  // the contacts are wanted, not their impulses
     const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
     graph::Executor executor({.threads = threads});

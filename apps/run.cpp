@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <memory>
+#include <functional>
 
+#include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/sample_builder.hpp"
 #include "io/error.hpp"
@@ -17,6 +19,7 @@
 #include "io/recorder.hpp"
 #include "io/run_json.hpp"
 #include "io/scene.hpp"
+#include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -63,22 +66,36 @@ class FrameClock {
 };
 
 /// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go
-/// in batches, since a row is less work than handing it over.
+/// in batches, since a row is less work than handing it over. Frames of several ranks are written by all of
+/// them together, between two steps: messages of a background lane would need an order among those of the
+/// steps.
 class RecorderFeed {
  public:
-  RecorderFeed(graph::Executor& executor, io::Recorder& recorder)
-      : executor_(executor), recorder_(recorder) {}
+  RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks)
+      : executor_(executor), recorder_(recorder), ranks_(ranks) {}
 
   void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+    if (ranks_.rank() != 0) return;
     rows_.push_back({simulation.report(), simulation.walls(), triaxial});
     if (rows_.size() >= 64 || since_.seconds() > 0.5) flush();
   }
 
   void frame(Frame&& frame) {
     flush();
+    if (ranks_.ranks() > 1) {
+      executor_.drain();
+      recorder_.record_frame(std::move(frame));
+      return;
+    }
     executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
       recorder_.record_frame(std::move(moved));
     });
+  }
+
+  /// Anything that writes files: one thread at a time may be inside HDF5.
+  void later(const char* name, std::function<void()> work) {
+    flush();
+    executor_.submit_background(name, std::move(work));
   }
 
   void flush() {
@@ -98,6 +115,7 @@ class RecorderFeed {
   };
   graph::Executor& executor_;
   io::Recorder& recorder_;
+  const graph::Communicator& ranks_;
   std::vector<Row> rows_;
   Stopwatch since_;
 };
@@ -126,14 +144,13 @@ std::string counted(std::size_t count, const char* what) {
   return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
-std::string contents(const io::Scene& scene, const Bodies& bodies) {
-  return fmt::format("{}, {}, {}", counted(bodies.size(), "grain"), counted(scene.setup.walls.size(), "wall"),
+std::string contents(const io::Scene& scene, std::size_t grains) {
+  return fmt::format("{}, {}, {}", counted(grains, "grain"), counted(scene.setup.walls.size(), "wall"),
                      counted(scene.setup.stages.size(), "stage"));
 }
 
-void print_start(const io::Scene& scene, const Bodies& bodies, int threads,
-                 const graph::Communicator& ranks) {
-  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, bodies));
+void print_start(const io::Scene& scene, std::size_t grains, int threads, const graph::Communicator& ranks) {
+  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, grains));
   const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
   const int cores = omp_get_num_procs();
   fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n",
@@ -158,22 +175,22 @@ int signal_of(const graph::Communicator& ranks) {
   return static_cast<int>(signal[0]);
 }
 
-/// Runs the steps; returns the signal that stopped them, or 0. `feed` and `progress` on rank 0 only.
+/// Runs the steps; returns the signal that stopped them, or 0.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
-            RecorderFeed* feed, Tally& tally, const graph::Communicator& ranks) {
+            const std::string& directory, RecorderFeed& feed, Tally& tally,
+            const graph::Communicator& ranks) {
   std::optional<io::Progress> progress;
-  if (feed) progress.emplace(io::progress_on_stderr());
+  if (ranks.rank() == 0) progress.emplace(io::progress_on_stderr());
   FrameClock clock(output);
-  const auto write_frame = [&] {
-    Frame frame = simulation.frame(output.contacts);
-    if (feed) feed->frame(std::move(frame));
-  };
+  const auto write_frame = [&] { feed.frame(simulation.frame(output.contacts)); };
   if (output.stage_frames) write_frame();
   while (!simulation.finished()) {
     const StepReport& report = simulation.step();
     tally.add(simulation);
     const std::optional<TriaxialReport> triaxial = simulation.triaxial();
-    if (feed) feed->row(simulation, triaxial);
+    feed.row(simulation, triaxial);
+    if (std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
+      feed.later("dump of a contact problem", fclib_dump(simulation, directory));
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
@@ -190,11 +207,11 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
 }
 
 /// Takes the run to its end, or to what breaks it off; the summary says which.
-io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies bodies, int threads,
-                     io::Recorder* recorder, const graph::Communicator& ranks) {
+io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
+                     const std::string& directory, io::Recorder& recorder, const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
-  summary.bodies = bodies.size();
+  summary.bodies = sample.size();
   summary.status = "done";
   Tally tally;
   const auto failed = [&summary](const std::exception& error) {
@@ -203,11 +220,11 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     summary.exit_code = exit_failure;
   };
   graph::Executor executor({.threads = threads});
-  Simulation simulation(scene.setup, std::move(bodies), executor, ranks);
-  std::optional<RecorderFeed> feed;
-  if (recorder) feed.emplace(executor, *recorder);
+  Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
+                        ranks);
+  RecorderFeed feed(executor, recorder, ranks);
   try {
-    if (const int signal = advance(simulation, options, scene.output, feed ? &*feed : nullptr, tally, ranks);
+    if (const int signal = advance(simulation, options, scene.output, directory, feed, tally, ranks);
         signal != 0) {
       summary.status = "stopped";
       summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
@@ -217,7 +234,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Bodies b
     failed(error);
   }
   try {
-    if (feed) feed->flush();
+    feed.flush();
     executor.drain();
   } catch (const std::exception& error) {
     failed(error);
@@ -296,12 +313,13 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
   return flag[0] > 0;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
+int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample,
               const graph::Communicator& ranks) {
   const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();
   provenance.threads = threads;
+  provenance.simd = name_of(SweepKernels(scene.setup.solver.simd).set());
   provenance.command_line = options.command_line;
   provenance.seed = scene.setup.seed;
   provenance.scene_file = scene.source_file;
@@ -309,7 +327,6 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  std::unique_ptr<io::Recorder> recorder;
   bool refused = false;
   if (ranks.rank() == 0) {
     try {
@@ -319,15 +336,16 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
       refused = true;
     }
     if (!refused) {
-      recorder = std::make_unique<io::Recorder>(directory, files, scene.setup, provenance);
       io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
-      print_start(scene, bodies, threads, ranks);
+      print_start(scene, sample.size(), threads, ranks);
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  const io::Summary summary = simulate(options, scene, std::move(bodies), threads, recorder.get(), ranks);
-  if (recorder) {
-    recorder->finish(summary);
+  io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
+  const io::Summary summary =
+      simulate(options, scene, std::move(sample), threads, directory, recorder, ranks);
+  recorder.finish(summary);
+  if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
   } else if (summary.status == "failed") {
     fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);
@@ -343,22 +361,23 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Bodies bodies,
 
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
-  Bodies bodies;
+  Sample sample;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     scene = io::load_scene(options.scene, options.overrides);
+    if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
-      bodies = build_sample(scene);
-      io::place_walls(scene, bodies);
+      sample = build_sample(scene);
+      io::place_walls(scene, sample);
     }
     if (options.dry_run && ranks.rank() == 0) {
       fmt::print("{}", io::resolved_scene(scene));
       fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n",
-                 options.scene, contents(scene, bodies));
+                 options.scene, contents(scene, sample.size()));
     }
   } catch (const std::exception& error) {
     if (ranks.rank() == 0) fmt::print(stderr, "talus: error: {}\n", error.what());
@@ -371,7 +390,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(bodies), ranks);
+    return run_scene(options, scene, std::move(sample), ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

@@ -16,6 +16,7 @@ struct RunOptions {
   std::optional<std::int64_t> steps;      ///< stop after so many steps
   int threads = 0;                        ///< 0: one per core this process may use
   std::vector<std::string> overrides;     ///< "a.b=c"
+  std::vector<std::int64_t> dump_fclib;   ///< steps whose contact problem is written to fclib_STEP.hdf5
   bool dry_run = false;                   ///< read, build, place and check; write nothing
   std::vector<std::string> command_line;  ///< for run.json
 };

@@ -21,22 +21,20 @@ std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<
 
 }  // namespace
 
-Bodies build_sample(const io::Scene& scene) {
-  const io::SampleSpec& sample = scene.sample;
-  if (sample.kind == io::SampleSpec::Kind::bodies)
-    return io::read_bodies(sample.file, scene.density, scene.setup.rotation);
+Sample build_sample(const io::Scene& scene) {
+  const io::SampleSpec& spec = scene.sample;
+  if (spec.kind == io::SampleSpec::Kind::bodies)
+    return io::read_bodies(spec.file, scene.density, scene.setup.rotation);
 
-  const auto count = static_cast<std::size_t>(
-      sample.count > 0 ? sample.count : sample.cells[0] * sample.cells[1] * sample.cells[2]);
-  const std::vector<double> radii = draw_radii(sample.radii, count, scene.setup.seed);
-  const std::vector<Vec3> centres = sample.kind == io::SampleSpec::Kind::lattice
-                                        ? lattice_sites(sample, radii)
-                                        : deposit(radii, sample.base[0], sample.base[1]);
-  Bodies bodies;
-  for (std::size_t k = 0; k < count; ++k)
-    add_sphere(bodies, BodyId{static_cast<std::int64_t>(k)}, centres[k], radii[k], scene.density,
-               scene.setup.rotation);
-  return bodies;
+  const auto count =
+      static_cast<std::size_t>(spec.count > 0 ? spec.count : spec.cells[0] * spec.cells[1] * spec.cells[2]);
+  Sample sample;
+  sample.density = scene.density;
+  sample.turns = scene.setup.rotation;
+  sample.radius = draw_radii(spec.radii, count, scene.setup.seed);
+  sample.x = spec.kind == io::SampleSpec::Kind::lattice ? lattice_sites(spec, sample.radius)
+                                                        : deposit(sample.radius, spec.base[0], spec.base[1]);
+  return sample;
 }
 
 }  // namespace talus

@@ -1,62 +1,171 @@
 #include "apps/solve.hpp"
 
 #include <fmt/format.h>
+#include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
 
+#include "apps/exit_codes.hpp"
+#include "apps/solve_table.hpp"
 #include "io/error.hpp"
 #include "io/fclib.hpp"
-#include "kernels/delassus.hpp"
+#include "io/output_directory.hpp"
+#include "kernels/delassus_solve.hpp"
 
 namespace talus {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
+/// Processor time of this thread [s]: what a solve costs, however busy the machine is.
+double processor_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// The command without its error handling; throws what the kernels and io throw.
-int solve(const SolveOptions& options) {
+struct Plan {
+  std::vector<std::filesystem::path> files;
+  std::vector<DelassusMethod> methods;
+  ErrorMeasure measure = ErrorMeasure::larger;
+  bool table = false;  ///< several solves
+};
+
+std::vector<std::filesystem::path> problems_at(const std::filesystem::path& path) {
+  if (!std::filesystem::is_directory(path)) return {path};
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(path)) {
+    const auto extension = entry.path().extension();
+    if (extension == ".hdf5" || extension == ".h5") files.push_back(entry.path());
+  }
+  if (files.empty())
+    throw io::FileError(path.string(), "holds no .hdf5 or .h5 file; give a problem or a folder of problems");
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// Checks the options and finds the files; throws std::invalid_argument or io::FileError.
+Plan plan_of(const SolveOptions& options) {
   if (!(options.tol > 0))
     throw std::invalid_argument(fmt::format("--tol is {}, it must be above 0", options.tol));
   if (!(options.max_seconds > 0))
     throw std::invalid_argument(fmt::format("--max-seconds is {}, it must be above 0", options.max_seconds));
-  const DelassusProblem problem = io::read_fclib(options.path);
-  if (!options.out.empty()) io::check_fclib_output(options.path, options.out);
+  if (options.repeat < 1)
+    throw std::invalid_argument(fmt::format("--repeat is {}, it must be at least 1", options.repeat));
+  Plan plan;
+  if (options.method == "all") {
+    plan.methods.assign(all_delassus_methods.begin(), all_delassus_methods.end());
+  } else if (const auto method = delassus_method(options.method)) {
+    plan.methods = {*method};
+  } else {
+    std::string known;
+    for (const DelassusMethod each : all_delassus_methods) known += fmt::format("{}, ", name_of(each));
+    throw std::invalid_argument(
+        fmt::format("--method is \"{}\", but there are {}and all", options.method, known));
+  }
+  if (options.measure == "siconos") {
+    plan.measure = ErrorMeasure::siconos;
+  } else if (options.measure == "scaled") {
+    plan.measure = ErrorMeasure::scaled;
+  } else if (options.measure != "larger") {
+    throw std::invalid_argument(
+        fmt::format("--measure is \"{}\", but there are larger, siconos and scaled", options.measure));
+  }
+  plan.files = problems_at(options.path);
+  plan.table = plan.methods.size() > 1 || std::filesystem::is_directory(options.path);
+  if (!options.out.empty()) {
+    if (plan.table) throw std::invalid_argument("--out wants one problem and one method");
+    io::check_fclib_output(options.path, options.out);
+  }
+  return plan;
+}
 
-  std::vector<double> r(3 * problem.contacts(), 0.0), u(r.size());
-  const auto start = Clock::now();
-  const NlgsReport report = solve_nlgs(
-      problem, {.tolerance = options.tol, .stop = [&] { return seconds_since(start) > options.max_seconds; }},
-      r);
-  const double seconds = seconds_since(start);
+struct Solved {
+  SolveRow row;
+  std::vector<double> r;
+  std::int64_t failed_contacts = 0;
+};
 
-  const nlohmann::ordered_json line = {{"problem", options.path.stem().string()},
-                                       {"contacts", problem.contacts()},
-                                       {"method", "nlgs"},
-                                       {"error", report.error.siconos},
-                                       {"scaled_error", report.error.scaled},
-                                       {"iterations", report.iterations},
-                                       {"seconds", seconds},
-                                       {"converged", report.converged}};
+Solved solve_one(const DelassusProblem& problem, const std::string& name, DelassusMethod method,
+                 const Plan& plan, const SolveOptions& options) {
+  Solved solved;
+  DelassusReport report;
+  std::vector<double> times;
+  for (int k = 0; k < options.repeat; ++k) {
+    solved.r.assign(3 * problem.contacts(), 0.0);
+    const auto start = Clock::now();
+    const DelassusGoal goal{.tolerance = options.tol, .measure = plan.measure, .stop = [&] {
+                              return std::chrono::duration<double>(Clock::now() - start).count() >
+                                     options.max_seconds;
+                            }};
+    const double before = processor_seconds();
+    report = solve_delassus(problem, method, goal, solved.r);
+    times.push_back(processor_seconds() - before);
+    if (!report.converged) break;  // a missed tolerance is missed again
+  }
+  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
+  std::nth_element(times.begin(), middle, times.end());
+  solved.row = {.problem = name,
+                .contacts = problem.contacts(),
+                .method = std::string(name_of(method)),
+                .error = report.error.siconos,
+                .scaled_error = report.error.scaled,
+                .iterations = report.iterations,
+                .factorisations = report.factorisations,
+                .seconds = *middle,
+                .converged = report.converged};
+  solved.failed_contacts = report.failed_contacts;
+  return solved;
+}
+
+void print_line(const SolveRow& row) {
+  const nlohmann::ordered_json line = {
+      {"problem", row.problem}, {"contacts", row.contacts},         {"method", row.method},
+      {"error", row.error},     {"scaled_error", row.scaled_error}, {"iterations", row.iterations},
+      {"seconds", row.seconds}, {"converged", row.converged}};
   // A file name need not be UTF-8; replace what is not instead of losing the answer.
   fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   std::fflush(stdout);
-  if (!options.out.empty()) {
-    relative_velocity(problem, r, u);
-    io::write_fclib_solution(options.path, options.out, r, u);
+}
+
+/// The command without its error handling; throws what the kernels and io throw.
+int solve(const SolveOptions& options) {
+  const Plan plan = plan_of(options);
+  std::vector<SolveRow> rows;
+  bool unreadable = false;
+  for (const auto& file : plan.files) {
+    io::FclibProblem problem;
+    try {
+      problem = io::read_fclib_problem(file);
+    } catch (const io::FileError& error) {
+      if (!plan.table) throw;
+      fmt::print(stderr, "talus solve: {}\n", error.what());
+      unreadable = true;
+      continue;
+    }
+    for (const DelassusMethod method : plan.methods) {
+      Solved solved = solve_one(problem.contact, file.stem().string(), method, plan, options);
+      if (!plan.table) print_line(solved.row);
+      if (!options.out.empty())
+        io::write_fclib_solution(file, options.out, io::fclib_solution(problem, solved.r));
+      if (solved.failed_contacts > 0)
+        fmt::print(stderr,
+                   "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
+                   file.string(), solved.failed_contacts);
+      rows.push_back(std::move(solved.row));
+    }
   }
-  if (report.failed_contacts > 0)
-    fmt::print(stderr,
-               "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
-               options.path.string(), report.failed_contacts);
-  return report.converged ? 0 : 3;
+  if (plan.table) fmt::print("{}", solve_table(rows));
+  std::fflush(stdout);
+  if (!options.csv.empty()) io::write_whole(options.csv.string(), solve_csv(rows));
+  if (!options.profile.empty()) io::write_whole(options.profile.string(), performance_profile(rows));
+  if (unreadable) return exit_bad_input;
+  return all_solved(rows) ? exit_done : exit_tolerance_missed;
 }
 
 }  // namespace
@@ -66,13 +175,13 @@ int solve_command(const SolveOptions& options) {
     return solve(options);
   } catch (const io::FileError& error) {
     fmt::print(stderr, "talus solve: {}\n", error.what());
-    return 2;
+    return exit_bad_input;
   } catch (const std::invalid_argument& error) {
     fmt::print(stderr, "talus solve: {}\n", error.what());
-    return 2;
+    return exit_bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus solve: {}: {}\n", options.path.string(), error.what());
-    return 1;
+    return exit_failure;
   }
 }
 

@@ -72,10 +72,12 @@ std::size_t read_header(std::string_view line, const Place& place) {
 
 }  // namespace
 
-Bodies read_bodies(const std::string& path, double density, bool turns) {
+Sample read_bodies(const std::string& path, double density, bool turns) {
   std::ifstream in(path);
   if (!in) throw SceneError(path, 0, "", "cannot open the file of bodies");
-  Bodies bodies;
+  Sample sample;
+  sample.density = density;
+  sample.turns = turns;
   std::unordered_map<std::int64_t, int> line_of_id;
   std::array<std::string_view, columns.size() + 1> fields;
   std::size_t count = 0;
@@ -99,15 +101,15 @@ Bodies read_bodies(const std::string& path, double density, bool turns) {
     for (std::size_t k = 1; k < count; ++k) value[k] = number<double>(fields[k], columns[k], place);
     const double radius = value[4];
     if (radius <= 0) place.fail("radius", fmt::format("must be > 0 m, got {}", radius));
-    add_sphere(bodies, BodyId{id}, Vec3(value[1], value[2], value[3]), radius, density, turns);
-    Velocity& velocity = bodies.velocity.back();
-    for (std::size_t c = 0; c < 3; ++c) {
-      velocity.u[c] = value[5 + c];
-      velocity.w[c] = turns ? radius * value[8 + c] : 0;
-    }
+    sample.id.push_back(BodyId{id});
+    sample.x.emplace_back(value[1], value[2], value[3]);
+    sample.radius.push_back(radius);
+    if (count > 5)  // columns that the header lacks are 0
+      sample.velocity.push_back(
+          {value[5], value[6], value[7], radius * value[8], radius * value[9], radius * value[10]});
   }
-  if (bodies.size() == 0) throw SceneError(path, place.line, "", "no bodies in the file");
-  return bodies;
+  if (sample.size() == 0) throw SceneError(path, place.line, "", "no bodies in the file");
+  return sample;
 }
 
 }  // namespace talus::io

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "kernels/bodies.hpp"
+#include "kernels/sample.hpp"
 
 namespace talus::io {
 
@@ -12,6 +12,6 @@ namespace talus::io {
 /// false the spheres do not turn and wx, wy, wz are dropped. Throws SceneError with file, line and column for
 /// a missing file, an unknown header, a wrong number of fields, a field that is not a finite number, a radius
 /// <= 0, and an id that occurs twice or is negative.
-Bodies read_bodies(const std::string& path, double density, bool turns = true);
+Sample read_bodies(const std::string& path, double density, bool turns = true);
 
 }  // namespace talus::io

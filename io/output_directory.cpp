@@ -33,6 +33,16 @@ bool is_numbered(std::string_view name, std::string_view prefix, std::string_vie
   return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
+/// fclib_000012.hdf5, or its draft fclib_000012.hdf5.PID.part without the last extension.
+bool is_dump(std::string_view name) {
+  constexpr std::string_view suffix = ".hdf5";
+  const std::size_t end = name.find(suffix);
+  if (end == name.npos) return false;
+  const std::string_view process = name.substr(end + suffix.size());
+  return is_numbered(name.substr(0, end + suffix.size()), "fclib_", suffix) &&
+         std::ranges::all_of(process, [](unsigned char c) { return c == '.' || std::isdigit(c) != 0; });
+}
+
 /// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
 std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
   std::vector<fs::path> found;
@@ -54,7 +64,8 @@ bool is_output_name(const fs::path& relative) {
   std::string_view name = text;
   if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
   return std::ranges::find(fixed_names, name) != fixed_names.end() ||
-         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp");
+         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
+         is_dump(name);
 }
 
 bool is_partition_name(const fs::path& relative) {
@@ -92,25 +103,31 @@ void prepare_output_directory(const fs::path& directory, bool force, IsOutputNam
   }
 }
 
-void write_whole(const fs::path& path, std::string_view content) {
+void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
   fs::path temporary = path;
   temporary += unfinished;
-  try {
-    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-    file.write(content);
-    file.close();
-  } catch (const FileError&) {
+  const auto discard = [&] {
     std::error_code ignored;
     fs::remove(temporary, ignored);
+  };
+  try {
+    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+    content([&](std::string_view text) { file.write(text); });
+    file.close();
+  } catch (...) {
+    discard();
     throw;
   }
   std::error_code error;
   fs::rename(temporary, path, error);
   if (error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
+    discard();
     throw FileError(path.string(), "cannot be replaced: " + error.message());
   }
+}
+
+void write_whole(const fs::path& path, std::string_view content) {
+  write_whole(path, [&](const WriteText& out) { out(content); });
 }
 
 }  // namespace talus::io

@@ -3,7 +3,10 @@
 /// The directory of a run: who may be overwritten, and how files appear in it.
 
 #include <filesystem>
+#include <functional>
 #include <string_view>
+
+#include "io/write_text.hpp"
 
 namespace talus::io {
 
@@ -27,5 +30,9 @@ void prepare_output_directory(const std::filesystem::path& directory, bool force
 /// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
 /// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.
 void write_whole(const std::filesystem::path& path, std::string_view content);
+
+/// The same for content that is made piece by piece: `content` calls its argument with the text in order.
+/// What it throws goes on, and the unfinished file is removed.
+void write_whole(const std::filesystem::path& path, const std::function<void(const WriteText&)>& content);
 
 }  // namespace talus::io

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels/walls.hpp"
+#include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
 
 namespace talus::io {
@@ -31,6 +32,10 @@ struct ForcePicture {
 /// to y are drawn where they cut the picture. Throws std::invalid_argument when a contact names a body or
 /// wall that is not there.
 std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options);
+
+/// Collective: what draw_forces needs of a frame of which each rank has a part, on rank 0: all bodies, but of
+/// the contacts only those about the slab. Empty on others; rows travel in bounded pieces.
+Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, const ForcePicture& options);
 
 struct PartitionPicture {
   std::string title;

@@ -47,28 +47,32 @@ std::vector<TriaxialReport> ThinnedCurve::rows() const {
 
 Recorder::Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
                    const Provenance& provenance)
-    : directory_(directory),
-      options_(options),
-      walls_(setup.walls),
-      provenance_(provenance),
-      steps_(directory / "steps.csv", steps_csv_header()),
-      wall_rows_(directory / "walls.csv", walls_csv_header()) {
+    : Recorder(directory, options, setup, provenance, graph::one_rank()) {}
+
+Recorder::Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
+                   const Provenance& provenance, const graph::Communicator& ranks)
+    : directory_(directory), options_(options), walls_(setup.walls), provenance_(provenance), ranks_(ranks) {
   for (const Stage& stage : setup.stages) axis_of_stage_.emplace(stage.name, stage.end.strain_axis);
-  if (options_.frames) results_.emplace(directory_ / "results.h5", names_of(walls_));
-  if (options_.fields) {
-    std::error_code error;
-    std::filesystem::create_directories(directory_ / "fields", error);
-    if (error) throw FileError((directory_ / "fields").string(), "cannot be created: " + error.message());
+  if (ranks.rank() == 0) {
+    steps_.emplace(directory / "steps.csv", steps_csv_header());
+    wall_rows_.emplace(directory / "walls.csv", walls_csv_header());
+    if (options_.fields) {
+      std::error_code error;
+      std::filesystem::create_directories(directory_ / "fields", error);
+      if (error) throw FileError((directory_ / "fields").string(), "cannot be created: " + error.message());
+    }
+    write_run_json(directory_ / "run.json", provenance_, Summary{});
   }
-  write_run_json(directory_ / "run.json", provenance_, Summary{});
+  if (options_.frames) results_.emplace(directory_ / "results.h5", names_of(walls_), ranks_);
 }
 
 void Recorder::record_step(const StepReport& report, std::span<const WallReport> walls,
                            const std::optional<TriaxialReport>& triaxial) {
-  append_steps_row(steps_.pending(), report);
-  steps_.commit();
-  for (const WallReport& wall : walls) append_walls_row(wall_rows_.pending(), report, wall);
-  wall_rows_.commit();
+  if (ranks_.rank() != 0) return;
+  append_steps_row(steps_->pending(), report);
+  steps_->commit();
+  for (const WallReport& wall : walls) append_walls_row(wall_rows_->pending(), report, wall);
+  wall_rows_->commit();
   if (!triaxial) return;
   if (!triaxial_) triaxial_.emplace(directory_ / "triaxial.csv", triaxial_csv_header());
   append_triaxial_row(triaxial_->pending(), *triaxial);
@@ -85,15 +89,15 @@ void Recorder::record_frame(Frame&& frame) {
   validate(state);
   if (results_) results_->append(state);
   if (options_.fields) write_fields(state);
-  if (options_.pictures && options_.contacts)
-    write_whole(directory_ / "forces.svg", draw_forces(state, walls_, {}));
+  if (options_.pictures && options_.contacts) draw_force_picture(state);
   draw_triaxial_picture();
   ++frames_;
 }
 
 void Recorder::finish(Summary summary) {
-  steps_.close();
-  wall_rows_.close();
+  if (ranks_.rank() != 0) return;
+  steps_->close();
+  wall_rows_->close();
   if (triaxial_) triaxial_->close();
   draw_triaxial_picture();
   summary.frames = frames_;
@@ -101,20 +105,40 @@ void Recorder::finish(Summary summary) {
 }
 
 void Recorder::write_fields(const Frame& frame) {
+  // Made of the parts of all ranks; rank 0 writes.
+  const auto write = [&](const std::string& name, const auto& make) {
+    if (ranks_.rank() == 0)
+      write_whole(directory_ / "fields" / name, make);
+    else
+      make([](std::string_view) {});
+  };
+  const auto collect = [&](const char* name, const std::vector<FieldFile>& files) {
+    if (ranks_.rank() == 0) write_whole(directory_ / name, collection_pvd(files));
+  };
   const std::string grains = fmt::format("grains_{:06}.vtp", frames_);
-  write_whole(directory_ / "fields" / grains, grains_vtp(frame));
+  write(grains, [&](const WriteText& out) { write_grains_vtp(frame, ranks_, out); });
   grain_files_.push_back({frame.time, 0, grains});
-  write_whole(directory_ / "fields" / "grains.pvd", collection_pvd(grain_files_));
+  collect("fields/grains.pvd", grain_files_);
   if (options_.contacts) {
     const std::string forces = fmt::format("forces_{:06}.vtp", frames_);
-    write_whole(directory_ / "fields" / forces, forces_vtp(frame));
+    write(forces, [&](const WriteText& out) { write_forces_vtp(frame, ranks_, out); });
     force_files_.push_back({frame.time, 0, forces});
-    write_whole(directory_ / "fields" / "forces.pvd", collection_pvd(force_files_));
+    collect("fields/forces.pvd", force_files_);
   }
   std::vector<FieldFile> all;
   for (const FieldFile& file : grain_files_) all.push_back({file.time, 0, "fields/" + file.path});
   for (const FieldFile& file : force_files_) all.push_back({file.time, 1, "fields/" + file.path});
-  write_whole(directory_ / "fields.pvd", collection_pvd(all));
+  collect("fields.pvd", all);
+}
+
+void Recorder::draw_force_picture(const Frame& part) const {
+  const ForcePicture options;
+  if (ranks_.ranks() == 1) {
+    write_whole(directory_ / "forces.svg", draw_forces(part, walls_, options));
+    return;
+  }
+  const Frame all = gather_for_picture(part, ranks_, options);
+  if (ranks_.rank() == 0) write_whole(directory_ / "forces.svg", draw_forces(all, walls_, options));
 }
 
 void Recorder::draw_triaxial_picture() const {

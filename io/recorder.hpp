@@ -59,13 +59,18 @@ class Recorder {
   /// are those of `setup`.
   Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
            const Provenance& provenance);
+  /// On several ranks, each of which has one. Collective, as are the frames; tables and pictures are rank
+  /// 0's, and the other calls do nothing on others. `ranks` must outlive the recorder.
+  Recorder(const std::filesystem::path& directory, const RecorderOptions& options, const Setup& setup,
+           const Provenance& provenance, const graph::Communicator& ranks);
 
   /// A line in steps.csv, one per wall in walls.csv, and one in triaxial.csv if there is a report; that file
   /// appears with its first line.
   void record_step(const StepReport& report, std::span<const WallReport> walls,
                    const std::optional<TriaxialReport>& triaxial);
 
-  /// Writes a state and lets go of it. Throws std::invalid_argument when its arrays do not fit together.
+  /// Writes a state, of which each rank has its part, and lets go of it. Throws std::invalid_argument when
+  /// its arrays do not fit together.
   void record_frame(Frame&& frame);
 
   /// Completes the tables and pictures and writes run.json with the summary (`frames` is filled in here).
@@ -74,6 +79,7 @@ class Recorder {
 
  private:
   void write_fields(const Frame& frame);
+  void draw_force_picture(const Frame& part) const;
   void draw_triaxial_picture() const;
 
   std::filesystem::path directory_;
@@ -81,8 +87,8 @@ class Recorder {
   std::vector<Wall> walls_;
   std::map<std::string, int> axis_of_stage_;
   Provenance provenance_;
-  CsvFile steps_;
-  CsvFile wall_rows_;
+  const graph::Communicator& ranks_;
+  std::optional<CsvFile> steps_, wall_rows_;  ///< on rank 0
   std::optional<CsvFile> triaxial_;
   std::optional<ResultsWriter> results_;
   std::vector<FieldFile> grain_files_, force_files_;  ///< paths relative to fields/

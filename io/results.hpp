@@ -14,10 +14,13 @@
 /// HDF5 is not built for threads: one thread of the process at a time, for writer and readers alike.
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
 
 namespace talus::io {
@@ -26,24 +29,40 @@ namespace talus::io {
 /// `orientation` may be empty.
 void validate(const Frame& frame);
 
-/// Writes results.h5 frame by frame.
+/// Who writes a file of several ranks.
+enum class SharedWriting {
+  parallel,  ///< every rank its rows, through MPI; HDF5 must be built for it
+  gathered,  ///< rank 0, which gets the rows of the others in pieces
+};
+/// Parallel where the HDF5 of this build can do it.
+SharedWriting shared_writing();
+
+/// Writes results.h5 frame by frame; one file, of the same content for any number of ranks.
 /// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame
 /// gets its name last, when all of it is there: after a kill the file holds the frames before, unless the
 /// kill hit the few milliseconds in which the file's directory is written.
 class ResultsWriter {
  public:
-  /// Replaces a file of that name. Throws FileError.
+  /// Replaces a file of that name. Throws FileError. `ranks` must outlive the writer.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names);
+  /// Collective, as are the frames.
+  ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
+                const graph::Communicator& ranks, SharedWriting way = shared_writing());
 
-  /// Appends a frame; frame.walls are those of the constructor, in the same order. Throws FileError;
+  /// Appends a frame, of which each rank has its part; frame.walls are those of the constructor, in the same
+  /// order. Throws FileError, with parallel writing on all ranks when one cannot write;
   /// std::invalid_argument when the arrays do not fit together.
   void append(const Frame& frame);
 
   std::size_t frames_written() const { return frames_; }
 
  private:
+  void append_here(const Frame& part, std::span<const std::int64_t> rows);
+
   std::string path_;
   std::vector<std::string> wall_names_;
+  const graph::Communicator& ranks_;
+  SharedWriting way_;
   std::size_t frames_ = 0;
 };
 

@@ -68,6 +68,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"cores_online", p.cores_online},
       {"cores_allowed", p.cores_allowed},
       {"threads", p.threads},
+      {"simd", p.simd},
       {"omp_proc_bind", p.omp_proc_bind},
       {"omp_places", p.omp_places},
       {"date_utc", p.date_utc},

@@ -21,6 +21,7 @@ struct Provenance {
   int cores_online = 0;       ///< of the machine
   int cores_allowed = 0;      ///< in the affinity mask of the process at its start
   int threads = 0;            ///< that compute
+  std::string simd;           ///< instructions of the sweeps: "portable", "avx2" or "avx512"
   std::string omp_proc_bind;  ///< environment variable, "" when unset
   std::string omp_places;     ///< environment variable, "" when unset
   std::string date_utc;       ///< start, ISO 8601, e.g. 2024-05-31T12:00:00Z

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "io/scene_error.hpp"
-#include "kernels/bodies.hpp"
+#include "kernels/sample.hpp"
 #include "kernels/size_distribution.hpp"
 #include "runtime/step/setup.hpp"
 
@@ -75,7 +75,7 @@ Scene parse_scene(const std::string& text, const std::string& file,
 /// the outermost grain;
 /// - a pushed wall, also in the loads of the stages, without mass (0) gets a tenth of the mass of the grains.
 /// Throws SceneError when there are no grains, walls cross, or the centre of a grain lies behind a wall.
-void place_walls(Scene& scene, const Bodies& bodies);
+void place_walls(Scene& scene, const Sample& grains);
 
 /// The scene as TOML with every default spelled out; parse_scene gives the same scene back.
 std::string resolved_scene(const Scene& scene);

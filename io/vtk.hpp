@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "io/write_text.hpp"
+#include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
 
 namespace talus::io {
@@ -31,6 +33,13 @@ std::string grains_vtp(const Frame& frame, std::span<const GrainField> fields = 
 /// of the wall, -1 between grains). Throws std::invalid_argument when a contact names a body that the frame
 /// does not hold.
 std::string forces_vtp(const Frame& frame);
+
+/// The same texts of frames of which each rank has a part (frame.hpp). Collective; `out` gets the text in
+/// order on rank 0 and is not called on others. What one array needs is held at a time, by each rank for its
+/// part.
+void write_grains_vtp(const Frame& part, const graph::Communicator& ranks, const WriteText& out,
+                      std::span<const GrainField> fields = {});
+void write_forces_vtp(const Frame& part, const graph::Communicator& ranks, const WriteText& out);
 
 /// One file of a collection.
 struct FieldFile {

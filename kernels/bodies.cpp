@@ -9,12 +9,20 @@
 #include <string>
 
 #include "kernels/morton.hpp"
+#include "kernels/permute.hpp"
 
 namespace talus {
 
+namespace {
+constexpr double four_thirds_pi = 4.18879020478639098;
+}
+
+double sphere_mass(double radius, double density) {
+  return four_thirds_pi * density * radius * radius * radius;
+}
+
 void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density, bool turns) {
-  constexpr double four_thirds_pi = 4.18879020478639098;
-  const double mass = four_thirds_pi * density * radius * radius * radius;
+  const double mass = sphere_mass(radius, density);
   Velocity rest;
   rest.inv_mass = 1 / mass;
   rest.spin_mobility = turns ? 2.5 / mass : 0;  // R^2 / (2/5 m R^2)
@@ -25,10 +33,18 @@ void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, do
   if (!bodies.orientation.empty()) bodies.orientation.push_back({1, 0, 0, 0});
 }
 
+void reserve(Bodies& bodies, std::size_t count, bool orientation) {
+  bodies.id.reserve(count);
+  bodies.x.reserve(count);
+  bodies.radius.reserve(count);
+  bodies.velocity.reserve(count);
+  if (orientation) bodies.orientation.reserve(count);
+}
+
 double total_volume(const Bodies& bodies) {
   double volume = 0;
   for (double r : bodies.radius) volume += r * r * r;
-  return 4.18879020478639098 * volume;
+  return four_thirds_pi * volume;
 }
 
 KineticEnergy kinetic_energy(std::span<const Velocity> velocity) {
@@ -41,16 +57,6 @@ KineticEnergy kinetic_energy(std::span<const Velocity> velocity) {
   }
   return energy;
 }
-
-namespace {
-template <class T>
-void permute(std::vector<T>& values, std::span<const Slot> order) {
-  if (values.empty()) return;
-  std::vector<T> moved(order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) moved[k] = values[static_cast<std::size_t>(order[k])];
-  values.swap(moved);
-}
-}  // namespace
 
 void reorder(Bodies& bodies, std::span<const Slot> order) {
   permute(bodies.id, order);

@@ -9,14 +9,15 @@
 
 namespace talus {
 
-/// What the sweeps read and write of one sphere: one cache line.
+/// What the sweeps read and write of one sphere: one cache line. Its halves are vectors of four, each with
+/// its mobility at the end; without friction the sweeps touch the first half only.
 /// A sphere of radius R turns as w = R omega [m/s], so that no radius and no tangent frame is needed at a
 /// contact (docs/theory.md, "Spheres"): with n pointing to it from the other body, the surface at the contact
 /// point moves with u - w x n; the other body's with u + w x n.
 struct alignas(64) Velocity {
   double u[3]{};           ///< velocity of the centre [m/s]
-  double w[3]{};           ///< R omega [m/s]
   double inv_mass{};       ///< 1/m [1/kg]; 0 for a body that nothing moves
+  double w[3]{};           ///< R omega [m/s]
   double spin_mobility{};  ///< R^2/I [1/kg]; 0 for a body that does not turn
 };
 static_assert(sizeof(Velocity) == 64);
@@ -36,10 +37,16 @@ struct Bodies {
   }
 };
 
+/// Mass of a solid sphere [kg].
+double sphere_mass(double radius, double density);
+
 /// Appends a solid sphere at rest. radius > 0 [m], density > 0 [kg/m^3]; with `turns` false its spin mobility
 /// is 0.
 void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density,
                 bool turns = true);
+
+/// Room for `count` bodies in all, so that none of the arrays has to be moved while it is filled.
+void reserve(Bodies& bodies, std::size_t count, bool orientation = false);
 
 /// Volume of the spheres [m^3], summed in slot order.
 double total_volume(const Bodies& bodies);

@@ -1,6 +1,7 @@
 #include "kernels/chunks.hpp"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 namespace talus {
@@ -52,6 +53,29 @@ void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunk
       }
     }
     chunks.body_begin.push_back(static_cast<std::int32_t>(chunks.bodies.size()));
+  }
+}
+
+/// Candidates of grains with many candidates first: left to the end they would need groups of their own. By
+/// counting, so that equals keep their order. At walls the order is that of the candidates.
+void order_candidates(const Candidates& candidates, Chunks& chunks) {
+  constexpr std::size_t ranks = 64;
+  chunks.order.resize(candidates.grain_pairs.size());
+  std::vector<std::uint16_t> degree;
+  for (std::size_t c = 0; c < chunks.wall.size() && chunks.wall[c] < 0; ++c) {
+    const std::size_t begin = index(chunks.begin[c]), end = index(chunks.begin[c + 1]);
+    degree.assign(index(chunks.body_begin[c + 1] - chunks.body_begin[c]), 0);
+    for (std::size_t k = 2 * begin; k < 2 * end; ++k) ++degree[chunks.local[k]];
+    std::array<std::size_t, ranks + 1> next{};
+    const auto rank = [&](std::size_t k) {
+      const std::size_t both =
+          std::size_t{degree[chunks.local[2 * k]]} + std::size_t{degree[chunks.local[2 * k + 1]]};
+      return ranks - 1 - std::min(ranks - 1, both);
+    };
+    for (std::size_t k = begin; k < end; ++k) ++next[rank(k) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (std::size_t k = begin; k < end; ++k)
+      chunks.order[begin + next[rank(k)]++] = static_cast<std::uint16_t>(k - begin);
   }
 }
 
@@ -179,6 +203,7 @@ Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> 
   Chunks chunks;
   place_boundaries(groups, chunks);
   list_bodies(candidates, bodies, chunks);
+  order_candidates(candidates, chunks);
   const Incidence incidence = chunks_of_bodies(chunks, bodies);
   find_conflicts(incidence, chunks);
   colour_chunks(chunks);
@@ -254,7 +279,7 @@ std::size_t memory_used(const Chunks& chunks) {
           chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
           chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
              4 +
-         chunks.local.capacity() * 2 + chunks.boundary.capacity();
+         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.boundary.capacity();
 }
 
 }  // namespace talus

@@ -58,6 +58,8 @@ struct Chunks {
   std::vector<Slot> bodies;              ///< the grains that a chunk touches, in order of first use
   std::vector<std::uint16_t>
       local;  ///< 2 per candidate: places of its grains in the chunk's list (wall: the second is unused)
+  std::vector<std::uint16_t> order;       ///< per grain pair, from begin[c] on: candidates of chunk c, less
+                                          ///< begin[c], in the order in which groups are filled
   std::vector<std::int32_t> owned_begin;  ///< chunks + 1 offsets into `owned`
   std::vector<Slot>
       owned;  ///< grains of which this chunk is the first to write, in colour order: it resets them

@@ -29,11 +29,9 @@ bool constrain(const NarrowPhase& in, double gap, double v_n, double v_n_free, d
   return true;
 }
 
-/// Unit normal from `second` to `first`; +z for coincident centres.
-Vec3 normal_between(const Vec3& first, const Vec3& second) {
-  const Vec3 d = first - second;
-  const double distance = d.norm();
-  return distance > 0 ? Vec3(d / distance) : Vec3::UnitZ();
+/// d over its length; +z for coincident centres.
+Vec3 unit_normal(const Vec3& d, double length) {
+  return length > 0 ? Vec3(d / length) : Vec3::UnitZ();
 }
 
 /// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
@@ -46,7 +44,8 @@ bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
   return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
 }
 
-/// Returns the pairs that passed.
+/// Appends the contacts of a chunk to `found`, in the order in which they are to be dealt to groups, and
+/// returns the pairs that passed.
 std::int32_t find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                            std::size_t chunk, std::vector<Found>& found) {
   std::int32_t through = 0;
@@ -57,11 +56,13 @@ std::int32_t find_contacts(const NarrowPhase& in, const Candidates& candidates, 
   const double slow = 2 * in.time_step * in.gravity.norm();
   const auto u = [&](std::size_t s) { return Eigen::Map<const Vec3>(in.velocity[s].u); };
   if (chunks.wall[chunk] < 0) {
-    for (std::size_t k = begin; k < end; ++k) {
+    for (std::size_t at = begin; at < end; ++at) {
+      const std::size_t k = begin + chunks.order[at];
       const auto i = static_cast<std::size_t>(candidates.grain_pairs[k].first);
       const auto j = static_cast<std::size_t>(candidates.grain_pairs[k].second);
-      const double distance = (in.x[i] - in.x[j]).norm();
-      const Vec3 normal = normal_between(in.x[i], in.x[j]);
+      const Vec3 d = in.x[i] - in.x[j];
+      const double distance = d.norm();
+      const Vec3 normal = unit_normal(d, distance);
       double bias;
       const Vec3 v = u(i) - u(j);
       const double v_n = normal.dot(v);  // gravity moves both alike
@@ -87,40 +88,49 @@ std::int32_t find_contacts(const NarrowPhase& in, const Candidates& candidates, 
   return through;
 }
 
-constexpr int batch_width = 8;
-constexpr int batches_at_most = 64;
+constexpr std::size_t group_size = 16;
+constexpr std::size_t groups_open = 64;
 
-/// Deals the contacts to batches of 8 without a common grain, first fit, with one bit per batch and grain;
-/// what fits in none of 64 batches (a large grain among small ones) follows in its own order. Returns places
-/// in `found`.
-void order_in_batches(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found,
-                      std::vector<std::int32_t>& order) {
+/// Deals the contacts to groups of 16 without a common grain, first fit, with one bit per group and grain;
+/// what fits in none of 64 open groups (a large grain among small ones) follows, each a group of its own.
+/// `order` gets places in `found`, `sizes` those of the groups. The order of the candidates (cut_chunks),
+/// made once per broad phase, is what makes the groups full; this walk costs less than a sweep.
+void order_in_groups(const Chunks& chunks, std::size_t chunk, const std::vector<Found>& found,
+                     std::vector<std::int32_t>& order, std::uint8_t* sizes) {
+  if (chunks.wall[chunk] >= 0) {  // a grain meets a wall once
+    for (std::size_t f = 0; f < found.size(); ++f) order.push_back(static_cast<std::int32_t>(f));
+    for (std::size_t f = 0; f < found.size(); f += group_size)
+      *sizes++ = static_cast<std::uint8_t>(std::min(group_size, found.size() - f));
+    return;
+  }
   const auto bodies = static_cast<std::size_t>(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
-  const bool wall = chunks.wall[chunk] >= 0;
-  std::vector<std::uint64_t> in_batch(bodies, 0);
-  std::array<std::array<std::int32_t, batch_width>, batches_at_most> batch;
-  std::array<int, batches_at_most> filled{};
+  std::vector<std::uint64_t> in_group(bodies, 0);
+  std::array<std::array<std::int32_t, group_size>, groups_open> group;
+  std::array<std::size_t, groups_open> filled{};
   std::uint64_t open = ~std::uint64_t{0};
   std::vector<std::int32_t> late;
   for (std::size_t f = 0; f < found.size(); ++f) {
     const auto k = static_cast<std::size_t>(found[f].candidate);
-    std::uint64_t& mask_i = in_batch[chunks.local[2 * k]];
-    std::uint64_t& mask_j = in_batch[wall ? chunks.local[2 * k] : chunks.local[2 * k + 1]];
+    std::uint64_t& mask_i = in_group[chunks.local[2 * k]];
+    std::uint64_t& mask_j = in_group[chunks.local[2 * k + 1]];
     const std::uint64_t room = open & ~(mask_i | mask_j);
     if (room == 0) {
       late.push_back(static_cast<std::int32_t>(f));
       continue;
     }
-    const auto b = static_cast<std::size_t>(std::countr_zero(room));
-    const std::uint64_t bit = std::uint64_t{1} << b;
+    const auto g = static_cast<std::size_t>(std::countr_zero(room));
+    const std::uint64_t bit = std::uint64_t{1} << g;
     mask_i |= bit;
     mask_j |= bit;
-    batch[b][static_cast<std::size_t>(filled[b]++)] = static_cast<std::int32_t>(f);
-    if (filled[b] == batch_width) open &= ~bit;
+    group[g][filled[g]++] = static_cast<std::int32_t>(f);
+    if (filled[g] == group_size) open &= ~bit;
   }
-  for (std::size_t b = 0; b < batches_at_most; ++b)
-    order.insert(order.end(), batch[b].begin(), batch[b].begin() + filled[b]);
+  for (std::size_t g = 0; g < groups_open && filled[g] > 0; ++g) {
+    order.insert(order.end(), group[g].begin(), group[g].begin() + static_cast<std::ptrdiff_t>(filled[g]));
+    *sizes++ = static_cast<std::uint8_t>(filled[g]);
+  }
   order.insert(order.end(), late.begin(), late.end());
+  std::fill_n(sizes, late.size(), std::uint8_t{1});
 }
 
 }  // namespace
@@ -136,6 +146,7 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
   contacts.candidate.resize(n);
+  contacts.group.resize(n);
   contacts.count.assign(chunks.size(), 0);
   contacts.passed.assign(chunks.size(), 0);
 }
@@ -147,7 +158,8 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
   contacts.passed[chunk] = find_contacts(in, candidates, chunks, chunk, found);
   std::vector<std::int32_t> order;
   order.reserve(found.size());
-  order_in_batches(chunks, chunk, found, order);
+  order_in_groups(chunks, chunk, found, order,
+                  contacts.group.data() + static_cast<std::size_t>(chunks.begin[chunk]));
 
   const std::size_t grains = candidates.grain_pairs.size();
   const bool friction = candidates.components == 3;
@@ -220,8 +232,8 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
     Vec3 normal;
     if (k < grains) {
       const GrainPair& pair = candidates.grain_pairs[k];
-      normal =
-          normal_between(x[static_cast<std::size_t>(pair.first)], x[static_cast<std::size_t>(pair.second)]);
+      const Vec3 d = x[static_cast<std::size_t>(pair.first)] - x[static_cast<std::size_t>(pair.second)];
+      normal = unit_normal(d, d.norm());
     } else {
       normal = walls[static_cast<std::size_t>(candidates.wall_pairs[k - grains].wall)].normal;
     }
@@ -240,9 +252,11 @@ std::size_t memory_used(const Contacts& contacts) {
   for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
                              &contacts.ry, &contacts.rz, &contacts.rn})
     bytes += values->capacity() * sizeof(double);
-  return bytes + (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
-                  contacts.count.capacity() + contacts.passed.capacity()) *
-                     4;
+  return bytes +
+         (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
+          contacts.count.capacity() + contacts.passed.capacity()) *
+             4 +
+         contacts.group.capacity();
 }
 
 }  // namespace talus

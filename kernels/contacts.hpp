@@ -11,8 +11,8 @@
 namespace talus {
 
 /// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
-/// chunks.begin[c] + count[c]), in batches of 8 that share no grain where the chunk allows it, so that
-/// neighbours in the sweep do not wait for one another.
+/// chunks.begin[c] + count[c]), in groups of 16 and, towards the end, fewer. No grain stands twice in a
+/// group, so that a group can be swept at once.
 struct Contacts {
   std::vector<double> nx, ny, nz;   ///< normal, unit, from the second body (or the wall) to the first
   std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
@@ -23,6 +23,7 @@ struct Contacts {
   std::vector<std::int32_t> count;   ///< per chunk
   std::vector<std::int32_t> passed;  ///< per chunk: pairs that went through one another on their way to x, or
                                      ///< in by more than half the smaller radius: the time step is too long
+  std::vector<std::uint8_t> group;   ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
 };
 
 /// Room for the contacts of `chunks`; `friction` decides which impulses exist.

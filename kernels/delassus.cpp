@@ -17,89 +17,11 @@ void put(std::span<double> values, std::size_t contact, const Vec3& value) {
   Eigen::Map<Vec3>(values.data() + 3 * contact) = value;
 }
 
-/// q_a + sum of W_ab r_b over b != a: what the others do to contact a. 9 doubles and 18 flops a block.
-Vec3 velocity_from_others(const DelassusProblem& p, std::span<const double> r, std::size_t a) {
-  Vec3 u = p.q[a];
-  for (std::int64_t k = p.row_begin[a]; k < p.row_begin[a + 1]; ++k) {
-    const auto place = static_cast<std::size_t>(k);
-    u += p.block[place] * at(r, static_cast<std::size_t>(p.column[place]));
-  }
-  return u;
+/// sqrt(D_c), D_c = trace(W_cc)/3; 1 where that is not positive.
+double root_of_diagonal(const LocalBlock& block) {
+  const double third = block.W.trace() / 3;
+  return third > 0 ? std::sqrt(third) : 1;
 }
-
-/// What of the blocks the damped law needs.
-struct DampedBlocks {
-  std::vector<LocalBlock> block;  ///< W_cc + hold I
-  std::vector<double> hold;       ///< damping D_c [1/kg]
-};
-
-/// D_c, trace(W_cc)/3 where that is positive.
-double mean_diagonal(const LocalBlock& block) {
-  return std::max(0.0, block.W.trace() / 3);
-}
-
-DampedBlocks damped_blocks(const DelassusProblem& p, double damping) {
-  DampedBlocks d;
-  d.block.reserve(p.contacts());
-  d.hold.reserve(p.contacts());
-  for (const LocalBlock& own : p.diagonal) {
-    d.hold.push_back(damping * mean_diagonal(own));
-    d.block.push_back(local_block(own.W + d.hold.back() * Mat3::Identity(), own.mu));
-  }
-  return d;
-}
-
-/// One sweep; returns the number of contacts whose law had no solution.
-std::int64_t sweep(const DelassusProblem& p, const DampedBlocks& damped, std::span<double> r) {
-  std::int64_t failed = 0;
-  for (std::size_t a = 0; a < p.contacts(); ++a) {
-    const Vec3 old = at(r, a);
-    const Vec3 q = velocity_from_others(p, r, a) - damped.hold[a] * old;
-    const LocalSolution s = solve_local(damped.block[a], q, old);
-    put(r, a, s.r);
-    failed += s.status == LocalStatus::failed;
-  }
-  return failed;
-}
-
-/// Nesterov's momentum for a fixed-point iteration, with its two reasons to begin anew.
-class Momentum {
- public:
-  /// Forgets the past; no factor above `limit` from now on.
-  void restart(double limit) {
-    limit_ = limit;
-    t_ = 1;
-    last_step_ = std::numeric_limits<double>::infinity();
-  }
-
-  /// Turns `start` (where the sweep began) into the start of the next one. `r`: what the sweep made of it;
-  /// `previous`: the result of the sweep before, replaced by r. `weight`: D_c, one per contact.
-  void advance(std::span<const double> r, std::span<const double> weight, std::span<double> previous,
-               std::span<double> start) {
-    double turned_back = 0, step = 0;
-    for (std::size_t k = 0; k < r.size(); ++k) {
-      const double back = start[k] - r[k];
-      turned_back += weight[k / 3] * back * (r[k] - previous[k]);
-      step += weight[k / 3] * back * back;
-    }
-    const double t = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
-    double factor = std::min(limit_, (t_ - 1) / t);
-    t_ = t;
-    if (turned_back > 0 || step > 2 * last_step_) {
-      factor = 0;
-      t_ = 1;
-    }
-    last_step_ = step;
-    for (std::size_t k = 0; k < r.size(); ++k) {
-      start[k] = r[k] + factor * (r[k] - previous[k]);
-      previous[k] = r[k];
-    }
-  }
-
- private:
-  double limit_ = 1, t_ = 1;
-  double last_step_ = std::numeric_limits<double>::infinity();  ///< squared
-};
 
 /// Sums of squares of the natural map and of the three vectors it is compared with.
 struct SquaredNorms {
@@ -165,7 +87,65 @@ DelassusProblem assemble_delassus(std::span<const MatrixEntry> entries, std::spa
   return p;
 }
 
+DelassusProblem embed_plane(std::span<const MatrixEntry> entries, std::span<const double> q,
+                            std::span<const double> mu) {
+  const std::size_t contacts = mu.size();
+  if (q.size() != 2 * contacts)
+    throw std::invalid_argument("embed_plane: q has " + std::to_string(q.size()) + " values for " +
+                                std::to_string(contacts) + " contacts, it needs 2 for each");
+  const auto rows = static_cast<std::int64_t>(q.size());
+  const auto place = [](std::int64_t row) { return 3 * (row / 2) + row % 2; };
+  std::vector<MatrixEntry> space;
+  std::vector<double> trace(contacts, 0.0), q_space(3 * contacts, 0.0);
+  space.reserve(entries.size() + contacts);
+  for (const MatrixEntry& e : entries) {
+    if (e.row < 0 || e.row >= rows || e.column < 0 || e.column >= rows)
+      throw std::invalid_argument("embed_plane: an entry stands at (" + std::to_string(e.row) + ", " +
+                                  std::to_string(e.column) + ") of a " + std::to_string(rows) + " x " +
+                                  std::to_string(rows) + " matrix");
+    space.push_back({place(e.row), place(e.column), e.value});
+    if (e.row == e.column) trace[static_cast<std::size_t>(e.row / 2)] += e.value;
+  }
+  for (std::size_t a = 0; a < contacts; ++a) {
+    const auto last = static_cast<std::int64_t>(3 * a + 2);
+    space.push_back({last, last, 0.5 * trace[a]});
+    q_space[3 * a] = q[2 * a];
+    q_space[3 * a + 1] = q[2 * a + 1];
+  }
+  DelassusProblem p = assemble_delassus(space, q_space, mu);
+  p.dimension = 2;
+  return p;
+}
+
+std::vector<double> plane_components(std::span<const double> values) {
+  std::vector<double> out;
+  out.reserve(2 * values.size() / 3);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (k % 3 != 2) out.push_back(values[k]);
+  return out;
+}
+
+UnitDiagonal unit_diagonal(const DelassusProblem& problem) {
+  UnitDiagonal scaled{problem, {}};
+  scaled.root.reserve(problem.contacts());
+  for (const LocalBlock& own : problem.diagonal) scaled.root.push_back(root_of_diagonal(own));
+  DelassusProblem& p = scaled.problem;
+  for (std::size_t a = 0; a < p.contacts(); ++a) {
+    const double root = scaled.root[a];
+    p.q[a] /= root;
+    p.diagonal[a] = local_block(p.diagonal[a].W / (root * root), p.diagonal[a].mu);
+    for (auto k = static_cast<std::size_t>(p.row_begin[a]); k < static_cast<std::size_t>(p.row_begin[a + 1]);
+         ++k)
+      p.block[k] /= root * scaled.root[static_cast<std::size_t>(p.column[k])];
+  }
+  return scaled;
+}
+
 void relative_velocity(const DelassusProblem& problem, std::span<const double> r, std::span<double> u) {
+  if (std::all_of(r.begin(), r.end(), [](double value) { return value == 0; })) {
+    for (std::size_t a = 0; a < problem.contacts(); ++a) put(u, a, problem.q[a]);  // the usual start
+    return;
+  }
   for (std::size_t a = 0; a < problem.contacts(); ++a)
     put(u, a, velocity_from_others(problem, r, a) + problem.diagonal[a].W * at(r, a));
 }
@@ -181,8 +161,7 @@ DelassusError delassus_error(const DelassusProblem& problem, std::span<const dou
   };
   for (std::size_t a = 0; a < problem.contacts(); ++a) {
     const LocalBlock& block = problem.diagonal[a];
-    const double third = block.W.trace() / 3;
-    const double root = third > 0 ? std::sqrt(third) : 1;
+    const double root = root_of_diagonal(block);
     const Vec3 rc = at(r, a), uc = at(u, a);
     add(plain, rc, uc, problem.q[a], block.mu);
     add(scaled, rc * root, uc / root, problem.q[a] / root, block.mu);
@@ -190,51 +169,42 @@ DelassusError delassus_error(const DelassusProblem& problem, std::span<const dou
   return {plain.relative(), scaled.relative()};
 }
 
-NlgsReport solve_nlgs(const DelassusProblem& problem, const NlgsOptions& options, std::span<double> r) {
-  std::vector<double> u(r.size()), best(r.begin(), r.end()), start(best), previous(best), weight;
-  for (const LocalBlock& block : problem.diagonal) weight.push_back(mean_diagonal(block));
-  NlgsReport report;
-  report.error = delassus_error(problem, r, u);
-  report.history.push_back({0, report.error});
-  report.converged = report.error.siconos <= options.tolerance;
-
-  // The first sweep is not damped: contacts that do not touch each other are then solved at once.
-  DampedBlocks blocks{problem.diagonal, std::vector<double>(problem.contacts(), 0.0)};
-  Momentum momentum;
-  momentum.restart(options.momentum);
-  bool stopped = false;
-  std::int64_t next_check = 1, best_iteration = 0, phase_begin = 0;
-  while (!report.converged && !stopped && report.iterations < options.max_iterations) {
-    std::copy(start.begin(), start.end(), r.begin());
-    report.failed_contacts = sweep(problem, blocks, r);
-    if (++report.iterations == 1 && options.damping > 0) blocks = damped_blocks(problem, options.damping);
-    stopped = options.stop && options.stop();
-
-    if (report.iterations >= next_check || report.iterations == options.max_iterations || stopped) {
-      next_check = report.iterations + std::clamp<std::int64_t>(report.iterations / 10, 1, 50);
-      const DelassusError error = delassus_error(problem, r, u);
-      report.history.push_back({report.iterations, error});
-      if (error.siconos < report.error.siconos) {
-        report.error = error;
-        best_iteration = report.iterations;
-        std::copy(r.begin(), r.end(), best.begin());
-      }
-      report.converged = error.siconos <= options.tolerance;
-    }
-
-    if (report.iterations - std::max(best_iteration, phase_begin) >
-        std::max<std::int64_t>(1000, best_iteration)) {
-      constexpr double limits[] = {1, 0.9, 0};
-      momentum.restart(std::min(options.momentum, limits[++report.rescues % 3]));
-      phase_begin = report.iterations;
-      start = best;
-      previous = best;
-    } else {
-      momentum.advance(r, weight, previous, start);
-    }
+double measured(const DelassusError& error, ErrorMeasure measure) {
+  switch (measure) {
+    case ErrorMeasure::siconos:
+      return error.siconos;
+    case ErrorMeasure::scaled:
+      return error.scaled;
+    case ErrorMeasure::larger:
+      break;
   }
-  std::copy(best.begin(), best.end(), r.begin());
-  return report;
+  return std::max(error.siconos, error.scaled);
+}
+
+BestAnswer::BestAnswer(const DelassusProblem& problem, const DelassusGoal& goal, std::span<double> r)
+    : problem_(problem), goal_(goal), out_(r), best_(r.begin(), r.end()), u_(r.size()) {
+  report_.error = delassus_error(problem, r, u_);
+  report_.history.reserve(64);
+  report_.history.push_back({0, report_.error});
+  least_ = last_ = measured(report_.error, goal.measure);
+  report_.converged = least_ <= goal.tolerance;
+}
+
+bool BestAnswer::offer(std::int64_t iteration, std::span<const double> candidate) {
+  const DelassusError error = delassus_error(problem_, candidate, u_);
+  report_.history.push_back({iteration, error});
+  last_ = measured(error, goal_.measure);
+  if (!(last_ < least_)) return false;
+  least_ = last_;
+  report_.error = error;
+  report_.converged = least_ <= goal_.tolerance;
+  std::copy(candidate.begin(), candidate.end(), best_.begin());
+  return true;
+}
+
+DelassusReport BestAnswer::hand_back() {
+  std::copy(best_.begin(), best_.end(), out_.begin());
+  return std::move(report_);
 }
 
 }  // namespace talus

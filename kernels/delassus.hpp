@@ -6,7 +6,9 @@
 ///
 ///     const DelassusProblem problem = assemble_delassus(contacts, entries, q, mu);
 ///     std::vector<double> r(3 * contacts, 0.0);
-///     const NlgsReport report = solve_nlgs(problem, {.tolerance = 1e-4}, r);
+///     const DelassusReport report = solve_delassus(problem, DelassusMethod::automatic, {.tolerance = 1e-4},
+///     r);
+/// (kernels/delassus_solve.hpp)
 
 #include <cstdint>
 #include <functional>
@@ -31,15 +33,46 @@ struct DelassusProblem {
   std::vector<Mat3> block;              ///< [1/kg] W_ab, a != b; what the file did not store is 0
   std::vector<LocalBlock> diagonal;     ///< per contact: W_aa and mu
   std::vector<Vec3> q;                  ///< [m/s] per contact: the velocity without contact impulses
+  /// 3, or 2 for a problem of the plane, of which every contact has got a second tangent that nothing excites
+  /// (embed_plane).
+  int dimension = 3;
 
   std::size_t contacts() const { return q.size(); }
 };
+
+/// q_a + sum of W_ab r_b over b != a: what the others do to contact a [m/s]. 9 doubles and 18 flops a block.
+inline Vec3 velocity_from_others(const DelassusProblem& p, std::span<const double> r, std::size_t a) {
+  Vec3 u = p.q[a];
+  const auto end = static_cast<std::size_t>(p.row_begin[a + 1]);
+  for (auto k = static_cast<std::size_t>(p.row_begin[a]); k < end; ++k)
+    u += p.block[k] * Eigen::Map<const Vec3>(r.data() + 3 * static_cast<std::size_t>(p.column[k]));
+  return u;
+}
 
 /// Gathers scalar entries, in any order, into blocks. Entries at the same place are added, as in CSparse;
 /// blocks need not be complete. q has 3 and mu 1 value per contact. Throws std::invalid_argument when an
 /// index is outside the matrix or the sizes disagree.
 DelassusProblem assemble_delassus(std::span<const MatrixEntry> entries, std::span<const double> q,
                                   std::span<const double> mu);
+
+/// The same for a problem of the plane, 2 rows (normal, tangent) and 2 values of q a contact. The contacts
+/// get a second tangent with the diagonal (W_NN + W_TT)/2 and no coupling, in which impulses and velocities
+/// stay 0: the cone becomes the interval |r_T| <= mu r_N, trace/3 the mean diagonal of the plane, and both
+/// errors are those of the plane's problem.
+DelassusProblem embed_plane(std::span<const MatrixEntry> entries, std::span<const double> q,
+                            std::span<const double> mu);
+
+/// Components 0 and 1 of every contact: how a file of the plane wants r and u.
+std::vector<double> plane_components(std::span<const double> values);
+
+/// The problem in variables without units: r' = sqrt(D) r, u' = u / sqrt(D), q' likewise, with D_c =
+/// trace(W_cc)/3 (1 where that is not positive). Its diagonal blocks have the mean diagonal 1, and its plain
+/// natural map is the scaled error's.
+struct UnitDiagonal {
+  DelassusProblem problem;
+  std::vector<double> root;  ///< sqrt(D_c)
+};
+UnitDiagonal unit_diagonal(const DelassusProblem& problem);
 
 /// u = W r + q, afresh [m/s]; r and u have 3 values per contact.
 void relative_velocity(const DelassusProblem& problem, std::span<const double> r, std::span<double> u);
@@ -58,46 +91,63 @@ struct DelassusError {
 /// contact.
 DelassusError delassus_error(const DelassusProblem& problem, std::span<const double> r, std::span<double> u);
 
-struct NlgsOptions {
-  double tolerance = 1e-4;                   ///< on DelassusError::siconos; 0 runs until a limit
-  std::int64_t max_iterations = 10'000'000;  ///< sweeps, > 0
-  double damping = 0.03;  ///< 0 to 1: part of trace(W_cc)/3 that holds a contact to its last impulse; 0: none
-  double momentum = 1;    ///< 0 to 1: upper limit of the momentum factor; 0: none
-  /// Asked after every sweep; true ends the solve. For time limits: kernels own no clock.
+enum class ErrorMeasure {
+  siconos,  ///< DelassusError::siconos
+  scaled,   ///< DelassusError::scaled
+  larger,   ///< the larger of the two: neither hides what the other shows
+};
+double measured(const DelassusError& error, ErrorMeasure measure);
+
+/// When a solver ends.
+struct DelassusGoal {
+  double tolerance = 1e-4;  ///< on the measure; 0 runs until a limit
+  ErrorMeasure measure = ErrorMeasure::larger;
+  std::int64_t max_iterations = 10'000'000;  ///< of the method, >= 0
+  /// Asked after every iteration; true ends the solve. For time limits: kernels own no clock.
   std::function<bool()> stop = {};
 };
 
-struct NlgsCheck {
+struct DelassusCheck {
   std::int64_t iteration;
   DelassusError error;
 };
 
-struct NlgsReport {
+/// What a solver did. The r it hands back is that of the least error of all checks.
+struct DelassusReport {
   bool converged = false;
-  std::int64_t iterations = 0;       ///< sweeps done
-  DelassusError error;               ///< of the r handed back, computed afresh
-  std::vector<NlgsCheck> history;    ///< at iteration 0 and at every check
-  std::int64_t failed_contacts = 0;  ///< contacts whose local law had no solution in the last sweep
-  std::int64_t rescues = 0;          ///< times a stalled iteration went back to its best r
+  bool stopped = false;                ///< by DelassusGoal::stop
+  std::int64_t iterations = 0;         ///< sweeps, steps of ADMM and of Newton together
+  std::int64_t factorisations = 0;     ///< of these, how many factorised a matrix
+  DelassusError error;                 ///< of the r handed back, computed afresh
+  std::vector<DelassusCheck> history;  ///< at iteration 0 and at every check
+  std::int64_t failed_contacts = 0;    ///< contacts whose local law had no solution in the last sweep
+  std::int64_t rescues = 0;            ///< times a stalled iteration went back to its best r
 };
 
-/// Nonlinear Gauss-Seidel: contact by contact, the exact local law with the newest impulses of all others
-/// (Jean and Moreau 1992). `r` (3 values per contact) is the start and takes the result. Three things are
-/// added to the textbook's sweep:
-///  - damping: from the second sweep on, the law is solved with W_cc + damping D_c I and q less damping D_c
-///    r_c(old), D_c = trace(W_cc)/3: a proximal step, whose fixed points are the same. Without it NLGS (and
-///    Siconos' NSGS) runs in circles on FCLIB's OneObject-i100000-316, where W is singular and unsymmetric.
-///    On the development set 0.01 to 0.1 serve alike.
-///  - momentum: a sweep starts from r_k + beta_k (r_k - r_k-1), beta_k Nesterov's, begun anew when the step
-///  turns
-///    back (O'Donoghue and Candes 2015) or grows by more than sqrt(2), in the norm with the weights D_c.
-///    Where a plain sweep needs hundreds of iterations, 3 to 50 times fewer.
-///  - rescue: without a better r for as many sweeps as the best one took (at least 1000), back to it, with a
-///    momentum limit of 0.9, then 0, then again that of the options.
-/// The error is computed afresh at sweeps 1, 2, 3, ... and then at intervals of a tenth of the sweeps done,
-/// up to
-/// 50. When the tolerance is not reached, the r of the least error of all checks is handed back. Same input,
-/// same bits (but for where `stop` ends it).
-NlgsReport solve_nlgs(const DelassusProblem& problem, const NlgsOptions& options, std::span<double> r);
+/// Keeps the r of the least error and the history of one solve. All solvers share it.
+class BestAnswer {
+ public:
+  /// Judges the start. `r` takes the answer at `hand_back`, and must outlive this.
+  BestAnswer(const DelassusProblem& problem, const DelassusGoal& goal, std::span<double> r);
+  /// Judges `candidate` (3 per contact) as the result of `iteration`; true when it is the best so far.
+  bool offer(std::int64_t iteration, std::span<const double> candidate);
+  bool done() const { return report_.converged; }
+  std::span<const double> best() const { return best_; }
+  /// Of the last candidate offered [m/s].
+  std::span<const double> velocity() const { return u_; }
+  double last() const { return last_; }
+  double least() const { return least_; }
+  DelassusReport& report() { return report_; }
+  /// Copies the best r to where the solve began, and hands the report over.
+  DelassusReport hand_back();
+
+ private:
+  const DelassusProblem& problem_;
+  const DelassusGoal& goal_;
+  std::span<double> out_;
+  std::vector<double> best_, u_;
+  double least_ = 0, last_ = 0;
+  DelassusReport report_;
+};
 
 }  // namespace talus

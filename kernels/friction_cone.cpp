@@ -145,8 +145,9 @@ Vec3 project_on_cone(const Vec3& z, double mu) {
   const double zt = z.tail<2>().norm();
   if (zt <= mu * z[0]) return z;
   if (mu * zt <= -z[0]) return Vec3::Zero();
-  // Unit generatrix (c, s): c = 1/sqrt(1 + mu^2), written so that a large mu does not overflow.
-  const double c = 1 / std::hypot(1.0, mu), s = mu * c;
+  // Unit generatrix (c, s): c = 1/sqrt(1 + mu^2), written so that a large mu does not overflow; std::hypot
+  // would cost more than all the rest.
+  const double c = mu < 1e8 ? 1 / std::sqrt(1 + mu * mu) : 1 / mu, s = mu * c;
   const double along = c * z[0] + s * zt;
   Vec3 p;
   p[0] = c * along;

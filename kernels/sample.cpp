@@ -32,6 +32,20 @@ constexpr std::uint32_t jitter_draw = 1;
 
 }  // namespace
 
+double mass(const Sample& sample, std::size_t k) {
+  return sphere_mass(sample.radius[k], sample.density);
+}
+
+void append(const Sample& sample, Bodies& bodies) {
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density, sample.turns);
+    if (sample.velocity.empty()) continue;
+    const auto first = sample.velocity[k].begin();
+    std::copy_n(first, 3, bodies.velocity.back().u);
+    if (sample.turns) std::copy_n(first + 3, 3, bodies.velocity.back().w);
+  }
+}
+
 std::vector<double> draw_radii(const SizeDistribution& sizes, std::size_t n, std::uint64_t seed) {
   using Kind = SizeDistribution::Kind;
   if (!(sizes.max > 0))

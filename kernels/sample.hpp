@@ -5,15 +5,38 @@
 /// (Random123, philox4x32: Salmon et al., SC'11), so grain k depends on (seed, k) only, and no libm function
 /// but sqrt is used.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "kernels/bodies.hpp"
 #include "kernels/size_distribution.hpp"
 #include "kernels/types.hpp"
 
 namespace talus {
+
+/// Grains before the first step, in as few numbers as say all: 32 bytes a grain at rest, where Bodies take
+/// 104. A sample is made on one rank; it becomes Bodies piece by piece, where they belong
+/// (runtime/step/dealing.hpp).
+struct Sample {
+  std::vector<BodyId> id;                       ///< empty: grain k has id k
+  std::vector<Vec3> x;                          ///< centre [m]
+  std::vector<double> radius;                   ///< [m]
+  std::vector<std::array<double, 6>> velocity;  ///< u and R omega [m/s]; empty: at rest
+  double density = 0;                           ///< [kg/m^3]
+  bool turns = true;                            ///< false: spin mobility and R omega are 0
+
+  std::size_t size() const { return x.size(); }
+  BodyId id_of(std::size_t k) const { return id.empty() ? BodyId{static_cast<std::int64_t>(k)} : id[k]; }
+};
+
+/// Mass of grain k [kg].
+double mass(const Sample& sample, std::size_t k);
+
+/// Appends the grains of the sample, in order.
+void append(const Sample& sample, Bodies& bodies);
 
 /// n radii [m]; radius k depends on the distribution, `seed` and k only.
 /// Throws std::invalid_argument unless 0 < max and, except for `constant`, 0 < min <= max.

@@ -67,9 +67,9 @@ inline void push(Velocity& a, Velocity& b, V3 n, V3 dr) {
   add_to(a.u, a.inv_mass * dr);
   add_to(b.u, -b.inv_mass * dr);
   if constexpr (Friction) {
-    const V3 turn = cross(n, dr);
-    add_to(a.w, -a.spin_mobility * turn);
-    add_to(b.w, -b.spin_mobility * turn);
+    const V3 turn = cross(dr, n);
+    add_to(a.w, a.spin_mobility * turn);
+    add_to(b.w, b.spin_mobility * turn);
   }
 }
 
@@ -77,7 +77,7 @@ template <bool Friction>
 inline void push(Velocity& a, WallCopy& wall, V3 n, V3 dr) {
   add_to(a.u, a.inv_mass * dr);
   add_to(wall.velocity, -wall.inv_mass * dot(n, dr) * n);  // a wall moves along its normal only
-  if constexpr (Friction) add_to(a.w, -a.spin_mobility * cross(n, dr));
+  if constexpr (Friction) add_to(a.w, a.spin_mobility * cross(dr, n));
 }
 
 /// max(0, value) without a jump, as nobody can predict which contacts are open; a NaN stays one.
@@ -94,22 +94,6 @@ inline void prefetch_bodies(const Contacts& c, std::size_t k, std::size_t end,
   __builtin_prefetch(&velocity[static_cast<std::size_t>(c.second[ahead])], 1);
 }
 
-/// Closed form of Signorini-Coulomb with a diagonal W: the new impulse.
-template <bool Friction>
-inline V3 solve_law(V3 r, V3 v, V3 n, double bias, double w_nn, double w_tt, double mu) {
-  const double r_n = dot(r, n), v_n = dot(v, n);
-  const double r_n_new = positive_part(r_n - (v_n + bias) / w_nn);
-  if constexpr (!Friction) {
-    return r_n_new * n;
-  } else {
-    const double limit = mu * r_n_new;
-    const V3 t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
-    const double t2 = dot(t, t);
-    const double scale = t2 > limit * limit ? limit / std::sqrt(t2) : 1.0;
-    return r_n_new * n + scale * t;
-  }
-}
-
 template <bool Friction>
 inline void store_impulse(Contacts& c, std::size_t k, V3 r, V3 n) {
   if constexpr (Friction) {
@@ -121,6 +105,28 @@ inline void store_impulse(Contacts& c, std::size_t k, V3 r, V3 n) {
   }
 }
 
+/// Closed form of Signorini-Coulomb with a diagonal W: stores the new impulse and returns what it adds.
+template <bool Friction>
+inline V3 solve_law(Contacts& c, std::size_t k, V3 n, V3 v, double w_nn, double w_tt, double mu) {
+  const double v_n = dot(v, n);
+  if constexpr (Friction) {
+    const V3 r{c.rx[k], c.ry[k], c.rz[k]};
+    const double r_n = dot(r, n);
+    const double r_n_new = positive_part(r_n - (v_n + c.bias[k]) / w_nn);
+    const double limit = mu * r_n_new;
+    const V3 t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
+    const double t2 = dot(t, t);
+    const double scale = t2 > limit * limit ? limit / std::sqrt(t2) : 1.0;
+    const V3 r_new = r_n_new * n + scale * t;
+    store_impulse<true>(c, k, r_new, n);
+    return r_new - r;
+  } else {
+    const double r_n = c.rn[k], r_n_new = positive_part(r_n - (v_n + c.bias[k]) / w_nn);
+    c.rn[k] = r_n_new;
+    return (r_n_new - r_n) * n;
+  }
+}
+
 /// Projection of z on the Coulomb cone about n.
 inline V3 project_on_cone(V3 z, V3 n, double mu) {
   const double z_n = dot(z, n);
@@ -128,35 +134,77 @@ inline V3 project_on_cone(V3 z, V3 n, double mu) {
   const double length = std::sqrt(dot(t, t));
   if (mu * length <= -z_n) return {0, 0, 0};  // first: with mu = 0 = length the other one would hold, too
   if (length <= mu * z_n) return z;
-  const double r_n = (z_n + mu * length) / (1 + mu * mu);
+  const double r_n = (z_n + mu * length) * (1 / (1 + mu * mu));
   return r_n * n + (mu * r_n / length) * t;
 }
+
+/// Up to 8 copies of a chunk's copy of a wall, one for each lane of a vector, as if the wall had that many
+/// more chunks. A driven wall has nothing to split.
+class SplitWall {
+ public:
+  SplitWall(const WallCopy& wall, ContactRange range)
+      : begin_(range.begin), lanes_(std::min(range.end - range.begin, wall_lanes)) {
+    WallCopy part = wall;
+    part.inv_mass *= static_cast<double>(lanes_);
+    std::fill(std::begin(copies_), std::end(copies_), part);
+  }
+  WallCopy& at(std::size_t k) { return copies_[(k - begin_) % wall_lanes]; }
+  void glue(WallCopy& wall) const {
+    if (wall.inv_mass == 0 || lanes_ == 0) return;
+    V3 sum{0, 0, 0};
+    for (std::size_t l = 0; l < lanes_; ++l) sum = sum + load(copies_[l].velocity);
+    const V3 mean = (1 / static_cast<double>(lanes_)) * sum;
+    wall.velocity[0] = mean.x;
+    wall.velocity[1] = mean.y;
+    wall.velocity[2] = mean.z;
+  }
+
+ private:
+  static constexpr std::size_t wall_lanes = 8;
+  std::size_t begin_, lanes_;
+  WallCopy copies_[wall_lanes];
+};
 
 /// 1/M of the body whose copy this is.
 inline double whole(const Velocity& copy, Slot slot, Multiplicities multiplicity) {
   return multiplicity.empty() ? copy.inv_mass : copy.inv_mass / multiplicity[static_cast<std::size_t>(slot)];
 }
 
+/// Sums in 8 lanes, contact k of a range in lane k mod 8, then over the lanes in order: as vectors do it.
+class LaneSums {
+ public:
+  ErrorSums& at(std::size_t k) { return lane_[k % 8]; }
+  ErrorSums total() const {
+    ErrorSums sums;
+    for (const ErrorSums& lane : lane_) sums.add(lane);
+    return sums;
+  }
+
+ private:
+  ErrorSums lane_[8];
+};
+
 template <bool Friction>
-inline void add_error(ErrorSums& sums, V3 r, V3 v, V3 n, double bias, double w_nn, double mu) {
-  const double v_n = dot(v, n) + bias;
-  double e = 0;
-  V3 v_biased = v + bias * n;
+inline void add_error(ErrorSums& sums, const Contacts& c, std::size_t k, V3 n, V3 v, double w_nn, double mu) {
+  const double v_0 = dot(v, n), v_n = v_0 + c.bias[k];
+  double e, r_n;
   if constexpr (Friction) {
-    const V3 v_t = v - dot(v, n) * n;
-    const V3 v_hat = v_biased + mu * std::sqrt(dot(v_t, v_t)) * n;
+    const V3 r{c.rx[k], c.ry[k], c.rz[k]};
+    const V3 v_t = v - v_0 * n;
+    const V3 v_hat = v_t + (v_n + mu * std::sqrt(dot(v_t, v_t))) * n;
     const V3 miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
     e = w_nn * std::sqrt(dot(miss, miss));
+    r_n = dot(r, n);
+    sums.impulse2 += dot(r, r) * (w_nn * w_nn);
+    if (r_n > 0 || v_n < 0) sums.velocity2 += dot(v_t, v_t) + v_n * v_n;
   } else {
-    const double r_n = dot(r, n);
-    e = w_nn * std::abs(r_n - std::max(0.0, r_n - v_n / w_nn));
-    v_biased = v_n * n;
+    r_n = c.rn[k];
+    e = w_nn * std::abs(r_n - positive_part(r_n - v_n / w_nn));
+    sums.impulse2 += r_n * r_n * (w_nn * w_nn);
+    if (r_n > 0 || v_n < 0) sums.velocity2 += v_n * v_n;
   }
-  const double r_n = dot(r, n);
   sums.residual2 += e * e;
   sums.residual_max = std::max(sums.residual_max, e);
-  sums.impulse2 += dot(r, r) * w_nn * w_nn;
-  if (r_n > 0 || v_n < 0) sums.velocity2 += dot(v_biased, v_biased);
   ++sums.contacts;
   if (r_n > 0) ++sums.active;
 }
@@ -170,27 +218,25 @@ void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> ve
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
     const V3 n = normal_of(contacts, k);
-    const V3 r = impulse_of<Friction>(contacts, k, n);
     const double w_nn = a.inv_mass + b.inv_mass;
-    const double w_tt = w_nn + a.spin_mobility + b.spin_mobility;
-    const V3 r_new = solve_law<Friction>(r, relative<Friction>(a, b, n), n, contacts.bias[k], w_nn, w_tt, mu);
-    push<Friction>(a, b, n, r_new - r);
-    store_impulse<Friction>(contacts, k, r_new, n);
+    const double w_tt = w_nn + (a.spin_mobility + b.spin_mobility);
+    push<Friction>(a, b, n, solve_law<Friction>(contacts, k, n, relative<Friction>(a, b, n), w_nn, w_tt, mu));
   }
 }
 
 template <bool Friction>
 void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                 WallCopy& wall) {
+  SplitWall split(wall, range);
   for (std::size_t k = range.begin; k < range.end; ++k) {
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
+    WallCopy& own = split.at(k);
     const V3 n = normal_of(contacts, k);
-    const V3 r = impulse_of<Friction>(contacts, k, n);
-    const V3 r_new = solve_law<Friction>(r, relative<Friction>(a, wall, n), n, contacts.bias[k],
-                                         a.inv_mass + wall.inv_mass, a.inv_mass + a.spin_mobility, mu);
-    push<Friction>(a, wall, n, r_new - r);
-    store_impulse<Friction>(contacts, k, r_new, n);
+    push<Friction>(a, own, n,
+                   solve_law<Friction>(contacts, k, n, relative<Friction>(a, own, n),
+                                       a.inv_mass + own.inv_mass, a.inv_mass + a.spin_mobility, mu));
   }
+  split.glue(wall);
 }
 
 template <bool Friction>
@@ -207,42 +253,43 @@ void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<V
 template <bool Friction>
 void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                      WallCopy& wall) {
+  SplitWall split(wall, range);
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const V3 n = normal_of(contacts, k);
-    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], wall, n,
+    push<Friction>(velocity[static_cast<std::size_t>(contacts.first[k])], split.at(k), n,
                    impulse_of<Friction>(contacts, k, n));
   }
+  split.glue(wall);
 }
 
 template <bool Friction>
 ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                        double mu, Multiplicities multiplicity) {
-  ErrorSums sums;
+  LaneSums sums;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
     const V3 n = normal_of(contacts, k);
     const double w_nn =
         whole(a, contacts.first[k], multiplicity) + whole(b, contacts.second[k], multiplicity);
-    add_error<Friction>(sums, impulse_of<Friction>(contacts, k, n), relative<Friction>(a, b, n), n,
-                        contacts.bias[k], w_nn, mu);
+    add_error<Friction>(sums.at(k - range.begin), contacts, k, n, relative<Friction>(a, b, n), w_nn, mu);
   }
-  return sums;
+  return sums.total();
 }
 
 template <bool Friction>
 ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                      double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities multiplicity) {
-  ErrorSums sums;
+  LaneSums sums;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
     const V3 n = normal_of(contacts, k);
-    const V3 r = impulse_of<Friction>(contacts, k, n);
-    add_error<Friction>(sums, r, relative<Friction>(a, wall, n), n, contacts.bias[k],
+    ErrorSums& own = sums.at(k - range.begin);
+    add_error<Friction>(own, contacts, k, n, relative<Friction>(a, wall, n),
                         whole(a, contacts.first[k], multiplicity) + wall_inv_mass, mu);
-    add_to(sums.wall_impulse, r);
+    add_to(own.wall_impulse, impulse_of<Friction>(contacts, k, n));
   }
-  return sums;
+  return sums.total();
 }
 
 void ErrorSums::add(const ErrorSums& other) {

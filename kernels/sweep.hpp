@@ -33,7 +33,9 @@ struct ContactRange {
 template <bool Friction>
 void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu);
 
-/// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i.
+/// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i. A copy of finite
+/// mass is split once more, contact k of the range against part k mod 8, and glued at the end: 8 contacts
+/// that do not wait for one another.
 template <bool Friction>
 void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                 WallCopy& wall);

@@ -93,12 +93,15 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
                                 std::span<const WallPair> wall_pairs, std::span<const std::int32_t> subdomain,
                                 std::span<const std::int32_t> home) {
+  // Most grains stand in one subdomain: what says the same as the first standing found is not listed.
   std::vector<Standing> standings;
-  standings.reserve(2 * grain_pairs.size() + wall_pairs.size());
-  std::vector<char> touched(home.size(), 0);
+  standings.reserve(grains);
+  std::vector<std::int32_t> first(grains, -1);
   const auto stands = [&](Slot body, std::int32_t in) {
+    std::int32_t& seen = first[at(body)];
+    if (seen == in) return;
+    if (seen < 0) seen = in;
     standings.push_back({body, in});
-    if (!home.empty()) touched[at(body)] = 1;
   };
   for (std::size_t k = 0; k < grain_pairs.size(); ++k) {
     stands(grain_pairs[k].first, subdomain[k]);
@@ -107,7 +110,7 @@ BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> g
   for (std::size_t k = 0; k < wall_pairs.size(); ++k)
     stands(wall_pairs[k].body, subdomain[grain_pairs.size() + k]);
   for (std::size_t k = 0; k < home.size(); ++k)
-    if (touched[k] == 0) standings.push_back({static_cast<Slot>(k), home[k]});
+    if (first[k] < 0) standings.push_back({static_cast<Slot>(k), home[k]});
   return collect_standings(grains, standings);
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every test: installs what is missing, checks the format of the sources, builds preset `ci` (warnings are errors), runs ctest.
-# Further arguments go to ctest, e.g. -L unit. With TALUS_SANITIZERS=1 the unit tests run again under the address and
-# undefined-behaviour sanitizers. Exit code 0 only if all of it passed.
+# Further arguments go to ctest, e.g. -L unit. With TALUS_SANITIZERS=1 the tests of units and of several ranks run again
+# under the address and undefined-behaviour sanitizers. Exit code 0 only if all of it passed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -27,6 +27,6 @@ ctest --preset ci -j2 "$@" || status=$?
 if [ "${TALUS_SANITIZERS:-0}" = 1 ]; then
   cmake --preset asan
   cmake --build --preset asan
-  ctest --preset asan -j2 -L unit || status=$?
+  ctest --preset asan -j2 -L 'unit|mpi' || status=$?
 fi
 exit "$status"

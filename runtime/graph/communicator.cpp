@@ -5,6 +5,7 @@
 #define MPICH_SKIP_MPICXX
 #include <mpi.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <utility>
@@ -64,6 +65,11 @@ Communicator::Communicator(const MpiSession& session, CommunicatorOptions option
 
 Communicator::~Communicator() = default;
 
+const Communicator& one_rank() {
+  static const Communicator alone;
+  return alone;
+}
+
 std::string Communicator::thread_level() const {
   int started = 0;
   MPI_Initialized(&started);
@@ -76,38 +82,32 @@ std::string Communicator::thread_level() const {
                                           : "single";
 }
 
-std::vector<std::vector<std::byte>> Communicator::exchange(std::vector<std::vector<std::byte>> to) const {
-  if (to.size() != static_cast<std::size_t>(ranks_))
-    throw std::invalid_argument("Communicator::exchange wants one part per rank");
-  if (ranks_ == 1) return to;
-  const auto n = static_cast<std::size_t>(ranks_);
-  std::vector<std::uint64_t> out_bytes(n), in_bytes(n);
-  for (std::size_t r = 0; r < n; ++r) out_bytes[r] = to[r].size();
+void Communicator::exchange(std::span<const std::span<const std::byte>> to,
+                            const std::function<std::byte*(std::size_t, std::size_t)>& room) const {
+  const auto n = static_cast<std::size_t>(ranks_), own = static_cast<std::size_t>(rank_);
+  if (to.size() != n) throw std::invalid_argument("Communicator::exchange wants one part per rank");
+  if (n == 1) return;
+  std::vector<std::uint64_t> out_bytes(n, 0), in_bytes(n);
+  for (std::size_t r = 0; r < n; ++r)
+    if (r != own) out_bytes[r] = to[r].size();
   check(MPI_Alltoall(out_bytes.data(), 1, MPI_UINT64_T, in_bytes.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD),
         "MPI_Alltoall");
   constexpr std::uint64_t limit = 0x7fffffff;
-  std::vector<std::vector<std::byte>> from(n);
   std::vector<MPI_Request> requests;
   for (std::size_t r = 0; r < n; ++r) {
     if (out_bytes[r] > limit || in_bytes[r] > limit)
       throw std::runtime_error("a message of more than 2 GiB between two ranks; use more ranks");
-    from[r].resize(in_bytes[r]);
-    if (static_cast<int>(r) == rank_) {
-      from[r] = std::move(to[r]);
-      continue;
-    }
     if (in_bytes[r] > 0)
-      check(MPI_Irecv(from[r].data(), static_cast<int>(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
+      check(MPI_Irecv(room(r, in_bytes[r]), static_cast<int>(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
                       MPI_COMM_WORLD, &requests.emplace_back()),
             "MPI_Irecv");
   }
   for (std::size_t r = 0; r < n; ++r)
-    if (static_cast<int>(r) != rank_ && out_bytes[r] > 0)
+    if (out_bytes[r] > 0)
       check(MPI_Isend(to[r].data(), static_cast<int>(out_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
                       MPI_COMM_WORLD, &requests.emplace_back()),
             "MPI_Isend");
   check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
-  return from;
 }
 
 void Communicator::sum(std::span<std::int64_t> values) const {
@@ -136,6 +136,35 @@ std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) con
                        MPI_COMM_WORLD),
         "MPI_Allgatherv");
   return all;
+}
+
+void Communicator::to_first(std::span<const std::byte> part, std::size_t piece,
+                            const std::function<void(std::span<const std::byte>)>& take) const {
+  const auto in_pieces = [piece](std::size_t bytes, const auto& work) {
+    for (std::size_t begin = 0; begin < bytes; begin += piece) work(begin, std::min(piece, bytes - begin));
+  };
+  if (rank_ != 0) {
+    const std::uint64_t bytes = part.size();
+    check(MPI_Send(&bytes, 1, MPI_UINT64_T, 0, 0, MPI_COMM_WORLD), "MPI_Send");
+    in_pieces(part.size(), [&](std::size_t begin, std::size_t size) {
+      check(MPI_Send(part.data() + begin, static_cast<int>(size), MPI_BYTE, 0, 0, MPI_COMM_WORLD),
+            "MPI_Send");
+    });
+    return;
+  }
+  in_pieces(part.size(), [&](std::size_t begin, std::size_t size) { take(part.subspan(begin, size)); });
+  std::vector<std::byte> received;
+  for (int rank = 1; rank < ranks_; ++rank) {
+    std::uint64_t bytes = 0;
+    check(MPI_Recv(&bytes, 1, MPI_UINT64_T, rank, 0, MPI_COMM_WORLD, MPI_STATUS_IGNORE), "MPI_Recv");
+    in_pieces(bytes, [&](std::size_t, std::size_t size) {
+      received.resize(size);
+      check(MPI_Recv(received.data(), static_cast<int>(size), MPI_BYTE, rank, 0, MPI_COMM_WORLD,
+                     MPI_STATUS_IGNORE),
+            "MPI_Recv");
+      take(received);
+    });
+  }
 }
 
 struct Communicator::PendingGather::Request {

@@ -3,9 +3,11 @@
 /// Ranks as the rest of the program sees them: collective calls for what happens once a step or more rarely,
 /// and channels for what travels every iteration. With one rank nothing is sent and MPI is not called.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <span>
 #include <stdexcept>
@@ -55,8 +57,10 @@ class Communicator {
   int ranks_on_node() const noexcept { return ranks_on_node_; }
 
   // Collective: every rank calls, in the same order.
-  /// Sends to[r] to rank r and returns what each rank sent here.
-  std::vector<std::vector<std::byte>> exchange(std::vector<std::vector<std::byte>> to) const;
+  /// Sends to[r] to rank r. `room(r, bytes)` gives the place for what rank r sends here, and is not asked for
+  /// this rank itself, whose own part is nobody's message. One part per rank, each below 2 GiB.
+  void exchange(std::span<const std::span<const std::byte>> to,
+                const std::function<std::byte*(std::size_t, std::size_t)>& room) const;
   void sum(std::span<std::int64_t> values) const;
   void max(std::span<double> values) const;
   /// The parts of all ranks in order of rank.
@@ -66,6 +70,10 @@ class Communicator {
   class PendingGather;
   std::unique_ptr<PendingGather> start_gather(std::vector<double> part,
                                               std::span<const std::size_t> lengths) const;
+  /// The parts of all ranks in order of rank go to rank 0, whose `take` gets them in pieces of at most
+  /// `piece` > 0 bytes, of one rank each; the others' is not called.
+  void to_first(std::span<const std::byte> part, std::size_t piece,
+                const std::function<void(std::span<const std::byte>)>& take) const;
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   void progress() const;
@@ -73,11 +81,15 @@ class Communicator {
   /// wait for it.
   [[noreturn]] void abort(int code) const;
 
-  /// Records instead of bytes.
+  /// Sends to[r] to rank r and returns what each rank sent here. Nothing is copied on the way, and what is
+  /// for this rank is moved.
   template <class Record>
-  std::vector<std::vector<Record>> exchange_records(const std::vector<std::vector<Record>>& to) const;
+  std::vector<std::vector<Record>> exchange_records(std::vector<std::vector<Record>> to) const;
   template <class Record>
   std::vector<Record> gather_records(std::span<const Record> part) const;
+  /// Pieces of about 256 kB.
+  template <class Record, class Take>
+  void records_to_first(std::span<const Record> part, const Take& take) const;
 
   // Channels. Of one rank: used by one thread at a time.
   /// A message of fixed length that is sent again and again (MPI's persistent requests).
@@ -92,6 +104,9 @@ class Communicator {
   bool any_thread_ = true;
   CommunicatorOptions options_;
 };
+
+/// For programs of one rank: no MPI call is ever made through it.
+const Communicator& one_rank();
 
 /// See Communicator::open_send. A sender calls `start` when its buffer is full, and `done` until true before
 /// it fills it again; a receiver calls `start` when its buffer may be overwritten, then `done` until true.
@@ -129,20 +144,17 @@ class Communicator::PendingGather {
 };
 
 template <class Record>
-std::vector<std::vector<Record>> Communicator::exchange_records(
-    const std::vector<std::vector<Record>>& to) const {
+std::vector<std::vector<Record>> Communicator::exchange_records(std::vector<std::vector<Record>> to) const {
   static_assert(std::is_trivially_copyable_v<Record>);
-  std::vector<std::vector<std::byte>> bytes(to.size());
-  for (std::size_t r = 0; r < to.size(); ++r) {
-    bytes[r].resize(to[r].size() * sizeof(Record));
-    if (!to[r].empty()) std::memcpy(bytes[r].data(), to[r].data(), bytes[r].size());
-  }
-  bytes = exchange(std::move(bytes));
-  std::vector<std::vector<Record>> from(bytes.size());
-  for (std::size_t r = 0; r < from.size(); ++r) {
-    from[r].resize(bytes[r].size() / sizeof(Record));
-    if (!from[r].empty()) std::memcpy(from[r].data(), bytes[r].data(), bytes[r].size());
-  }
+  if (ranks_ == 1) return to;
+  std::vector<std::span<const std::byte>> bytes;
+  for (const auto& part : to) bytes.push_back(std::as_bytes(std::span(part)));
+  std::vector<std::vector<Record>> from(to.size());
+  exchange(bytes, [&](std::size_t r, std::size_t size) {
+    from[r].resize(size / sizeof(Record));
+    return reinterpret_cast<std::byte*>(from[r].data());
+  });
+  from[static_cast<std::size_t>(rank_)] = std::move(to[static_cast<std::size_t>(rank_)]);
   return from;
 }
 
@@ -154,6 +166,18 @@ std::vector<Record> Communicator::gather_records(std::span<const Record> part) c
   std::vector<Record> all(bytes.size() / sizeof(Record));
   if (!all.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());
   return all;
+}
+
+template <class Record, class Take>
+void Communicator::records_to_first(std::span<const Record> part, const Take& take) const {
+  static_assert(std::is_trivially_copyable_v<Record>);
+  constexpr std::size_t records = std::max<std::size_t>(1, (std::size_t{1} << 18) / sizeof(Record));
+  std::vector<Record> aligned;
+  to_first(std::as_bytes(part), records * sizeof(Record), [&](std::span<const std::byte> bytes) {
+    aligned.resize(bytes.size() / sizeof(Record));
+    std::memcpy(aligned.data(), bytes.data(), bytes.size());
+    take(std::span<const Record>(aligned));
+  });
 }
 
 }  // namespace talus::graph

@@ -42,9 +42,15 @@ struct Decomposition {
   bool several() const { return partition.subdomains > 1; }
 };
 
-/// One subdomain per rank unless the settings say more; consecutive subdomains share a rank.
+/// One subdomain per rank unless the settings say more, laid on the ranks by settings.mapping.
 /// Throws std::invalid_argument when there are more ranks than subdomains.
 Decomposition make_decomposition(const DecompositionSettings& settings, const graph::Communicator& ranks);
+
+/// How to cut space into `subdomains` by the settings.
+PartitionOptions partition_options(const DecompositionSettings& settings, std::int32_t subdomains);
+
+/// The ranks as a partitioner sees them.
+Reduction reduction_over(const graph::Communicator& ranks);
 
 /// The distinct bodies that a rank needs to find its candidates: those in and around its subdomains, in
 /// Morton order of the partition's frame. Masses are whole.
@@ -58,17 +64,19 @@ struct Surroundings {
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of
 /// the largest reaches of this rank's regions, so that each candidate whose midpoint is here, and each other
 /// candidate of its bodies, is found here without further messages. `reach` [m]: of the slots of `bodies`.
+/// The state of the bodies goes over to the surroundings: of `bodies`, ids and centres stay for `distribute`.
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
-                                  const graph::Communicator& ranks, const Bodies& bodies,
+                                  const graph::Communicator& ranks, Bodies& bodies,
                                   std::span<const double> reach, const Candidates& candidates,
                                   bool partition_anew);
 
 /// Collective. From the candidates `found` among the surroundings (no impulses) to the copies, candidates
-/// with the impulses of `candidates`, and groups of this rank. `bodies` and `candidates` are replaced.
-/// `glued[wall]`: the wall has a finite mass.
+/// with the impulses of `candidates`, and groups of this rank. `bodies` and `candidates` are replaced; the
+/// bodies of the surroundings are gone afterwards, their reaches stay. `glued[wall]`: the wall has a finite
+/// mass.
 std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
-                                       const graph::Communicator& ranks, const Surroundings& around,
-                                       const Candidates& found, std::span<const char> glued, Bodies& bodies,
+                                       const graph::Communicator& ranks, Surroundings& around,
+                                       Candidates found, std::span<const char> glued, Bodies& bodies,
                                        Candidates& candidates);
 
 std::size_t memory_used(const Decomposition& decomposition);

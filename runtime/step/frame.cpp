@@ -1,14 +1,17 @@
 #include "runtime/step/frame.hpp"
 
 #include <algorithm>
+#include <numeric>
 
+#include "kernels/permute.hpp"
+#include "kernels/release.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
 
 namespace {
 
-/// As they travel to rank 0.
+/// As they travel.
 struct BodyRow {
   std::int64_t id;
   double x[3], radius, u[3], omega[3];
@@ -26,89 +29,163 @@ Vec3 vector_of(const double* from) {
   return {from[0], from[1], from[2]};
 }
 
-std::vector<BodyRow> body_rows(const StepState& state) {
-  const Bodies& bodies = state.bodies;
-  std::vector<BodyRow> rows;
-  for (std::size_t s = 0; s < bodies.size(); ++s) {
-    if (!state.decomposition.counts.empty() && !state.decomposition.counts[s]) continue;
-    BodyRow& row = rows.emplace_back();
-    row.id = static_cast<std::int64_t>(bodies.id[s]);
-    copy3(bodies.x[s], row.x);
-    row.radius = bodies.radius[s];
-    std::copy_n(bodies.velocity[s].u, 3, row.u);
-    for (std::size_t k = 0; k < 3; ++k) row.omega[k] = bodies.velocity[s].w[k] / bodies.radius[s];
-    if (!bodies.orientation.empty()) std::copy_n(bodies.orientation[s].data(), 4, row.orientation);
-  }
-  return rows;
+/// Rows on the way at a time, of one sender to all.
+constexpr std::size_t piece = 8192;
+
+BodyRow body_row(const Bodies& bodies, std::size_t s) {
+  BodyRow row{};
+  row.id = static_cast<std::int64_t>(bodies.id[s]);
+  copy3(bodies.x[s], row.x);
+  row.radius = bodies.radius[s];
+  std::copy_n(bodies.velocity[s].u, 3, row.u);
+  for (std::size_t k = 0; k < 3; ++k) row.omega[k] = bodies.velocity[s].w[k] / bodies.radius[s];
+  if (!bodies.orientation.empty()) std::copy_n(bodies.orientation[s].data(), 4, row.orientation);
+  return row;
 }
 
-std::vector<ContactRow> contact_rows(const StepState& state, double time_step) {
-  const Bodies& bodies = state.bodies;
-  std::vector<ContactRow> rows;
+/// A contact with an impulse: where it stands, and its chunk.
+struct Active {
+  std::int32_t contact, chunk;
+};
+
+std::vector<Active> active_contacts(const StepState& state) {
+  std::vector<Active> active;
   for (std::size_t c = 0; c < state.chunks.size(); ++c) {
-    const auto begin = static_cast<std::size_t>(state.chunks.begin[c]);
-    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(state.contacts.count[c]); ++k) {
-      const Vec3 normal = contact_normal(state.contacts, k), impulse = contact_impulse(state.contacts, k);
-      if (impulse.dot(normal) <= 0) continue;
-      const auto i = static_cast<std::size_t>(state.contacts.first[k]);
-      const Slot second = state.contacts.second[k];
-      const auto j = static_cast<std::size_t>(std::max(second, 0));
-      const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
-      const double gap =
-          second >= 0
-              ? (bodies.x[i] - bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
-              : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
-      ContactRow& row = rows.emplace_back();
-      row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
-      row.bodies[1] =
-          second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
-      copy3(normal, row.normal);
-      copy3(bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * normal, row.point);
-      row.gap = gap;
-      copy3(impulse / time_step, row.force);
+    const std::int32_t begin = state.chunks.begin[c];
+    for (std::int32_t k = begin; k < begin + state.contacts.count[c]; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      if (contact_impulse(state.contacts, at).dot(contact_normal(state.contacts, at)) > 0)
+        active.push_back({k, static_cast<std::int32_t>(c)});
     }
   }
-  return rows;
+  return active;
 }
 
-template <class Row>
-std::vector<Row> on_rank_0(std::vector<Row> rows, const graph::Communicator& ranks) {
-  if (ranks.ranks() == 1) return rows;
-  std::vector<std::vector<Row>> to(static_cast<std::size_t>(ranks.ranks()));
-  to[0] = std::move(rows);
-  std::vector<Row> all;
-  for (const auto& part : ranks.exchange_records(to)) all.insert(all.end(), part.begin(), part.end());
-  return all;
+ContactRow contact_row(const StepState& state, const Active& active, double time_step) {
+  const Bodies& bodies = state.bodies;
+  const auto k = static_cast<std::size_t>(active.contact);
+  const Vec3 normal = contact_normal(state.contacts, k), impulse = contact_impulse(state.contacts, k);
+  const auto i = static_cast<std::size_t>(state.contacts.first[k]);
+  const Slot second = state.contacts.second[k];
+  const auto j = static_cast<std::size_t>(std::max(second, 0));
+  const auto wall =
+      static_cast<std::size_t>(std::max(state.chunks.wall[static_cast<std::size_t>(active.chunk)], 0));
+  const double gap =
+      second >= 0 ? (bodies.x[i] - bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
+                  : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
+  ContactRow row;
+  row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
+  row.bodies[1] =
+      second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
+  copy3(normal, row.normal);
+  copy3(bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * normal, row.point);
+  row.gap = gap;
+  copy3(impulse / time_step, row.force);
+  return row;
+}
+
+/// First ids of the ranks after the first, so that all get about as many: quantiles of a sample of the ids.
+std::vector<std::int64_t> splitters(std::vector<std::int64_t> ids, const graph::Communicator& ranks) {
+  const auto n = static_cast<std::size_t>(ranks.ranks());
+  if (n == 1) return {};
+  std::sort(ids.begin(), ids.end());
+  const std::size_t wanted = std::min<std::size_t>(ids.size(), 256);
+  std::vector<std::int64_t> sample;
+  for (std::size_t k = 0; k < wanted; ++k) sample.push_back(ids[k * ids.size() / wanted]);
+  sample = ranks.gather_records(std::span<const std::int64_t>(sample));
+  std::sort(sample.begin(), sample.end());
+  std::vector<std::int64_t> first;
+  for (std::size_t r = 1; r < n; ++r)
+    first.push_back(sample.empty() ? 0 : sample[std::min(r * sample.size() / n, sample.size() - 1)]);
+  return first;
+}
+
+/// Sends row(k), k < count, to the rank that has `id_of(row)`, and calls add(row) for those that come here.
+template <class Row, class IdOf, class Add>
+void deal_rows(std::size_t count, std::span<const std::int64_t> first, const graph::Communicator& ranks,
+               const Row& row, const IdOf& id_of, const Add& add) {
+  if (ranks.ranks() == 1) {
+    for (std::size_t k = 0; k < count; ++k) add(row(k));
+    return;
+  }
+  double most[1] = {static_cast<double>(count)};
+  ranks.max(most);
+  for (std::size_t begin = 0; begin < static_cast<std::size_t>(most[0]); begin += piece) {
+    std::vector<std::vector<decltype(row(0))>> to(static_cast<std::size_t>(ranks.ranks()));
+    for (std::size_t k = begin; k < std::min(begin + piece, count); ++k) {
+      const auto made = row(k);
+      to[static_cast<std::size_t>(std::upper_bound(first.begin(), first.end(), id_of(made)) - first.begin())]
+          .push_back(made);
+    }
+    for (const auto& part : ranks.exchange_records(std::move(to)))
+      for (const auto& come : part) add(come);
+  }
+}
+
+/// The order of 0 .. keys - 1 by ascending key.
+template <class Key>
+std::vector<Slot> ascending(std::span<const Key> keys) {
+  std::vector<Slot> order(keys.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](Slot a, Slot b) {
+    return keys[static_cast<std::size_t>(a)] < keys[static_cast<std::size_t>(b)];
+  });
+  return order;
 }
 
 }  // namespace
 
-void gather_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
-                  double time_step, Frame& frame) {
-  std::vector<BodyRow> bodies = on_rank_0(body_rows(state), ranks);
-  std::sort(bodies.begin(), bodies.end(), [](const BodyRow& a, const BodyRow& b) { return a.id < b.id; });
-  for (const BodyRow& row : bodies) {
-    frame.id.push_back(row.id);
-    frame.x.push_back(vector_of(row.x));
-    frame.radius.push_back(row.radius);
-    frame.u.push_back(vector_of(row.u));
-    if (rotation) frame.omega.push_back(vector_of(row.omega));
-    if (state.decomposition.orientation)
-      frame.orientation.push_back(
-          {row.orientation[0], row.orientation[1], row.orientation[2], row.orientation[3]});
+void fill_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
+                double time_step, Frame& frame) {
+  std::vector<std::size_t> counted;
+  std::vector<std::int64_t> ids;
+  for (std::size_t s = 0; s < state.bodies.size(); ++s) {
+    if (!state.decomposition.counts.empty() && !state.decomposition.counts[s]) continue;
+    counted.push_back(s);
+    ids.push_back(static_cast<std::int64_t>(state.bodies.id[s]));
   }
+  const std::vector<std::int64_t> first = splitters(std::move(ids), ranks);
+  const bool orientation = state.decomposition.orientation;
+  deal_rows(
+      counted.size(), first, ranks, [&](std::size_t k) { return body_row(state.bodies, counted[k]); },
+      [](const BodyRow& row) { return row.id; },
+      [&](const BodyRow& row) {
+        frame.id.push_back(row.id);
+        frame.x.push_back(vector_of(row.x));
+        frame.radius.push_back(row.radius);
+        frame.u.push_back(vector_of(row.u));
+        if (rotation) frame.omega.push_back(vector_of(row.omega));
+        if (orientation)
+          frame.orientation.push_back(
+              {row.orientation[0], row.orientation[1], row.orientation[2], row.orientation[3]});
+      });
+  release(counted);
+  const std::vector<Slot> by_id = ascending(std::span<const std::int64_t>(frame.id));
+  permute(frame.id, by_id);
+  permute(frame.x, by_id);
+  permute(frame.radius, by_id);
+  permute(frame.u, by_id);
+  permute(frame.omega, by_id);
+  permute(frame.orientation, by_id);
   if (!contacts) return;
-  std::vector<ContactRow> rows = on_rank_0(contact_rows(state, time_step), ranks);
-  std::sort(rows.begin(), rows.end(), [](const ContactRow& a, const ContactRow& b) {
-    return a.bodies[0] != b.bodies[0] ? a.bodies[0] < b.bodies[0] : a.bodies[1] < b.bodies[1];
-  });
-  for (const ContactRow& row : rows) {
-    frame.contact_bodies.push_back({row.bodies[0], row.bodies[1]});
-    frame.contact_normal.push_back(vector_of(row.normal));
-    frame.contact_point.push_back(vector_of(row.point));
-    frame.contact_gap.push_back(row.gap);
-    frame.contact_force.push_back(vector_of(row.force));
-  }
+  const std::vector<Active> active = active_contacts(state);
+  deal_rows(
+      active.size(), first, ranks, [&](std::size_t k) { return contact_row(state, active[k], time_step); },
+      [](const ContactRow& row) { return row.bodies[0]; },
+      [&](const ContactRow& row) {
+        frame.contact_bodies.push_back({row.bodies[0], row.bodies[1]});
+        frame.contact_normal.push_back(vector_of(row.normal));
+        frame.contact_point.push_back(vector_of(row.point));
+        frame.contact_gap.push_back(row.gap);
+        frame.contact_force.push_back(vector_of(row.force));
+      });
+  const std::vector<Slot> by_ids =
+      ascending(std::span<const std::array<std::int64_t, 2>>(frame.contact_bodies));
+  permute(frame.contact_bodies, by_ids);
+  permute(frame.contact_normal, by_ids);
+  permute(frame.contact_point, by_ids);
+  permute(frame.contact_gap, by_ids);
+  permute(frame.contact_force, by_ids);
 }
 
 }  // namespace talus

@@ -58,7 +58,9 @@ struct TriaxialReport {
       0;  ///< 2 x active grain-grain contacts (+ walls) per grain with contacts, rattlers left out
 };
 
-/// State at an output time. Vectors named first are per body, those after `contact` per active contact.
+/// State at an output time. Vectors named first are per body, those after `contact` per active contact; on
+/// several ranks each has a part: bodies in order of id, contacts in order of their ids, and the parts of the
+/// ranks, in order of rank, follow one another.
 struct Frame {
   std::int64_t step = 0;
   double time = 0;
@@ -79,9 +81,9 @@ struct Frame {
 
 struct StepState;
 
-/// Fills the bodies and contacts of `frame` with those of all ranks, in order of id; on rank 0 only,
-/// collective.
-void gather_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
-                  double time_step, Frame& frame);
+/// Fills the bodies and contacts of `frame`: this rank's part, about as large as that of any other; a contact
+/// is where its first body is. Collective; rows travel in bounded pieces.
+void fill_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
+                double time_step, Frame& frame);
 
 }  // namespace talus

@@ -25,6 +25,8 @@ constexpr double most_momentum = 0.9;
 constexpr double hopeless_growth = 4;
 /// With friction momentum gets this far at twice the speed of conjugate gradients, and then falls behind.
 constexpr double momentum_reach = 5e-5;
+/// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
+constexpr int plain_sweeps = 3;
 /// What momentum makes worse shows within as many sweeps.
 constexpr int trusted_sweeps = 25;
 
@@ -45,6 +47,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       settings_(settings),
       decomposition_(decomposition),
       ranks_(ranks),
+      kernels_(settings.simd),
       gluing_(state, decomposition, ranks),
       admm_(state, parameters, decomposition, ranks) {}
 
@@ -102,8 +105,8 @@ void Iteration::begin() {
 double Iteration::beta(int epoch) const {
   const Course& now = course(epoch);
   if (now.method == SolverMethod::nncg) return conjugate_beta_;
-  const int sweep = number(epoch) - now.from;
-  return std::min(now.most, sweep / (sweep + 3.0));
+  const int sweep = number(epoch) - now.from - plain_sweeps;
+  return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
 }
 
 void Iteration::begin_course(SolverMethod method, double most) {
@@ -138,9 +141,9 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu) {
   const bool damped = !before_.empty() && chunks.boundary[c] != 0;
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
   if (at_wall)
-    sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
+    kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
   else
-    sweep_grains<Friction>(state_.contacts, range, velocity, mu);
+    kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu);
   if (damped)
     relax<Friction>(state_.contacts, range, before_[c], state_.decomposition.multiplicity, velocity,
                     at_wall ? &state_.copies[c] : nullptr);
@@ -172,18 +175,18 @@ void Iteration::chunk(std::size_t c, int epoch) {
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
-        accumulate_wall<Friction>(contacts, range, velocity, copy);
+        kernels_.accumulate_wall<Friction>(contacts, range, velocity, copy);
       } else {
-        accumulate_grains<Friction>(contacts, range, velocity);
+        kernels_.accumulate_grains<Friction>(contacts, range, velocity);
       }
       break;
     }
     case Work::measure:
       sums_[c] = at_wall
-                     ? error_wall<Friction>(contacts, range, velocity, mu, copy,
-                                            state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(),
-                                            multiplicity)
-                     : error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
+                     ? kernels_.error_wall<Friction>(
+                           contacts, range, velocity, mu, copy,
+                           state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(), multiplicity)
+                     : kernels_.error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
       if (ranks_.ranks() > 1) store_impulses(contacts, chunks, c, state_.candidates);
       break;
     case Work::sweep:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/momentum.hpp"
+#include "kernels/sweep_kernels.hpp"
 #include "runtime/step/admm.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
@@ -124,6 +125,7 @@ class Iteration {
   const SolverSettings& settings_;
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
+  SweepKernels kernels_;
   Gluing gluing_;
   Admm admm_;
   std::vector<ErrorSums> sums_;              ///< per chunk

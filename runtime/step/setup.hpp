@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/sweep_kernels.hpp"
 #include "kernels/types.hpp"
 #include "kernels/walls.hpp"
 #include "partition/partitioner.hpp"
@@ -54,8 +55,8 @@ enum class SolverMethod {
               ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
   nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
   momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
-  admm,       ///< one call of ADMM in body space (kernels/admm.hpp), then sweeps as they are
   nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
+  admm,       ///< one call of ADMM in body space (kernels/admm.hpp), then sweeps as they are
 };
 
 struct SolverSettings {
@@ -69,6 +70,7 @@ struct SolverSettings {
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
+  InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps; all give the same bits
 };
 
 /// How subdomains act on one another.
@@ -90,13 +92,20 @@ enum class BalanceBy {
          ///< of the results, then depends on the machine's day
 };
 
+/// Which rank has which subdomain. No result depends on it.
+enum class SubdomainMapping {
+  block,   ///< consecutive subdomains share a rank: fewest messages between ranks
+  cyclic,  ///< subdomain e is on rank e modulo the ranks: where work varies slowly over the sample
+};
+
 struct DecompositionSettings {
   Coupling coupling = Coupling::nscdd;
   ExchangeScheme exchange = ExchangeScheme::dcs;
   PartitionKind partitioner = PartitionKind::automatic;
   int subdomains = 0;                   ///< 0: one per rank
   std::array<std::int64_t, 3> boxes{};  ///< per axis, for the partitioners that cut boxes; zeros: chosen
-  int sweeps_per_exchange = 1;          ///< n_GS >= 1
+  SubdomainMapping mapping = SubdomainMapping::block;
+  int sweeps_per_exchange = 1;  ///< n_GS >= 1
   BalanceBy balance = BalanceBy::contacts;
   int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
   double max_imbalance = 0.2;  ///< contacts of the fullest over those of the mean subdomain, less 1: beyond

@@ -8,6 +8,8 @@
 #include <limits>
 #include <unordered_map>
 
+#include "runtime/step/dealing.hpp"
+
 namespace talus {
 
 namespace {
@@ -36,11 +38,6 @@ std::string describe(const Bodies& bodies, Slot slot) {
       v.w[0], v.w[1], v.w[2]);
 }
 
-const graph::Communicator& one_rank() {
-  static const graph::Communicator alone;
-  return alone;
-}
-
 }  // namespace
 
 struct Simulation::Implementation {
@@ -48,37 +45,13 @@ struct Simulation::Implementation {
       : setup(std::move(given)),
         ranks(ranks_),
         state(start(setup, std::move(bodies), ranks_)),
-        size(measure_sample()),
-        graph(state, parameters, setup.solver, setup.decomposition, static_cast<std::int64_t>(size.bodies),
-              executor, ranks_) {
+        size(measure_sample(state.bodies, ranks_)),
+        graph(state, parameters, setup.solver, setup.decomposition, size.bodies, executor, ranks_) {
+    state.decomposition.orientation = size.orientation;
     const double unit = size.bodies > 0 ? size.smallest : 1;
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
     begin_stage();
-  }
-
-  /// Of all bodies; rank 0 has them in the beginning.
-  struct SampleSize {
-    double bodies = 0;
-    double smallest = std::numeric_limits<double>::infinity();
-    double mean_diameter = 0, total_mass = 0, volume = 0;
-    double orientation = 0;
-  };
-
-  SampleSize measure_sample() {
-    const Bodies& grains = state.bodies;
-    SampleSize own;
-    own.bodies = static_cast<double>(grains.size());
-    for (double r : grains.radius) {
-      own.smallest = std::min(own.smallest, r);
-      own.mean_diameter += 2 * r / own.bodies;
-    }
-    for (const Velocity& v : grains.velocity) own.total_mass += 1 / v.inv_mass;
-    own.volume = total_volume(grains);
-    own.orientation = grains.orientation.empty() ? 0 : 1;
-    const SampleSize all = ranks.gather_records(std::span<const SampleSize>(&own, 1)).front();
-    state.decomposition.orientation = all.orientation > 0;
-    return all;
   }
 
   static StepState start(const Setup& setup, Bodies bodies, const graph::Communicator& ranks) {
@@ -87,7 +60,11 @@ struct Simulation::Implementation {
     StepState state;
     state.decomposition = make_decomposition(setup.decomposition, ranks);
     state.bodies = std::move(bodies);
-    reorder(state.bodies, morton_order(state.bodies));
+    if (state.decomposition.several())  // until the first step deals them out; lanes go by subdomain
+      std::fill(state.decomposition.slot_begin.begin() + 1, state.decomposition.slot_begin.end(),
+                state.bodies.size());
+    else
+      reorder(state.bodies, morton_order(state.bodies));
     if (!setup.rotation)
       for (Velocity& v : state.bodies.velocity) {
         v.spin_mobility = 0;
@@ -220,10 +197,9 @@ struct Simulation::Implementation {
       from_walls += wall.impulse;
       impulse_unit = std::max(impulse_unit, wall.impulse.norm());
     }
-    // What contacts pass on by rounding alone has no direction to be judged by.
-    constexpr double rounding = 1e-12;
-    impulse_unit =
-        std::max(impulse_unit, rounding * std::sqrt(2 * size.total_mass * sums.motion.energy_free));
+    // What rounding leaves of the sample's momentum, at most sqrt(2 E M), is no defect.
+    const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
+    impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * size.total_mass));
     const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
     ++stage_steps;
     ++report.step;
@@ -359,7 +335,7 @@ Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
 }
 
 Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor)
-    : Simulation(std::move(setup), std::move(bodies), executor, one_rank()) {}
+    : Simulation(std::move(setup), std::move(bodies), executor, graph::one_rank()) {}
 
 Simulation::~Simulation() = default;
 
@@ -464,7 +440,7 @@ std::uint64_t Simulation::digest() const {
 }
 
 std::int64_t Simulation::bodies() const {
-  return static_cast<std::int64_t>(impl_->size.bodies);
+  return impl_->size.bodies;
 }
 const MessageCount& Simulation::messages() const {
   return impl_->graph.iteration().gluing().messages();
@@ -478,8 +454,8 @@ Frame Simulation::frame(bool contacts) const {
   frame.step = impl_->report.step;
   frame.time = impl_->report.time;
   frame.stage = stage().name;
-  gather_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
-               impl_->parameters.time_step, frame);
+  fill_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
+             impl_->parameters.time_step, frame);
   frame.walls = walls();
   return frame;
 }

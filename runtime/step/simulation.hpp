@@ -38,9 +38,9 @@ class RunawayError : public std::runtime_error {
 /// subdomains, results depend neither on the number of threads nor on that of ranks (step_graph.hpp).
 class Simulation {
  public:
-  /// Throws std::invalid_argument when the setup makes no sense, on all ranks. The bodies are those of rank
-  /// 0, all others pass none; the first step deals them out. Executor and ranks must outlive the simulation.
-  /// Collective.
+  /// Throws std::invalid_argument when the setup makes no sense, on all ranks. Each rank
+  /// passes the bodies it has, any part of all (dealing.hpp); the first step deals them out. Executor and
+  /// ranks must outlive the simulation. Collective.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks);
   /// On one rank.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
@@ -77,7 +77,7 @@ class Simulation {
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them
-  /// out. Collective; whole on rank 0, where the others' are empty.
+  /// out. Collective; each rank gets its part (frame.hpp).
   Frame frame(bool contacts = true) const;
 
   /// talus::digest of all bodies. Collective.

@@ -16,6 +16,7 @@ struct StepTimes {
   double detection = 0;  ///< predicted poses, broad and narrow phase, chunks, matching
   double iteration = 0;  ///< the epoch loop
   double rest = 0;       ///< integration and measures
+  double dealing = 0;    ///< part of detection: partition, migration, interfaces, plan of the exchange
 };
 
 /// What the tasks of a step leave for its report.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/release.hpp"
 #include "runtime/step/step_graph.hpp"
 
 namespace talus {
@@ -127,7 +128,7 @@ void StepGraph::make_cells() {
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
-  const Bodies& bodies = state_.bodies;
+  Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -138,6 +139,11 @@ void StepGraph::make_cells() {
     state_.wall_then.push_back(wall.point);
     wall_margin_.push_back(half_skin + margin_of(wall));
   }
+  // What the last step found is in the impulses of the candidates; detection works in its room.
+  const auto make_room = [this] {
+    state_.contacts = {};
+    state_.chunks = {};
+  };
   if (state_.decomposition.several()) {
     const bool first = state_.decomposition.interfaces.empty();
     const bool anew = first || partition_due();
@@ -146,11 +152,15 @@ void StepGraph::make_cells() {
       imbalance_then_ = iteration_.imbalance();
       if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
     }
+    make_room();
+    const double began = now();
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
+    sums_.times.dealing = now() - began;
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
   }
+  make_room();
   state_.x_then = bodies.x;
   state_.reach_then = std::move(reach);
   cells_ = build_cells(state_.x_then, state_.reach_then);
@@ -172,17 +182,19 @@ void StepGraph::make_chunks() {
   Candidates fresh;
   fresh.components = parameters_.friction ? 3 : 1;
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
-  for (auto& part : pairs_) part = {};
+  for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
                                      several ? around_.reach : state_.reach_then, wall_margin_);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
+  const double began = now();
   if (several) {
-    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, fresh, glued, state_.bodies,
-                        state_.candidates);
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
+                        state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
+    sums_.times.dealing += now() - began;
   } else {
     match_impulses(state_.candidates, fresh);
     state_.candidates = std::move(fresh);
@@ -190,7 +202,9 @@ void StepGraph::make_chunks() {
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  const double planning = now();
   iteration_.plan();
+  if (several) sums_.times.dealing += now() - planning;
   std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
   ranks_.sum(candidates);
   all_candidates_ = candidates[0];
@@ -434,7 +448,9 @@ void StepGraph::sum_up() {
   for (std::size_t e = 0; e < by_subdomain.size(); ++e)
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
   sums_.candidates = all_candidates_;
-  sums_.times = {iterating_ - started_, iterated_ - iterating_, now() - iterated_};
+  sums_.times.detection = iterating_ - started_;
+  sums_.times.iteration = iterated_ - iterating_;
+  sums_.times.rest = now() - iterated_;
 }
 
 }  // namespace talus

@@ -1,16 +1,18 @@
 /// Table 4 of Visseq, Alart and Dureisseix (2013) for every partitioner on a dense sample: load and interface
 /// of the subdomains, time to partition, and the grains that migrate when the sample has deformed a little.
-/// Usage: bench_partition [grains, default 200000] [subdomains, default 96]
+/// Usage: bench_partition [grains, default 200000 | RESULTS.h5] [subdomains, default 96]
+/// With grains they are deposited; with the results of a run its last frame is taken, grains and walls.
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <numeric>
+#include <string>
 #include <vector>
 
+#include "io/results.hpp"
 #include "kernels/broad_phase.hpp"
 #include "kernels/sample.hpp"
 #include "partition/interface.hpp"
@@ -25,53 +27,83 @@ double seconds_since(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-struct Sample {
+struct Dense {
   std::vector<Vec3> x;
   std::vector<double> radii;
   std::vector<GrainPair> grain_pairs;
   std::vector<WallPair> wall_pairs;
 };
 
-/// A deposited packing cut level at the top, as the lid of a compaction leaves it, with six walls. Pairs
-/// nearer than `margin` of the mean radius count as contacts.
-Sample deposited(std::size_t grains, double margin) {
-  Sample sample;
-  const auto drawn = draw_radii({SizeDistribution::Kind::uniform, 10.0 / 11, 12.0 / 11}, grains * 21 / 20, 1);
-  const double length = std::cbrt(static_cast<double>(grains) * 4.18879 / 0.62);
-  const auto centres = deposit(drawn, length, length);
-  double top = 0;
-  std::vector<double> heights;
-  for (std::size_t k = 0; k < drawn.size(); ++k) heights.push_back(centres[k][2] + drawn[k]);
-  std::nth_element(heights.begin(), heights.begin() + static_cast<std::ptrdiff_t>(grains - 1), heights.end());
-  top = heights[grains - 1];
-  std::vector<double> reach;
-  for (std::size_t k = 0; k < drawn.size(); ++k) {
-    if (centres[k][2] + drawn[k] > top) continue;
-    sample.x.push_back(centres[k]);
-    sample.radii.push_back(drawn[k]);
-    reach.push_back(drawn[k] + margin / 2);
-  }
+/// Pairs whose surfaces are nearer than `margin` [m], and those of the walls of the box [low, high].
+void find_contacts(Dense& sample, double margin, const Vec3& low, const Vec3& high) {
+  std::vector<double> reach = sample.radii;
+  for (double& r : reach) r += margin / 2;
   const CellGrid grid = build_cells(sample.x, reach);
   std::vector<std::vector<GrainPair>> parts(1);
   find_pairs(grid, sample.x, reach, 0, grid.cells.size(), parts[0]);
   sample.grain_pairs = sort_pairs(parts, sample.x.size());
-  const Vec3 high(length, length, top);
   for (std::int32_t wall = 0; wall < 6; ++wall)
     for (std::size_t k = 0; k < sample.x.size(); ++k) {
       const double coordinate = sample.x[k][wall / 2];
-      const double gap = (wall % 2 == 0 ? coordinate : high[wall / 2] - coordinate) - sample.radii[k];
+      const double gap =
+          (wall % 2 == 0 ? coordinate - low[wall / 2] : high[wall / 2] - coordinate) - sample.radii[k];
       if (gap < margin) sample.wall_pairs.push_back({wall, static_cast<Slot>(k)});
     }
+}
+
+/// A deposited packing cut level at the top, as the lid of a compaction leaves it, with six walls. Pairs
+/// nearer than `margin` of the mean radius count as contacts.
+Dense deposited(std::size_t grains, double margin) {
+  Dense sample;
+  const auto drawn = draw_radii({SizeDistribution::Kind::uniform, 10.0 / 11, 12.0 / 11}, grains * 21 / 20, 1);
+  const double length = std::cbrt(static_cast<double>(grains) * 4.18879 / 0.62);
+  const auto centres = deposit(drawn, length, length);
+  std::vector<double> heights;
+  for (std::size_t k = 0; k < drawn.size(); ++k) heights.push_back(centres[k][2] + drawn[k]);
+  std::nth_element(heights.begin(), heights.begin() + static_cast<std::ptrdiff_t>(grains - 1), heights.end());
+  const double top = heights[grains - 1];
+  for (std::size_t k = 0; k < drawn.size(); ++k) {
+    if (centres[k][2] + drawn[k] > top) continue;
+    sample.x.push_back(centres[k]);
+    sample.radii.push_back(drawn[k]);
+  }
+  find_contacts(sample, margin, Vec3::Zero(), Vec3(length, length, top));
+  return sample;
+}
+
+/// The last frame of a run in a box; pairs nearer than a tenth of the smallest radius count as contacts, as
+/// in the run.
+Dense compacted(const std::string& results) {
+  const Frame frame = io::read_frame(results, io::frame_count(results) - 1);
+  Dense sample;
+  sample.x = frame.x;
+  sample.radii = frame.radius;
+  Vec3 low = Vec3::Zero(), high = Vec3::Zero();
+  for (const WallReport& wall : frame.walls) {
+    if (wall.name.size() != 2) continue;  // x-, x+, ...: the sides of a box
+    const Eigen::Index axis = wall.name[0] - 'x';
+    if (wall.name[1] == '-')
+      low[axis] = wall.position;
+    else
+      high[axis] = -wall.position;
+  }
+  const double smallest = *std::min_element(sample.radii.begin(), sample.radii.end());
+  find_contacts(sample, 0.1 * smallest, low, high);
+  double volume = 0;
+  for (double r : sample.radii) volume += 4.18879 * r * r * r;
+  std::printf("# step %lld, solid fraction %.4f\n", static_cast<long long>(frame.step),
+              volume / (high - low).prod());
   return sample;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto grains = static_cast<std::size_t>(argc > 1 ? std::atol(argv[1]) : 200000);
-  const auto subdomains = static_cast<std::int32_t>(argc > 2 ? std::atol(argv[2]) : 96);
+  const std::string what = argc > 1 ? argv[1] : "200000";
+  const auto subdomains = static_cast<std::int32_t>(argc > 2 ? std::stoi(argv[2]) : 96);
   auto begin = std::chrono::steady_clock::now();
-  const Sample sample = deposited(grains, 0.05);
+  const Dense sample =
+      what.ends_with(".h5") ? compacted(what) : deposited(static_cast<std::size_t>(std::stol(what)), 0.05);
   const std::size_t contacts = sample.grain_pairs.size() + sample.wall_pairs.size();
   std::printf("# %zu grains, %zu contacts (%zu at walls), sample in %.1f s\n", sample.x.size(), contacts,
               sample.wall_pairs.size(), seconds_since(begin));

@@ -16,22 +16,20 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
 #include <numeric>
-#include <random>
-#include <sstream>
-#include <stdexcept>
 
 #include "kernels/admm.hpp"
 #include "kernels/sample.hpp"
 #include "kernels/sweep.hpp"
 #include "runtime/step/simulation.hpp"
+#include "tests/bench/packing.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace {
 
 using namespace talus;
+using bench::Packing;
 
 constexpr double gravity = 9.81, mu = 0.35;
 
@@ -162,31 +160,6 @@ double column_error(const Scene& scene) {
       most = std::max(most, exact);
     }
   return error / most;
-}
-
-struct Packing {
-  double edge = 0;
-  Bodies bodies;
-};
-
-Packing read_packing(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw std::runtime_error("cannot open " + path);
-  Packing packing;
-  std::string line, word;
-  std::getline(file, line);
-  std::istringstream first(line);
-  if (!(first >> word >> word >> packing.edge)) throw std::runtime_error(path + ":1: expected `# L <edge>`");
-  std::getline(file, line);
-  for (int number = 3; std::getline(file, line); ++number) {
-    std::replace(line.begin(), line.end(), ',', ' ');
-    std::istringstream values(line);
-    double x, y, z, r;
-    if (!(values >> x >> y >> z >> r))
-      throw std::runtime_error(fmt::format("{}:{}: expected x,y,z,r", path, number));
-    add_sphere(packing.bodies, BodyId{number - 3}, Vec3(x, y, z), r, 1.0);
-  }
-  return packing;
 }
 
 /// The pile in its box; the lid is a plate of `plate` mean grain masses with nothing but its weight on it.
@@ -332,7 +305,7 @@ int main(int argc, char** argv) {
             force);
   }
   if (argc < 2) return 0;
-  const Packing packing = read_packing(argv[1]);
+  const Packing packing = bench::read_packing(argv[1]);
   for (bool closed : {true, false}) {
     const Scene scene = plate_scene(packing, 1e6, closed);
     std::vector<AdmmSettings> packings;

@@ -15,15 +15,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
-#include <random>
-#include <sstream>
 #include <stdexcept>
 
 #include "kernels/broad_phase.hpp"
-#include "kernels/sweep.hpp"
+#include "kernels/sweep_kernels.hpp"
 #include "runtime/step/simulation.hpp"
+#include "tests/bench/packing.hpp"
 
 namespace {
 
@@ -35,47 +33,9 @@ double clock_now(clockid_t clock) {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-struct Packing {
-  double edge = 0;
-  Bodies bodies;
-};
-
-Packing read_packing(const std::string& path) {
-  std::ifstream file(path);
-  if (!file) throw std::runtime_error("cannot open " + path);
-  Packing packing;
-  std::string line, word;
-  std::getline(file, line);
-  std::istringstream first(line);
-  if (!(first >> word >> word >> packing.edge)) throw std::runtime_error(path + ":1: expected `# L <edge>`");
-  std::getline(file, line);
-  for (int number = 3; std::getline(file, line); ++number) {
-    std::replace(line.begin(), line.end(), ',', ' ');
-    std::istringstream values(line);
-    double x, y, z, r;
-    if (!(values >> x >> y >> z >> r))
-      throw std::runtime_error(fmt::format("{}:{}: expected x,y,z,r", path, number));
-    add_sphere(packing.bodies, BodyId{number - 3}, Vec3(x, y, z), r, 1.0);
-  }
-  return packing;
-}
-
-/// Hexagonal close packing of spacing 2 with jitter, radii 0.95-1.05, resting on the floor: about 7 contacts
-/// a grain within 0.02.
-Packing make_packing() {
-  std::mt19937_64 random(1);
-  std::uniform_real_distribution<double> jitter(-0.05, 0.05);
-  Packing packing;
-  for (int k = 0; k < 16000; ++k) {
-    const int i = k % 25, j = k / 25 % 25, l = k / 625;
-    const double x = 2 * i + (j + l) % 2 + 1, y = std::sqrt(3.0) * (j + l % 2 / 3.0) + 1,
-                 z = 2 * std::sqrt(6.0) / 3 * l + 1;
-    add_sphere(packing.bodies, BodyId{k}, Vec3(x + jitter(random), y + jitter(random), z + jitter(random)),
-               1 + jitter(random), 1.0);
-    packing.edge = std::max({packing.edge, x + 1, y + 1, z + 1});
-  }
-  return packing;
-}
+using bench::make_packing;
+using bench::Packing;
+using bench::read_packing;
 
 Setup pile(double edge, int sweeps, bool friction) {
   Setup setup;
@@ -122,15 +82,15 @@ struct Times {
 };
 
 template <bool Friction>
-void sweep_once(const Chunks& chunks, Contacts& contacts, std::vector<Velocity>& velocity,
-                std::vector<WallCopy>& copies) {
+void sweep_once(const SweepKernels& kernels, const Chunks& chunks, Contacts& contacts,
+                std::vector<Velocity>& velocity, std::vector<WallCopy>& copies) {
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const auto begin = static_cast<std::size_t>(chunks.begin[c]);
     const ContactRange range{begin, begin + static_cast<std::size_t>(contacts.count[c])};
     if (chunks.wall[c] < 0)
-      sweep_grains<Friction>(contacts, range, velocity, 0.35);
+      kernels.sweep_grains<Friction>(contacts, range, velocity, 0.35);
     else
-      sweep_wall<Friction>(contacts, range, velocity, 0.35, copies[c]);
+      kernels.sweep_wall<Friction>(contacts, range, velocity, 0.35, copies[c]);
   }
 }
 
@@ -139,6 +99,7 @@ constexpr int sweeps_per_sample = 20;
 /// The kernels by themselves, in the order of chunks, on copies of the state that a step left.
 template <bool Friction>
 void time_kernels(const StepState& state, Times& times, int repeats) {
+  const SweepKernels kernels(best_instruction_set());
   Contacts contacts = state.contacts;
   std::vector<Velocity> velocity = state.bodies.velocity;
   std::vector<WallCopy> copies(state.chunks.size());
@@ -147,15 +108,15 @@ void time_kernels(const StepState& state, Times& times, int repeats) {
   for (int repeat = 0; repeat <= repeats; ++repeat) {
     const double sweep = cpu_time([&] {
       for (int k = 0; k < sweeps_per_sample; ++k)
-        sweep_once<Friction>(state.chunks, contacts, velocity, copies);
+        sweep_once<Friction>(kernels, state.chunks, contacts, velocity, copies);
     });
     const double measure = cpu_time([&] {
       for (int k = 0; k < sweeps_per_sample; ++k)
         for (std::size_t c = 0; c < state.chunks.size(); ++c) {
           const auto begin = static_cast<std::size_t>(state.chunks.begin[c]);
           if (state.chunks.wall[c] < 0)
-            error_grains<Friction>(contacts, {begin, begin + static_cast<std::size_t>(contacts.count[c])},
-                                   velocity, 0.35);
+            kernels.error_grains<Friction>(
+                contacts, {begin, begin + static_cast<std::size_t>(contacts.count[c])}, velocity, 0.35);
         }
     });
     std::vector<std::vector<GrainPair>> parts(1);
@@ -164,7 +125,8 @@ void time_kernels(const StepState& state, Times& times, int repeats) {
       find_pairs(grid, state.bodies.x, reach, 0, grid.cells.size(), parts[0]);
       sort_pairs(parts, reach.size());
     });
-    const double cut = cpu_time([&] { cut_chunks(state.candidates, state.bodies.size(), 384); });
+    const double cut = cpu_time(
+        [&] { cut_chunks(state.candidates, state.bodies.size(), chunk_target(state.candidates.size())); });
     const NarrowPhase in{
         state.bodies.x,   state.bodies.radius, state.bodies.velocity, state.walls, 0.005, 0.02, 0,
         Vec3(0, 0, -9.81)};
@@ -213,9 +175,10 @@ void report(const Packing& packing, int repeats) {
     fmt::print("{:<34}{:>12.1f}{:>14.1f}{:>12.2f}\n", what, 1e6 * seconds, 1e9 * seconds / contacts,
                seconds / sweep);
   };
-  fmt::print("\n{}: {} bodies, {} candidates, {} contacts, {} chunks in {} colours, {} repeats\n",
+  fmt::print("\n{}: {} bodies, {} candidates, {} contacts, {} chunks in {} colours, {}, {} repeats\n",
              Friction ? "friction 0.35" : "frictionless", state.bodies.size(), state.candidates.size(),
-             times.contacts, state.chunks.size(), state.chunks.colours, repeats);
+             times.contacts, state.chunks.size(), state.chunks.colours, name_of(best_instruction_set()),
+             repeats);
   fmt::print("{:<34}{:>12}{:>14}{:>12}\n", "kernel (thread CPU time, median)", "us", "ns/contact",
              "in sweeps");
   row("sweep, 1 thread", sweep);

@@ -50,18 +50,30 @@ TEST(Contacts, AreTheCandidatesNearerThanTheAlertDistance) {
   EXPECT_EQ(found, expected);
 }
 
-TEST(Contacts, StandInBatchesOfEightWithoutACommonGrain) {
-  const Sample sample = test::dense_sample(12, 3, true, false, 384);
-  int batches = 0, disjoint = 0;
-  for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-    for (std::size_t k = sample.range(c).begin; k + 8 <= sample.range(c).end; k += 8) {
-      std::set<Slot> grains(&sample.contacts.first[k], &sample.contacts.first[k] + 8);
-      grains.insert(&sample.contacts.second[k], &sample.contacts.second[k] + 8);
-      ++batches;
-      disjoint += grains.size() == 16;
+// Also where chunks are shorter than a group, and where a large grain is in every contact.
+TEST(Contacts, StandInGroupsWithoutACommonGrain) {
+  for (int target : {1, 7, 48, 384}) {
+    const Sample sample = test::dense_sample(9, 3, true, true, target);
+    std::size_t full = 0, all = 0;
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+      const ContactRange range = sample.range(c);
+      std::size_t k = range.begin;
+      for (const std::uint8_t* size = &sample.contacts.group[range.begin]; k < range.end; k += *size++) {
+        ASSERT_GE(*size, 1);
+        ASSERT_LE(*size, 16);
+        std::set<Slot> grains(&sample.contacts.first[k], &sample.contacts.first[k] + *size);
+        const bool wall = sample.chunks.wall[c] >= 0;
+        if (!wall) grains.insert(&sample.contacts.second[k], &sample.contacts.second[k] + *size);
+        EXPECT_EQ(grains.size(), (wall ? 1u : 2u) * *size);
+        full += *size == 16 ? 16 : 0;
+        all += *size;
+      }
+      EXPECT_EQ(k, range.end) << "groups cover the contacts of chunk " << c;
     }
-  EXPECT_GT(batches, 400);
-  EXPECT_GE(disjoint, 95 * batches / 100);
+    if (target == 384) {
+      EXPECT_GE(full, 85 * all / 100);
+    }
+  }
 }
 
 // 150 small grains on a large one share it in every pair: there is no batch of two, and more than 64 batches

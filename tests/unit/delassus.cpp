@@ -7,6 +7,9 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "kernels/delassus_solve.hpp"
+#include "kernels/delassus_sweeps.hpp"
+
 namespace talus {
 namespace {
 
@@ -92,7 +95,7 @@ TEST(Nlgs, TowerCarriesItsWeight) {
   const Tower t = tower(8);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> r(24, 0.0);
-  const auto report = solve_nlgs(p, {.tolerance = 1e-12}, r);
+  const auto report = solve_nlgs(p, {.tolerance = 1e-12}, {}, r);
   EXPECT_TRUE(report.converged);
   for (std::size_t c = 0; c < 8; ++c) EXPECT_NEAR(r[3 * c], static_cast<double>(c + 1), 1e-9);
 }
@@ -102,7 +105,7 @@ TEST(Nlgs, FloorPulledAwayFasterThanFrictionHoldsSlidesUnderTheTower) {
   const Tower t = tower(8, 3.0);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> r(24, 0.0), u(24);
-  EXPECT_TRUE(solve_nlgs(p, {.tolerance = 1e-12}, r).converged);
+  EXPECT_TRUE(solve_nlgs(p, {.tolerance = 1e-12}, {}, r).converged);
   relative_velocity(p, r, u);
   EXPECT_NEAR(r[21], 8, 1e-9);
   EXPECT_NEAR(r[22], -4, 1e-9);
@@ -113,8 +116,8 @@ TEST(Nlgs, MomentumAndDampingReachTheAnswerOfThePlainSweepInFarFewer) {
   const Tower t = tower(40);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> plain(120, 0.0), fast(120, 0.0);
-  const auto slow_report = solve_nlgs(p, {.tolerance = 1e-10, .damping = 0, .momentum = 0}, plain);
-  const auto fast_report = solve_nlgs(p, {.tolerance = 1e-10}, fast);
+  const auto slow_report = solve_nlgs(p, {.tolerance = 1e-10}, {.damping = 0, .momentum = 0}, plain);
+  const auto fast_report = solve_nlgs(p, {.tolerance = 1e-10}, {}, fast);
   EXPECT_TRUE(slow_report.converged && fast_report.converged);
   EXPECT_LT(5 * fast_report.iterations, slow_report.iterations);
   for (std::size_t c = 0; c < 40; ++c) EXPECT_NEAR(fast[3 * c], plain[3 * c], 1e-5);
@@ -126,7 +129,7 @@ TEST(Nlgs, GoesBackToItsBestAnswerWhenItStalls) {
   const auto p =
       assemble_delassus(entries, std::vector<double>{-1, 0, 0, -1, 0, 0}, std::vector<double>{0.3, 0.3});
   std::vector<double> r(6, 0.0), u(6);
-  const auto report = solve_nlgs(p, {.tolerance = 1e-6, .max_iterations = 5000}, r);
+  const auto report = solve_nlgs(p, {.tolerance = 1e-6, .max_iterations = 5000}, {}, r);
   EXPECT_FALSE(report.converged);
   EXPECT_GE(report.rescues, 3);
   EXPECT_EQ(delassus_error(p, r, u).siconos, report.error.siconos);
@@ -136,7 +139,8 @@ TEST(Nlgs, ReportsAMissedToleranceAndHandsBackItsBestAnswer) {
   const Tower t = tower(50);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> r(150, 0.0), u(150);
-  const auto report = solve_nlgs(p, {.tolerance = 1e-12, .max_iterations = 37}, r);
+  const auto report =
+      solve_nlgs(p, {.tolerance = 1e-12, .measure = ErrorMeasure::siconos, .max_iterations = 37}, {}, r);
   EXPECT_FALSE(report.converged);
   EXPECT_EQ(report.iterations, 37);
   EXPECT_EQ(report.history.back().iteration, 37);
@@ -149,7 +153,7 @@ TEST(Nlgs, StopsWhenAskedTo) {
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> r(150, 0.0);
   int checks = 0;
-  const auto report = solve_nlgs(p, {.tolerance = 0, .stop = [&] { return ++checks == 5; }}, r);
+  const auto report = solve_nlgs(p, {.tolerance = 0, .stop = [&] { return ++checks == 5; }}, {}, r);
   EXPECT_FALSE(report.converged);
   EXPECT_EQ(report.iterations, 5);
 }
@@ -158,7 +162,7 @@ TEST(Nlgs, KeepsASolutionItIsGiven) {
   const Tower t = tower(3);
   const auto p = assemble_delassus(t.entries, t.q, t.mu);
   std::vector<double> r = {1, 0, 0, 2, 0, 0, 3, 0, 0};
-  const auto report = solve_nlgs(p, {.tolerance = 1e-10}, r);
+  const auto report = solve_nlgs(p, {.tolerance = 1e-10}, {}, r);
   EXPECT_TRUE(report.converged);
   EXPECT_EQ(report.iterations, 0);
 }
@@ -168,8 +172,8 @@ TEST(Nlgs, GivesTheSameBitsForEntriesInAnyOrder) {
   auto reversed = t.entries;
   std::reverse(reversed.begin(), reversed.end());
   std::vector<double> a(60, 0.0), b(60, 0.0);
-  solve_nlgs(assemble_delassus(t.entries, t.q, t.mu), {.tolerance = 1e-10}, a);
-  solve_nlgs(assemble_delassus(reversed, t.q, t.mu), {.tolerance = 1e-10}, b);
+  solve_nlgs(assemble_delassus(t.entries, t.q, t.mu), {.tolerance = 1e-10}, {}, a);
+  solve_nlgs(assemble_delassus(reversed, t.q, t.mu), {.tolerance = 1e-10}, {}, b);
   EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(double)), 0);
 }
 
@@ -179,7 +183,7 @@ TEST(Nlgs, CountsContactsWhoseLawHasNoSolution) {
   const auto p =
       assemble_delassus(entries, std::vector<double>{-1, 0, 0, -1, 0, 0}, std::vector<double>{0.3, 0.3});
   std::vector<double> r(6, 0.0);
-  const auto report = solve_nlgs(p, {.tolerance = 1e-6, .max_iterations = 10}, r);
+  const auto report = solve_nlgs(p, {.tolerance = 1e-6, .max_iterations = 10}, {}, r);
   EXPECT_FALSE(report.converged);
   EXPECT_EQ(report.failed_contacts, 1);
   EXPECT_NEAR(r[0], 1, 1e-12);
@@ -187,7 +191,7 @@ TEST(Nlgs, CountsContactsWhoseLawHasNoSolution) {
 
 TEST(Nlgs, SolvesAProblemWithoutContacts) {
   std::vector<double> r;
-  const auto report = solve_nlgs(assemble_delassus({}, {}, {}), {}, r);
+  const auto report = solve_nlgs(assemble_delassus({}, {}, {}), {}, {}, r);
   EXPECT_TRUE(report.converged);
   EXPECT_EQ(report.error.siconos, 0);
 }

@@ -179,11 +179,9 @@ TEST_F(Fclib, RefusesATruncatedFileWhereverItIsCut) {
 
 TEST_F(Fclib, SaysWhichKindsOfProblemItDoesNotSolve) {
   Contents c = compressed_rows();
-  c.spacedim = {2};
-  expect_refused(c, "2 dimensions");
+  c.spacedim = {5};
+  expect_refused(c, "spacedim is 5");
   c = compressed_rows();
-  c.group = "fclib_global";
-  expect_refused(c, "global problem");
   c.group = "fclib_global_rolling";
   expect_refused(c, "rolling friction");
   c.group = "results";
@@ -218,6 +216,7 @@ TEST_F(Fclib, RefusesSizesThatDisagree) {
   expect_refused(c, "6 x 9");
   c = compressed_rows();
   c.m = c.n = {7};
+  c.p.push_back(8);
   expect_refused(c, "7 x 7");
   c = compressed_rows();
   c.m = c.n = {-6};
@@ -289,13 +288,51 @@ TEST_F(Fclib, RefusesNumbersThatAreNone) {
   expect_refused(c, "vectors/mu[1] is -0.1");
 }
 
+TEST_F(Fclib, APlaneProblemIsOneOfSpaceWhoseSecondTangentNothingExcites) {
+  Contents c = compressed_rows();
+  c.spacedim = {2};
+  c.mu = {0.3, 0.4, 0.5};
+  const FclibProblem p = read_fclib_problem(write(c));
+  ASSERT_EQ(p.contact.contacts(), 3U);
+  EXPECT_EQ(p.contact.diagonal[1].W, Mat3(Vec3(3, 4, 3.5).asDiagonal()));  // mean diagonal that of the plane
+  const std::vector<double> r = {1, 2, 0, 3, 4, 0, 5, 6, 0};
+  const FclibSolution solution = fclib_solution(p, r);
+  EXPECT_EQ(solution.r, (std::vector<double>{1, 2, 3, 4, 5, 6}));
+  // W(0, 4) = 7 and W(5, 1) = -8 of the plane's rows.
+  EXPECT_EQ(solution.u, (std::vector<double>{-1 + 1 + 7 * 5, 4, 9, -2 + 16, 0.1 + 25, 36 - 16}));
+}
+
+TEST_F(Fclib, WhatItWritesItReadsBackBitForBit) {
+  for (const int dimension : {3, 2}) {
+    Contents c = triplets();
+    c.spacedim = {dimension};
+    if (dimension == 2) c.mu = {0.3, 0.4, 0.5};
+    const FclibProblem first = read_fclib_problem(write(c));
+    const std::vector<double> r(3 * first.contact.contacts(), 0.25);
+    write_fclib(first.contact, fclib_solution(first, r), {"title", "description", "math"},
+                path("again.hdf5"));
+    const DelassusProblem second = read_fclib(path("again.hdf5"));
+    EXPECT_EQ(second.dimension, dimension);
+    EXPECT_EQ(second.q, first.contact.q);
+    EXPECT_EQ(second.column, first.contact.column);
+    EXPECT_EQ(second.block, first.contact.block);
+    for (std::size_t k = 0; k < second.contacts(); ++k) {
+      EXPECT_EQ(second.diagonal[k].W, first.contact.diagonal[k].W);
+      EXPECT_EQ(second.diagonal[k].mu, first.contact.diagonal[k].mu);
+    }
+    EXPECT_EQ(read_solution(path("again.hdf5"), "/solution/r").size(),
+              static_cast<std::size_t>(dimension) * second.contacts());
+  }
+}
+
 TEST_F(Fclib, WritesTheSolutionIntoACopyAndLeavesTheProblemAlone) {
   write(triplets());
   fs::permissions(path(), fs::perms::owner_read);  // problems are often read-only
   const auto size = fs::file_size(path());
   const std::vector<double> r = {1, 2, 3, 4, 5, 6}, u = {-1, -2, -3, -4, -5, -6};
-  write_fclib_solution(path(), path("solved.hdf5"), r, u);
-  write_fclib_solution(path("solved.hdf5"), path("again.hdf5"), u, r);  // replaces the solution that is there
+  write_fclib_solution(path(), path("solved.hdf5"), {r, u, {}, {}});
+  write_fclib_solution(path("solved.hdf5"), path("again.hdf5"),
+                       {u, r, {}, {}});  // replaces the solution that is there
   EXPECT_EQ(read_solution(path("solved.hdf5"), "/solution/r"), r);
   EXPECT_EQ(read_solution(path("solved.hdf5"), "/solution/u"), u);
   EXPECT_EQ(read_solution(path("again.hdf5"), "/solution/r"), u);
@@ -310,9 +347,9 @@ TEST_F(Fclib, NeverOverwritesTheProblemUnderWhateverName) {
   fs::create_symlink(path(), path("link.hdf5"));
   fs::create_hard_link(path(), path("twin.hdf5"));
   for (const fs::path& out : {path(), folder_ / "." / "problem.hdf5", path("link.hdf5"), path("twin.hdf5")})
-    EXPECT_THROW(write_fclib_solution(path(), out, r, r), FileError) << out;
-  EXPECT_THROW(write_fclib_solution(path(), folder_ / "no" / "folder.hdf5", r, r), FileError);
-  EXPECT_THROW(write_fclib_solution(path(), folder_, r, r), FileError);
+    EXPECT_THROW(write_fclib_solution(path(), out, {r, r, {}, {}}), FileError) << out;
+  EXPECT_THROW(write_fclib_solution(path(), folder_ / "no" / "folder.hdf5", {r, r, {}, {}}), FileError);
+  EXPECT_THROW(write_fclib_solution(path(), folder_, {r, r, {}, {}}), FileError);
 }
 
 }  // namespace

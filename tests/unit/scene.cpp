@@ -321,25 +321,26 @@ TEST(Overrides, MistakesNameTheOverride) {
 // --- Walls and masses that wait for the grains
 // ----------------------------------------------------------------------------------
 
-Bodies two_grains() {
-  Bodies bodies;
-  add_sphere(bodies, BodyId{0}, Vec3(0.02, 0.02, 0.01), 0.01, 2600);
-  add_sphere(bodies, BodyId{1}, Vec3(0.05, 0.07, 0.03), 0.02, 2600);
-  return bodies;
+Sample two_grains() {
+  Sample sample;
+  sample.x = {Vec3(0.02, 0.02, 0.01), Vec3(0.05, 0.07, 0.03)};
+  sample.radius = {0.01, 0.02};
+  sample.density = 2600;
+  return sample;
 }
 
 TEST(PlaceWalls, SidesStandAtTheBaseAndTheLidOnTheHighestGrain) {
   Scene scene =
       parse_scene(scene_with("#stage", "[[stage.load]]\nwall = \"x+\"\ndrive = \"force\"\nforce = 1"), file);
-  const Bodies bodies = two_grains();
-  place_walls(scene, bodies);
+  const Sample grains = two_grains();
+  place_walls(scene, grains);
   const auto& walls = scene.setup.walls;
   EXPECT_EQ(walls[0].point, Vec3(0, 0, 0));
   EXPECT_EQ(walls[1].point, Vec3(0.1, 0, 0));
   EXPECT_EQ(walls[3].point, Vec3(0, 0.1, 0));
   EXPECT_EQ(walls[4].point, Vec3(0, 0, 0));
   EXPECT_EQ(walls[5].point, Vec3(0, 0, 0.05));
-  const double tenth = 0.1 * (bodies.mass(0) + bodies.mass(1));
+  const double tenth = 0.1 * (mass(grains, 0) + mass(grains, 1));
   EXPECT_DOUBLE_EQ(walls[5].load.mass, tenth);
   EXPECT_DOUBLE_EQ(scene.setup.stages[0].loads[0].second.mass, tenth);
   EXPECT_EQ(walls[0].load.mass, 0);
@@ -355,7 +356,7 @@ TEST(PlaceWalls, GivenPositionsAndMassesStay) {
 TEST(PlaceWalls, RefusesGrainsBehindAWallAndNoGrains) {
   Scene scene = parse_scene(scene_with("#wall", "position = 0.02"), file);
   EXPECT_THROW(place_walls(scene, two_grains()), SceneError);
-  EXPECT_THROW(place_walls(scene, Bodies{}), SceneError);
+  EXPECT_THROW(place_walls(scene, Sample{}), SceneError);
 }
 
 // --- Resolved scene, reference, shipped scenes
@@ -409,11 +410,13 @@ TEST(ResolvedScene, SpellsOutDefaultsAndKeepsPlacesBitForBit) {
 
 TEST(ShippedScenes, ReplicaIsTheStateOfTheArchive) {
   Scene scene = load_scene(shipped_path("replica-iso12k"));
-  const Bodies bodies = read_bodies(scene.sample.file, scene.density);
+  const Sample sample = read_bodies(scene.sample.file, scene.density);
+  Bodies bodies;
+  append(sample, bodies);
   ASSERT_EQ(bodies.size(), 12000u);
   EXPECT_DOUBLE_EQ(bodies.velocity[0].u[0], -4.462695e-03);
   EXPECT_DOUBLE_EQ(bodies.velocity[0].w[2], 1.445077413e-02 * 5.163119e-01);
-  place_walls(scene, bodies);
+  place_walls(scene, sample);
   EXPECT_EQ(scene.setup.walls[1].velocity, Vec3(-0.0002423821, 0, 0));
   EXPECT_EQ(scene.setup.detection.alert, 2.00005e-4);
   EXPECT_EQ(scene.setup.detection.skin, 0);

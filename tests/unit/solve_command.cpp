@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -102,7 +103,7 @@ TEST_F(SolveCommand, PrintsOneLineOfJsonAndReturnsZero) {
   EXPECT_EQ(line.size(), 8U);
   EXPECT_EQ(line.at("problem"), "chain");
   EXPECT_EQ(line.at("contacts"), 20);
-  EXPECT_EQ(line.at("method"), "nlgs");
+  EXPECT_EQ(line.at("method"), "auto");
   EXPECT_LE(line.at("error").get<double>(), 1e-6);
   EXPECT_GT(line.at("scaled_error").get<double>(), 0);
   EXPECT_GT(line.at("iterations").get<int>(), 1);
@@ -137,14 +138,43 @@ TEST_F(SolveCommand, WritesASolutionThatStandsUpToTheErrorItReports) {
   EXPECT_EQ(u, fresh);
 }
 
+TEST_F(SolveCommand, GivesATableOfAFolderAndAllMethodsWithCsvAndProfile) {
+  fs::create_directory(folder_ / "set");
+  write_chain(folder_ / "set" / "long.hdf5", 30);
+  write_chain(folder_ / "set" / "short.hdf5", 2);
+  const auto csv = folder_ / "table.csv", profile = folder_ / "profile.csv";
+  const Outcome outcome = talus("solve " + (folder_ / "set").string() + " --method all --tol 1e-6 --csv " +
+                                csv.string() + " --profile " + profile.string());
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_NE(outcome.output.find("newton: 2 of 2 solved"), std::string::npos) << outcome.output;
+  const auto lines = [](const fs::path& path) {
+    std::ifstream file(path);
+    std::vector<std::string> all;
+    for (std::string line; std::getline(file, line);) all.push_back(line);
+    return all;
+  };
+  ASSERT_EQ(lines(csv).size(), 1U + 2 * 6);
+  EXPECT_EQ(lines(csv)[1].substr(0, 13), "long,30,nlgs,");
+  EXPECT_EQ(lines(profile).front(), "factor,nlgs,nlgs+momentum,nncg,admm,newton,auto");
+  EXPECT_EQ(lines(profile).back().substr(0, 5), "1000,");
+}
+
+TEST_F(SolveCommand, AFolderWithOneBadFileIsSolvedAllTheSameAndSaysTwo) {
+  write_chain(folder_ / "good.hdf5", 3);
+  std::ofstream(folder_ / "bad.hdf5") << "nothing\n";
+  const Outcome outcome = talus("solve " + folder_.string());
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.output.find("auto: 1 of 1 solved"), std::string::npos) << outcome.output;
+}
+
 TEST_F(SolveCommand, ReturnsTwoForBadInputWithoutALineOrAFile) {
   const auto problem = write_chain(folder_ / "chain.hdf5", 3);
   const std::string good = "solve " + problem.string();
   for (const std::string& arguments :
        {"solve " + (folder_ / "nowhere.hdf5").string(),
         std::string("solve " TALUS_SOURCE_DIR "/CMakeLists.txt"), good + " --tol 0", good + " --tol nan",
-        good + " --max-seconds -1", good + " --out " + problem.string(),
-        good + " --out " + (folder_ / "no" / "folder.hdf5").string()}) {
+        good + " --max-seconds -1", good + " --method gauss", good + " --measure length",
+        good + " --out " + problem.string(), good + " --out " + (folder_ / "no" / "folder.hdf5").string()}) {
     const Outcome outcome = talus(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_EQ(outcome.output, "") << arguments;

@@ -321,7 +321,7 @@ TEST(NaturalMap, IsZeroForAnOpenContactWithoutFrictionOrTangentialVelocity) {
   OneContact one(random, true);
   one.contacts.nx = one.contacts.ny = one.contacts.rx = one.contacts.ry = one.contacts.rz = {0};
   one.contacts.nz = {1};
-  one.velocity[0] = {{0, 0, 3}, {0, 0, 0}, 1, 2.5};
+  one.velocity[0] = {{0, 0, 3}, 1, {0, 0, 0}, 2.5};
   one.contacts.bias = {0};
   EXPECT_EQ(error_wall<true>(one.contacts, {0, 1}, one.velocity, 0, {}, 0).residual_max, 0);
 }

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "runtime/step/simulation.hpp"
+
+namespace talus {
+
+/// Throws std::invalid_argument when the contact problems of this run cannot be dumped: on several ranks, or
+/// with several subdomains, where a body's mass is shared by its copies.
+void check_dump(const Setup& setup, int ranks);
+
+/// Assembles the contact problem of the step just done, with the impulses that the step found as its
+/// solution: W = H' M^-1 H, q with the gap and restitution terms in it, mu. What it returns writes it to
+/// fclib_STEP.hdf5 in `directory`, and belongs on the lane that writes files. Throws io::FileError there.
+std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory);
+
+}  // namespace talus

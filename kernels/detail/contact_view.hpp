@@ -1,0 +1,48 @@
+#pragma once
+
+/// What the kernels of every instruction set are called with: plain pointers, so that their translation units
+/// include no header whose inline functions could be kept in a version for the wrong processor.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace talus {
+
+/// Contacts [begin, end) of one chunk, arrays as in `Contacts`.
+struct ContactView {
+  const double *nx, *ny, *nz, *bias;
+  double *rx, *ry, *rz;  ///< with friction
+  double* rn;            ///< without
+  const std::int32_t *first, *second;
+  const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
+  std::size_t begin, end;
+};
+
+/// Sums of the error as in `ErrorSums`.
+struct ErrorTotals {
+  double residual2, residual_max, impulse2, velocity2;
+  double wall_impulse[3];
+  std::int64_t active;
+};
+
+/// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
+/// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be null.
+struct LaneKernels {
+  void (*sweep_grains)(const ContactView&, double* bodies, double mu);
+  void (*sweep_wall)(const ContactView&, double* bodies, double mu, double* wall, double wall_inv_mass);
+  void (*accumulate_grains)(const ContactView&, double* bodies);
+  void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
+  ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,
+                              const std::uint16_t* multiplicity);
+  ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const double* wall,
+                            double wall_inv_mass, const std::uint16_t* multiplicity);
+};
+
+/// Kernels of one instruction set, with and without friction.
+struct LaneKernelPair {
+  LaneKernels friction, frictionless;
+};
+LaneKernelPair lane_kernels_avx2();
+LaneKernelPair lane_kernels_avx512();
+
+}  // namespace talus

@@ -1,0 +1,154 @@
+#pragma once
+
+/// The error of kernels/sweep.hpp on W = 4 or 8 contacts at a time. It reads only, so that any contacts may
+/// stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever W is.
+
+#include "kernels/detail/sweep_lanes.hpp"
+
+namespace talus {
+namespace {
+
+template <class V>
+struct ErrorLanes {
+  V residual2{}, residual_max{}, impulse2{}, velocity2{};
+  Space<V> wall_impulse{};
+  V active{};
+};
+
+/// Projection of z on the Coulomb cone about n.
+template <class V>
+[[gnu::always_inline]] inline Space<V> project_on_cone(const Space<V>& z, const Space<V>& n, double mu) {
+  const V z_n = dot(z, n);
+  const Space<V> t = z - z_n * n;
+  const V length = root(dot(t, t));
+  const V r_n = (z_n + mu * length) * (1 / (1 + mu * mu));
+  const Space<V> edge = r_n * n + (mu * r_n / length) * t;
+  const auto apex = mu * length <= -z_n, inside = length <= mu * z_n;
+  const auto choose = [&](V on_edge, V own) { return apex ? V{} : inside ? own : on_edge; };
+  return {choose(edge.x, z.x), choose(edge.y, z.y), choose(edge.z, z.z)};
+}
+
+template <bool Friction, class V>
+[[gnu::always_inline]] inline void add_error(const Slice& c, const Space<V>& n, const Space<V>& v, V w_nn,
+                                             double mu, ErrorLanes<V>& sums) {
+  const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias);
+  V e, r_n, carried;
+  if constexpr (Friction) {
+    const Space<V> r = load_impulse<true, V>(c, 0, n);
+    const Space<V> v_t = v - v_0 * n;
+    const V v_t2 = dot(v_t, v_t);
+    const Space<V> v_hat = v_t + (v_n + mu * root(v_t2)) * n;
+    const Space<V> miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
+    e = w_nn * root(dot(miss, miss));
+    r_n = dot(r, n);
+    sums.impulse2 += dot(r, r) * (w_nn * w_nn);
+    carried = v_t2 + v_n * v_n;
+  } else {
+    r_n = load<V>(c.rn);
+    const V next = r_n - v_n / w_nn;
+    e = w_nn * absolute(r_n - 0.5 * (next + absolute(next)));
+    sums.impulse2 += r_n * r_n * (w_nn * w_nn);
+    carried = v_n * v_n;
+  }
+  sums.velocity2 += (r_n > 0) | (v_n < 0) ? carried : V{};
+  sums.residual2 += e * e;
+  sums.residual_max = sums.residual_max < e ? e : sums.residual_max;
+  sums.active += r_n > 0 ? V{} + 1.0 : V{};
+}
+
+/// 1/M of the bodies whose copies these are, by which the error counts.
+template <class V>
+[[gnu::always_inline]] inline V whole(const double* const* a, const std::int32_t* slot, std::size_t count,
+                                      const std::uint16_t* multiplicity) {
+  V inv_mass = V{} + 1.0;
+  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / multiplicity[slot[l]];
+  return inv_mass;
+}
+
+/// Adds up lanes in order; those of `sums` follow one another.
+template <int W>
+ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
+  ErrorTotals total{};
+  double active = 0;
+  for (const ErrorLanes<Lanes<W>>& part : sums)
+    for (int l = 0; l < W; ++l) {
+      total.residual2 += part.residual2[l];
+      total.residual_max =
+          total.residual_max < part.residual_max[l] ? part.residual_max[l] : total.residual_max;
+      total.impulse2 += part.impulse2[l];
+      total.velocity2 += part.velocity2[l];
+      total.wall_impulse[0] += part.wall_impulse.x[l];
+      total.wall_impulse[1] += part.wall_impulse.y[l];
+      total.wall_impulse[2] += part.wall_impulse.z[l];
+      active += part.active[l];
+    }
+  total.active = static_cast<std::int64_t>(active);
+  return total;
+}
+
+/// Adds up the error of `count` <= W contacts from k on, whose arrays are `own` and whose bodies are a, b.
+template <bool Friction, bool AtWall, int W>
+[[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
+                                               const Slice& own, double* const* a, double* const* b,
+                                               double mu, const double* wall, double wall_inv_mass,
+                                               const std::uint16_t* multiplicity,
+                                               ErrorLanes<Lanes<W>>& sums) {
+  using V = Lanes<W>;
+  const Space<V> n = load_normal<V>(own, 0);
+  Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
+  if (multiplicity) {
+    m.w_nn = whole<V>(a, c.first + k, count, multiplicity);
+    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second + k, count, multiplicity);
+  }
+  if constexpr (AtWall) {
+    m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
+    m.w_nn = m.w_nn + wall_inv_mass;
+    sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(own, 0, n);
+  }
+  add_error<Friction>(own, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums);
+}
+
+/// `wall` is null between grains.
+template <bool Friction, bool AtWall, int W>
+[[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
+                                                   const double* wall, double wall_inv_mass,
+                                                   const std::uint16_t* multiplicity) {
+  const ContactView c = view;
+  ErrorLanes<Lanes<W>> sums[8 / W];
+  double* records = const_cast<double*>(bodies);  // addresses are those that a sweep would write to
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
+    double *a[W], *b[W];
+    find_bodies<W>(records, c.first + k, a);
+    if constexpr (!AtWall) find_bodies<W>(records, c.second + k, b);
+    error_block<Friction, AtWall, W>(c, k, W, slice(c, k), a, b, mu, wall, wall_inv_mass, multiplicity,
+                                     sums[lanes]);
+  }
+  if (k < c.end) {
+    Part<Friction, W> part(c, k, c.end - k, records, !AtWall);
+    // A lane without a contact sees no motion, and so no error.
+    if constexpr (AtWall) __builtin_memcpy(part.grain, wall, 3 * sizeof(double));
+    error_block<Friction, AtWall, W>(c, k, c.end - k, part.slice(), part.a, part.b, mu, wall, wall_inv_mass,
+                                     multiplicity, sums[lanes]);
+  }
+  return add_lanes<W>(sums);
+}
+
+template <bool Friction, int W>
+ErrorTotals error_grains(const ContactView& c, const double* bodies, double mu,
+                         const std::uint16_t* multiplicity) {
+  return error_of<Friction, false, W>(c, bodies, mu, nullptr, 0, multiplicity);
+}
+template <bool Friction, int W>
+ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, const double* wall,
+                       double wall_inv_mass, const std::uint16_t* multiplicity) {
+  return error_of<Friction, true, W>(c, bodies, mu, wall, wall_inv_mass, multiplicity);
+}
+
+template <bool Friction, int W>
+constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,      sweep_wall<Friction, W>,
+                                          accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,
+                                          error_grains<Friction, W>,      error_wall<Friction, W>};
+
+}  // namespace
+}  // namespace talus

@@ -1,0 +1,177 @@
+#pragma once
+
+/// Vectors of 4 or 8 doubles and what the sweeps need of them, on the compiler's vector extension (g++ and
+/// clang++), so that one text serves every instruction set; only the square root names intrinsics.
+///
+/// Everything here has internal linkage and includes nothing that has not: each user is compiled for its own
+/// instruction set, and a function shared between them would be kept by the linker in one version, that may
+/// be one that the processor does not know.
+///
+/// No operation here is fused or reordered (-ffp-contract=off): a lane computes to the bit what the scalar
+/// kernel computes for the same contact (docs/decisions/0008-lanes.md).
+
+#include <cstddef>
+#include <cstdint>
+// Vectors pass between inlined functions only, so that it does not matter how a call would pass them.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
+
+namespace talus {
+namespace {
+
+/// Half a body record.
+typedef double Quad __attribute__((vector_size(32)));
+typedef double Octet __attribute__((vector_size(64)));
+
+template <int W>
+struct LanesOf;
+template <>
+struct LanesOf<4> {
+  using Type = Quad;
+};
+template <>
+struct LanesOf<8> {
+  using Type = Octet;
+};
+/// W doubles.
+template <int W>
+using Lanes = typename LanesOf<W>::Type;
+
+template <class V>
+[[gnu::always_inline]] inline V load(const double* from) {
+  V v;
+  __builtin_memcpy(&v, from, sizeof(V));
+  return v;
+}
+template <class V>
+[[gnu::always_inline]] inline void store(double* to, V v) {
+  __builtin_memcpy(to, &v, sizeof(V));
+}
+
+[[gnu::always_inline]] inline Quad root(Quad v) {
+#ifdef __AVX__
+  return reinterpret_cast<Quad>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(v)));
+#else
+  for (int k = 0; k < 4; ++k) v[k] = __builtin_sqrt(v[k]);
+  return v;
+#endif
+}
+[[gnu::always_inline]] inline Octet root(Octet v) {
+#ifdef __AVX512F__
+  return reinterpret_cast<Octet>(_mm512_maskz_sqrt_pd(0xff, reinterpret_cast<__m512d>(v)));
+#else
+  for (int k = 0; k < 8; ++k) v[k] = __builtin_sqrt(v[k]);
+  return v;
+#endif
+}
+
+template <class V>
+[[gnu::always_inline]] inline V absolute(V v) {
+  using Bits = decltype(v < v);
+  return reinterpret_cast<V>(reinterpret_cast<Bits>(v) & ~reinterpret_cast<Bits>(-V{}));
+}
+
+/// x, y, z of W vectors in space.
+template <class V>
+struct Space {
+  V x, y, z;
+};
+template <class V>
+[[gnu::always_inline]] inline Space<V> operator+(const Space<V>& a, const Space<V>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class V>
+[[gnu::always_inline]] inline Space<V> operator-(const Space<V>& a, const Space<V>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class V>
+[[gnu::always_inline]] inline Space<V> operator*(V s, const Space<V>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+template <class V>
+[[gnu::always_inline]] inline V dot(const Space<V>& a, const Space<V>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class V>
+[[gnu::always_inline]] inline Space<V> cross(const Space<V>& a, const Space<V>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Swaps rows and columns within each half of four: c0 becomes the first elements of the rows, and so on.
+[[gnu::always_inline]] inline void swap_rows_and_columns(Quad& c0, Quad& c1, Quad& c2, Quad& c3) {
+  const Quad a = __builtin_shufflevector(c0, c1, 0, 4, 2, 6), b = __builtin_shufflevector(c0, c1, 1, 5, 3, 7);
+  const Quad c = __builtin_shufflevector(c2, c3, 0, 4, 2, 6), d = __builtin_shufflevector(c2, c3, 1, 5, 3, 7);
+  c0 = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  c1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  c2 = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  c3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+[[gnu::always_inline]] inline void swap_rows_and_columns(Octet& c0, Octet& c1, Octet& c2, Octet& c3) {
+  const Octet a = __builtin_shufflevector(c0, c1, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Octet b = __builtin_shufflevector(c0, c1, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Octet c = __builtin_shufflevector(c2, c3, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Octet d = __builtin_shufflevector(c2, c3, 1, 9, 3, 11, 5, 13, 7, 15);
+  c0 = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
+  c1 = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
+  c2 = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
+  c3 = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+
+/// 8 x 8: rows become columns, in 24 shuffles.
+[[gnu::always_inline]] inline void transpose(Octet (&v)[8]) {
+  Octet pair[8], four[8];
+#pragma GCC unroll 4
+  for (int k = 0; k < 8; k += 2) {
+    pair[k] = __builtin_shufflevector(v[k], v[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
+    pair[k + 1] = __builtin_shufflevector(v[k], v[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
+  }
+#pragma GCC unroll 2
+  for (int k = 0; k < 8; k += 4)
+#pragma GCC unroll 2
+    for (int odd = 0; odd < 2; ++odd) {
+      four[k + odd] = __builtin_shufflevector(pair[k + odd], pair[k + 2 + odd], 0, 1, 4, 5, 8, 9, 12, 13);
+      four[k + 2 + odd] =
+          __builtin_shufflevector(pair[k + odd], pair[k + 2 + odd], 2, 3, 6, 7, 10, 11, 14, 15);
+    }
+#pragma GCC unroll 4
+  for (int k = 0; k < 4; ++k) {
+    v[k] = __builtin_shufflevector(four[k], four[k + 4], 0, 1, 4, 5, 8, 9, 12, 13);
+    v[k + 4] = __builtin_shufflevector(four[k], four[k + 4], 2, 3, 6, 7, 10, 11, 14, 15);
+  }
+}
+
+/// The last element of each half record in all its places.
+[[gnu::always_inline]] inline Quad spread_last(Quad v) {
+  return __builtin_shufflevector(v, v, 3, 3, 3, 3);
+}
+[[gnu::always_inline]] inline Octet spread_last(Octet v) {
+  return __builtin_shufflevector(v, v, 3, 3, 3, 3, 7, 7, 7, 7);
+}
+
+/// Flips the sign of every element whose pattern is -0.0.
+template <class V>
+[[gnu::always_inline]] inline V flip(V v, V pattern) {
+  using Bits = decltype(v < v);
+  return reinterpret_cast<V>(reinterpret_cast<Bits>(v) ^ reinterpret_cast<Bits>(pattern));
+}
+
+/// Half records a and b side by side.
+[[gnu::always_inline]] inline Octet join(const double* a, const double* b) {
+#ifdef __AVX512F__
+  return reinterpret_cast<Octet>(
+      _mm512_maskz_insertf64x4(0xff, _mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1));
+#else
+  return __builtin_shufflevector(load<Quad>(a), load<Quad>(b), 0, 1, 2, 3, 4, 5, 6, 7);
+#endif
+}
+[[gnu::always_inline]] inline Quad lower(Octet v) {
+  return __builtin_shufflevector(v, v, 0, 1, 2, 3);
+}
+[[gnu::always_inline]] inline Quad upper(Octet v) {
+  return __builtin_shufflevector(v, v, 4, 5, 6, 7);
+}
+
+}  // namespace
+}  // namespace talus

@@ -1,0 +1,458 @@
+#pragma once
+
+/// The sweep of kernels/sweep.hpp on W = 4 or 8 contacts at a time.
+///
+/// Contacts stand in groups of up to 16 that share no grain, so that sweeping a group at once is sweeping its
+/// contacts one after the other. In each group three phases follow one another, each without dependencies
+/// inside:
+///   gather   record_i -+ record_j while they are rows of four, then one transposition: u_i - u_j, w_i + w_j,
+///            1/m_i + 1/m_j and the sum of the spin mobilities, as lanes;
+///   compute  the law, without branches;
+///   scatter  one transposition of (dr, dr x n) back to rows, then record += mobility * row: no record is
+///            transposed for its mobility.
+/// Per contact: 2 records of 64 bytes read and written, 56 bytes of contact read and 24 written, about 117
+/// flop, 1.5 shuffles of 8 lanes. A group that is not full runs on a copy, its free lanes on a grain of its
+/// own.
+
+#include "kernels/detail/contact_view.hpp"
+#include "kernels/detail/lanes.hpp"
+
+namespace talus {
+namespace {
+
+constexpr std::size_t record = 8;       ///< doubles of a body
+constexpr std::size_t group_size = 16;  ///< contacts of a full group
+constexpr std::size_t wall_lanes = 8;   ///< copies of a wall inside a chunk
+
+/// Contacts that a kernel works on at once: W x blocks of them, from `k` on.
+struct Slice {
+  const double *nx, *ny, *nz, *bias;
+  double *rx, *ry, *rz, *rn;
+};
+
+[[gnu::always_inline]] inline Slice slice(const ContactView& c, std::size_t k) {
+  return {c.nx + k, c.ny + k, c.nz + k, c.bias + k, c.rx + k, c.ry + k, c.rz + k, c.rn + k};
+}
+
+template <bool Friction, class V>
+[[gnu::always_inline]] inline Space<V> load_impulse(const Slice& c, std::size_t at, const Space<V>& n) {
+  if constexpr (Friction)
+    return {load<V>(c.rx + at), load<V>(c.ry + at), load<V>(c.rz + at)};
+  else
+    return load<V>(c.rn + at) * n;
+}
+
+/// Two grains, or a grain and a wall, seen from their contact.
+template <class V>
+struct Meeting {
+  Space<V> du;  ///< u_i - u_j
+  Space<V> w;   ///< w_i + w_j
+  V w_nn;       ///< 1/m_i + 1/m_j
+  V spin;       ///< sum of the spin mobilities
+};
+
+/// Fills a meeting from columns.
+template <bool Friction, class V>
+[[gnu::always_inline]] inline Meeting<V> meeting_of(const V (&column)[8]) {
+  Meeting<V> m;
+  m.du = {column[0], column[1], column[2]};
+  m.w_nn = column[3];
+  if constexpr (Friction) {
+    m.w = {column[4], column[5], column[6]};
+    m.spin = column[7];
+  }
+  return m;
+}
+
+/// Reads W pairs; without b (null) single grains, whose du, w, 1/m and spin are their own.
+template <bool Friction, bool Pair>
+[[gnu::always_inline]] inline Meeting<Quad> gather(const double* const* a, const double* const* b, Quad) {
+  const Quad velocity = {-0.0, -0.0, -0.0, 0.0};
+  Quad column[8];
+#pragma GCC unroll 4
+  for (int l = 0; l < 4; ++l) {
+    column[l] = load<Quad>(a[l]);
+    if constexpr (Pair) column[l] = column[l] + flip(load<Quad>(b[l]), velocity);
+  }
+  swap_rows_and_columns(column[0], column[1], column[2], column[3]);
+  if constexpr (Friction) {
+#pragma GCC unroll 4
+    for (int l = 0; l < 4; ++l) {
+      column[4 + l] = load<Quad>(a[l] + 4);
+      if constexpr (Pair) column[4 + l] = column[4 + l] + load<Quad>(b[l] + 4);
+    }
+    swap_rows_and_columns(column[4], column[5], column[6], column[7]);
+  }
+  return meeting_of<Friction>(column);
+}
+
+template <bool Friction, bool Pair>
+[[gnu::always_inline]] inline Meeting<Octet> gather(const double* const* a, const double* const* b, Octet) {
+  Octet column[8];
+  if constexpr (Friction) {
+    const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+#pragma GCC unroll 8
+    for (int l = 0; l < 8; ++l) {
+      column[l] = load<Octet>(a[l]);
+      if constexpr (Pair) column[l] = column[l] + flip(load<Octet>(b[l]), velocity);
+    }
+    transpose(column);
+  } else {
+    const Octet velocity = {-0.0, -0.0, -0.0, 0.0, -0.0, -0.0, -0.0, 0.0};
+#pragma GCC unroll 4
+    for (int l = 0; l < 4; ++l) {
+      column[l] = join(a[l], a[l + 4]);
+      if constexpr (Pair) column[l] = column[l] + flip(join(b[l], b[l + 4]), velocity);
+    }
+    swap_rows_and_columns(column[0], column[1], column[2], column[3]);
+  }
+  return meeting_of<Friction>(column);
+}
+
+template <bool Friction, class V>
+[[gnu::always_inline]] inline Space<V> relative_velocity(const Meeting<V>& m, const Space<V>& n) {
+  if constexpr (Friction) return m.du - cross(m.w, n);
+  return m.du;
+}
+
+/// The impulse that solves the law, less the old one; stores the new one. Without friction only the first
+/// component is meant, along the normal.
+template <bool Friction, class V>
+[[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, std::size_t at, const Space<V>& n,
+                                                 const Space<V>& v, V w_nn, V w_tt, double mu) {
+  const V bias = load<V>(c.bias + at), v_n = dot(v, n);
+  if constexpr (Friction) {
+    const Space<V> r = load_impulse<true, V>(c, at, n);
+    const V r_n = dot(r, n), next = r_n - (v_n + bias) / w_nn;
+    const V r_n_new = 0.5 * (next + absolute(next)), limit = mu * r_n_new;
+    const Space<V> t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
+    const V t2 = dot(t, t);
+    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + 1.0;
+    const Space<V> r_new = r_n_new * n + scale * t;
+    store(c.rx + at, r_new.x);
+    store(c.ry + at, r_new.y);
+    store(c.rz + at, r_new.z);
+    return r_new - r;
+  } else {
+    const V r_n = load<V>(c.rn + at), next = r_n - (v_n + bias) / w_nn;
+    const V r_n_new = 0.5 * (next + absolute(next));
+    store(c.rn + at, r_n_new);
+    return (r_n_new - r_n) * n;
+  }
+}
+
+/// Adds dr to the grains a and, if there is a second one, takes it from b.
+template <bool Friction, bool Pair>
+[[gnu::always_inline]] inline void scatter(double* const* a, double* const* b, const Space<Quad>& n,
+                                           const Space<Quad>& dr) {
+  Quad row[4] = {dr.x, dr.y, dr.z, Quad{}};
+  swap_rows_and_columns(row[0], row[1], row[2], row[3]);
+#pragma GCC unroll 4
+  for (int l = 0; l < 4; ++l) {
+    const Quad i = load<Quad>(a[l]);
+    store(a[l], i + spread_last(i) * row[l]);
+    if constexpr (Pair) {
+      const Quad j = load<Quad>(b[l]);
+      store(b[l], j - spread_last(j) * row[l]);
+    }
+  }
+  if constexpr (Friction) {
+    const Space<Quad> turn = cross(dr, n);
+    Quad turns[4] = {turn.x, turn.y, turn.z, Quad{}};
+    swap_rows_and_columns(turns[0], turns[1], turns[2], turns[3]);
+#pragma GCC unroll 4
+    for (int l = 0; l < 4; ++l) {
+      const Quad i = load<Quad>(a[l] + 4);
+      store(a[l] + 4, i + spread_last(i) * turns[l]);
+      if constexpr (Pair) {
+        const Quad j = load<Quad>(b[l] + 4);
+        store(b[l] + 4, j + spread_last(j) * turns[l]);
+      }
+    }
+  }
+}
+
+template <bool Friction, bool Pair>
+[[gnu::always_inline]] inline void scatter(double* const* a, double* const* b, const Space<Octet>& n,
+                                           const Space<Octet>& dr) {
+  if constexpr (Friction) {
+    const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    const Space<Octet> turn = cross(dr, n);
+    Octet row[8] = {dr.x, dr.y, dr.z, Octet{}, turn.x, turn.y, turn.z, Octet{}};
+    transpose(row);
+#pragma GCC unroll 8
+    for (int l = 0; l < 8; ++l) {
+      const Octet i = load<Octet>(a[l]);
+      store(a[l], i + spread_last(i) * row[l]);
+      if constexpr (Pair) {
+        const Octet j = load<Octet>(b[l]);
+        store(b[l], j + spread_last(j) * flip(row[l], velocity));
+      }
+    }
+  } else {
+    Octet row[4] = {dr.x, dr.y, dr.z, Octet{}};
+    swap_rows_and_columns(row[0], row[1], row[2], row[3]);
+#pragma GCC unroll 8
+    for (int l = 0; l < 8; ++l) {
+      const Quad push = l < 4 ? lower(row[l % 4]) : upper(row[l % 4]);
+      const Quad i = load<Quad>(a[l]);
+      store(a[l], i + spread_last(i) * push);
+      if constexpr (Pair) {
+        const Quad j = load<Quad>(b[l]);
+        store(b[l], j - spread_last(j) * push);
+      }
+    }
+  }
+}
+
+template <class V>
+[[gnu::always_inline]] inline Space<V> load_normal(const Slice& c, std::size_t at) {
+  return {load<V>(c.nx + at), load<V>(c.ny + at), load<V>(c.nz + at)};
+}
+
+/// Blocks x W contacts in three phases.
+template <bool Friction, int W, int Blocks>
+[[gnu::always_inline]] inline void sweep_block(const Slice& c, double* const* a, double* const* b,
+                                               double mu) {
+  using V = Lanes<W>;
+  Meeting<V> m[Blocks];
+  Space<V> dr[Blocks];
+#pragma GCC unroll 4
+  for (int k = 0; k < Blocks; ++k) m[k] = gather<Friction, true>(a + W * k, b + W * k, V{});
+#pragma GCC unroll 4
+  for (int k = 0; k < Blocks; ++k) {
+    const auto at = static_cast<std::size_t>(W * k);
+    const Space<V> n = load_normal<V>(c, at);
+    V w_tt{};
+    if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
+    dr[k] = solve_law<Friction>(c, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu);
+  }
+#pragma GCC unroll 4
+  for (int k = 0; k < Blocks; ++k)
+    scatter<Friction, true>(a + W * k, b + W * k, load_normal<V>(c, static_cast<std::size_t>(W * k)), dr[k]);
+}
+
+/// Blocks of W contacts that go through the phases together: more would not stay in registers.
+constexpr int blocks_at_once = 2;
+
+constexpr std::size_t minimum(std::size_t a, std::size_t b) {
+  return a < b ? a : b;
+}
+
+[[gnu::always_inline]] inline double* body(double* bodies, std::int32_t slot) {
+  return bodies + record * static_cast<std::size_t>(slot);
+}
+[[gnu::always_inline]] inline const double* body(const double* bodies, std::int32_t slot) {
+  return bodies + record * static_cast<std::size_t>(slot);
+}
+
+/// Addresses of bodies. Slots are not negative: without a sign the address takes one instruction less.
+template <std::size_t Count>
+[[gnu::always_inline]] inline void find_bodies(double* bodies, const std::int32_t* slot, double** address) {
+#pragma GCC unroll 16
+  for (std::size_t l = 0; l < Count; ++l)
+    address[l] = bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]));
+}
+
+/// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
+/// them coming, and with 200,000 grains they stand beyond its second cache.
+[[gnu::always_inline]] inline void prefetch_group(const ContactView& c, std::size_t k, double* bodies) {
+  std::size_t ahead = k + 2 * group_size;
+  if (ahead + group_size > c.end) return;
+#pragma GCC unroll 16
+  for (std::size_t l = 0; l < group_size; ++l) {
+    __builtin_prefetch(body(bodies, c.first[ahead + l]), 1);
+    __builtin_prefetch(body(bodies, c.second[ahead + l]), 1);
+  }
+}
+
+/// A copy of contacts [k, k + count), count < W. The lanes behind them have n = r = bias = 0 and a grain of
+/// mass 1 at rest, so that nothing happens there.
+template <bool Friction, int W>
+struct Part {
+  double nx[W], ny[W], nz[W], bias[W], rx[W], ry[W], rz[W], rn[W];
+  double grain[record] = {0, 0, 0, 1, 0, 0, 0, 0};
+  double *a[W], *b[W];
+
+  [[gnu::always_inline]] Part(const ContactView& c, std::size_t k, std::size_t count, double* bodies,
+                              bool pairs) {
+    for (std::size_t l = 0; l < W; ++l) {
+      const bool real = l < count;
+      const std::size_t from = real ? k + l : k;
+      nx[l] = real ? c.nx[from] : 0;
+      ny[l] = real ? c.ny[from] : 0;
+      nz[l] = real ? c.nz[from] : 0;
+      bias[l] = real ? c.bias[from] : 0;
+      if constexpr (Friction) {
+        rx[l] = real ? c.rx[from] : 0;
+        ry[l] = real ? c.ry[from] : 0;
+        rz[l] = real ? c.rz[from] : 0;
+      } else {
+        rn[l] = real ? c.rn[from] : 0;
+      }
+      a[l] = real ? body(bodies, c.first[from]) : grain;
+      if (pairs) b[l] = real ? body(bodies, c.second[from]) : grain;
+    }
+  }
+
+  [[gnu::always_inline]] Slice slice() { return {nx, ny, nz, bias, rx, ry, rz, rn}; }
+
+  [[gnu::always_inline]] void copy_out(const ContactView& c, std::size_t k, std::size_t count) const {
+    for (std::size_t l = 0; l < count; ++l) {
+      if constexpr (Friction) {
+        c.rx[k + l] = rx[l];
+        c.ry[k + l] = ry[l];
+        c.rz[k + l] = rz[l];
+      } else {
+        c.rn[k + l] = rn[l];
+      }
+    }
+  }
+};
+
+template <bool Friction, int W>
+void sweep_grains(const ContactView& view, double* bodies, double mu) {
+  constexpr std::size_t at_once = W * blocks_at_once;
+  const ContactView c = view;  // a local one, so that no store can change it
+  const std::uint8_t* group = c.group;
+  for (std::size_t k = c.begin; k < c.end; ++group) {
+    const std::size_t end = k + *group;
+    prefetch_group(c, k, bodies);
+    for (; k + at_once <= end; k += at_once) {
+      double *a[at_once], *b[at_once];
+      find_bodies<at_once>(bodies, c.first + k, a);
+      find_bodies<at_once>(bodies, c.second + k, b);
+      sweep_block<Friction, W, blocks_at_once>(slice(c, k), a, b, mu);
+    }
+    for (; k + W <= end; k += W) {
+      double *a[W], *b[W];
+      find_bodies<W>(bodies, c.first + k, a);
+      find_bodies<W>(bodies, c.second + k, b);
+      sweep_block<Friction, W, 1>(slice(c, k), a, b, mu);
+    }
+    if (k == end) continue;
+    Part<Friction, W> part(c, k, end - k, bodies, true);
+    sweep_block<Friction, W, 1>(part.slice(), part.a, part.b, mu);
+    part.copy_out(c, k, end - k);
+    k = end;
+  }
+}
+
+/// V += M^-1 H r for W contacts.
+template <bool Friction, bool Pair, int W>
+[[gnu::always_inline]] inline void accumulate_block(const Slice& c, double* const* a, double* const* b) {
+  const auto n = load_normal<Lanes<W>>(c, 0);
+  scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, n));
+}
+
+template <bool Friction, int W>
+void accumulate_grains(const ContactView& view, double* bodies) {
+  const ContactView c = view;
+  const std::uint8_t* group = c.group;
+  for (std::size_t k = c.begin; k < c.end; ++group) {
+    const std::size_t end = k + *group;
+    prefetch_group(c, k, bodies);
+    for (; k + W <= end; k += W) {
+      double *a[W], *b[W];
+      find_bodies<W>(bodies, c.first + k, a);
+      find_bodies<W>(bodies, c.second + k, b);
+      accumulate_block<Friction, true, W>(slice(c, k), a, b);
+    }
+    if (k == end) continue;
+    Part<Friction, W> part(c, k, end - k, bodies, true);
+    accumulate_block<Friction, true, W>(part.slice(), part.a, part.b);
+    k = end;
+  }
+}
+
+/// The copies of a wall, one for each of 8 lanes: its velocity, and 1/m of a lane.
+template <int W>
+struct SplitWall {
+  Space<Lanes<W>> velocity[wall_lanes / W];
+  double inv_mass;
+  std::size_t lanes;
+
+  SplitWall(const double* wall, double wall_inv_mass, std::size_t contacts) : lanes(minimum(contacts, 8)) {
+    for (auto& v : velocity) v = {Lanes<W>{} + wall[0], Lanes<W>{} + wall[1], Lanes<W>{} + wall[2]};
+    inv_mass = wall_inv_mass * static_cast<double>(lanes);
+  }
+  void push(std::size_t part, const Space<Lanes<W>>& n, const Space<Lanes<W>>& dr) {
+    velocity[part] = velocity[part] + (-inv_mass * dot(n, dr)) * n;
+  }
+  void glue(double* wall) const {
+    if (inv_mass == 0 || lanes == 0) return;
+    double x[wall_lanes], y[wall_lanes], z[wall_lanes];
+    for (std::size_t k = 0; k < wall_lanes / W; ++k) {
+      store(x + W * k, velocity[k].x);
+      store(y + W * k, velocity[k].y);
+      store(z + W * k, velocity[k].z);
+    }
+    double sum[3] = {0, 0, 0};
+    for (std::size_t l = 0; l < lanes; ++l) {
+      sum[0] += x[l];
+      sum[1] += y[l];
+      sum[2] += z[l];
+    }
+    for (int d = 0; d < 3; ++d) wall[d] = 1 / static_cast<double>(lanes) * sum[d];
+  }
+};
+
+/// A block of W grains against as many copies of a wall.
+template <bool Friction, int W>
+[[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, double* const* a, double mu,
+                                                    std::size_t lanes, SplitWall<W>& wall) {
+  using V = Lanes<W>;
+  Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
+  m.du = m.du - wall.velocity[lanes];
+  const Space<V> n = load_normal<V>(c, 0);
+  V w_tt{};
+  if constexpr (Friction) w_tt = m.w_nn + m.spin;
+  const Space<V> dr =
+      solve_law<Friction>(c, 0, n, relative_velocity<Friction>(m, n), m.w_nn + wall.inv_mass, w_tt, mu);
+  scatter<Friction, false>(a, nullptr, n, dr);
+  wall.push(lanes, n, dr);
+}
+
+template <bool Friction, int W>
+void sweep_wall(const ContactView& view, double* bodies, double mu, double* wall, double wall_inv_mass) {
+  const ContactView c = view;
+  SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
+    double* a[W];
+    find_bodies<W>(bodies, c.first + k, a);
+    sweep_wall_block<Friction, W>(slice(c, k), a, mu, lanes, split);
+  }
+  if (k < c.end) {
+    Part<Friction, W> part(c, k, c.end - k, bodies, false);
+    sweep_wall_block<Friction, W>(part.slice(), part.a, mu, lanes, split);
+    part.copy_out(c, k, c.end - k);
+  }
+  split.glue(wall);
+}
+
+template <bool Friction, int W>
+void accumulate_wall(const ContactView& view, double* bodies, double* wall, double wall_inv_mass) {
+  using V = Lanes<W>;
+  const ContactView c = view;
+  SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
+  const auto add = [&](const Slice& own, double* const* a, std::size_t lanes) {
+    const Space<V> n = load_normal<V>(own, 0);
+    accumulate_block<Friction, false, W>(own, a, nullptr);
+    split.push(lanes, n, load_impulse<Friction, V>(own, 0, n));
+  };
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
+    double* a[W];
+    find_bodies<W>(bodies, c.first + k, a);
+    add(slice(c, k), a, lanes);
+  }
+  if (k < c.end) {
+    Part<Friction, W> part(c, k, c.end - k, bodies, false);
+    add(part.slice(), part.a, lanes);
+  }
+  split.glue(wall);
+}
+
+}  // namespace
+}  // namespace talus

@@ -1,0 +1,169 @@
+#include "kernels/sweep_kernels.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <stdexcept>
+#include <string>
+
+#include "kernels/detail/contact_view.hpp"
+
+namespace talus {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> names = {"auto", "portable", "avx2", "avx512"};
+
+/// Lane kernels see a body as 8 doubles.
+static_assert(offsetof(Velocity, u) == 0 && offsetof(Velocity, inv_mass) == 24 &&
+              offsetof(Velocity, w) == 32 && offsetof(Velocity, spin_mobility) == 56);
+double* records(std::span<Velocity> velocity) {
+  return reinterpret_cast<double*>(velocity.data());
+}
+const double* records(std::span<const Velocity> velocity) {
+  return reinterpret_cast<const double*>(velocity.data());
+}
+
+/// `contacts` is written by the sweeps only.
+ContactView view(const Contacts& contacts, ContactRange range) {
+  Contacts& c = const_cast<Contacts&>(contacts);
+  return {c.nx.data(),
+          c.ny.data(),
+          c.nz.data(),
+          c.bias.data(),
+          c.rx.data(),
+          c.ry.data(),
+          c.rz.data(),
+          c.rn.data(),
+          c.first.data(),
+          c.second.data(),
+          c.group.data() + range.begin,
+          range.begin,
+          range.end};
+}
+
+ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
+  ErrorSums sums;
+  sums.residual2 = totals.residual2;
+  sums.residual_max = totals.residual_max;
+  sums.impulse2 = totals.impulse2;
+  sums.velocity2 = totals.velocity2;
+  std::copy_n(totals.wall_impulse, 3, sums.wall_impulse);
+  sums.contacts = static_cast<std::int64_t>(range.end - range.begin);
+  sums.active = totals.active;
+  return sums;
+}
+
+bool runs(InstructionSet set) {
+#ifdef __x86_64__
+  if (set == InstructionSet::avx512)
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512vl");
+  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2");
+#endif
+  return set == InstructionSet::portable;
+}
+
+}  // namespace
+
+std::string_view name_of(InstructionSet set) {
+  return names[static_cast<std::size_t>(set)];
+}
+
+std::optional<InstructionSet> instruction_set_of(std::string_view name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return {};
+  return static_cast<InstructionSet>(found - names.begin());
+}
+
+InstructionSet best_instruction_set() {
+  for (const InstructionSet set : {InstructionSet::avx512, InstructionSet::avx2})
+    if (runs(set)) return set;
+  return InstructionSet::portable;
+}
+
+SweepKernels::SweepKernels(InstructionSet set)
+    : set_(set == InstructionSet::automatic ? best_instruction_set() : set), lanes_{nullptr, nullptr} {
+  if (!runs(set_))
+    throw std::invalid_argument("instruction set '" + std::string(name_of(set)) +
+                                "': this processor runs at most '" +
+                                std::string(name_of(best_instruction_set())) + "'");
+  if (set_ == InstructionSet::portable) return;
+  static const LaneKernelPair avx2 = lane_kernels_avx2(), avx512 = lane_kernels_avx512();
+  const LaneKernelPair& pair = set_ == InstructionSet::avx2 ? avx2 : avx512;
+  lanes_[0] = &pair.frictionless;
+  lanes_[1] = &pair.friction;
+}
+
+template <bool Friction>
+void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                                double mu) const {
+  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
+  lanes_[Friction]->sweep_grains(view(contacts, range), records(velocity), mu);
+}
+
+template <bool Friction>
+void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                              WallCopy& wall) const {
+  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
+  lanes_[Friction]->sweep_wall(view(contacts, range), records(velocity), mu, wall.velocity, wall.inv_mass);
+}
+
+template <bool Friction>
+void SweepKernels::accumulate_grains(const Contacts& contacts, ContactRange range,
+                                     std::span<Velocity> velocity) const {
+  if (!lanes_[Friction]) return talus::accumulate_grains<Friction>(contacts, range, velocity);
+  lanes_[Friction]->accumulate_grains(view(contacts, range), records(velocity));
+}
+
+template <bool Friction>
+void SweepKernels::accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                                   WallCopy& wall) const {
+  if (!lanes_[Friction]) return talus::accumulate_wall<Friction>(contacts, range, velocity, wall);
+  lanes_[Friction]->accumulate_wall(view(contacts, range), records(velocity), wall.velocity, wall.inv_mass);
+}
+
+template <bool Friction>
+ErrorSums SweepKernels::error_grains(const Contacts& contacts, ContactRange range,
+                                     std::span<const Velocity> velocity, double mu,
+                                     Multiplicities multiplicity) const {
+  if (!lanes_[Friction]) return talus::error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
+  return sums_of(
+      lanes_[Friction]->error_grains(view(contacts, range), records(velocity), mu, multiplicity.data()),
+      range);
+}
+
+template <bool Friction>
+ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
+                                   std::span<const Velocity> velocity, double mu, const WallCopy& wall,
+                                   double wall_inv_mass, Multiplicities multiplicity) const {
+  if (!lanes_[Friction])
+    return talus::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, multiplicity);
+  return sums_of(lanes_[Friction]->error_wall(view(contacts, range), records(velocity), mu, wall.velocity,
+                                              wall_inv_mass, multiplicity.data()),
+                 range);
+}
+
+template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;
+template void SweepKernels::sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                             WallCopy&) const;
+template void SweepKernels::accumulate_grains<true>(const Contacts&, ContactRange, std::span<Velocity>) const;
+template void SweepKernels::accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>,
+                                                  WallCopy&) const;
+template ErrorSums SweepKernels::error_grains<true>(const Contacts&, ContactRange, std::span<const Velocity>,
+                                                    double, Multiplicities) const;
+template ErrorSums SweepKernels::error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>,
+                                                  double, const WallCopy&, double, Multiplicities) const;
+template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double) const;
+template void SweepKernels::sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                              WallCopy&) const;
+template void SweepKernels::accumulate_grains<false>(const Contacts&, ContactRange,
+                                                     std::span<Velocity>) const;
+template void SweepKernels::accumulate_wall<false>(const Contacts&, ContactRange, std::span<Velocity>,
+                                                   WallCopy&) const;
+template ErrorSums SweepKernels::error_grains<false>(const Contacts&, ContactRange, std::span<const Velocity>,
+                                                     double, Multiplicities) const;
+template ErrorSums SweepKernels::error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>,
+                                                   double, const WallCopy&, double, Multiplicities) const;
+
+}  // namespace talus

@@ -1,0 +1,66 @@
+#pragma once
+
+/// The kernels of kernels/sweep.hpp for the processor at hand: the same functions, the same bits.
+///
+///     const SweepKernels kernels(best_instruction_set());
+///     kernels.sweep_grains<true>(contacts, range, velocity, mu);
+
+#include <optional>
+#include <string_view>
+
+#include "kernels/sweep.hpp"
+
+namespace talus {
+
+struct LaneKernels;
+
+/// From the weakest to the strongest. Results do not depend on the set, to the bit: every lane does what the
+/// scalar kernel does, nothing is fused (docs/decisions/0008-lanes.md). So ranks may differ in it.
+enum class InstructionSet {
+  automatic,  ///< the strongest that runs here
+  portable,   ///< the scalar kernels
+  avx2,       ///< 4 contacts at a time
+  avx512,     ///< 8 contacts at a time (F, DQ, VL)
+};
+
+std::string_view name_of(InstructionSet set);
+/// "auto", "portable", "avx2" or "avx512"; nothing for other names.
+std::optional<InstructionSet> instruction_set_of(std::string_view name);
+
+/// The strongest that the processor and the operating system run.
+InstructionSet best_instruction_set();
+
+/// A choice of kernels. Each does what its namesake in kernels/sweep.hpp does; a range is that of a whole
+/// chunk, and `contacts.group` holds its groups (narrow_chunk).
+class SweepKernels {
+ public:
+  /// Throws std::invalid_argument when this processor does not run `set`.
+  explicit SweepKernels(InstructionSet set);
+
+  /// What was chosen, never `automatic`.
+  InstructionSet set() const { return set_; }
+
+  template <bool Friction>
+  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) const;
+  template <bool Friction>
+  void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                  WallCopy& wall) const;
+  template <bool Friction>
+  void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) const;
+  template <bool Friction>
+  void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                       WallCopy& wall) const;
+  template <bool Friction>
+  ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                         double mu, Multiplicities multiplicity = {}) const;
+  template <bool Friction>
+  ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                       double mu, const WallCopy& wall, double wall_inv_mass,
+                       Multiplicities multiplicity = {}) const;
+
+ private:
+  InstructionSet set_;
+  const LaneKernels* lanes_[2];  ///< without and with friction; null: the scalar kernels
+};
+
+}  // namespace talus

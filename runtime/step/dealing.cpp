@@ -1,0 +1,139 @@
+#include "runtime/step/dealing.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "partition/partitioner.hpp"
+#include "runtime/step/decomposition.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Grains on the way at a time, of all receivers together: less than a megabyte.
+constexpr std::size_t piece = 8192;
+
+/// A grain on its way.
+struct GrainRecord {
+  std::int64_t id;
+  double x[3], radius;
+  double velocity[6];
+};
+
+GrainRecord record_of(const Sample& sample, std::size_t k) {
+  GrainRecord record{};
+  record.id = static_cast<std::int64_t>(sample.id_of(k));
+  std::copy_n(sample.x[k].data(), 3, record.x);
+  record.radius = sample.radius[k];
+  if (!sample.velocity.empty()) std::copy_n(sample.velocity[k].begin(), 6, record.velocity);
+  return record;
+}
+
+void add(const GrainRecord& record, double density, bool turns, Bodies& bodies) {
+  add_sphere(bodies, BodyId{record.id}, {record.x[0], record.x[1], record.x[2]}, record.radius, density,
+             turns);
+  std::copy_n(record.velocity, 3, bodies.velocity.back().u);
+  if (turns) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
+}
+
+/// Rank of each grain: that of the subdomain its centre is in.
+std::vector<std::int32_t> receivers(Sample& sample, const DecompositionSettings& settings,
+                                    const graph::Communicator& ranks) {
+  const Decomposition decomposition = make_decomposition(settings, ranks);
+  PartitionPoints points;
+  points.x.swap(sample.x);
+  if (settings.partitioner == PartitionKind::metis) points.half.assign(points.x.size(), Vec3::Zero());
+  const Partition partition = make_partition(
+      points, partition_options(settings, decomposition.partition.subdomains), reduction_over(ranks));
+  points.x.swap(sample.x);
+  std::vector<std::int32_t> rank(sample.size());
+  for (std::size_t k = 0; k < rank.size(); ++k)
+    rank[k] = decomposition.rank_of[static_cast<std::size_t>(partition.subdomain_of(sample.x[k]))];
+  return rank;
+}
+
+/// The sum over all ranks of one number per body, the same for any order: the terms are cut into integers of
+/// 31 bits, relative to the largest. What is cut off is below 2^-62 of the largest term.
+class ExactSum {
+ public:
+  explicit ExactSum(double largest) : scale_(largest > 0 ? std::exp2(30 - std::ilogb(largest)) : 0) {}
+  void add(double term) {
+    const double scaled = term * scale_, high = std::floor(scaled);
+    parts_[0] += static_cast<std::int64_t>(high);
+    parts_[1] += static_cast<std::int64_t>((scaled - high) * 0x1p31);
+  }
+  double over(const graph::Communicator& ranks) {
+    ranks.sum(parts_);
+    if (scale_ == 0) return 0;
+    return (static_cast<double>(parts_[0]) + static_cast<double>(parts_[1]) * 0x1p-31) / scale_;
+  }
+
+ private:
+  double scale_;
+  std::array<std::int64_t, 2> parts_{};
+};
+
+}  // namespace
+
+Bodies deal_out(Sample sample, const DecompositionSettings& settings, const graph::Communicator& ranks) {
+  Bodies bodies;
+  if (ranks.ranks() == 1) {
+    reserve(bodies, sample.size());
+    append(sample, bodies);
+    return bodies;
+  }
+  struct Common {
+    std::int64_t grains;
+    double density;
+    bool turns;
+  };
+  const Common own{static_cast<std::int64_t>(sample.size()), sample.density, sample.turns};
+  const Common all = ranks.gather_records(std::span<const Common>(&own, 1)).front();
+  const std::vector<std::int32_t> rank = receivers(sample, settings, ranks);
+  std::vector<std::int64_t> count(static_cast<std::size_t>(ranks.ranks()), 0);
+  for (std::int32_t to : rank) ++count[static_cast<std::size_t>(to)];
+  ranks.sum(count);
+  reserve(bodies, static_cast<std::size_t>(count[static_cast<std::size_t>(ranks.rank())]));
+  for (std::size_t begin = 0; begin < static_cast<std::size_t>(all.grains); begin += piece) {
+    std::vector<std::vector<GrainRecord>> to(count.size());
+    for (std::size_t k = begin; k < std::min(begin + piece, sample.size()); ++k)
+      to[static_cast<std::size_t>(rank[k])].push_back(record_of(sample, k));
+    for (const auto& part : ranks.exchange_records(std::move(to)))
+      for (const GrainRecord& record : part) add(record, all.density, all.turns, bodies);
+  }
+  return bodies;
+}
+
+SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks) {
+  const auto volume_of = [](double radius) { return sphere_mass(radius, 1); };
+  // The largest of each is wanted first; of the smallest radius the negative. `orientation` is a flag.
+  std::array<double, 4> most{0, -std::numeric_limits<double>::infinity(), 0,
+                             own.orientation.empty() ? 0.0 : 1.0};
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    most[0] = std::max(most[0], own.radius[k]);
+    most[1] = std::max(most[1], -own.radius[k]);
+    most[2] = std::max(most[2], own.mass(k));
+  }
+  ranks.max(most);
+  ExactSum diameter(2 * most[0]), volume(volume_of(most[0])), mass(most[2]);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    diameter.add(2 * own.radius[k]);
+    volume.add(volume_of(own.radius[k]));
+    mass.add(own.mass(k));
+  }
+  std::int64_t bodies[1] = {static_cast<std::int64_t>(own.size())};
+  ranks.sum(bodies);
+  SampleSize size;
+  size.bodies = bodies[0];
+  size.smallest = -most[1];
+  size.mean_diameter = diameter.over(ranks) / static_cast<double>(std::max<std::int64_t>(size.bodies, 1));
+  size.volume = volume.over(ranks);
+  size.total_mass = mass.over(ranks);
+  size.orientation = most[3] > 0;
+  return size;
+}
+
+}  // namespace talus

@@ -1,0 +1,33 @@
+#pragma once
+
+/// How a sample comes to the ranks before the first step.
+
+#include <cstdint>
+
+#include "kernels/bodies.hpp"
+#include "kernels/sample.hpp"
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus {
+
+/// Collective. The bodies of this rank: those whose centres lie in its subdomains, cut as the settings say.
+/// The sample is that of rank 0, all others pass an empty one; it leaves in pieces of a few thousand grains
+/// and is let go of, so that no rank ever holds the bodies of another. Throws std::invalid_argument when
+/// there are more ranks than subdomains, or a centre is not finite.
+Bodies deal_out(Sample sample, const DecompositionSettings& settings, const graph::Communicator& ranks);
+
+/// Of the bodies of all ranks.
+struct SampleSize {
+  std::int64_t bodies = 0;
+  double smallest = 0;       ///< radius [m]
+  double mean_diameter = 0;  ///< [m]
+  double total_mass = 0;     ///< [kg]
+  double volume = 0;         ///< of the solid [m^3]
+  bool orientation = false;
+};
+
+/// Collective; the same bits however the bodies are dealt to the ranks, and in whatever order they stand.
+SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks);
+
+}  // namespace talus

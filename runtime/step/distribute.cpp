@@ -1,0 +1,260 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "kernels/release.hpp"
+#include "runtime/step/decomposition.hpp"
+
+namespace talus {
+
+namespace {
+
+/// A warm start on its way.
+struct ImpulseRecord {
+  std::int64_t first;
+  std::int64_t second;  ///< -1 - wall at a wall
+  double r[3];          ///< on the first body; r[0] alone without friction
+};
+
+std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// The midpoint decides; at a wall the centre.
+Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3> x) {
+  const std::size_t grains = candidates.grain_pairs.size();
+  if (k >= grains) return x[at(candidates.wall_pairs[k - grains].body)];
+  const GrainPair& pair = candidates.grain_pairs[k];
+  return 0.5 * (x[at(pair.first)] + x[at(pair.second)]);
+}
+
+/// The impulses of the last steps, in slots of the surroundings. Those whose point has come to a subdomain of
+/// another rank go there; `candidates` are let go of.
+Candidates collect_impulses(const Decomposition& decomposition, const graph::Communicator& ranks,
+                            const Surroundings& around, const Bodies& bodies, Candidates candidates) {
+  const auto components = static_cast<std::size_t>(candidates.components);
+  const std::size_t grains = candidates.grain_pairs.size();
+  Candidates old;
+  old.components = candidates.components;
+  std::vector<double> at_walls;
+  const auto take = [&](const ImpulseRecord& record) {
+    const Slot first = around.find(record.first);
+    const bool wall = record.second < 0;
+    if (wall)
+      old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first});
+    else
+      old.grain_pairs.push_back({first, around.find(record.second)});
+    std::vector<double>& impulse = wall ? at_walls : old.impulse;
+    impulse.insert(impulse.end(), record.r, record.r + components);
+  };
+  old.grain_pairs.reserve(grains);
+  old.impulse.reserve(components * candidates.size());
+  std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const double* r = &candidates.impulse[components * k];
+    if (std::all_of(r, r + components, [](double value) { return value == 0; })) continue;
+    ImpulseRecord record{};
+    if (k < grains) {
+      record.first = static_cast<std::int64_t>(bodies.id[at(candidates.grain_pairs[k].first)]);
+      record.second = static_cast<std::int64_t>(bodies.id[at(candidates.grain_pairs[k].second)]);
+    } else {
+      record.first = static_cast<std::int64_t>(bodies.id[at(candidates.wall_pairs[k - grains].body)]);
+      record.second = -1 - std::int64_t{candidates.wall_pairs[k - grains].wall};
+    }
+    std::copy_n(r, components, record.r);
+    const std::int32_t subdomain = decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x));
+    const std::int32_t rank = decomposition.rank_of[at(subdomain)];
+    if (rank == ranks.rank())
+      take(record);
+    else
+      to[at(rank)].push_back(record);
+  }
+  candidates = {};
+  for (const auto& part : ranks.exchange_records(std::move(to)))
+    for (const ImpulseRecord& record : part) take(record);
+  old.impulse.insert(old.impulse.end(), at_walls.begin(), at_walls.end());
+  std::vector<Slot> same(around.bodies.size());
+  std::iota(same.begin(), same.end(), 0);
+  renumber(old, same);
+  return old;
+}
+
+/// Copies that stand in a subdomain now and did not before.
+std::int64_t arrivals(std::span<const BodyId> before, std::span<const BodyId> now) {
+  const auto sorted = [](std::span<const BodyId> ids) {
+    std::vector<BodyId> copy(ids.begin(), ids.end());
+    std::sort(copy.begin(), copy.end());
+    return copy;
+  };
+  const std::vector<BodyId> a = sorted(before), b = sorted(now);
+  std::int64_t count = 0;
+  auto old = a.begin();
+  for (BodyId id : b) {
+    while (old != a.end() && *old < id) ++old;
+    if (old == a.end() || *old != id) ++count;
+  }
+  return count;
+}
+
+/// A candidate of this rank and where it goes: grain pairs by subdomain, those at the interface first; then
+/// wall pairs by wall.
+struct Key {
+  std::int32_t wall, local, inner, candidate;
+  auto operator<=>(const Key&) const = default;
+};
+
+std::vector<Key> sort_own(const Decomposition& decomposition, const Candidates& found,
+                          std::span<const std::int32_t> subdomain, const BodySubdomains& standings,
+                          std::span<const char> glued) {
+  const std::size_t grains = found.grain_pairs.size();
+  std::vector<std::int32_t> local_of(at(decomposition.partition.subdomains), -1);
+  for (std::size_t e = 0; e < decomposition.here.size(); ++e)
+    local_of[at(decomposition.here[e])] = static_cast<std::int32_t>(e);
+  const auto shared = [&](Slot body) { return standings.multiplicity(at(body)) > 1; };
+  std::vector<Key> keys;
+  keys.reserve(found.size());
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    const std::int32_t local = local_of[at(subdomain[k])];
+    if (local < 0) continue;
+    const std::int32_t wall = k < grains ? -1 : found.wall_pairs[k - grains].wall;
+    const bool boundary = k < grains
+                              ? shared(found.grain_pairs[k].first) || shared(found.grain_pairs[k].second)
+                              : glued[at(wall)] != 0 || shared(found.wall_pairs[k - grains].body);
+    keys.push_back({wall, local, boundary ? 0 : 1, static_cast<std::int32_t>(k)});
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+/// Multiplicities of the copies, who counts, and where each subdomain's begin.
+void list_copies(Decomposition& decomposition, const BodySubdomains& standings, std::span<const BodyId> id) {
+  decomposition.slot_begin.assign(1, 0);
+  decomposition.multiplicity.clear();
+  decomposition.counts.clear();
+  for (const SubdomainInterface& interface : decomposition.interfaces) {
+    for (std::size_t k = 0; k < interface.bodies.size(); ++k) {
+      const std::size_t b = at(interface.bodies[k]);
+      const std::int32_t m = interface.multiplicity[k];
+      if (m > std::numeric_limits<std::uint16_t>::max())
+        throw std::runtime_error(fmt::format("body {} stands in {} subdomains; use fewer subdomains",
+                                             static_cast<std::int64_t>(id[b]), m));
+      decomposition.multiplicity.push_back(static_cast<std::uint16_t>(m));
+      decomposition.counts.push_back(standings.of(b).front() == interface.subdomain ? 1 : 0);
+    }
+    decomposition.slot_begin.push_back(decomposition.multiplicity.size());
+  }
+}
+
+/// Copies of the bodies of the interfaces, field by field: each field of the surroundings goes when it has
+/// been copied.
+Bodies make_copies(Decomposition& decomposition, bool split, Bodies& around) {
+  Bodies copies;
+  const auto copy = [&](auto& from, auto& to) {
+    to.reserve(decomposition.slot_begin.back());
+    for (const SubdomainInterface& interface : decomposition.interfaces)
+      for (Slot body : interface.bodies) to.push_back(from[at(body)]);
+    release(from);
+  };
+  copy(around.id, copies.id);
+  copy(around.x, copies.x);
+  copy(around.radius, copies.radius);
+  copy(around.velocity, copies.velocity);
+  if (decomposition.orientation) copy(around.orientation, copies.orientation);
+  decomposition.whole.clear();
+  decomposition.whole.reserve(copies.size());
+  for (std::size_t s = 0; s < copies.size(); ++s) {
+    Velocity& v = copies.velocity[s];
+    decomposition.whole.push_back({v.inv_mass, v.spin_mobility});
+    if (!split) continue;
+    v.inv_mass *= decomposition.multiplicity[s];
+    v.spin_mobility *= decomposition.multiplicity[s];
+  }
+  return copies;
+}
+
+}  // namespace
+
+std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
+                                       const graph::Communicator& ranks, Surroundings& around,
+                                       Candidates found, std::span<const char> glued, Bodies& bodies,
+                                       Candidates& candidates) {
+  const Partition& partition = decomposition.partition;
+  const std::size_t grains = found.grain_pairs.size();
+  match_impulses(collect_impulses(decomposition, ranks, around, bodies, std::move(candidates)), found);
+  candidates = {};
+  release(bodies.x);
+
+  std::vector<std::int64_t> load(at(partition.subdomains), 0);
+  std::vector<Key> keys;
+  const std::vector<std::size_t> slot_begin_before = decomposition.slot_begin;
+  const bool first = decomposition.interfaces.empty();
+  {
+    std::vector<std::int32_t> subdomain(found.size()), home;
+    for (std::size_t k = 0; k < found.size(); ++k)
+      subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x));
+    for (const Vec3& x : around.bodies.x) home.push_back(partition.subdomain_of(x));
+    const BodySubdomains standings =
+        grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);
+    const std::int32_t hubs = settings.exchange == ExchangeScheme::ccs ? 2 : 9;
+    decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
+    list_copies(decomposition, standings, around.bodies.id);
+    keys = sort_own(decomposition, found, subdomain, standings, glued);
+    for (const Key& key : keys) ++load[at(subdomain[at(key.candidate)])];
+  }
+  ranks.sum(load);
+  // As large as without subdomains: small chunks have poor batches, and subdomains run beside one another.
+  const int target =
+      chunk_target(static_cast<std::size_t>(std::accumulate(load.begin(), load.end(), std::int64_t{0})));
+
+  // Slot of a body in its subdomain: bodies of an interface stand in the order of the surroundings.
+  const auto slot_in = [&](std::int32_t local, Slot body) {
+    const auto& list = decomposition.interfaces[at(local)].bodies;
+    return static_cast<Slot>(decomposition.slot_begin[at(local)]) +
+           static_cast<Slot>(std::lower_bound(list.begin(), list.end(), body) - list.begin());
+  };
+  Candidates cut;
+  cut.components = found.components;
+  const auto components = static_cast<std::size_t>(found.components);
+  cut.impulse.reserve(components * keys.size());
+  cut.grain_pairs.reserve(static_cast<std::size_t>(
+      std::count_if(keys.begin(), keys.end(), [](const Key& key) { return key.wall < 0; })));
+  std::vector<CandidateGroup> groups;
+  const Key* last = nullptr;
+  for (const Key& key : keys) {
+    if (!last || key.wall != last->wall || key.local != last->local || key.inner != last->inner) {
+      const auto begin = static_cast<std::int32_t>(cut.size());
+      groups.push_back({begin, begin, key.wall, key.local, key.inner == 0, target});
+    }
+    last = &key;
+    const std::size_t k = at(key.candidate);
+    if (k < grains)
+      cut.grain_pairs.push_back(
+          {slot_in(key.local, found.grain_pairs[k].first), slot_in(key.local, found.grain_pairs[k].second)});
+    else
+      cut.wall_pairs.push_back({key.wall, slot_in(key.local, found.wall_pairs[k - grains].body)});
+    for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
+    ++groups.back().end;
+  }
+  release(keys);
+  found = {};
+
+  Bodies copies = make_copies(decomposition, settings.coupling == Coupling::nscdd, around.bodies);
+  std::int64_t migrants[1] = {0};
+  for (std::size_t e = 0; e < decomposition.here.size(); ++e) {
+    const auto part = [e](const std::vector<BodyId>& id, const std::vector<std::size_t>& begin) {
+      return std::span(id).subspan(begin[e], begin[e + 1] - begin[e]);
+    };
+    migrants[0] += arrivals(part(bodies.id, slot_begin_before), part(copies.id, decomposition.slot_begin));
+  }
+  ranks.sum(migrants);
+  decomposition.migrants = first ? 0 : migrants[0];
+  decomposition.imbalance = imbalance(load);
+  bodies = std::move(copies);
+  candidates = std::move(cut);
+  return groups;
+}
+
+}  // namespace talus

@@ -1,0 +1,70 @@
+#pragma once
+
+/// What the tests of several ranks share: mpirun in front of the command, a folder of their own.
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "tests/unit/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus::test {
+
+/// mpirun for so many ranks, also as root, also on fewer cores.
+inline std::string launcher(int ranks) {
+  return "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe --bind-to none "
+         "-n " +
+         std::to_string(ranks);
+}
+
+class OnRanks : public testing::Test {
+ protected:
+  /// Without mpirun when `ranks` is 1.
+  Outcome run(int ranks, const std::string& arguments, const std::string& environment = "") const {
+    return test::run(folder_.path(), arguments,
+                     environment + " " + (ranks > 1 ? launcher(ranks) : std::string()));
+  }
+  std::string digest_of(const std::string& out) const { return summary(at(out)).at("digest"); }
+  std::string file(const std::string& out, const std::string& name) const { return content(at(out) / name); }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+
+  ScratchDirectory folder_;
+};
+
+/// 300 grains between a moving lid and five fixed walls, in six subdomains, dealt out anew every third step.
+inline const std::string six_subdomains = R"(name = "ranks"
+box = true
+time_step = 1e-3
+[material]
+density = 2600
+friction = 0.3
+[sample]
+kind = "deposition"
+count = 300
+base = [0.12, 0.12]
+radius_distribution = "uniform"
+radius_min = 0.008
+radius_max = 0.012
+[[wall]]
+name = "z+"
+drive = "pressure"
+pressure = 1e4
+[[stage]]
+name = "press"
+friction = 0
+end = { steps = 5 }
+[[stage]]
+name = "hold"
+end = { steps = 5 }
+[solver]
+max_iterations = 40
+[decomposition]
+subdomains = 6
+repartition_every = 3
+[output]
+every_steps = 4
+pictures = false
+)";
+
+}  // namespace talus::test
