@@ -11,12 +11,14 @@
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
 #include "apps/study_error.hpp"
+#include "apps/study_stability.hpp"
 #include "apps/trace_command.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
 
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 
 namespace {
 
@@ -201,6 +203,33 @@ int main(int argc, char** argv) {
   study_app->require_subcommand(1);
   StudyErrorOptions study_error;
   CLI::App* study_error_app = add_study_error(*study_app, study_error);
+  StabilityOptions stability;
+  CLI::App* stability_app = study_app->add_subcommand(
+      "stability", "stiff and extreme scenes with known answers: true errors against certificates");
+  stability_app->add_option("--only", stability.only, "scenes with this in their name, may be repeated [all]")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  stability_app->add_option("--method", stability.settings.method, "solver.method of every scene")
+      ->type_name("auto|nlgs|nlgs+momentum|nncg|admm")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, SolverMethod>{{"auto", SolverMethod::automatic},
+                                              {"nlgs", SolverMethod::nlgs},
+                                              {"nlgs+momentum", SolverMethod::momentum},
+                                              {"nncg", SolverMethod::nncg},
+                                              {"admm", SolverMethod::admm}}));
+  stability_app
+      ->add_option("--tolerance", stability.settings.tolerance,
+                   "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
+      ->type_name("T")
+      ->check(CLI::PositiveNumber);
+  stability_app
+      ->add_option("--seconds", stability.settings.seconds, "a scene is stopped after so many seconds")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  stability_app->add_option("--out", stability.out, "directory of the files [out/study-stability]")
+      ->type_name("DIR");
+  stability_app->add_flag("--force", stability.force, "replace earlier results in the directory");
+  stability_app->add_flag("--list", stability.list, "print the names of the scenes, run nothing");
 
   CLI::App* reference_app =
       app.add_subcommand("scene-reference", "print docs/scenes.md: every key of a scene file");
@@ -227,6 +256,7 @@ int main(int argc, char** argv) {
   if (*export_app) return trace_export_command(trace_export);
   if (*replay_app) return replay_command(std::move(replay));
   if (*study_error_app) return study_error_command(study_error);
+  if (*stability_app) return stability_command(stability);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;
 }

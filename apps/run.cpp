@@ -132,6 +132,7 @@ class RecorderFeed {
 
 struct Tally {
   std::int64_t unconverged = 0;
+  std::int64_t passed = 0;  ///< pairs that went through one another
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;
@@ -143,6 +144,7 @@ struct Tally {
     iterating += simulation.sums().times.iteration;
     iterations += report.iterations;
     if (!report.converged) ++unconverged;
+    passed += report.passed;
     worst_error = std::max(worst_error, report.error_rms);
     worst_balance = std::max(worst_balance, report.balance);
   }
@@ -268,6 +270,11 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
                "took {:.1f} % of the iterations on rank 0\n",
                messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
                tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
+  if (ranks.rank() == 0 && tally.passed > 0)
+    fmt::print(stderr,
+               "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
+               "these steps count as unconverged. Reduce time_step\n",
+               tally.passed);
   if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
     summary.exit_code = exit_tolerance_missed;
   summary.steps = simulation.report().step;

@@ -5,11 +5,24 @@
 /// is carried (docs/decisions/0012-stiff.md).
 
 #include <algorithm>
+#include <cmath>
 
 namespace talus {
 
 /// Problems of fewer sweeps are none that sweeps cannot see through.
 constexpr double stiff = 1000;
+
+/// What is left of a change when it goes on as it went: the larger of `change`, over the second half of the
+/// sweeps, and its extrapolation from the change `before`, over the second quarter. An error that decays as
+/// exp(-k/t) changes by s (1 + s) as much over the second half as over the quarter before, with s =
+/// exp(-n/4t); what is left is s^2/(1 - s^2) of the last change. Where changes still grow nothing has
+/// settled, and `unsettled` times the change is taken.
+inline double left_over(double change, double before) {
+  constexpr double unsettled = 20;
+  if (!(change < 2 * before)) return unsettled * change;
+  const double s = (std::sqrt(1 + 4 * change / before) - 1) / 2;
+  return change * std::clamp(s * s / (1 - s * s), 1.0, unsettled);
+}
 
 /// Estimate of the relative error of the forces that the walls carry, from their relative `change` over the
 /// second half of `sweeps` sweeps in a problem that takes about `sweeps_needed` of them (estimate_stiffness).
@@ -17,7 +30,7 @@ constexpr double stiff = 1000;
 /// of it only, and a plate that sweeps leave falling looks still: 10^6 grain masses on a pile, k = 8e4; after
 /// 1000 sweeps the force is 0.7 % of the weight, its change 0.5, and the estimate 80.
 inline double unbalance(double change, int sweeps, double sweeps_needed) {
-  if (sweeps_needed < stiff || sweeps == 0) return change;
+  if (sweeps == 0 || sweeps >= sweeps_needed) return change;
   return change * std::max(1.0, 2 * sweeps_needed / sweeps);
 }
 

@@ -34,9 +34,22 @@ Vec3 unit_normal(const Vec3& d, double length) {
   return length > 0 ? Vec3(d / length) : Vec3::UnitZ();
 }
 
-/// Appends the contacts of a chunk to `found`, in the order in which they are to be dealt to groups.
-void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
-                   std::size_t chunk, std::vector<Found>& found) {
+/// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
+/// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
+bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
+  if (way.squaredNorm() < 0.25 * small * small) return false;
+  const Vec3 start = d - way;
+  const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const double overlap = touching - (start + nearest * way).norm();
+  return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
+}
+
+/// Appends the contacts of a chunk to `found`, in the order in which they are to be dealt to groups, and
+/// returns the pairs that passed.
+std::int32_t find_contacts(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                           std::size_t chunk, std::vector<Found>& found) {
+  std::int32_t through = 0;
+  const double half_step = 0.5 * in.time_step;
   const std::size_t grains = candidates.grain_pairs.size();
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]),
              end = static_cast<std::size_t>(chunks.begin[chunk + 1]);
@@ -51,11 +64,14 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
       const double distance = d.norm();
       const Vec3 normal = unit_normal(d, distance);
       double bias;
-      const double v_n = normal.dot(u(i) - u(j));  // gravity moves both alike
+      const Vec3 v = u(i) - u(j);
+      const double v_n = normal.dot(v);  // gravity moves both alike
+      through += passed(in.x[i] - in.x[j], half_step * v, in.radius[i] + in.radius[j],
+                        std::min(in.radius[i], in.radius[j]));
       if (constrain(in, distance - in.radius[i] - in.radius[j], v_n, v_n, slow, bias))
         found.push_back({normal, bias, static_cast<std::int32_t>(k)});
     }
-    return;
+    return through;
   }
   const Wall& wall = in.walls[static_cast<std::size_t>(chunks.wall[chunk])];
   const double fall = in.time_step * wall.normal.dot(in.gravity);
@@ -63,10 +79,13 @@ void find_contacts(const NarrowPhase& in, const Candidates& candidates, const Ch
     const auto i = static_cast<std::size_t>(candidates.wall_pairs[k - grains].body);
     const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
     const double v_n = wall.normal.dot(u(i) - wall.velocity);
+    const double gap_before = gap - half_step * v_n;
+    through += std::min(0.0, gap_before) - gap > 0.5 * in.radius[i];
     double bias;
     if (constrain(in, gap, v_n, v_n + fall, slow, bias))
       found.push_back({wall.normal, bias, static_cast<std::int32_t>(k)});
   }
+  return through;
 }
 
 constexpr std::size_t group_size = 16;
@@ -129,13 +148,14 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   contacts.candidate.resize(n);
   contacts.group.resize(n);
   contacts.count.assign(chunks.size(), 0);
+  contacts.passed.assign(chunks.size(), 0);
 }
 
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, Contacts& contacts) {
   std::vector<Found> found;
   found.reserve(static_cast<std::size_t>(chunks.begin[chunk + 1] - chunks.begin[chunk]));
-  find_contacts(in, candidates, chunks, chunk, found);
+  contacts.passed[chunk] = find_contacts(in, candidates, chunks, chunk, found);
   std::vector<std::int32_t> order;
   order.reserve(found.size());
   order_in_groups(chunks, chunk, found, order,
@@ -234,7 +254,7 @@ std::size_t memory_used(const Contacts& contacts) {
     bytes += values->capacity() * sizeof(double);
   return bytes +
          (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
-          contacts.count.capacity()) *
+          contacts.count.capacity() + contacts.passed.capacity()) *
              4 +
          contacts.group.capacity();
 }

@@ -20,8 +20,10 @@ struct Contacts {
   std::vector<double> rn;           ///< normal impulse [N s]; empty with friction
   std::vector<Slot> first, second;  ///< second is -1 at a wall
   std::vector<std::int32_t> candidate;
-  std::vector<std::int32_t> count;  ///< per chunk
-  std::vector<std::uint8_t> group;  ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
+  std::vector<std::int32_t> count;   ///< per chunk
+  std::vector<std::int32_t> passed;  ///< per chunk: pairs that went through one another on their way to x, or
+                                     ///< in by more than half the smaller radius: the time step is too long
+  std::vector<std::uint8_t> group;   ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
 };
 
 /// Room for the contacts of `chunks`; `friction` decides which impulses exist.

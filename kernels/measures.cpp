@@ -6,6 +6,7 @@ namespace talus {
 
 void ContactSums::add(const ContactSums& other) {
   overlapping += other.overlapping;
+  passed += other.passed;
   penetration += other.penetration;
   penetration_max = std::max(penetration_max, other.penetration_max);
   moment += other.moment;
@@ -25,6 +26,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
                              std::span<const Vec3> x, std::span<const double> radius,
                              std::span<const Wall> walls) {
   ContactSums sums;
+  sums.passed = contacts.passed[chunk];
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
   for (std::size_t k = begin; k < begin + static_cast<std::size_t>(contacts.count[chunk]); ++k) {
     const auto i = static_cast<std::size_t>(contacts.first[k]);

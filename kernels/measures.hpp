@@ -10,9 +10,10 @@ namespace talus {
 
 /// Sums over the contacts of some chunks at the end of the step; add them in a fixed order only.
 struct ContactSums {
-  std::int64_t overlapping = 0;                      ///< contacts with gap < 0
-  double penetration = 0;                            ///< sum of -gap over them [m]
-  double penetration_max = 0;                        ///< [m]
+  std::int64_t overlapping = 0;  ///< contacts with gap < 0
+  std::int64_t passed = 0;       ///< pairs that went through one another (Contacts::passed)
+  double penetration = 0;        ///< sum of -gap over them [m]
+  double penetration_max = 0;    ///< [m]
   Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  ///< sum of r (x) l [N s m], l the branch vector: h V
                                                      ///< times the Love-Weber stress
   double normal_impulse = 0;                         ///< sum of r_n [N s]

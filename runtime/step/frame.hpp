@@ -30,6 +30,8 @@ struct StepReport {
   double imbalance = 1;  ///< largest over mean work of the subdomains
   double wall_s = 0;     ///< elapsed time of the step [s]
   bool converged = false;
+  std::int64_t passed = 0;  ///< pairs that went through one another, or deep into one another, within the
+                            ///< step: it is too long for them, and not converged
 };
 
 /// One row of walls.csv.

@@ -272,15 +272,29 @@ double Iteration::impulse_scale() const {
 double Iteration::drift() const {
   const double scale = impulse_scale();
   if (scale == 0) return 0;
-  // Since ADMM: all that sweeps changed of what it had settled.
-  std::size_t from = history_from_;
-  if (result_.stiff_calls == 0)
-    while (from + 1 < history_.size() && 2 * history_[from + 1].iterations <= history_.back().iterations)
+  const auto last_check_in = [&](int part) {
+    std::size_t from = history_from_;
+    while (from + 1 < history_.size() && part * history_[from + 1].iterations <= history_.back().iterations)
       ++from;
-  double change = 0;
-  for (std::size_t w = 0; w < state_.walls.size(); ++w)
-    change = std::max(change, (impulses_.back()[w] - impulses_[from][w]).norm());
-  return change / scale;
+    return from;
+  };
+  // Largest distance on the way: what swings may just pass where it came from.
+  const auto change = [&](std::size_t from, std::size_t to) {
+    double largest = 0;
+    for (std::size_t k = from; k < to; ++k)
+      for (std::size_t w = 0; w < state_.walls.size(); ++w)
+        largest = std::max(largest, (impulses_[to][w] - impulses_[k][w]).norm());
+    return largest / scale;
+  };
+  const std::size_t last = history_.size() - 1;
+  // Since ADMM: all that sweeps changed of what it had settled.
+  if (result_.stiff_calls > 0) return change(history_from_, last);
+  const std::size_t half = last_check_in(2), quarter = last_check_in(4);
+  if (half == quarter) return change(half, last);
+  // The checks do not stand at halves and quarters.
+  const double second_quarter = 0.25 * history_[last].iterations;
+  const int between = history_[half].iterations - history_[quarter].iterations;
+  return left_over(change(half, last), change(quarter, half) * second_quarter / between);
 }
 
 namespace {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace talus {
@@ -14,8 +15,12 @@ void require(bool holds, const std::string& message) {
 
 void validate_load(const std::string& where, const WallLoad& load) {
   require(load.velocity.allFinite(), where + ": velocity must be finite [m/s]");
+  require(std::isfinite(load.pressure),
+          fmt::format("{}: pressure must be finite [Pa], got {}", where, load.pressure));
+  require(std::isfinite(load.force), fmt::format("{}: force must be finite [N], got {}", where, load.force));
   if (load.drive != WallDrive::pressure && load.drive != WallDrive::force) return;
-  require(load.mass > 0, fmt::format("{}: a pushed wall needs a mass > 0 [kg], got {}", where, load.mass));
+  require(load.mass > 0 && std::isfinite(load.mass),
+          fmt::format("{}: a pushed wall needs a finite mass > 0 [kg], got {}", where, load.mass));
 }
 }  // namespace
 
@@ -23,14 +28,19 @@ void validate(const Setup& setup) {
   for (const Wall& wall : setup.walls) {
     require(std::abs(wall.normal.norm() - 1) < 1e-9,
             fmt::format("wall '{}': normal must be a unit vector", wall.name));
+    require(wall.point.allFinite() && wall.velocity.allFinite(),
+            fmt::format("wall '{}': point and velocity must be finite", wall.name));
     validate_load(fmt::format("wall '{}'", wall.name), wall.load);
   }
   require(!setup.stages.empty(), "at least one stage is needed");
   for (const Stage& stage : setup.stages) {
-    require(stage.time_step > 0,
-            fmt::format("stage '{}': time_step must be > 0 s, got {}", stage.name, stage.time_step));
-    require(stage.law.mu_grains >= 0 && stage.law.mu_walls >= 0,
-            fmt::format("stage '{}': friction must be >= 0", stage.name));
+    require(
+        stage.time_step > 0 && std::isfinite(stage.time_step),
+        fmt::format("stage '{}': time_step must be finite and > 0 s, got {}", stage.name, stage.time_step));
+    require(stage.gravity.allFinite(), fmt::format("stage '{}': gravity must be finite [m/s^2]", stage.name));
+    for (double mu : {stage.law.mu_grains, stage.law.mu_walls})
+      require(mu >= 0 && std::isfinite(mu),
+              fmt::format("stage '{}': friction must be finite and >= 0, got {}", stage.name, mu));
     require(
         stage.law.restitution >= 0 && stage.law.restitution <= 1,
         fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, stage.law.restitution));
@@ -43,6 +53,9 @@ void validate(const Setup& setup) {
       validate_load(fmt::format("stage '{}', wall '{}'", stage.name, name), load);
     }
   }
+  require(setup.solver.tolerance >= 0 && setup.solver.balance_tolerance >= 0,
+          fmt::format("solver.tolerance and balance_tolerance must be >= 0, got {} and {}",
+                      setup.solver.tolerance, setup.solver.balance_tolerance));
   require(setup.solver.max_iterations >= 1, "solver.max_iterations must be >= 1");
   require(setup.solver.check_every >= 1, "solver.check_every must be >= 1");
 }

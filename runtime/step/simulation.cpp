@@ -155,6 +155,19 @@ struct Simulation::Implementation {
     }
   }
 
+  /// Walls do not feel one another: two that face each other have run through when nothing between held them.
+  void check_walls_apart(std::int64_t step) const {
+    for (const Wall& moving : state.walls)
+      for (const Wall& other : state.walls)
+        if (moving.load.drive != WallDrive::fixed && (moving.normal + other.normal).norm() < 1e-12 &&
+            (other.point - moving.point).dot(moving.normal) < 0)
+          throw RunawayError(
+              fmt::format("step {} (stage '{}'): wall '{}' has passed wall '{}', which faces it. Are there "
+                          "grains between "
+                          "them? Reduce the load, the velocity or the time step",
+                          step, setup.stages[stage_index].name, moving.name, other.name));
+  }
+
   void check_for_runaway(double wall_energy_free) const {
     const MotionSums& motion = graph.sums().motion;
     const std::int64_t step = report.step + 1;
@@ -172,6 +185,7 @@ struct Simulation::Implementation {
           "step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping "
           "grains",
           step, setup.stages[stage_index].name, describe(state.bodies, motion.fastest)));
+    check_walls_apart(step);
     double fastest_wall2 = 0;
     for (const Wall& wall : state.walls)
       fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
@@ -181,7 +195,7 @@ struct Simulation::Implementation {
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. "
           "Reduce the time "
-          "step or raise solver.max_iterations",
+          "step or raise solver.max_iterations; with solver.overlap_correction, begin without deep overlaps",
           step, setup.stages[stage_index].name, energy, supplied, describe(state.bodies, motion.fastest)));
   }
 
@@ -219,12 +233,13 @@ struct Simulation::Implementation {
             : 0;
     report.penetration_max =
         sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / size.smallest : 0;
+    report.passed = sums.contacts.passed;
     report.kinetic_translation = sums.motion.energy.translation;
     report.kinetic_rotation = sums.motion.energy.rotation;
     const double box = box_volume(state.walls);
     report.solid_fraction = box > 0 ? size.volume / box : 0;
     report.wall_s = elapsed;
-    report.converged = result.converged && defect <= setup.solver.balance_tolerance;
+    report.converged = result.converged && defect <= setup.solver.balance_tolerance && report.passed == 0;
   }
 
   /// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x

@@ -395,7 +395,7 @@ void StepGraph::measure_lane(std::uint32_t lane) {
 namespace {
 
 /// What a subdomain adds to the report, as numbers that travel.
-constexpr std::size_t row_width = 1 + 9 + 13;
+constexpr std::size_t row_width = 1 + 9 + 14;
 
 void write_row(std::int32_t subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
   const double head[] = {static_cast<double>(subdomain),
@@ -411,7 +411,8 @@ void write_row(std::int32_t subdomain, const MotionSums& motion, const ContactSu
                          static_cast<double>(contacts.overlapping),
                          contacts.penetration,
                          contacts.penetration_max,
-                         contacts.normal_impulse};
+                         contacts.normal_impulse,
+                         static_cast<double>(contacts.passed)};
   row = std::copy(std::begin(head), std::end(head), row);
   std::copy_n(contacts.moment.data(), 9, row);
 }
@@ -430,7 +431,8 @@ void add_row(const double* row, bool here, StepSums& sums) {
   contacts.penetration = row[11];
   contacts.penetration_max = row[12];
   contacts.normal_impulse = row[13];
-  contacts.moment = Eigen::Map<const Eigen::Matrix3d>(row + 14);
+  contacts.passed = static_cast<std::int64_t>(row[14]);
+  contacts.moment = Eigen::Map<const Eigen::Matrix3d>(row + 15);
   sums.contacts.add(contacts);
 }
 

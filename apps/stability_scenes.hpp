@@ -1,0 +1,84 @@
+#pragma once
+
+/// The scenes of `talus study stability`: small problems that are hard for a reason, most of them with a
+/// known answer.
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runtime/step/simulation.hpp"
+
+namespace talus::stability {
+
+/// What a truth looks at: one step, from its beginning to its end.
+struct StepView {
+  const Simulation& simulation;
+  const Frame& before;  ///< without contacts, and without walls
+  const Frame& after;
+
+  double time_step() const { return simulation.stage().time_step; }  ///< [s]
+  const Vec3& gravity() const { return simulation.stage().gravity; }
+};
+
+/// The true error of a step against its exact answer, relative to what the contacts do in it as a whole (the
+/// certificate's unit); nothing where the answer of this step is not known.
+using Truth = std::function<std::optional<double>(const StepView&)>;
+
+/// A scene, ready to run.
+struct Problem {
+  Setup setup;  ///< one stage without an end; the solver's settings are those a user gets unasked
+  Bodies bodies;
+  int steps = 3;
+  Truth truth;  ///< empty: not known
+  /// True when `truth` takes the velocities before the step as they are. Otherwise it holds only as long as
+  /// no step before has missed its tolerance.
+  bool truth_from_any_state = false;
+  /// Not 0: what the true error may reach whatever the certificate says. 0: twice the certificate.
+  double allowed = 0;
+};
+
+struct Scene {
+  std::string name;
+  std::string asks;  ///< what is hard about it, and what is known
+  std::function<Problem()> build;
+};
+
+/// All scenes, in the order of the table. A name is unique.
+std::vector<Scene> scenes();
+
+/// Parts of the table.
+void add_columns(std::vector<Scene>& table);
+void add_boxes(std::vector<Scene>& table);
+void add_wedges_and_arches(std::vector<Scene>& table);
+void add_motion(std::vector<Scene>& table);
+void add_units(std::vector<Scene>& table);
+void add_nonsense(std::vector<Scene>& table);
+
+// --- Building blocks -------------------------------------------------------------------------------------
+
+constexpr double earth = 9.81;       ///< [m/s^2]
+constexpr double radius = 0.05;      ///< [m] of a usual grain
+constexpr double density = 2600;     ///< [kg/m^3]
+constexpr double natural_dt = 1e-3;  ///< [s] 1/100 of the time in which a grain falls by its diameter
+
+Problem problem(double time_step, const Vec3& gravity, double mu);
+Stage& stage(Problem& problem);
+Wall& add_wall(Problem& problem, std::string name, const Vec3& point, const Vec3& normal);
+/// Six fixed walls, x-, x+, y-, y+, z-, z+, around [0, lengths].
+void add_box(Problem& problem, const Vec3& lengths);
+/// Adds a grain of the given mass; ids count from 0.
+Velocity& add_grain(Problem& problem, const Vec3& centre, double r, double mass);
+double sphere_mass(double r);  ///< [kg] at the usual density
+
+/// Largest error of the walls' forces against `exact` [N], over the largest of `exact`.
+Truth wall_forces(std::vector<Vec3> exact);
+
+/// The velocities that the same step takes when it is solved to 1e-10 with conjugate gradients, in the norm
+/// of kinetic energy, over what the contacts change. Without friction they are unique. Nothing known beyond
+/// the first step, or when the reference itself falls short.
+Truth reference_velocities(const Problem& problem);
+
+}  // namespace talus::stability
