@@ -103,7 +103,6 @@ std::int64_t arrivals(std::span<const BodyId> before, std::span<const BodyId> no
 /// wall pairs by wall.
 struct Key {
   std::int32_t wall, local, inner, candidate;
-  auto operator<=>(const Key&) const = default;
 };
 
 std::vector<Key> sort_own(const Decomposition& decomposition, const Candidates& found,
@@ -116,6 +115,12 @@ std::vector<Key> sort_own(const Decomposition& decomposition, const Candidates& 
   const auto shared = [&](Slot body) { return standings.multiplicity(at(body)) > 1; };
   std::vector<Key> keys;
   keys.reserve(found.size());
+  // Candidates come in ascending order, so that counting by the rest sorts them.
+  const std::size_t here = decomposition.here.size();
+  std::vector<std::size_t> place(2 * here * (glued.size() + 1) + 1, 0);
+  const auto bucket = [&](const Key& key) {
+    return (static_cast<std::size_t>(key.wall + 1) * here + at(key.local)) * 2 + at(key.inner);
+  };
   for (std::size_t k = 0; k < found.size(); ++k) {
     const std::int32_t local = local_of[at(subdomain[k])];
     if (local < 0) continue;
@@ -124,9 +129,12 @@ std::vector<Key> sort_own(const Decomposition& decomposition, const Candidates& 
                               ? shared(found.grain_pairs[k].first) || shared(found.grain_pairs[k].second)
                               : glued[at(wall)] != 0 || shared(found.wall_pairs[k - grains].body);
     keys.push_back({wall, local, boundary ? 0 : 1, static_cast<std::int32_t>(k)});
+    ++place[bucket(keys.back()) + 1];
   }
-  std::sort(keys.begin(), keys.end());
-  return keys;
+  std::partial_sum(place.begin(), place.end(), place.begin());
+  std::vector<Key> sorted(keys.size());
+  for (const Key& key : keys) sorted[place[bucket(key)]++] = key;
+  return sorted;
 }
 
 /// Multiplicities of the copies, who counts, and where each subdomain's begin.
