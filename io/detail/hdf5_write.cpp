@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "io/error.hpp"
+
 namespace talus::io::detail {
 
 Hdf5Object file_access(const std::string& file, bool together) {
