@@ -21,23 +21,8 @@ std::size_t memory_used(const StepState& state) {
 
 namespace {
 
-/// Beyond 0.9 momentum stalls on packings with friction.
-constexpr double most_momentum = 0.9;
-/// Between two checks; what makes it so much worse is no method for this problem.
-constexpr double hopeless_growth = 4;
-/// With friction momentum gets this far at twice the speed of conjugate gradients, and then falls behind.
-constexpr double momentum_reach = 5e-5;
-/// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
-constexpr int plain_sweeps = 3;
-/// What momentum makes worse shows within as many sweeps.
-constexpr int trusted_sweeps = 25;
-
 double clock_now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-Carry carry_of(SolverMethod method) {
-  return method == SolverMethod::nncg ? Carry::conjugate : Carry::momentum;
 }
 
 }  // namespace
@@ -90,50 +75,7 @@ void Iteration::begin() {
   sweeps_ = before_segment_ = 0;
   history_from_ = 0;
   sweeps_needed_ = -1;
-  result_.iterations = -1;  // the first course begins with sweep 0
-  SolverMethod method = settings_.method;
-  if (method == SolverMethod::automatic) {
-    // Damped Schwarz is no descent: what is carried on from it need not go down.
-    const bool far = parameters_.friction && settings_.tolerance < momentum_reach;
-    method = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several()
-                 ? SolverMethod::nlgs
-             : far ? SolverMethod::nncg
-                   : SolverMethod::momentum;
-  }
-  if (method == SolverMethod::admm) method = SolverMethod::nlgs;
-  begin_course(method, most_momentum);
-  result_.iterations = 0;
-}
-
-double Iteration::beta(int epoch) const {
-  const Course& now = course(epoch);
-  if (now.method == SolverMethod::nncg) return conjugate_beta_;
-  const int sweep = number(epoch) - now.from - plain_sweeps;
-  return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
-}
-
-void Iteration::begin_course(SolverMethod method, double most) {
-  course_before_ = course_;
-  course_ = {method, result_.iterations + 1, most};
-  conjugate_beta_ = change2_ = 0;
-  if (method == SolverMethod::nlgs) return;
-  allocate(trail_, carry_of(method), state_.contacts, state_.bodies.size(), state_.chunks.size());
-  changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
-}
-
-/// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
-/// write, and its wall copy.
-void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
-  const Chunks& chunks = state_.chunks;
-  const Carry carry = carry_of(course(epoch).method);
-  const double beta = this->beta(epoch);
-  carry_impulses(carry, beta, range, state_.contacts, trail_);
-  const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-  carry_velocities(
-      carry, beta,
-      std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-      state_.bodies.velocity, trail_);
-  if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
+  first_course();
 }
 
 template <bool Friction>
@@ -414,16 +356,6 @@ bool Iteration::swept(int epoch) {
   return true;
 }
 
-void Iteration::plan_sweeps(int epoch) {
-  int sweeps = std::max(settings_.check_every, sweeps_ / 4);
-  if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
-  sweeps = std::min(sweeps, settings_.max_iterations - sweeps_);
-  before_segment_ = sweeps_;
-  sweeps_ += sweeps;
-  sweeps_from_ = epoch + 1;
-  segment_ = epoch + 1 + sweeps;
-}
-
 /// The ratio of Fletcher and Reeves, from what the last two sweeps changed; added up like the error.
 void Iteration::turn_conjugate() {
   const Decomposition& all = state_.decomposition;
@@ -436,69 +368,6 @@ void Iteration::turn_conjugate() {
   for (const double* row : sorted_rows(everywhere, 2, all.partition.subdomains)) change2 += row[1];
   conjugate_beta_ = change2_ > 0 && change2 <= change2_ ? change2 / change2_ : 0;
   change2_ = change2;
-}
-
-/// After a check: momentum that has made it worse (sliding contacts turn its modes complex, and those grow)
-/// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
-void Iteration::choose_course() {
-  const std::size_t checks = history_.size();
-  if (checks < history_from_ + 2) return;
-  const double growth = history_[checks - 1].error_rms / history_[checks - 2].error_rms;
-  if (course_.method == SolverMethod::momentum && growth > 1) {
-    const double less = 1 - 2 * (1 - course_.most);
-    if (settings_.method == SolverMethod::automatic && growth < hopeless_growth)
-      begin_course(SolverMethod::nncg, 0);
-    else if (less > 0 && growth < hopeless_growth)
-      begin_course(SolverMethod::momentum, less);
-    else
-      begin_course(SolverMethod::nlgs, 0);
-  } else if (course_.method == SolverMethod::nncg && growth > hopeless_growth) {
-    begin_course(SolverMethod::nlgs, 0);
-  }
-}
-
-/// About the sweeps of the present course that this step's problem takes. Several subdomains may be on
-/// several ranks, of which none sees the whole problem: drift is then taken at its word, on one rank too, for
-/// the same bits.
-double Iteration::sweeps_needed() {
-  if (sweeps_needed_ < 0) sweeps_needed_ = state_.decomposition.several() ? 0 : admm_.sweeps_needed();
-  // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
-  const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
-                       : course_.method == SolverMethod::nncg   ? 40
-                                                                : 1;
-  return sweeps_needed_ / speed;
-}
-
-bool Iteration::balanced() {
-  result_.unbalance = result_.drift;
-  if (result_.stiff_calls > 0)
-    result_.unbalance += result_.stiff.balance_defect;
-  else if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
-    result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
-  return result_.unbalance <= settings_.balance_tolerance;
-}
-
-/// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
-/// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
-bool Iteration::ask_admm() {
-  constexpr int chance = 50, calls = 3;
-  if (!admm_.available()) return false;
-  if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
-  const bool may = settings_.method == SolverMethod::admm ||
-                   (settings_.method == SolverMethod::automatic && !state_.decomposition.several());
-  if (!may) return false;
-  if (result_.stiff_calls == calls || balanced()) return false;
-  const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
-  return since >= chance << (2 * result_.stiff_calls) &&
-         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff);
-}
-
-void Iteration::call_admm(int epoch) {
-  result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
-  history_from_ = history_.size();
-  begin_course(course_.method, course_.most);
-  before_segment_ = sweeps_;
-  segment_ = epoch + 1;
 }
 
 /// Judges the sums of the check after result_.iterations sweeps. False: the step ends with them.

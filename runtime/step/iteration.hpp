@@ -109,6 +109,7 @@ class Iteration {
   const Course& course(int epoch) const { return number(epoch) >= course_.from ? course_ : course_before_; }
   int number(int epoch) const { return before_segment_ + epoch - sweeps_from_; }
   double beta(int epoch) const;
+  void first_course();
   void begin_course(SolverMethod method, double most);
   bool measured(int epoch);
   bool swept(int epoch);
