@@ -28,19 +28,7 @@ std::string label(const DecompositionSettings& settings) {
 
 /// Grains that touch and overlap and move at random, between three fixed walls and three that press.
 talus::Setup pressed_lattice(int edge, double friction, std::int64_t steps) {
-  talus::Setup setup;
-  setup.walls = test::box_of_walls(-0.5, edge - 0.5);
-  Stage stage;
-  stage.name = "press";
-  stage.time_step = 1e-3;
-  stage.law = {friction, friction, 0};
-  stage.end.steps = steps;
-  WallLoad load;
-  load.drive = WallDrive::pressure;
-  load.pressure = 1e4;
-  load.mass = 1e4;
-  for (const char* name : {"x+", "y+", "z+"}) stage.loads.push_back({name, load});
-  setup.stages = {stage};
+  talus::Setup setup = test::pressed_setup(test::box_of_walls(-0.5, edge - 0.5), friction, steps, 1e4, 1e4);
   setup.detection.alert = 0.02;
   return setup;
 }

@@ -32,20 +32,7 @@ const std::vector<Variant> variants = {
 
 /// 6 x 6 x 6 grains in a box whose lid and two sides press with 20 kPa.
 talus::Setup pressed_box(double friction, std::int64_t steps) {
-  talus::Setup setup;
-  setup.walls = test::box_of_walls(0, 6 * 0.021);
-  Stage stage;
-  stage.name = "press";
-  stage.time_step = 1e-3;
-  stage.law = {friction, friction, 0};
-  stage.end.steps = steps;
-  WallLoad load;
-  load.drive = WallDrive::pressure;
-  load.pressure = 2e4;
-  load.mass = 1;
-  for (const char* name : {"x+", "y+", "z+"}) stage.loads.push_back({name, load});
-  setup.stages = {stage};
-  return setup;
+  return test::pressed_setup(test::box_of_walls(0, 6 * 0.021), friction, steps, 2e4, 1);
 }
 
 Bodies lattice(int edge, std::uint64_t seed) {

@@ -6,6 +6,7 @@
 #include <random>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernels/bodies.hpp"
@@ -14,6 +15,7 @@
 #include "kernels/contacts.hpp"
 #include "kernels/sweep.hpp"
 #include "kernels/walls.hpp"
+#include "runtime/step/setup.hpp"
 
 namespace talus::test {
 
@@ -55,6 +57,25 @@ inline std::vector<Wall> box_of_walls(double low, double high) {
       walls.push_back(wall);
     }
   return walls;
+}
+
+/// One stage in a box of walls whose lid and two sides press with `pressure` [Pa] and weigh `wall_mass` [kg].
+inline talus::Setup pressed_setup(std::vector<Wall> box, double friction, std::int64_t steps, double pressure,
+                                  double wall_mass) {
+  talus::Setup setup;
+  setup.walls = std::move(box);
+  Stage stage;
+  stage.name = "press";
+  stage.time_step = 1e-3;
+  stage.law = {friction, friction, 0};
+  stage.end.steps = steps;
+  WallLoad load;
+  load.drive = WallDrive::pressure;
+  load.pressure = pressure;
+  load.mass = wall_mass;
+  for (const char* name : {"x+", "y+", "z+"}) stage.loads.push_back({name, load});
+  setup.stages = {stage};
+  return setup;
 }
 
 /// Every pair with |x_i - x_j| < reach_i + reach_j, by looking at all of them; in order of (first, second).
