@@ -2,43 +2,17 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <map>
 
-#include "runtime/graph/clock.hpp"
-#include "runtime/trace/recorder.hpp"
+#include "runtime/step/detail/gluing_parts.hpp"
 
 namespace talus {
 
+using detail::at;
+using detail::await;
+using detail::start;
+using detail::tag_of;
+
 namespace {
-
-using Channel = graph::Communicator::Channel;
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
-/// Adds the time it took to `waited`.
-void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
-  if (channel.done()) return;
-  const trace::Span span(trace, trace::kind_receive, message);
-  const double start = graph::seconds_now();
-  channel.wait();
-  waited += graph::seconds_now() - start;
-}
-
-void start(Channel& channel, trace::Recorder* trace, std::uint32_t message) {
-  const trace::Span span(trace, trace::kind_send, message);
-  channel.start();
-}
-
-/// A message from and to another rank; buffers have one room more than payload, for the time stamp of a
-/// delay.
-struct Link {
-  std::vector<double> out, in;
-  std::unique_ptr<Channel> sender, receiver;
-  std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
-};
 
 template <std::size_t Width>
 void read_velocity(const Velocity& v, double* out) {
@@ -76,47 +50,7 @@ void take_means(std::span<Velocity> velocity, std::span<const std::size_t> share
   }
 }
 
-constexpr int centre_tag = 1;
-int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
-  return 2 + from * subdomains + to;
-}
-
 }  // namespace
-
-/// Towards one neighbour.
-struct Gluing::Side {
-  std::vector<std::size_t> slots;  ///< of the bodies in the message, in its order
-  Link link;                       ///< `in` and the channels: of neighbours on other ranks only
-  const double* source = nullptr;  ///< the neighbour's message to this subdomain
-  std::int32_t local = -1;         ///< the neighbour's place here, -1 on another rank
-};
-
-struct Gluing::Subdomain {
-  std::vector<Side> sides;
-  std::vector<std::size_t> shared;  ///< slots
-  std::vector<const double*>
-      sources;               ///< per copy of `interface.copies`: where it is read; null: the own one
-  std::vector<double> base;  ///< Schwarz: velocities after the last gluing, per shared body
-  std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
-  std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
-  std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
-  double waited = 0;
-};
-
-/// The one rank through which some velocities go is rank 0.
-struct Gluing::Centre {
-  struct Contribution {
-    const double* partial = nullptr;
-    std::vector<std::size_t> item;  ///< per hub of the subdomain
-  };
-  std::vector<Contribution> contributions;  ///< rank 0: of every subdomain, in order
-  std::vector<double> sums;  ///< 3 per wall, then width per item: all on rank 0, else those asked for
-  std::vector<std::unique_ptr<Link>> links;             ///< rank 0: per other rank
-  std::vector<std::vector<std::size_t>> items_of_rank;  ///< rank 0: per other rank
-  std::atomic<std::size_t> published{0};                ///< other ranks: subdomains whose part is ready
-  std::unique_ptr<Link> to_centre;                      ///< other ranks
-  double waited = 0;
-};
 
 Gluing::Gluing(StepState& state, const DecompositionSettings& settings, const graph::Communicator& ranks)
     : state_(state), settings_(settings), ranks_(ranks) {}
@@ -193,104 +127,6 @@ void Gluing::plan_sides(std::size_t e) {
   }
 }
 
-void Gluing::plan_centre() {
-  const Decomposition& all = state_.decomposition;
-  /// A body that goes through the centre, as a subdomain names it.
-  struct HubRecord {
-    std::int64_t subdomain;
-    std::int64_t id;
-  };
-  std::vector<HubRecord> mine;
-  for (std::size_t e = 0; e < all.here.size() && all.several(); ++e) {
-    const SubdomainInterface& interface = all.interfaces[e];
-    for (std::int32_t hub : interface.hubs) {
-      const std::size_t slot = subdomains_[e].shared[at(hub)];
-      mine.push_back({all.here[e], static_cast<std::int64_t>(state_.bodies.id[slot])});
-    }
-  }
-  // Every rank learns all names: a few words per hub, none in most scenes.
-  std::vector<HubRecord> everywhere = ranks_.gather_records(std::span<const HubRecord>(mine));
-  std::stable_sort(everywhere.begin(), everywhere.end(),
-                   [](const HubRecord& a, const HubRecord& b) { return a.subdomain < b.subdomain; });
-  const auto items_of = [&](auto wanted) {
-    std::vector<std::int64_t> ids;
-    for (const HubRecord& record : everywhere)
-      if (wanted(all.rank_of[static_cast<std::size_t>(record.subdomain)])) ids.push_back(record.id);
-    std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    return ids;
-  };
-  const auto place = [](const std::vector<std::int64_t>& ids, std::int64_t id) {
-    return static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
-  };
-  const bool is_centre = ranks_.rank() == 0;
-  const std::vector<std::int64_t> items =
-      items_of([&](std::int32_t rank) { return is_centre || rank == ranks_.rank(); });
-  const std::size_t at_walls = 3 * walls_.size();
-  centre_ = std::make_unique<Centre>();
-  Centre& centre = *centre_;
-  centre.sums.resize(at_walls + items.size() * width_);
-  std::vector<std::size_t> length(at(all.partition.subdomains), at_walls);
-  for (const HubRecord& record : everywhere) length[static_cast<std::size_t>(record.subdomain)] += width_;
-  for (std::size_t e = 0; e < all.here.size(); ++e) {
-    Subdomain& subdomain = subdomains_[e];
-    subdomain.partial.resize(length[at(all.here[e])]);
-    for (const HubRecord& record : everywhere)
-      if (record.subdomain == all.here[e]) subdomain.hub_item.push_back(place(items, record.id));
-  }
-  if (ranks_.ranks() > 1 && (at_walls > 0 || !everywhere.empty())) {
-    const auto open = [&](int other, std::size_t out, std::size_t in) {
-      auto link = std::make_unique<Link>();
-      link->out.resize(out + 1);
-      link->in.resize(in + 1);
-      link->sender = ranks_.open_send(other, centre_tag, link->out);
-      link->receiver = ranks_.open_receive(other, centre_tag, link->in);
-      // A rank is named after its first subdomain; 0 is the centre.
-      const int named = is_centre ? other : ranks_.rank();
-      const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), named) -
-                                                    all.rank_of.begin());
-      link->out_name = trace::message_name(first, trace::centre_group);
-      link->in_name = trace::message_name(trace::centre_group, first);
-      if (is_centre) std::swap(link->out_name, link->in_name);
-      link->receiver->start();
-      return link;
-    };
-    const auto length_of_rank = [&](int rank) {
-      std::size_t sum = 0;
-      for (std::size_t e = 0; e < length.size(); ++e)
-        if (all.rank_of[e] == rank) sum += length[e];
-      return sum;
-    };
-    if (is_centre) {
-      for (int rank = 1; rank < ranks_.ranks(); ++rank) {
-        std::vector<std::size_t>& wanted = centre.items_of_rank.emplace_back();
-        for (std::int64_t id : items_of([&](std::int32_t r) { return r == rank; }))
-          wanted.push_back(place(items, id));
-        centre.links.push_back(open(rank, at_walls + wanted.size() * width_, length_of_rank(rank)));
-      }
-    } else {
-      centre.to_centre = open(0, length_of_rank(ranks_.rank()), centre.sums.size());
-    }
-  }
-  if (!is_centre) return;
-  std::vector<std::size_t> read_of_rank(static_cast<std::size_t>(ranks_.ranks()), 0);
-  for (std::size_t e = 0; e < length.size(); ++e) {
-    Centre::Contribution contribution;
-    const std::int32_t rank = all.rank_of[e];
-    if (rank == 0) {
-      const auto local = std::lower_bound(all.here.begin(), all.here.end(), static_cast<std::int32_t>(e));
-      contribution.partial = subdomains_[static_cast<std::size_t>(local - all.here.begin())].partial.data();
-    } else if (!centre.links.empty()) {
-      contribution.partial = centre.links[at(rank - 1)]->in.data() + read_of_rank[at(rank)];
-      read_of_rank[at(rank)] += length[e];
-    }
-    for (const HubRecord& record : everywhere)
-      if (record.subdomain == static_cast<std::int64_t>(e))
-        contribution.item.push_back(place(items, record.id));
-    centre.contributions.push_back(std::move(contribution));
-  }
-}
-
 void Gluing::count_messages() {
   std::array<std::int64_t, 4> count{};
   const auto add = [&](std::size_t doubles, bool between) {
@@ -307,10 +143,9 @@ void Gluing::count_messages() {
     add(subdomain.partial.size(), false);                                // to the centre
     add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
   }
-  if (centre_ && centre_->to_centre) {
+  if (centre_ && centre_->up) {
     count[2] += 2;
-    count[3] +=
-        static_cast<std::int64_t>(8 * (centre_->to_centre->out.size() + centre_->to_centre->in.size() - 2));
+    count[3] += static_cast<std::int64_t>(8 * (centre_->up->out.size() + centre_->up->in.size() - 2));
   }
   ranks_.sum(count);
   messages_ = {count[0], count[1], count[2], count[3]};
@@ -355,8 +190,9 @@ void Gluing::publish(std::size_t e, Mode mode) {
       write_velocities<6>(state_.bodies.velocity, side.slots, side.link.out.data());
     else
       write_velocities<3>(state_.bodies.velocity, side.slots, side.link.out.data());
-    if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   }
+  for (Side& side : mine.sides)
+    if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   for (std::size_t g = 0; g < walls_.size(); ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);
@@ -368,48 +204,11 @@ void Gluing::publish(std::size_t e, Mode mode) {
     for (std::size_t h = 0; h < interface.hubs.size(); ++h)
       write_velocity(mine.shared[at(interface.hubs[h])], &mine.partial[3 * walls_.size() + h * width_]);
   }
-  if (!centre_->to_centre) return;
-  // The last of this rank's subdomains sends for all: its count has seen what the others wrote.
+  if (!centre_->up || !centre_->links.empty()) return;
+  // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
   if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
   centre_->published.store(0, std::memory_order_relaxed);
-  Link& link = *centre_->to_centre;
-  await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
-  auto out = link.out.begin();
-  for (const Subdomain& subdomain : subdomains_)
-    out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  start(*link.sender, ranks_.trace(), link.out_name);
-}
-
-void Gluing::centre(Mode mode) {
-  if (mode == Mode::local || centre_->sums.empty()) return;
-  Centre& centre = *centre_;
-  if (centre.to_centre) {
-    Link& link = *centre.to_centre;
-    await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);
-    std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
-    link.receiver->start();
-    return;
-  }
-  for (const auto& link : centre.links) await(*link->receiver, centre.waited, ranks_.trace(), link->in_name);
-  std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
-  const std::size_t at_walls = 3 * walls_.size();
-  for (const Centre::Contribution& contribution : centre.contributions) {
-    for (std::size_t k = 0; k < at_walls; ++k) centre.sums[k] += contribution.partial[k];
-    for (std::size_t h = 0; h < contribution.item.size(); ++h)
-      for (std::size_t k = 0; k < width_; ++k)
-        centre.sums[at_walls + contribution.item[h] * width_ + k] +=
-            contribution.partial[at_walls + h * width_ + k];
-  }
-  for (std::size_t r = 0; r < centre.links.size(); ++r) {
-    Link& link = *centre.links[r];
-    link.receiver->start();
-    await(*link.sender, centre.waited, ranks_.trace(), link.out_name);
-    auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
-    for (std::size_t item : centre.items_of_rank[r])
-      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
-                        out);
-    start(*link.sender, ranks_.trace(), link.out_name);
-  }
+  send_up();
 }
 
 void Gluing::glue(std::size_t e, Mode mode) {
