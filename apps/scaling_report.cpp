@@ -29,19 +29,19 @@ std::string curve_of(const ScalingRow& row) {
 
 std::string table_of(const std::vector<ScalingRow>& rows, ScalingKind kind) {
   io::CsvTable table(
-      {"curve",    "result",        "source",  "network",      "variant",       "subdomains", "ranks",
-       "threads",  "cores",         "grains",  "contacts",     "repeats",       "seconds",    "fastest",
-       "slowest",  "iterations",    "speedup", "efficiency",   "of_iterations", "of_sweeps",  "work",
-       "balance",  "communication", "within",  "exposed",      "partitioning",  "detection",  "inloop_1",
-       "inloop_2", "update",        "bound",   "critical_path"});
+      {"curve",     "result",        "source",   "network",    "variant",       "subdomains", "ranks",
+       "threads",   "cores",         "grains",   "contacts",   "repeats",       "seconds",    "fastest",
+       "slowest",   "iterations",    "speedup",  "efficiency", "of_iterations", "of_sweeps",  "work",
+       "balance",   "communication", "within",   "bound",      "critical_path", "exposed",    "partitioning",
+       "detection", "inloop_1",      "inloop_2", "update"});
   for (const ScalingRow& r : rows)
     if (r.kind == kind) {
       const auto part = [&](std::size_t p) { return r.source == ScalingSource::replay ? r.share[p] : r.nan; };
       table.row(curve_of(r), r.predicted() ? "predicted" : "measured", name_of(r.source), r.network,
                 r.variant, r.subdomains, r.ranks, r.threads, r.cores(), static_cast<std::int64_t>(r.grains),
                 r.contacts, r.repeats, r.seconds, r.fastest, r.slowest, r.iterations, r.speedup, r.efficiency,
-                r.of_iterations, r.of_sweeps, r.work, r.balance, r.communication, r.within, r.exposed,
-                part(0), part(1), part(2), part(3), part(4), bound_of(r), r.path);
+                r.of_iterations, r.of_sweeps, r.work, r.balance, r.communication, r.within, bound_of(r),
+                r.path, r.exposed, part(0), part(1), part(2), part(3), part(4));
     }
   return table.text();
 }

@@ -10,7 +10,9 @@
 #include "apps/child_process.hpp"
 #include "apps/exit_codes.hpp"
 #include "apps/study_variants.hpp"
+#include "io/csv_table.hpp"
 #include "io/error.hpp"
+#include "io/output_directory.hpp"
 
 namespace talus {
 
@@ -124,6 +126,31 @@ RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subj
   fs::create_directories(trace.parent_path());
   fs::rename(scratch.folder() / "out" / "trace.h5", trace);
   return times;
+}
+
+std::vector<RecordedTrace> read_recordings(const fs::path& times_csv) {
+  std::vector<RecordedTrace> recorded;
+  std::ifstream in(times_csv);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    try {
+      if (cells.size() != 6) throw std::invalid_argument(line);
+      recorded.push_back(
+          {cells[0], cells[2], cells[1], {std::stod(cells[3]), std::stod(cells[4]), std::stod(cells[5]), 0}});
+    } catch (const std::logic_error&) {
+      throw io::FileError(times_csv.string(), fmt::format("'{}' is no line of a list of recordings", line));
+    }
+  }
+  return recorded;
+}
+
+void write_recordings(const fs::path& times_csv, const std::vector<RecordedTrace>& recorded) {
+  io::CsvTable table({"file", "variant", "steps", "seconds", "iterations", "contacts"});
+  for (const RecordedTrace& r : recorded)
+    table.row(r.file, r.variant, r.steps, r.times.seconds, r.times.iterations, r.times.contacts);
+  io::write_whole(times_csv, table.text());
 }
 
 std::vector<int> rank_counts(int cores) {

@@ -55,6 +55,19 @@ RunTimes run_once(const ScalingLauncher& launcher, const ScalingSubject& subject
 RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subject, int subdomains,
                      const std::filesystem::path& trace);
 
+/// A recording that a study keeps.
+struct RecordedTrace {
+  std::string file;   ///< name in the folder of traces
+  std::string steps;  ///< that were recorded, "first:last"
+  std::string variant;
+  RunTimes times;
+};
+
+/// The list of recordings beside them, times.csv: file,variant,steps,seconds,iterations,contacts. Reading a
+/// list that is not there gives none. Throw io::FileError.
+std::vector<RecordedTrace> read_recordings(const std::filesystem::path& times_csv);
+void write_recordings(const std::filesystem::path& times_csv, const std::vector<RecordedTrace>& recorded);
+
 /// Numbers of ranks that share `cores` with the same number of threads each, ascending: the divisors.
 std::vector<int> rank_counts(int cores);
 

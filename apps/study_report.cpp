@@ -387,8 +387,8 @@ constexpr std::array<std::string_view, 15> chart_names{"residual_seconds",
                                                        "efficiency_sweeps",
                                                        "weak_efficiency",
                                                        "hybrid"};
-constexpr std::array<std::string_view, 6> other_names{"plot.gp",  "report.html", "commands.sh",
-                                                      "slurm.sh", "strong.toml", "strong.csv"};
+constexpr std::array<std::string_view, 7> other_names{
+    "plot.gp", "report.html", "commands.sh", "slurm.sh", "strong.toml", "strong.csv", "traces/times.csv"};
 
 bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
   return std::ranges::find(names, name) != names.end();

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 
@@ -50,6 +52,14 @@ void refuse(const std::string& what) {
   throw std::invalid_argument(what);
 }
 
+/// Powers of two, and all of them.
+std::vector<int> cores_to_measure(int cores) {
+  std::vector<int> all;
+  for (int count = 1; count < cores; count *= 2) all.push_back(count);
+  all.push_back(cores);
+  return all;
+}
+
 ScalingNetwork given_network(const StudyScalingOptions& options) {
   ScalingNetwork network = scaling_network("today");
   network.name = "given";
@@ -72,6 +82,10 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
   std::vector<int> strong = options.subdomains;
   if (strong.empty()) strong = {1, 2, 4, 8, 16};
   strong.push_back(1);  // what the others are held against
+  plan.cores = options.cores.value_or(omp_get_num_procs());
+  plan.repeat = options.repeat;
+  if (plan.repeat > 0)
+    for (const int cores : cores_to_measure(plan.cores)) strong.push_back(cores);
   plan.strong = ascending(strong);
   if (!options.no_weak) {
     std::vector<int> weak = options.weak.empty() ? plan.strong : options.weak;
@@ -95,8 +109,6 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
     plan.variants.push_back(variant);
   }
   if (!options.beside.empty()) plan.beside = read_speedups(options.beside);
-  plan.cores = options.cores.value_or(omp_get_num_procs());
-  plan.repeat = options.repeat;
   plan.record = options.record;
   plan.typical = options.typical;
   const std::string mpirun = options.mpirun.empty() ? "mpirun" : split_words(options.mpirun).front();
@@ -115,7 +127,9 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
 class Study {
  public:
   Study(const StudyScalingOptions& options, ScalingPlan plan, fs::path directory)
-      : plan_(std::move(plan)), directory_(std::move(directory)) {
+      : plan_(std::move(plan)),
+        directory_(std::move(directory)),
+        recordings_(read_recordings(directory_ / "traces" / "times.csv")) {
     launcher_.talus = own_path();
     launcher_.mpirun = split_words(options.mpirun);
     launcher_.work = directory_ / "run";
@@ -125,23 +139,26 @@ class Study {
 
   /// The whole study of one sample that stays as it is.
   void strong(const ScalingSubject& subject) {
-    measure(subject, cores_to_measure());
+    measure(subject, cores_to_measure(plan_.cores));
+    std::vector<ScalingTraces> all;
     for (const int n : plan_.strong) {
-      std::vector<ScalingMachine> machines{{n, n, 1}};
-      predict_from(record(subject, n), machines);
+      all.push_back({subject, n, {}, {}});
       for (const std::string& variant : plan_.variants) {
         // How subdomains act on one another makes no difference to one.
         if (n == 1 && of_decomposition(variant)) continue;
-        ScalingSubject changed = subject;
-        changed.variant = variant;
-        predict_from(record(changed, n), machines);
+        all.push_back({subject, n, {}, {}});
+        all.back().subject.variant = variant;
       }
     }
+    record(all);
+    for (const ScalingTraces& traces : all) predict_from(traces);
   }
 
   void weak(const ScalingSubject& subject, int n) {
     if (n <= plan_.cores) measure(subject, {n});
-    predict_from(record(subject, n), {{n, n, 1}});
+    std::vector<ScalingTraces> traces{{subject, n, {}, {}}};
+    record(traces);
+    predict_from(traces.front());
   }
 
   const std::vector<ScalingRow>& rows() {
@@ -154,14 +171,6 @@ class Study {
   static bool of_decomposition(const std::string& variant) {
     return std::ranges::all_of(split_words(variant),
                                [](const std::string& word) { return word.starts_with("decomposition."); });
-  }
-
-  /// Powers of two, and all of them.
-  std::vector<int> cores_to_measure() const {
-    std::vector<int> all;
-    for (int cores = 1; cores < plan_.cores; cores *= 2) all.push_back(cores);
-    all.push_back(plan_.cores);
-    return all;
   }
 
   /// Runs on every number of cores, a subdomain a core, divided into ranks and threads in all ways. Machines
@@ -184,24 +193,42 @@ class Study {
     }
   }
 
-  ScalingTraces record(const ScalingSubject& subject, int subdomains) {
-    ScalingTraces traces{subject, subdomains, {}, {}};
-    const std::string stem =
-        fmt::format("{}-{}{}", name_of(subject.kind), subdomains,
-                    subject.variant.empty()
-                        ? ""
-                        : fmt::format("-variant{}", std::ranges::find(plan_.variants, subject.variant) -
-                                                        plan_.variants.begin() + 1));
-    for (int k = 1; k <= plan_.record; ++k) {
-      const fs::path file = directory_ / "traces" / fmt::format("{}-{}.h5", stem, k);
-      traces.times.push_back(record_once(launcher_, subject, subdomains, file));
-      traces.files.push_back(file);
-    }
-    return traces;
+  /// Recordings take turns as runs do.
+  void record(std::vector<ScalingTraces>& all) {
+    for (int k = 1; k <= plan_.record; ++k)
+      for (ScalingTraces& traces : all) {
+        const ScalingSubject& subject = traces.subject;
+        std::string variant;
+        if (!subject.variant.empty())
+          variant = fmt::format(
+              "-variant{}", std::ranges::find(plan_.variants, subject.variant) - plan_.variants.begin() + 1);
+        const std::string name =
+            fmt::format("{}-{}{}-{}.h5", name_of(subject.kind), traces.subdomains, variant, k);
+        const fs::path file = directory_ / "traces" / name;
+        traces.times.push_back(recorded(name, file, traces));
+        traces.files.push_back(file);
+      }
   }
 
-  void predict_from(const ScalingTraces& traces, std::vector<ScalingMachine> machines) {
+  /// Of an earlier study, or recorded now.
+  RunTimes recorded(const std::string& name, const fs::path& file, const ScalingTraces& traces) {
+    const std::string steps = fmt::format("{}:{}", plan_.first, plan_.last);
+    for (const RecordedTrace& there : recordings_)
+      if (there.file == name && there.variant == traces.subject.variant && there.steps == steps &&
+          fs::exists(file))
+        return there.times;
+    const RunTimes times = record_once(launcher_, traces.subject, traces.subdomains, file);
+    say(fmt::format("recorded {}: {:.4g} s a step, {:.1f} iterations", name, times.seconds,
+                    times.iterations));
+    std::erase_if(recordings_, [&](const RecordedTrace& there) { return there.file == name; });
+    recordings_.push_back({name, steps, traces.subject.variant, times});
+    write_recordings(directory_ / "traces" / "times.csv", recordings_);  // a killed study can be taken up
+    return times;
+  }
+
+  void predict_from(const ScalingTraces& traces) {
     const int n = traces.subdomains;
+    const ScalingMachine machines[] = {{n, n, 1}};
     add(predict(traces, machines, plan_.networks, plan_.typical));
     // What was measured, predicted: how far the others can be believed.
     if (n <= plan_.cores && plan_.repeat > 0 && traces.subject.variant.empty()) {
@@ -235,8 +262,39 @@ class Study {
   ScalingPlan plan_;
   fs::path directory_;
   ScalingLauncher launcher_;
+  std::vector<RecordedTrace> recordings_;
   std::vector<ScalingRow> rows_;
 };
+
+bool is_study_name_but_trace(const fs::path& relative) {
+  return is_study_name(relative) && *relative.begin() != "traces";
+}
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Writes the scene of strong scaling. Traces that are there must be of the same; throws
+/// std::invalid_argument.
+void write_strong(const ScalingSample& sample, const fs::path& directory, bool reuse, const auto& prepare) {
+  const std::string scene = text_of(directory / "strong.toml"), grains = text_of(directory / "strong.csv");
+  if (!reuse || scene.empty()) {
+    prepare();
+    write_scaling_sample(sample, directory, "strong");
+    return;
+  }
+  const fs::path draft = directory / "run";
+  fs::create_directories(draft);
+  write_scaling_sample(sample, draft, "strong");
+  const bool same = text_of(draft / "strong.toml") == scene && text_of(draft / "strong.csv") == grains;
+  fs::remove_all(draft);
+  if (!same)
+    refuse(fmt::format("--reuse: the traces in {} are of another scene or sample; --force replaces them",
+                       directory.string()));
+  prepare();
+  write_scaling_sample(sample, directory, "strong");
+}
 
 int run_study(const StudyScalingOptions& options) {
   ScalingPlan plan;
@@ -257,7 +315,10 @@ int run_study(const StudyScalingOptions& options) {
     if (const auto most = static_cast<std::size_t>(plan.strong.back()); most > sample.grains.size())
       refuse(fmt::format("{} subdomains for {} grains", most, sample.grains.size()));
     if (directory.empty()) directory = "out/scaling-" + sample.scene.name;
-    io::prepare_output_directory(directory, options.force, is_study_name);
+    write_strong(sample, directory, options.reuse, [&] {
+      io::prepare_output_directory(directory, options.force || options.reuse,
+                                   options.reuse ? is_study_name_but_trace : is_study_name);
+    });
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
@@ -272,7 +333,6 @@ int run_study(const StudyScalingOptions& options) {
   report.last = plan.last;
   report.record = plan.record;
   report.typical = plan.typical;
-  write_scaling_sample(sample, directory, "strong");
   Study study(options, plan, directory);
   const ScalingSubject subject{ScalingKind::strong, directory + "/strong.toml", "", sample.grains.size()};
   say(fmt::format("{}: {} grains, steps {} to {}", report.name, subject.grains, plan.first, plan.last));
@@ -307,6 +367,8 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
   app->add_option("scene", options.scene, "scene file")->type_name("FILE")->required();
   app->add_option("--out", options.out, "directory of the study [out/scaling-NAME]")->type_name("DIR");
   app->add_flag("--force", options.force, "replace an earlier study in the directory");
+  app->add_flag("--reuse", options.reuse,
+                "the same, but play the traces again that it has recorded of the same scene");
   app->add_option("--steps", options.steps, "steps that count, first and last")
       ->type_name("FIRST:LAST")
       ->capture_default_str();

@@ -14,6 +14,7 @@ struct StudyScalingOptions {
   std::string scene;                   ///< scene file
   std::string out;                     ///< [out/scaling-NAME]
   bool force = false;                  ///< replace an earlier study in `out`
+  bool reuse = false;                  ///< the same, but for its traces, which are played again
   std::vector<std::string> overrides;  ///< "a.b=c"
   std::string from;                    ///< results.h5 whose last frame is the sample; "": as the scene says
   std::string stage;                   ///< to begin with [the first]

@@ -66,11 +66,11 @@ TEST_F(StudyScaling, MeasuresPredictsAndWritesEverything) {
       EXPECT_FALSE(row.at("bound").empty());
     }
   }
-  // Strong: 1 x 1, 1 x 2, 2 x 1. Weak: 1 x 1; 4 subdomains have more cores than there are.
-  EXPECT_EQ(measured, 4);
-  // Strong: 1 and 4 subdomains on two networks, 4 with CCS, and 1 on one node, as measured. Weak: 1 and 4,
-  // and 1 on one node. Hybrid: 1 x 4, 2 x 2, 4 x 1.
-  EXPECT_EQ(predicted, 2 * 2 + 2 + 1 + 2 * 2 + 1 + 3 * 2);
+  // Strong and weak: 1 x 1, 1 x 2, 2 x 1.
+  EXPECT_EQ(measured, 6);
+  // Strong: 1, 2 and 4 subdomains on two networks, 2 and 4 with CCS; 1 x 1, 1 x 2, 2 x 1 on one node, as
+  // measured. Hybrid: 1 x 4, 2 x 2, 4 x 1. Weak: 1, 2 and 4, and what fits on one node.
+  EXPECT_EQ(predicted, (3 + 2 + 3) * 2 + 3 + 3 * 2 + 3);
 }
 
 TEST_F(StudyScaling, WeakSamplesHaveAsManyGrainsPerCore) {
@@ -96,6 +96,26 @@ TEST_F(StudyScaling, BeginsFromTheEndOfARun) {
   EXPECT_EQ(run("study scaling scene.toml --out t --from r/results.h5 --stage nothing").code, 2);
   EXPECT_EQ(run("study scaling scene.toml --out t --from r/results.h5 --weak 2").code, 2);
   EXPECT_FALSE(fs::exists(at("t")));
+}
+
+TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
+  const std::string command =
+      "study scaling scene.toml --out s --steps 2:3 --subdomains 2 --repeat 0 --no-weak ";
+  ASSERT_EQ(run(command).code, 0);
+  const std::string trace = content(at("s/traces/strong-2-1.h5"));
+  const Table before = read_table(at("s/strong_scaling.csv"));
+  const Outcome again = run(command + "--reuse --latency 1e-4");
+  ASSERT_EQ(again.code, 0) << again.messages;
+  EXPECT_EQ(again.messages.find("recorded"), std::string::npos) << again.messages;
+  EXPECT_EQ(content(at("s/traces/strong-2-1.h5")), trace);
+  const Table after = read_table(at("s/strong_scaling.csv"));
+  EXPECT_EQ(after.rows[0].at("seconds"), before.rows[0].at("seconds")) << "one core sends nothing";
+  EXPECT_GT(after.number(1, "seconds"), before.number(1, "seconds"));
+  const auto files = files_below(at("s"));
+  const Outcome other = run(command + "--reuse --set material.friction=0.1");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.messages.find("another scene"), std::string::npos) << other.messages;
+  EXPECT_EQ(files_below(at("s")), files);
 }
 
 TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
