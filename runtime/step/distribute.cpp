@@ -39,42 +39,50 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
   const std::size_t grains = candidates.grain_pairs.size();
   Candidates old;
   old.components = candidates.components;
-  std::vector<double> at_walls;
-  const auto take = [&](const ImpulseRecord& record) {
-    const Slot first = around.find(record.first);
-    const bool wall = record.second < 0;
-    if (wall)
-      old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first});
-    else
-      old.grain_pairs.push_back({first, around.find(record.second)});
-    std::vector<double>& impulse = wall ? at_walls : old.impulse;
-    impulse.insert(impulse.end(), record.r, record.r + components);
-  };
   old.grain_pairs.reserve(grains);
   old.impulse.reserve(components * candidates.size());
+  std::vector<double> at_walls;
+  const auto push = [components](std::vector<double>& impulse, const double* r) {
+    for (std::size_t c = 0; c < components; ++c) impulse.push_back(r[c]);
+  };
   std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     const double* r = &candidates.impulse[components * k];
     if (std::all_of(r, r + components, [](double value) { return value == 0; })) continue;
-    ImpulseRecord record{};
-    if (k < grains) {
-      record.first = static_cast<std::int64_t>(bodies.id[at(candidates.grain_pairs[k].first)]);
-      record.second = static_cast<std::int64_t>(bodies.id[at(candidates.grain_pairs[k].second)]);
-    } else {
-      record.first = static_cast<std::int64_t>(bodies.id[at(candidates.wall_pairs[k - grains].body)]);
-      record.second = -1 - std::int64_t{candidates.wall_pairs[k - grains].wall};
+    const bool wall = k >= grains;
+    const GrainPair pair = wall ? GrainPair{} : candidates.grain_pairs[k];
+    const WallPair at_wall = wall ? candidates.wall_pairs[k - grains] : WallPair{};
+    const std::int32_t rank =
+        ranks.ranks() == 1
+            ? 0
+            : decomposition
+                  .rank_of[at(decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x)))];
+    if (rank == ranks.rank()) {
+      if (wall)
+        old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)]});
+      else
+        old.grain_pairs.push_back({around.of_slot[at(pair.first)], around.of_slot[at(pair.second)]});
+      push(wall ? at_walls : old.impulse, r);
+      continue;
     }
+    ImpulseRecord record{};
+    record.first = static_cast<std::int64_t>(bodies.id[at(wall ? at_wall.body : pair.first)]);
+    record.second =
+        wall ? -1 - std::int64_t{at_wall.wall} : static_cast<std::int64_t>(bodies.id[at(pair.second)]);
     std::copy_n(r, components, record.r);
-    const std::int32_t subdomain = decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x));
-    const std::int32_t rank = decomposition.rank_of[at(subdomain)];
-    if (rank == ranks.rank())
-      take(record);
-    else
-      to[at(rank)].push_back(record);
+    to[at(rank)].push_back(record);
   }
   candidates = {};
   for (const auto& part : ranks.exchange_records(std::move(to)))
-    for (const ImpulseRecord& record : part) take(record);
+    for (const ImpulseRecord& record : part) {
+      const Slot first = around.find(record.first);
+      const bool wall = record.second < 0;
+      if (wall)
+        old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first});
+      else
+        old.grain_pairs.push_back({first, around.find(record.second)});
+      push(wall ? at_walls : old.impulse, record.r);
+    }
   old.impulse.insert(old.impulse.end(), at_walls.begin(), at_walls.end());
   std::vector<Slot> same(around.bodies.size());
   std::iota(same.begin(), same.end(), 0);
@@ -82,19 +90,18 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
   return old;
 }
 
-/// Copies that stand in a subdomain now and did not before.
-std::int64_t arrivals(std::span<const BodyId> before, std::span<const BodyId> now) {
-  const auto sorted = [](std::span<const BodyId> ids) {
-    std::vector<BodyId> copy(ids.begin(), ids.end());
-    std::sort(copy.begin(), copy.end());
-    return copy;
-  };
-  const std::vector<BodyId> a = sorted(before), b = sorted(now);
+/// Bodies of the surroundings that stand in a subdomain of this rank now and did not before, each counted per
+/// subdomain. `slot_begin`: of the slots before.
+std::int64_t arrivals(const Decomposition& decomposition, const Surroundings& around,
+                      std::span<const std::size_t> slot_begin) {
   std::int64_t count = 0;
-  auto old = a.begin();
-  for (BodyId id : b) {
-    while (old != a.end() && *old < id) ++old;
-    if (old == a.end() || *old != id) ++count;
+  std::vector<std::int32_t> stood_in(around.by_id.size(), -1);
+  for (std::size_t e = 0; e < decomposition.interfaces.size(); ++e) {
+    const auto local = static_cast<std::int32_t>(e);
+    for (std::size_t s = slot_begin[e]; s < slot_begin[e + 1]; ++s)
+      if (around.of_slot[s] >= 0) stood_in[at(around.of_slot[s])] = local;
+    const std::vector<Slot>& now = decomposition.interfaces[e].bodies;
+    count += std::count_if(now.begin(), now.end(), [&](Slot body) { return stood_in[at(body)] != local; });
   }
   return count;
 }
@@ -217,11 +224,11 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   const int target =
       chunk_target(static_cast<std::size_t>(std::accumulate(load.begin(), load.end(), std::int64_t{0})));
 
-  // Slot of a body in its subdomain: bodies of an interface stand in the order of the surroundings.
-  const auto slot_in = [&](std::int32_t local, Slot body) {
-    const auto& list = decomposition.interfaces[at(local)].bodies;
-    return static_cast<Slot>(decomposition.slot_begin[at(local)]) +
-           static_cast<Slot>(std::lower_bound(list.begin(), list.end(), body) - list.begin());
+  // Of the bodies of one subdomain, that of the candidates at hand.
+  std::vector<Slot> slot(around.bodies.size());
+  const auto turn_to = [&](std::int32_t local) {
+    auto next = static_cast<Slot>(decomposition.slot_begin[at(local)]);
+    for (Slot body : decomposition.interfaces[at(local)].bodies) slot[at(body)] = next++;
   };
   Candidates cut;
   cut.components = found.components;
@@ -236,13 +243,14 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
       const auto begin = static_cast<std::int32_t>(cut.size());
       groups.push_back({begin, begin, key.wall, key.local, key.inner == 0, target});
     }
+    if (!last || key.local != last->local) turn_to(key.local);
     last = &key;
     const std::size_t k = at(key.candidate);
     if (k < grains)
       cut.grain_pairs.push_back(
-          {slot_in(key.local, found.grain_pairs[k].first), slot_in(key.local, found.grain_pairs[k].second)});
+          {slot[at(found.grain_pairs[k].first)], slot[at(found.grain_pairs[k].second)]});
     else
-      cut.wall_pairs.push_back({key.wall, slot_in(key.local, found.wall_pairs[k - grains].body)});
+      cut.wall_pairs.push_back({key.wall, slot[at(found.wall_pairs[k - grains].body)]});
     for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
     ++groups.back().end;
   }
@@ -250,13 +258,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   found = {};
 
   Bodies copies = make_copies(decomposition, settings.coupling == Coupling::nscdd, around.bodies);
-  std::int64_t migrants[1] = {0};
-  for (std::size_t e = 0; e < decomposition.here.size(); ++e) {
-    const auto part = [e](const std::vector<BodyId>& id, const std::vector<std::size_t>& begin) {
-      return std::span(id).subspan(begin[e], begin[e + 1] - begin[e]);
-    };
-    migrants[0] += arrivals(part(bodies.id, slot_begin_before), part(copies.id, decomposition.slot_begin));
-  }
+  std::int64_t migrants[1] = {arrivals(decomposition, around, slot_begin_before)};
   ranks.sum(migrants);
   decomposition.migrants = first ? 0 : migrants[0];
   decomposition.imbalance = imbalance(load);
