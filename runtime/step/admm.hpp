@@ -1,25 +1,28 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "kernels/admm.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
 
-/// ADMM (kernels/admm.hpp) on the contacts of a step, whatever subdomains this rank's copies stand in: a body
-/// is one unknown, its mass whole. On one rank; on several `available` is false and nothing is called.
+/// ADMM (kernels/admm.hpp) on the contacts of a step. Each subdomain is a part of the problem: it holds its
+/// own contacts and bodies, masses whole; what copies have to agree on goes the way of the gluing, and sums
+/// are gathered as rows by subdomain. So the bits depend on the partition alone, and a rank holds no more
+/// than its own subdomains and the coarse level.
 ///
-///   between two epochs, on one thread:  admm.improve();  next epoch: V afresh from r, then sweeps
+///   between two epochs, at a gate of all ranks:  admm.improve();  next epoch: V afresh from r, then sweeps
 class Admm {
  public:
   /// Keeps references.
   Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
-       const graph::Communicator& ranks);
+       Gluing& gluing, const graph::Communicator& ranks);
 
-  bool available() const { return ranks_.ranks() == 1; }
-
+  // Collective.
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
 
@@ -29,12 +32,12 @@ class Admm {
   BodyAdmmResult improve(double tolerance, int calls);
 
  private:
-  BodyProblem gather() const;
+  std::vector<BodyProblem> gather() const;
 
   StepState& state_;
   const StepParameters& parameters_;
   const DecompositionSettings& decomposition_;
-  const graph::Communicator& ranks_;
+  std::unique_ptr<PartLink> link_;
 };
 
 }  // namespace talus

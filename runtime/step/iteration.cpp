@@ -36,7 +36,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       ranks_(ranks),
       kernels_(settings.simd),
       gluing_(state, decomposition, ranks),
-      admm_(state, parameters, decomposition, ranks) {}
+      admm_(state, parameters, decomposition, gluing_, ranks) {}
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
@@ -55,6 +55,7 @@ void Iteration::begin() {
       state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
           static_cast<std::int32_t>(c));
   gluing_.begin();
+  gluing_.forget_jumps();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const WallState& wall = state_.wall_states[w];
     const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
@@ -352,7 +353,10 @@ bool Iteration::swept(int epoch) {
   if (epoch != read_at_) return true;
   read_at_ = -1;
   add_up(pending_->wait());
-  if (!judge()) restore_at_ = epoch + 1;
+  if (!judge())
+    restore_at_ = epoch + 1;
+  else if (ask_admm())
+    call_admm(epoch);
   return true;
 }
 
