@@ -104,7 +104,7 @@ TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
   ASSERT_EQ(run(command).code, 0);
   const std::string trace = content(at("s/traces/strong-2-1.h5"));
   const Table before = read_table(at("s/strong_scaling.csv"));
-  const Outcome again = run(command + "--reuse --latency 1e-4");
+  const Outcome again = run(command + "--reuse --latency 1e-4 --ranks-per-node 1");
   ASSERT_EQ(again.code, 0) << again.messages;
   EXPECT_EQ(again.messages.find("recorded"), std::string::npos) << again.messages;
   EXPECT_EQ(content(at("s/traces/strong-2-1.h5")), trace);
