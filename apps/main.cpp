@@ -54,6 +54,9 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
       "--typical", replay.machine.typical,
       "tasks that took over three times their median of the step take the median: for noisy recordings");
   app.add_flag("--blocking-check", replay.blocking_check, "convergence checks wait for their sums");
+  app.add_option("--smpi-platform", replay.smpi_platform,
+                 "write the machine for smpirun, which runs the real program on it (preset smpi)")
+      ->type_name("FILE");
   app.add_option("-o,--out", replay.out, "write what would have been, as a trace")->type_name("FILE");
 }
 
