@@ -103,6 +103,16 @@ double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& ep
   double work = 0;
   for (const StepIndex::Rank& rank : index.ranks)
     work = std::max(work, stage.timeline.self(rank.check[epoch.source]));
+  if (stage.machine.typical || stage.machine.quantile > 0) {
+    std::vector<float> all;  // of the step: there are few
+    for (const StepIndex::Rank& rank : index.ranks)
+      for (const Place check : rank.check)
+        if (check.exists()) all.push_back(static_cast<float>(stage.timeline.self(check)));
+    if (!all.empty() && stage.machine.quantile > 0)
+      work = static_cast<double>(quantile_of(all, stage.machine.quantile));
+    else if (!all.empty())
+      work = std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
+  }
   return work / stage.machine.speed;
 }
 
