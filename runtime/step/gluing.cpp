@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <map>
-#include <thread>
 
-#include "runtime/graph/worker.hpp"
+#include "runtime/graph/clock.hpp"
 #include "runtime/trace/recorder.hpp"
 
 namespace talus {
@@ -20,17 +18,13 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-/// Polls, and adds the time it took to `waited`. Ranks that share a core give way to one another.
+/// Adds the time it took to `waited`.
 void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
   if (channel.done()) return;
   const trace::Span span(trace, trace::kind_receive, message);
-  const auto start = std::chrono::steady_clock::now();
-  for (int polls = 0; !channel.done(); ++polls)
-    if (polls < 256)
-      graph::pause();
-    else
-      std::this_thread::yield();
-  waited += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double start = graph::seconds_now();
+  channel.wait();
+  waited += graph::seconds_now() - start;
 }
 
 void start(Channel& channel, trace::Recorder* trace, std::uint32_t message) {

@@ -3,11 +3,11 @@
 #include "runtime/step/task_kinds.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "kernels/balance.hpp"
+#include "runtime/graph/clock.hpp"
 
 namespace talus {
 
@@ -18,14 +18,6 @@ std::size_t memory_used(const StepState& state) {
          state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
          state.copies.capacity() * sizeof(WallCopy);
 }
-
-namespace {
-
-double clock_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-}  // namespace
 
 Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
                      const DecompositionSettings& decomposition, const graph::Communicator& ranks)
@@ -65,7 +57,7 @@ void Iteration::begin() {
                       state_.decomposition.several();
   before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
-  began_ = clock_now();
+  began_ = graph::seconds_now();
   impulses_.clear();
   history_.clear();
   result_ = {};
@@ -162,12 +154,12 @@ void Iteration::node(std::uint32_t node, int epoch) {
   const Work now = work(epoch);
   const std::size_t chunks = state_.chunks.size();
   if (node < chunks) {
-    const double start = busy_.empty() ? 0 : clock_now();
+    const double start = busy_.empty() ? 0 : graph::seconds_now();
     if (parameters_.friction)
       chunk<true>(node, epoch);
     else
       chunk<false>(node, epoch);
-    if (!busy_.empty()) busy_[node] += clock_now() - start;
+    if (!busy_.empty()) busy_[node] += graph::seconds_now() - start;
     // Long messages advance only while somebody calls MPI.
     if (ranks_.ranks() > 1 && node % 4 == 0) ranks_.progress();
     return;
@@ -326,7 +318,7 @@ bool Iteration::decide(int epoch) {
 /// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
 bool Iteration::measured(int epoch) {
   result_.iterations = sweeps_;
-  measured_ = clock_now();
+  measured_ = graph::seconds_now();
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows = rows_of_subdomains();
   std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
