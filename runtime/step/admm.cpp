@@ -8,10 +8,15 @@ namespace talus {
 
 namespace {
 
+/// The copies agree by the messages of the gluing; rows travel to all ranks; threads share the subdomains.
 class StepLink final : public PartLink {
  public:
-  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks)
-      : state_(state), gluing_(gluing), ranks_(ranks) {}
+  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew)
+      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew) {}
+
+  void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
+    crew_.share(parts, work);
+  }
 
   void sum_copies(PartField& field) const override {
     if (state_.decomposition.several()) gluing_.sum_copies(field);
@@ -45,6 +50,7 @@ class StepLink final : public PartLink {
   const StepState& state_;
   Gluing& gluing_;
   const graph::Communicator& ranks_;
+  graph::Crew& crew_;
 };
 
 /// The fastest that impulses make a body.
@@ -72,7 +78,7 @@ Admm::Admm(StepState& state, const StepParameters& parameters, const Decompositi
     : state_(state),
       parameters_(parameters),
       decomposition_(decomposition),
-      link_(std::make_unique<StepLink>(state, gluing, ranks)) {}
+      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_)) {}
 
 std::vector<BodyProblem> Admm::gather() const {
   std::vector<WallMotion> walls;

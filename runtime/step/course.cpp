@@ -144,7 +144,9 @@ void Iteration::call_admm(int epoch) {
   gluing_.forget_jumps();
   result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
+  // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone.
   begin_course(course_.method, course_.most);
+  course_.from = result_.iterations;
   before_segment_ = sweeps_;
   segment_ = epoch + 1;
 }

@@ -61,6 +61,8 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// Of threads that wait for decide(): ADMM's subdomains are shared out.
+  void assist() { admm_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
