@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kernels/body_system.hpp"
-#include "kernels/coarse_level.hpp"
+#include "kernels/body_solver.hpp"
 
 namespace talus {
 
@@ -15,110 +14,6 @@ namespace {
 std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
-
-double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
-  const double w_nn =
-      1 / problem.bodies[at(c.first)].mass + (c.second >= 0 ? 1 / problem.bodies[at(c.second)].mass : 0);
-  return 1 / w_nn;
-}
-
-/// Projection on the Coulomb cone about n.
-Vec3 project(const Vec3& z, const Vec3& n, double mu) {
-  const double z_n = n.dot(z);
-  if (mu == 0) return std::max(0.0, z_n) * n;
-  const Vec3 t = z - z_n * n;
-  const double length = t.norm();
-  if (mu * length <= -z_n) return Vec3::Zero();
-  if (length <= mu * z_n) return z;
-  const double r_n = (z_n + mu * length) / (1 + mu * mu);
-  return r_n * n + (mu * r_n / length) * t;
-}
-
-/// What counts of a vector at a contact: without friction its normal part.
-Vec3 constrained(const ContactEquation& c, const Vec3& v) {
-  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
-}
-
-double dot(std::span<const Twist> a, std::span<const Twist> b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += talus::dot(a[k], b[k]);
-  return sum;
-}
-
-/// |x|_M^2.
-double kinetic2(const BodyProblem& problem, std::span<const Twist> x) {
-  double sum = 0;
-  for (std::size_t b = 0; b < x.size(); ++b)
-    sum += problem.bodies[b].mass * x[b].u.squaredNorm() + problem.bodies[b].spin_mass * x[b].w.squaredNorm();
-  return sum;
-}
-
-/// A V = f by conjugate gradients, from V; preconditioned by one V-cycle: forward Gauss-Seidel, the coarse
-/// level, backward Gauss-Seidel.
-class LinearSolver {
- public:
-  LinearSolver(const BodyProblem& problem, std::span<const double> rho, int aggregate)
-      : aggregates_(grow_aggregates(problem, aggregate)),
-        system_(problem, rho),
-        coarse_(problem, aggregates_, rho),
-        residual_(problem.bodies.size()),
-        z_(residual_.size()),
-        direction_(residual_.size()),
-        product_(residual_.size()),
-        rest_(residual_.size()) {}
-
-  void scale(double factor) {
-    system_.scale(factor);
-    coarse_.scale(factor);
-  }
-
-  int solve(std::span<const Twist> f, std::span<Twist> V, double tolerance, int max_iterations) {
-    system_.multiply(V, product_);
-    for (std::size_t b = 0; b < residual_.size(); ++b) {
-      residual_[b].u = f[b].u - product_[b].u;
-      residual_[b].w = f[b].w - product_[b].w;
-    }
-    precondition();
-    direction_ = z_;
-    double rz = dot(residual_, z_);
-    const double goal = tolerance * tolerance * rz;
-    int k = 0;
-    while (k < max_iterations && rz > goal) {
-      system_.multiply(direction_, product_);
-      const double curvature = dot(direction_, product_);
-      if (!(curvature > 0)) break;
-      const double step = rz / curvature;
-      for (std::size_t b = 0; b < residual_.size(); ++b) {
-        V[b].u += step * direction_[b].u;
-        V[b].w += step * direction_[b].w;
-        residual_[b].u -= step * product_[b].u;
-        residual_[b].w -= step * product_[b].w;
-      }
-      ++k;
-      precondition();
-      const double next = dot(residual_, z_);
-      const double beta = next / rz;
-      rz = next;
-      for (std::size_t b = 0; b < residual_.size(); ++b) {
-        direction_[b].u = z_[b].u + beta * direction_[b].u;
-        direction_[b].w = z_[b].w + beta * direction_[b].w;
-      }
-    }
-    return k;
-  }
-
- private:
-  void precondition() {
-    system_.smooth_forward(residual_, z_, rest_);
-    coarse_.correct(rest_, z_);
-    system_.smooth_backward(residual_, z_);
-  }
-
-  Aggregates aggregates_;
-  BodySystem system_;
-  CoarseLevel coarse_;
-  std::vector<Twist> residual_, z_, direction_, product_, rest_;
-};
 
 }  // namespace
 
@@ -244,8 +139,8 @@ BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings
   if (kappa <= 0) kappa = estimate_stiffness(problem);
   std::vector<double> rho(contacts);
   for (std::size_t k = 0; k < contacts; ++k) rho[k] = kappa * effective_mass(problem, problem.contacts[k]);
-  LinearSolver linear(problem, rho,
-                      settings.aggregate > 0 ? settings.aggregate : aggregate_target(problem.grains));
+  BodySolver linear(problem, rho,
+                    settings.aggregate > 0 ? settings.aggregate : aggregate_target(problem.grains));
 
   std::vector<Vec3>& r = problem.impulse;
   std::vector<Vec3> y(contacts);        // aim of the contact velocity, with its shift
@@ -260,10 +155,10 @@ BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings
   };
   for (std::size_t k = 0; k < contacts; ++k) {
     const ContactEquation& c = problem.contacts[k];
-    r[k] = project(r[k], c.normal, c.mu);
+    r[k] = project_on_cone(r[k], c.normal, c.mu);
     const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
     shift[k] = c.mu * split(k, v).norm();
-    y[k] = v + shift[k] * c.normal + project(-v, c.normal, c.mu);
+    y[k] = v + shift[k] * c.normal + project_on_cone(-v, c.normal, c.mu);
   }
   for (result.iterations = 0; result.iterations < settings.max_iterations;) {
     for (std::size_t b = 0; b < bodies; ++b) force[b] = Twist{};
@@ -276,7 +171,10 @@ BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings
       force[b].u += problem.bodies[b].mass * problem.bodies[b].free.u;
       force[b].w += problem.bodies[b].spin_mass * problem.bodies[b].free.w;
     }
-    result.linear_iterations += linear.solve(force, V, settings.linear_tolerance, settings.max_linear);
+    double left = linear.begin(force, V);
+    const double goal = settings.linear_tolerance * settings.linear_tolerance * left;
+    for (int k = 0; k < settings.max_linear && left > goal; ++k, ++result.linear_iterations)
+      left = linear.iterate(V);
     ++result.iterations;
 
     double gap2 = 0, weight = 0;
@@ -284,7 +182,7 @@ BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings
       const ContactEquation& c = problem.contacts[k];
       const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset) + shift[k] * c.normal;
       const Vec3 x = settings.relaxation * v + (1 - settings.relaxation) * y[k];
-      const Vec3 r_new = project(r[k] - rho[k] * x, c.normal, c.mu);
+      const Vec3 r_new = project_on_cone(r[k] - rho[k] * x, c.normal, c.mu);
       y[k] = x + (r_new - r[k]) / rho[k];
       r[k] = r_new;
       const double m = rho[k] / kappa;

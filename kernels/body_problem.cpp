@@ -1,5 +1,7 @@
 #include "kernels/body_problem.hpp"
 
+#include <algorithm>
+
 #include "kernels/measures.hpp"
 
 namespace talus {
@@ -102,6 +104,30 @@ std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec
     V[b].w = body.spin_mass > 0 ? Vec3(body.free.w + V[b].w / body.spin_mass) : Vec3::Zero();
   }
   return V;
+}
+
+double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
+  const double w_nn =
+      1 / problem.bodies[at(c.first)].mass + (c.second >= 0 ? 1 / problem.bodies[at(c.second)].mass : 0);
+  return 1 / w_nn;
+}
+
+Vec3 project_on_cone(const Vec3& z, const Vec3& n, double mu) {
+  const double z_n = n.dot(z);
+  if (mu == 0) return std::max(0.0, z_n) * n;
+  const Vec3 t = z - z_n * n;
+  const double length = t.norm();
+  if (mu * length <= -z_n) return Vec3::Zero();
+  if (length <= mu * z_n) return z;
+  const double r_n = (z_n + mu * length) / (1 + mu * mu);
+  return r_n * n + (mu * r_n / length) * t;
+}
+
+double kinetic2(const BodyProblem& problem, std::span<const Twist> x) {
+  double sum = 0;
+  for (std::size_t b = 0; b < x.size(); ++b)
+    sum += problem.bodies[b].mass * x[b].u.squaredNorm() + problem.bodies[b].spin_mass * x[b].w.squaredNorm();
+  return sum;
 }
 
 std::vector<std::int32_t> heavy_unknowns(const BodyProblem& problem, double ratio) {

@@ -101,6 +101,20 @@ inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V
   return a.u - b.u + c.normal.cross(a.w + b.w);
 }
 
+/// What counts of a vector at a contact: without friction its normal part.
+inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
+  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
+}
+
+/// 1/W_nn [kg].
+double effective_mass(const BodyProblem& problem, const ContactEquation& c);
+
+/// Projection of z on the Coulomb cone about n.
+Vec3 project_on_cone(const Vec3& z, const Vec3& n, double mu);
+
+/// |x|_M^2 = sum m |u|^2 + (I/R^2) |w|^2 [J].
+double kinetic2(const BodyProblem& problem, std::span<const Twist> x);
+
 /// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_axis`.
 inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
   Twist& a = F[static_cast<std::size_t>(c.first)];

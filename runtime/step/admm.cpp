@@ -4,6 +4,8 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "kernels/balance.hpp"
+
 namespace talus {
 
 namespace {
@@ -48,6 +50,10 @@ BodyProblem Admm::gather() const {
 
 double Admm::sweeps_needed() const {
   return estimate_stiffness(gather());
+}
+
+double Admm::velocity_error(double enough) const {
+  return talus::velocity_error(gather(), enough).relative;
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {

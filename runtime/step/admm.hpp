@@ -23,6 +23,10 @@ class Admm {
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
 
+  /// Relative error of the velocities that the impulses give (kernels/balance.hpp); what is below `enough` is
+  /// not told apart. Velocities are not read.
+  double velocity_error(double enough) const;
+
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
   /// exact as the last, as that was not enough.
