@@ -1,9 +1,10 @@
 #include "kernels/balance.hpp"
 
+#include <array>
 #include <vector>
 
-#include "kernels/admm.hpp"
 #include "kernels/body_solver.hpp"
+#include "kernels/stiffness.hpp"
 
 namespace talus {
 
@@ -20,80 +21,110 @@ constexpr double caution = 3;
 /// Of the impulses between walls, over those of the step: what is smaller is of no interest.
 constexpr double interest = 1e-2;
 
-/// What the contacts that carry ask of the velocities.
+/// What the contacts of one part that carry ask of the velocities.
 struct Wishes {
-  BodyProblem problem;       ///< those contacts only
   std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s]
   double drive = 0;          ///< fastest drive among them [m/s]
   double pressed = 0;        ///< sum of the impulses at walls [N s]
 };
 
-Wishes wishes_of(const BodyProblem& problem, std::span<const Twist> V) {
+/// Drops the other contacts from `problem`.
+Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
   Wishes wishes;
-  wishes.problem.bodies = problem.bodies;
-  wishes.problem.grains = problem.grains;
+  std::size_t kept = 0;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     ContactEquation c = problem.contacts[k];
-    const Vec3& n = c.normal;
-    const double m = effective_mass(problem, c);
-    const auto along = [&](const Vec3& z) { return Vec3(z - n.dot(z) * n); };
-    const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset), &r = problem.impulse[k];
+    const Vec3 r = problem.impulse[k], v = constrained(c, relative_velocity(c, V) + c.offset);
     if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
-      wishes.pressed += std::abs(n.dot(r));
-    const Vec3 shifted = v + c.mu * along(v).norm() * n;
-    const Vec3 carried = project_on_cone(r - m * shifted, n, c.mu);
+      wishes.pressed += std::abs(c.normal.dot(r));
+    const double m = effective_mass(problem, c);
+    const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
+    const Vec3 carried = project_on_cone(c, r - m * shifted);
     if (carried == Vec3::Zero()) continue;
-    const Vec3 y = shifted + (carried - r) / m, slip = along(y);
-    Vec3 change = y - c.mu * slip.norm() * n - v;
-    const double most = c.mu * n.dot(carried);
-    if (c.mu > 0 && slip != Vec3::Zero() && along(carried).norm() > (1 - 1e-6) * most) {
+    const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
+    Vec3 change = y - c.mu * slip.norm() * c.normal - v;
+    const double most = c.mu * c.normal.dot(carried);
+    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most) {
       c.mu = 0;  // it slides: along the plane it asks for nothing
-      change = n.dot(change) * n;
+      change = constrained(c, change);
     }
     if (c.second < 0) wishes.drive = std::max(wishes.drive, c.offset.norm());
-    wishes.problem.contacts.push_back(c);
-    wishes.problem.impulse.push_back(r);
     wishes.change.push_back(change);
+    problem.contacts[kept] = c;
+    problem.impulse[kept++] = r;
   }
+  problem.contacts.resize(kept);
+  problem.impulse.resize(kept);
   return wishes;
+}
+
+/// |V - `from`|_M^2, `from` the free velocities or 0.
+double kinetic2(const BodyParts& parts, const PartField& V, bool from_free) {
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    for (std::size_t b = 0; b < V[p].size(); ++b) {
+      if (!parts[p].counted(b)) continue;
+      const BodyUnknown& body = parts[p].bodies[b];
+      row[0] += from_free ? talus::kinetic2(body, V[p][b].u - body.free.u, V[p][b].w - body.free.w)
+                          : talus::kinetic2(body, V[p][b].u, V[p][b].w);
+    }
+  })[0];
 }
 
 }  // namespace
 
-VelocityError velocity_error(const BodyProblem& problem, double enough) {
+VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough) {
+  const BodyParts parts(problems, link);
+  const double kappa = firmness * estimate_stiffness(parts);
+  const PartField V = velocities_of(parts, impulses_of(parts));
+  std::vector<Wishes> wishes(parts.size());
+  std::vector<std::vector<double>> rho(parts.size());
+  parts.each([&](std::size_t p) {
+    wishes[p] = wishes_of(problems[p], V[p]);
+    for (const ContactEquation& c : problems[p].contacts)
+      rho[p].push_back(kappa * effective_mass(problems[p], c));
+  });
+
+  enum { contacts, mass, pressed, drive, width };
+  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
+    row[contacts] = static_cast<double>(wishes[p].change.size());
+    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
+      if (parts[p].counted(b)) row[mass] += parts[p].bodies[b].mass;
+    row[pressed] = wishes[p].pressed;
+    row[drive] = wishes[p].drive;
+  });
+  std::array<double, width> all{};
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    all[k % width] = k % width == drive ? std::max(all[drive], rows[k]) : all[k % width] + rows[k];
+  if (all[contacts] == 0) return {};
+  const double other = all[drive] > 0 ? all[mass] * all[drive] * all[drive]
+                                      : interest * interest * all[pressed] * all[pressed] / all[mass];
+  const double scale2 = std::max(kinetic2(parts, V, true), other);
+
+  PartField force = parts.field(), motion = parts.field();
+  parts.each([&](std::size_t p) {
+    for (std::size_t k = 0; k < rho[p].size(); ++k)
+      add_force(parts[p].contacts[k], rho[p][k] * wishes[p].change[k], force[p]);
+  });
+  link.sum_copies(force);
+  parts.each([&](std::size_t p) {
+    for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
+  });
+  BodySolver solver(parts, rho, 0);
   VelocityError error;
-  std::vector<Twist> V = velocities_of(problem, problem.impulse);
-  const Wishes wishes = wishes_of(problem, V);
-  if (wishes.change.empty()) return error;
-
-  double mass = 0;
-  for (std::size_t b = 0; b < V.size(); ++b) {
-    V[b].u -= problem.bodies[b].free.u;
-    V[b].w -= problem.bodies[b].free.w;
-    mass += problem.bodies[b].mass;
-  }
-  const double other = wishes.drive > 0 ? mass * wishes.drive * wishes.drive
-                                        : interest * interest * wishes.pressed * wishes.pressed / mass;
-  const double scale2 = std::max(kinetic2(problem, V), other);
-
-  const double kappa = firmness * estimate_stiffness(problem);
-  std::vector<double> rho;
-  for (const ContactEquation& c : wishes.problem.contacts) rho.push_back(kappa * effective_mass(problem, c));
-  BodySolver solver(wishes.problem, rho, aggregate_target(problem.grains));
-  std::vector<Twist> force(V.size()), motion(V.size());
-  for (std::size_t k = 0; k < rho.size(); ++k)
-    add_force(wishes.problem.contacts[k], rho[k] * wishes.change[k], force);
-  for (std::size_t b = 0; b < V.size(); ++b) restrict_to_freedoms(problem.bodies[b], force[b]);
-
   double left = solver.begin(force, motion), found = 0;
   const double least = enough * enough * scale2, part = linear_tolerance * linear_tolerance;
   while (error.linear_iterations < max_linear && left > part * std::max(found, least)) {
     left = solver.iterate(motion);
-    found = kinetic2(problem, motion);
+    found = kinetic2(parts, motion, false);
     ++error.linear_iterations;
   }
   error.relative = (std::sqrt(found) + caution * std::sqrt(left)) / std::sqrt(scale2);
   return error;
+}
+
+VelocityError velocity_error(BodyProblem problem, double enough) {
+  const PartLink alone;
+  return velocity_error({&problem, 1}, alone, enough);
 }
 
 }  // namespace talus

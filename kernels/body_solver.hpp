@@ -1,38 +1,43 @@
 #pragma once
 
-/// (M + H rho H^T) V = f over bodies by conjugate gradients: what ADMM iterates with, and what measures how
-/// far a step's velocities are from their answer (balance.hpp).
+/// A V = f over the bodies of all parts, A = M + H rho H^T.
 
 #include <span>
 #include <vector>
 
+#include "kernels/body_parts.hpp"
 #include "kernels/body_system.hpp"
 #include "kernels/coarse_level.hpp"
 
 namespace talus {
 
-/// Preconditioned by one V-cycle: forward Gauss-Seidel, the coarse level, backward Gauss-Seidel.
-///
-///   for (double left = solver.begin(f, V); left > goal;) left = solver.iterate(V);
+/// Conjugate gradients, preconditioned by one V-cycle: forward Gauss-Seidel within each part, the coarse
+/// level of all, backward Gauss-Seidel. Of an iteration, with several parts: 4 sums over copies, and the rows
+/// of 2 scalar products and of the coarse level gathered.
 class BodySolver {
  public:
-  /// Keeps a reference to `problem`. `rho` [kg]: one per contact, > 0. `aggregate`: grains per aggregate.
-  BodySolver(const BodyProblem& problem, std::span<const double> rho, int aggregate);
+  /// Keeps a reference to `parts`. `rho` [kg] per part and contact; `aggregate`: grains per aggregate, 0:
+  /// aggregate_target.
+  BodySolver(const BodyParts& parts, std::span<const std::vector<double>> rho, int aggregate);
 
-  /// From V on. Returns z.A z of z, the preconditioned residual: about the square of the error of V in the
-  /// norm of A, and at most that; A is M + H rho H^T, so this norm is no smaller than the kinetic one [J].
-  double begin(std::span<const Twist> f, std::span<Twist> V);
+  /// From V on, or from 0 where V is. Returns z.A z of z, the preconditioned residual: about the square of
+  /// the error of V in the norm of A, and at most that; this norm is no smaller than the kinetic one [J]. `f`
+  /// and V hold the same bits for all copies of a body.
+  double begin(const PartField& f, const PartField& V);
   /// One iteration, on the V that the last call left. Returns the same; 0 where rounding ends it.
-  double iterate(std::span<Twist> V);
+  double iterate(PartField& V);
+  /// Until that is `tolerance` squared of what it was. Returns the number of iterations.
+  int solve(const PartField& f, PartField& V, double tolerance, int max_iterations);
 
  private:
-  double precondition();
+  void multiply(const PartField& x, PartField& y) const;
+  void precondition();
 
-  Aggregates aggregates_;
-  BodySystem system_;
+  const BodyParts& parts_;
+  std::vector<BodySystem> systems_;
   CoarseLevel coarse_;
   double left_ = 0;
-  std::vector<Twist> residual_, z_, direction_, product_, rest_;
+  PartField residual_, z_, direction_, product_, rest_;
 };
 
 }  // namespace talus

@@ -103,11 +103,9 @@ void Iteration::choose_course() {
   }
 }
 
-/// About the sweeps of the present course that this step's problem takes. Several subdomains may be on
-/// several ranks, of which none sees the whole problem: drift is then taken at its word, on one rank too, for
-/// the same bits.
+/// About the sweeps of the present course that this step's problem takes. Collective.
 double Iteration::sweeps_needed() {
-  if (sweeps_needed_ < 0) sweeps_needed_ = state_.decomposition.several() ? 0 : admm_.sweeps_needed();
+  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
   // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
   const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
                        : course_.method == SolverMethod::nncg   ? 40
@@ -121,7 +119,6 @@ bool Iteration::looks_at_all() {
   constexpr double cost = 100;
   constexpr std::int64_t tiny = 64;
   if (result_.stiff_calls > 0) return true;
-  if (state_.decomposition.several() || !admm_.available()) return false;
   if (result_.contacts <= tiny) return result_.contacts > 0;
   return sweeps_needed() >= cost && 10 * sweeps_needed_ >= static_cast<double>(result_.contacts);
 }
@@ -150,10 +147,8 @@ bool Iteration::balanced() {
 /// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
 bool Iteration::ask_admm() {
   constexpr int chance = 50, calls = 3;
-  if (!admm_.available()) return false;
   if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
-  const bool may = settings_.method == SolverMethod::admm ||
-                   (settings_.method == SolverMethod::automatic && !state_.decomposition.several());
+  const bool may = settings_.method == SolverMethod::admm || settings_.method == SolverMethod::automatic;
   if (!may) return false;
   if (result_.stiff_calls == calls) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
@@ -161,11 +156,19 @@ bool Iteration::ask_admm() {
          (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff) && !balanced();
 }
 
+/// With several ranks behind the sweep that hid the sums: what it did is dropped.
 void Iteration::call_admm(int epoch) {
+  if (ranks_.ranks() > 1)
+    for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+      restore_impulses(state_.candidates, state_.chunks, c, state_.contacts);
+  sweeps_ = result_.iterations;
+  gluing_.forget_jumps();
   result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
   looked_ = {};
+  // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone.
   begin_course(course_.method, course_.most);
+  course_.from = result_.iterations;
   before_segment_ = sweeps_;
   segment_ = epoch + 1;
 }

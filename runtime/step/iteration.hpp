@@ -43,7 +43,8 @@ struct IterationResult {
 /// at a gate behind that sweep. If they say that the step was solved, `restore` brings back the impulses that
 /// were certified, so that results are the bits of one rank, where nothing has to be waited for.
 ///
-/// Where ADMM is called, the gate's thread does it alone: the next epoch is `accumulate`.
+/// Where ADMM is called, it is by the gate's threads of all ranks, on the impulses that were certified: the
+/// next epoch is `accumulate`.
 ///
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
 /// centre, and glue of every subdomain follow. Publish comes after the boundary chunks and before the inner
@@ -60,6 +61,8 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// Of threads that wait for decide(): ADMM's subdomains are shared out.
+  void assist() { admm_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 

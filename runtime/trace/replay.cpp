@@ -66,7 +66,10 @@ class Player {
       const StepIndex index = stage_.timeline.index(step);
       lay_out_step(index);
       stage_.log.begin_step(step);
-      if (machine_.typical) stage_.typical = typical_times(stage_.timeline, index);
+      if (machine_.typical) {
+        stage_.typical = typical_times(stage_.timeline, index);
+        typical_tasks_ = typical_tasks(stage_.timeline, index);
+      }
       play_step(index, now);
     }
     out_.makespan = *std::max_element(now.begin(), now.end());
@@ -131,8 +134,15 @@ class Player {
     for (const SimTask::Source& source : task.sources) {
       const StepIndex::Rank& recorded = index.ranks[static_cast<std::size_t>(source.rank)];
       const Place part = recorded.part[source.task];
-      const double own = stage_.timeline.self(recorded.task[source.task]),
-                   inside = stage_.timeline.self(part);
+      double own = stage_.timeline.self(recorded.task[source.task]), inside = stage_.timeline.self(part);
+      if (machine_.typical && task.task.group >= 0) {
+        const double median = typical_tasks_[static_cast<std::size_t>(source.rank)].at(task.task.kind);
+        if (own + inside > 3 * median) {
+          const double part_left = median / (own + inside);
+          own *= part_left;
+          inside *= part_left;
+        }
+      }
       if (task.task.group >= 0 || info.shared) {
         const double of_rank = task.task.group >= 0 ? 1 : share(r, static_cast<std::size_t>(source.rank));
         timed.work += of_rank * (own + inside);
@@ -286,6 +296,7 @@ class Player {
   std::vector<std::uint32_t> rank_of_;  ///< per group
   std::vector<std::vector<SimTask>> tasks_;
   LoopLayout layout_;
+  std::vector<std::map<Kind, float>> typical_tasks_;  ///< with Machine::typical, of the step
 };
 
 }  // namespace

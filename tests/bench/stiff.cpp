@@ -124,7 +124,6 @@ struct Scene {
                            sample.contacts,
                            mu,
                            mu,
-                           {},
                            {}});
   }
 };

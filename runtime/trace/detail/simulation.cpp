@@ -66,6 +66,25 @@ std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& ti
   return typical;
 }
 
+std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const StepIndex& index) {
+  std::vector<std::map<Kind, float>> typical;
+  for (std::size_t r = 0; r < index.ranks.size(); ++r) {
+    const std::vector<Task>& tasks = timeline.trace().tasks[r];
+    std::map<Kind, std::vector<float>> times;
+    for (std::size_t i = 0; i < tasks.size(); ++i)
+      if (tasks[i].group >= 0)
+        times[tasks[i].kind].push_back(static_cast<float>(timeline.self(index.ranks[r].task[i]) +
+                                                          timeline.self(index.ranks[r].part[i])));
+    auto& medians = typical.emplace_back();
+    for (auto& [kind, list] : times) {
+      const auto middle = list.begin() + static_cast<std::ptrdiff_t>(list.size() / 2);
+      std::nth_element(list.begin(), middle, list.end());
+      medians[kind] = *middle;
+    }
+  }
+  return typical;
+}
+
 double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
   const std::uint32_t messages =
       layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];

@@ -60,6 +60,10 @@ struct Stage {
 std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
                                                               const StepIndex& index);
 
+/// Per recorded rank and kind of the step's tasks of single subdomains, which are like one another: the
+/// median of their times, that of the spans within included. [ns]
+std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const StepIndex& index);
+
 /// An epoch of the loop on the machine.
 struct SimEpoch {
   std::size_t source = 0;  ///< recorded epoch whose work it has
