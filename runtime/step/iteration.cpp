@@ -68,6 +68,7 @@ void Iteration::begin() {
   sweeps_ = before_segment_ = 0;
   history_from_ = 0;
   sweeps_needed_ = -1;
+  looked_ = {};
   first_course();
 }
 

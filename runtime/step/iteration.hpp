@@ -131,6 +131,7 @@ class Iteration {
   double impulse_scale() const;
   double drift() const;
   double sweeps_needed();
+  bool looks_at_all();
   bool balanced();
   bool ask_admm();
   void call_admm(int epoch);
@@ -160,6 +161,12 @@ class Iteration {
   double first_residual2_ = 0;       ///< at the first check of the step, or the first since ADMM [m^2/s^2]
   std::size_t history_from_ = 0;     ///< that check
   double sweeps_needed_ = -1;        ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  /// The last look at the error of all velocities.
+  struct Look {
+    int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
+    double error_rms = 0, error = 0;
+  };
+  Look looked_;
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment
