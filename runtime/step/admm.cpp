@@ -4,14 +4,21 @@
 #include <cmath>
 #include <utility>
 
+#include "kernels/balance.hpp"
+
 namespace talus {
 
 namespace {
 
+/// The copies agree by the messages of the gluing; rows travel to all ranks; threads share the subdomains.
 class StepLink final : public PartLink {
  public:
-  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks)
-      : state_(state), gluing_(gluing), ranks_(ranks) {}
+  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew)
+      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew) {}
+
+  void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
+    crew_.share(parts, work);
+  }
 
   void sum_copies(PartField& field) const override {
     if (state_.decomposition.several()) gluing_.sum_copies(field);
@@ -45,6 +52,7 @@ class StepLink final : public PartLink {
   const StepState& state_;
   Gluing& gluing_;
   const graph::Communicator& ranks_;
+  graph::Crew& crew_;
 };
 
 /// The fastest that impulses make a body.
@@ -72,7 +80,8 @@ Admm::Admm(StepState& state, const StepParameters& parameters, const Decompositi
     : state_(state),
       parameters_(parameters),
       decomposition_(decomposition),
-      link_(std::make_unique<StepLink>(state, gluing, ranks)) {}
+      ranks_(ranks),
+      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_)) {}
 
 std::vector<BodyProblem> Admm::gather() const {
   std::vector<WallMotion> walls;
@@ -105,6 +114,21 @@ std::vector<BodyProblem> Admm::gather() const {
 double Admm::sweeps_needed() const {
   const std::vector<BodyProblem> parts = gather();
   return estimate_stiffness(BodyParts(parts, *link_));
+}
+
+double Admm::velocity_error(double enough) const {
+  std::vector<BodyProblem> problems = gather();
+  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
+    for (BodyProblem& problem : problems)
+      for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+        const auto place = static_cast<std::size_t>(problem.contacts[k].place);
+        const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
+        const double* kept =
+            &state_.candidates.impulse[from * static_cast<std::size_t>(state_.candidates.components)];
+        problem.impulse[k] = state_.candidates.components == 3 ? Vec3(Eigen::Map<const Vec3>(kept))
+                                                               : Vec3(kept[0] * problem.contacts[k].normal);
+      }
+  return talus::velocity_error(problems, *link_, enough).relative;
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {

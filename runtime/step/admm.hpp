@@ -5,6 +5,7 @@
 
 #include "kernels/admm.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/graph/crew.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
@@ -16,15 +17,23 @@ namespace talus {
 /// than its own subdomains and the coarse level.
 ///
 ///   between two epochs, at a gate of all ranks:  admm.improve();  next epoch: V afresh from r, then sweeps
+///   threads that wait at the gate:               admm.assist()
 class Admm {
  public:
   /// Keeps references.
   Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
        Gluing& gluing, const graph::Communicator& ranks);
 
+  /// Of a thread that waits for the one that calls: takes its share of the subdomains.
+  void assist() { crew_.help(); }
+
   // Collective.
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
+
+  /// Relative error of the velocities that the impulses of the last check give, with several ranks those that
+  /// the candidates keep (kernels/balance.hpp); what is below `enough` is not told apart.
+  double velocity_error(double enough) const;
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
@@ -37,6 +46,8 @@ class Admm {
   StepState& state_;
   const StepParameters& parameters_;
   const DecompositionSettings& decomposition_;
+  const graph::Communicator& ranks_;
+  graph::Crew crew_;
   std::unique_ptr<PartLink> link_;
 };
 
