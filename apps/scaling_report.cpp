@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "apps/child_process.hpp"
 #include "io/csv_table.hpp"
 #include "io/output_directory.hpp"
 #include "io/run_json.hpp"
@@ -16,15 +17,26 @@ namespace talus {
 
 namespace {
 
+/// The overrides of a variant without the tables of their keys, which would not fit beside a picture.
+std::string short_name(const std::string& variant) {
+  std::string text;
+  for (const std::string& word : split_words(variant)) {
+    const std::size_t equals = std::min(word.find('='), word.size()), dot = word.rfind('.', equals);
+    text += " " + (dot == std::string::npos ? word : word.substr(dot + 1));
+  }
+  return text;
+}
+
 /// What curve of the pictures a row belongs to; predicted ones say so.
 std::string curve_of(const ScalingRow& row) {
-  std::string name = row.predicted() ? fmt::format("predicted by {} [{}]", name_of(row.source), row.network)
-                                     : std::string("measured");
+  std::string name =
+      !row.predicted()
+          ? std::string("measured")
+          : fmt::format("predicted{} [{}]", row.source == ScalingSource::smpi ? " by SMPI" : "", row.network);
   if (row.kind == ScalingKind::hybrid) name = fmt::format("{} cores: {}", row.cores(), name);
   if (row.kind != ScalingKind::hybrid && row.threads > 1)
     name += row.ranks == 1 ? " threads" : " ranks x threads";
-  if (!row.variant.empty()) name += " " + row.variant;
-  return name;
+  return name + short_name(row.variant);
 }
 
 std::string table_of(const std::vector<ScalingRow>& rows, ScalingKind kind) {
