@@ -15,31 +15,6 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-/// Projection on the Coulomb cone about n.
-Vec3 project(const Vec3& z, const Vec3& n, double mu) {
-  const double z_n = n.dot(z);
-  if (mu == 0) return std::max(0.0, z_n) * n;
-  const Vec3 t = z - z_n * n;
-  const double length = t.norm();
-  if (mu * length <= -z_n) return Vec3::Zero();
-  if (length <= mu * z_n) return z;
-  const double r_n = (z_n + mu * length) / (1 + mu * mu);
-  return r_n * n + (mu * r_n / length) * t;
-}
-
-/// What counts of a vector at a contact: without friction its normal part.
-Vec3 constrained(const ContactEquation& c, const Vec3& v) {
-  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
-}
-
-Vec3 tangential(const ContactEquation& c, const Vec3& v) {
-  return v - c.normal.dot(v) * c.normal;
-}
-
-double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
-  return body.mass * u.squaredNorm() + body.spin_mass * w.squaredNorm();
-}
-
 /// What the iteration carries along, of one part: an entry per contact.
 struct PartState {
   std::span<const double> rho;
@@ -54,10 +29,10 @@ struct PartState {
   void begin(const BodyProblem& problem, std::span<const Twist> V, std::span<Vec3> r) {
     for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
-      r[k] = project(r[k], c.normal, c.mu);
+      r[k] = project_on_cone(c, r[k]);
       const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
       shift[k] = c.mu * tangential(c, v).norm();
-      y[k] = v + shift[k] * c.normal + project(-v, c.normal, c.mu);
+      y[k] = v + shift[k] * c.normal + project_on_cone(c, -v);
     }
   }
 
@@ -78,7 +53,7 @@ struct PartState {
       const ContactEquation& c = problem.contacts[k];
       const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset) + shift[k] * c.normal;
       const Vec3 x = relaxation * v + (1 - relaxation) * y[k];
-      const Vec3 r_new = project(r[k] - rho[k] * x, c.normal, c.mu);
+      const Vec3 r_new = project_on_cone(c, r[k] - rho[k] * x);
       y[k] = x + (r_new - r[k]) / rho[k];
       r[k] = r_new;
       const double m = rho[k] / kappa;

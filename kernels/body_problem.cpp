@@ -1,5 +1,7 @@
 #include "kernels/body_problem.hpp"
 
+#include <algorithm>
+
 #include "kernels/measures.hpp"
 
 namespace talus {
@@ -120,6 +122,17 @@ std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) add_force(problem.contacts[k], impulse[k], V);
   for (std::size_t b = 0; b < V.size(); ++b) velocity_from_force(problem.bodies[b], V[b]);
   return V;
+}
+
+Vec3 project_on_cone(const ContactEquation& c, const Vec3& z) {
+  const double z_n = c.normal.dot(z);
+  if (c.mu == 0) return std::max(0.0, z_n) * c.normal;
+  const Vec3 t = z - z_n * c.normal;
+  const double length = t.norm();
+  if (c.mu * length <= -z_n) return Vec3::Zero();
+  if (length <= c.mu * z_n) return z;
+  const double r_n = (z_n + c.mu * length) / (1 + c.mu * c.mu);
+  return r_n * c.normal + (c.mu * r_n / length) * t;
 }
 
 }  // namespace talus

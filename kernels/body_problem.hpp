@@ -116,6 +116,23 @@ inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V
   return a.u - b.u + c.normal.cross(a.w + b.w);
 }
 
+/// What counts of a vector at a contact: without friction its normal part.
+inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
+  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
+}
+
+inline Vec3 tangential(const ContactEquation& c, const Vec3& v) {
+  return v - c.normal.dot(v) * c.normal;
+}
+
+/// Projection of z on the Coulomb cone of the contact.
+Vec3 project_on_cone(const ContactEquation& c, const Vec3& z);
+
+/// m |u|^2 + (I/R^2) |w|^2 [J].
+inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
+  return body.mass * u.squaredNorm() + body.spin_mass * w.squaredNorm();
+}
+
 /// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_axis`.
 inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
   Twist& a = F[static_cast<std::size_t>(c.first)];

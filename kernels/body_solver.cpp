@@ -82,7 +82,7 @@ void BodySolver::precondition() {
   parts_.link().sum_copies(z_);
 }
 
-int BodySolver::solve(const PartField& f, PartField& V, double tolerance, int max_iterations) {
+double BodySolver::begin(const PartField& f, const PartField& V) {
   multiply(V, product_);
   parts_.each([&](std::size_t p) {
     residual_[p] = f[p];
@@ -90,30 +90,36 @@ int BodySolver::solve(const PartField& f, PartField& V, double tolerance, int ma
   });
   precondition();
   direction_ = z_;
-  double rz = parts_.dot(residual_, z_);
-  const double goal = tolerance * tolerance * rz;
+  return left_ = parts_.dot(residual_, z_);
+}
+
+double BodySolver::iterate(PartField& V) {
+  multiply(direction_, product_);
+  const double curvature = parts_.dot(direction_, product_);
+  if (!(curvature > 0)) return 0;
+  const double step = left_ / curvature;
+  parts_.each([&](std::size_t p) {
+    add(V[p], step, direction_[p]);
+    add(residual_[p], -step, product_[p]);
+  });
+  precondition();
+  const double next = parts_.dot(residual_, z_);
+  const double beta = next / left_;
+  left_ = next;
+  parts_.each([&](std::size_t p) {
+    for (std::size_t b = 0; b < z_[p].size(); ++b) {
+      direction_[p][b].u = z_[p][b].u + beta * direction_[p][b].u;
+      direction_[p][b].w = z_[p][b].w + beta * direction_[p][b].w;
+    }
+  });
+  return next;
+}
+
+int BodySolver::solve(const PartField& f, PartField& V, double tolerance, int max_iterations) {
+  double left = begin(f, V);
+  const double goal = tolerance * tolerance * left;
   int k = 0;
-  while (k < max_iterations && rz > goal) {
-    multiply(direction_, product_);
-    const double curvature = parts_.dot(direction_, product_);
-    if (!(curvature > 0)) break;
-    const double step = rz / curvature;
-    parts_.each([&](std::size_t p) {
-      add(V[p], step, direction_[p]);
-      add(residual_[p], -step, product_[p]);
-    });
-    ++k;
-    precondition();
-    const double next = parts_.dot(residual_, z_);
-    const double beta = next / rz;
-    rz = next;
-    parts_.each([&](std::size_t p) {
-      for (std::size_t b = 0; b < z_[p].size(); ++b) {
-        direction_[p][b].u = z_[p][b].u + beta * direction_[p][b].u;
-        direction_[p][b].w = z_[p][b].w + beta * direction_[p][b].w;
-      }
-    });
-  }
+  for (; k < max_iterations && left > goal; ++k) left = iterate(V);
   return k;
 }
 

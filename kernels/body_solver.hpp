@@ -20,8 +20,13 @@ class BodySolver {
   /// aggregate_target.
   BodySolver(const BodyParts& parts, std::span<const std::vector<double>> rho, int aggregate);
 
-  /// From V; ends when the residual, in the norm of the preconditioner, is `tolerance` times what it was.
-  /// `f` and V hold the same bits for all copies of a body. Returns the number of iterations.
+  /// From V on, or from 0 where V is. Returns z.A z of z, the preconditioned residual: about the square of
+  /// the error of V in the norm of A, and at most that; this norm is no smaller than the kinetic one [J]. `f`
+  /// and V hold the same bits for all copies of a body.
+  double begin(const PartField& f, const PartField& V);
+  /// One iteration, on the V that the last call left. Returns the same; 0 where rounding ends it.
+  double iterate(PartField& V);
+  /// Until that is `tolerance` squared of what it was. Returns the number of iterations.
   int solve(const PartField& f, PartField& V, double tolerance, int max_iterations);
 
  private:
@@ -31,6 +36,7 @@ class BodySolver {
   const BodyParts& parts_;
   std::vector<BodySystem> systems_;
   CoarseLevel coarse_;
+  double left_ = 0;
   PartField residual_, z_, direction_, product_, rest_;
 };
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "kernels/balance.hpp"
+
 namespace talus {
 
 namespace {
@@ -78,6 +80,7 @@ Admm::Admm(StepState& state, const StepParameters& parameters, const Decompositi
     : state_(state),
       parameters_(parameters),
       decomposition_(decomposition),
+      ranks_(ranks),
       link_(std::make_unique<StepLink>(state, gluing, ranks, crew_)) {}
 
 std::vector<BodyProblem> Admm::gather() const {
@@ -111,6 +114,21 @@ std::vector<BodyProblem> Admm::gather() const {
 double Admm::sweeps_needed() const {
   const std::vector<BodyProblem> parts = gather();
   return estimate_stiffness(BodyParts(parts, *link_));
+}
+
+double Admm::velocity_error(double enough) const {
+  std::vector<BodyProblem> problems = gather();
+  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
+    for (BodyProblem& problem : problems)
+      for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+        const auto place = static_cast<std::size_t>(problem.contacts[k].place);
+        const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
+        const double* kept =
+            &state_.candidates.impulse[from * static_cast<std::size_t>(state_.candidates.components)];
+        problem.impulse[k] = state_.candidates.components == 3 ? Vec3(Eigen::Map<const Vec3>(kept))
+                                                               : Vec3(kept[0] * problem.contacts[k].normal);
+      }
+  return talus::velocity_error(problems, *link_, enough).relative;
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {

@@ -31,6 +31,10 @@ class Admm {
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
 
+  /// Relative error of the velocities that the impulses of the last check give, with several ranks those that
+  /// the candidates keep (kernels/balance.hpp); what is below `enough` is not told apart.
+  double velocity_error(double enough) const;
+
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
   /// exact as the last, as that was not enough.
@@ -42,6 +46,7 @@ class Admm {
   StepState& state_;
   const StepParameters& parameters_;
   const DecompositionSettings& decomposition_;
+  const graph::Communicator& ranks_;
   graph::Crew crew_;
   std::unique_ptr<PartLink> link_;
 };

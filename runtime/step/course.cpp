@@ -1,6 +1,7 @@
 /// How a step's sweeps are carried on, and when that changes: docs/decisions/0009-methods.md, 0012-stiff.md.
 
 #include <algorithm>
+#include <cmath>
 
 #include "kernels/balance.hpp"
 #include "runtime/step/iteration.hpp"
@@ -59,6 +60,12 @@ void Iteration::begin_course(SolverMethod method, double most) {
   changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
 }
 
+std::span<const Slot> Iteration::owned(std::size_t c) const {
+  const auto from = static_cast<std::size_t>(state_.chunks.owned_begin[c]),
+             to = static_cast<std::size_t>(state_.chunks.owned_begin[c + 1]);
+  return std::span(state_.chunks.owned).subspan(from, to - from);
+}
+
 /// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
 /// write, and its wall copy.
 void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
@@ -66,20 +73,52 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
   carry_impulses(carry, beta, range, state_.contacts, trail_);
-  const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-  carry_velocities(
-      carry, beta,
-      std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-      state_.bodies.velocity, trail_);
-  if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
+  const bool at_wall = chunks.wall[c] >= 0;
+  if (epoch == sweeps_from_) {
+    fasten(owned(c), state_.bodies.velocity, trail_);
+    if (at_wall) fasten(c, state_.copies[c], trail_);
+  }
+  carry_velocities(carry, beta, owned(c), state_.bodies.velocity, trail_);
+  if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
-void Iteration::plan_sweeps(int epoch) {
-  int sweeps = std::max(settings_.check_every, sweeps_ / 4);
+/// The last check that tells something about the present course besides the newest: at least check_every
+/// sweeps before it, since errors of neighbouring sweeps go up and down. Null when there is none.
+const Iteration::Check* Iteration::check_before() const {
+  for (std::size_t k = history_.size() - 1; k-- > history_from_;) {
+    if (history_[k].iterations + 1 < course_.from) return nullptr;
+    if (history_[k].iterations + settings_.check_every <= history_.back().iterations) return &history_[k];
+  }
+  return nullptr;
+}
+
+/// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,
+/// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
+/// by little; at most half of what was done, so that a wrong guess costs no more.
+int Iteration::sweeps_ahead() const {
+  const int done = result_.iterations;
+  int sweeps = std::max(settings_.check_every, done / 2);
   if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
-  sweeps = std::min(sweeps, settings_.max_iterations - sweeps_);
-  before_segment_ = sweeps_;
-  sweeps_ += sweeps;
+  const double error = history_.back().error_rms;
+  const Check* const before = check_before();
+  if (before && error > settings_.tolerance && error < before->error_rms) {
+    const double log_error = std::log(before->error_rms / error),
+                 log_missing = std::log(error / settings_.tolerance);
+    const double to_go =
+        before->iterations > 0
+            ? done * std::expm1(log_missing / log_error * std::log(double(done) / before->iterations))
+            : done * log_missing / log_error;
+    sweeps = std::max(least_sweeps, static_cast<int>(std::ceil(std::min<double>(sweeps, to_go))));
+  }
+  const int exchange = decomposition_.sweeps_per_exchange;
+  sweeps = (sweeps + exchange - 1) / exchange * exchange;
+  return std::min(sweeps, settings_.max_iterations - done);
+}
+
+/// The sweeps behind the check of this epoch: `sweeps_` done.
+void Iteration::plan_sweeps(int epoch, int sweeps) {
+  before_segment_ = result_.iterations;
+  sweeps_ = before_segment_ + sweeps;
   sweeps_from_ = epoch + 1;
   segment_ = epoch + 1 + sweeps;
 }
@@ -87,9 +126,9 @@ void Iteration::plan_sweeps(int epoch) {
 /// After a check: momentum that has made it worse (sliding contacts turn its modes complex, and those grow)
 /// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
 void Iteration::choose_course() {
-  const std::size_t checks = history_.size();
-  if (checks < history_from_ + 2) return;
-  const double growth = history_[checks - 1].error_rms / history_[checks - 2].error_rms;
+  const Check* const before = check_before();
+  if (!before) return;
+  const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
     if (settings_.method == SolverMethod::automatic && growth < hopeless_growth)
@@ -113,13 +152,34 @@ double Iteration::sweeps_needed() {
   return sweeps_needed_ / speed;
 }
 
+/// Whether this step's velocities are looked at as a whole: where that costs less than the sweeps that it may
+/// save, in problems that are stiff for their size; and in tiny ones.
+bool Iteration::looks_at_all() {
+  constexpr double cost = 100;
+  constexpr std::int64_t tiny = 64;
+  if (result_.stiff_calls > 0) return true;
+  if (result_.contacts <= tiny) return result_.contacts > 0;
+  return sweeps_needed() >= cost && 10 * sweeps_needed_ >= static_cast<double>(result_.contacts);
+}
+
+/// Judges the forces that walls and heavy bodies get. By the drift of wall forces, which sweeps show; or by
+/// the error of all velocities, which decides by itself. That is asked for again when the residual has fallen
+/// far enough, or a quarter more sweeps are done.
 bool Iteration::balanced() {
+  const double tolerance = settings_.balance_tolerance;
   result_.unbalance = result_.drift;
-  if (result_.stiff_calls > 0)
-    result_.unbalance += result_.stiff.balance_defect;
-  else if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
-    result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
-  return result_.unbalance <= settings_.balance_tolerance;
+  if (!looks_at_all()) {
+    if (result_.drift > 0 && result_.drift <= tolerance)
+      result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
+    return result_.unbalance <= tolerance;
+  }
+  const bool last = result_.iterations >= settings_.max_iterations;
+  const double guess = looked_.error * result_.error_rms / looked_.error_rms;
+  if (looked_.at < 0 || (looked_.at != result_.iterations &&
+                         (last || !(guess > tolerance) || 4 * result_.iterations > 5 * looked_.at)))
+    looked_ = {result_.iterations, result_.error_rms, admm_.velocity_error(0.2 * tolerance)};
+  result_.unbalance = looked_.at == result_.iterations ? looked_.error : guess;
+  return result_.unbalance <= tolerance;
 }
 
 /// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
@@ -129,10 +189,10 @@ bool Iteration::ask_admm() {
   if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
   const bool may = settings_.method == SolverMethod::admm || settings_.method == SolverMethod::automatic;
   if (!may) return false;
-  if (result_.stiff_calls == calls || balanced()) return false;
+  if (result_.stiff_calls == calls) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
   return since >= chance << (2 * result_.stiff_calls) &&
-         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff);
+         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff) && !balanced();
 }
 
 /// With several ranks behind the sweep that hid the sums: what it did is dropped.
@@ -144,6 +204,7 @@ void Iteration::call_admm(int epoch) {
   gluing_.forget_jumps();
   result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
+  looked_ = {};
   // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone.
   begin_course(course_.method, course_.most);
   course_.from = result_.iterations;
