@@ -195,6 +195,7 @@ PlateOutcome plate_on_block(SolverMethod method, double plate, int subdomains = 
   setup.stages = {stage};
   setup.solver.method = method;
   setup.solver.max_iterations = 400;
+  setup.solver.balance_tolerance = 0.01;
   setup.decomposition.subdomains = subdomains;
   setup.decomposition.coupling = coupling;
   graph::Executor executor({.threads = threads});
