@@ -24,9 +24,11 @@ const double* records(std::span<const Velocity> velocity) {
   return reinterpret_cast<const double*>(velocity.data());
 }
 
-/// `contacts` is written by the sweeps only.
-ContactView view(const Contacts& contacts, ContactRange range) {
-  Contacts& c = const_cast<Contacts&>(contacts);
+ImpulseView impulses(Contacts& c) {
+  return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
+}
+
+ContactView view(const Contacts& c, ContactRange range) {
   return {c.nx.data(),
           c.ny.data(),
           c.nz.data(),
@@ -99,14 +101,15 @@ template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 double mu) const {
   if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
-  lanes_[Friction]->sweep_grains(view(contacts, range), records(velocity), mu);
+  lanes_[Friction]->sweep_grains(view(contacts, range), impulses(contacts), records(velocity), mu);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                               WallCopy& wall) const {
   if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
-  lanes_[Friction]->sweep_wall(view(contacts, range), records(velocity), mu, wall.velocity, wall.inv_mass);
+  lanes_[Friction]->sweep_wall(view(contacts, range), impulses(contacts), records(velocity), mu,
+                               wall.velocity, wall.inv_mass);
 }
 
 template <bool Friction>

@@ -51,7 +51,7 @@ struct DetectionSettings {
 
 /// What makes of sweeps a solver.
 enum class SolverMethod {
-  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse;
+  automatic,  ///< momentum (plain sweeps for Schwarz, whose damped iteration is no descent);
               ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
   nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
   momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
