@@ -147,6 +147,30 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
                  range);
 }
 
+void SweepKernels::advance(std::span<double> values, std::span<double> last, double beta) const {
+  if (lanes_[1]) return lanes_[1]->advance(values.data(), last.data(), values.size(), beta);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const double s = values[k];
+    values[k] = s + beta * (s - last[k]);
+    last[k] = s;
+  }
+}
+
+void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velocity,
+                           std::span<Velocity> last, double beta) const {
+  if (lanes_[1])
+    return lanes_[1]->advance_bodies(records(velocity), records(last), slots.data(), slots.size(), beta);
+  for (const Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    const Velocity now = velocity[s];
+    for (std::size_t k = 0; k < 3; ++k) {
+      velocity[s].u[k] = now.u[k] + beta * (now.u[k] - last[s].u[k]);
+      velocity[s].w[k] = now.w[k] + beta * (now.w[k] - last[s].w[k]);
+    }
+    last[s] = now;
+  }
+}
+
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;
 template void SweepKernels::sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double,
                                              WallCopy&) const;

@@ -43,6 +43,10 @@ struct LaneKernels {
                               const std::uint16_t* multiplicity);
   ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const double* wall,
                             double wall_inv_mass, const std::uint16_t* multiplicity);
+  /// Momentum: of `count` numbers, and of whole records at `slots`.
+  void (*advance)(double* values, double* last, std::size_t count, double beta);
+  void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
+                         double beta);
 };
 
 /// Kernels of one instruction set, with and without friction.

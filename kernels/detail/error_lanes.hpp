@@ -3,6 +3,7 @@
 /// The error of kernels/sweep.hpp on W = 4 or 8 contacts at a time. It reads only, so that any contacts may
 /// stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever W is.
 
+#include "kernels/detail/advance_lanes.hpp"
 #include "kernels/detail/sweep_lanes.hpp"
 
 namespace talus {
@@ -146,9 +147,14 @@ ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, co
 }
 
 template <bool Friction, int W>
-constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,      sweep_wall<Friction, W>,
-                                          accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,
-                                          error_grains<Friction, W>,      error_wall<Friction, W>};
+constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
+                                          sweep_wall<Friction, W>,
+                                          accumulate_grains<Friction, W>,
+                                          accumulate_wall<Friction, W>,
+                                          error_grains<Friction, W>,
+                                          error_wall<Friction, W>,
+                                          advance<W>,
+                                          advance_bodies<W>};
 
 }  // namespace
 }  // namespace talus

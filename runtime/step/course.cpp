@@ -74,13 +74,13 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Chunks& chunks = state_.chunks;
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
-  carry_impulses(carry, beta, range, state_.contacts, trail_);
+  carry_impulses(kernels_, carry, beta, range, state_.contacts, trail_);
   const bool at_wall = chunks.wall[c] >= 0;
   if (epoch == sweeps_from_) {
     fasten(owned(c), state_.bodies.velocity, trail_);
     if (at_wall) fasten(c, state_.copies[c], trail_);
   }
-  carry_velocities(carry, beta, owned(c), state_.bodies.velocity, trail_);
+  carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, trail_);
   if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
