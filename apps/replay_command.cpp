@@ -7,6 +7,8 @@
 
 #include "apps/exit_codes.hpp"
 #include "io/detail/svg.hpp"
+#include "io/output_directory.hpp"
+#include "io/smpi_platform.hpp"
 #include "io/trace_file.hpp"
 #include "runtime/trace/analysis.hpp"
 
@@ -31,11 +33,23 @@ double recorded_makespan(const trace::Trace& trace) {
   return trace::analyse(trace).makespan;
 }
 
+void write_platform(const std::string& file, const trace::Machine& machine) {
+  io::write_whole(file, io::smpi_platform(machine));
+  std::string hosts;
+  if (machine.ranks_per_node > 1) {
+    io::write_whole(file + ".hosts", io::smpi_hosts(machine));
+    hosts = fmt::format("-hostfile {}.hosts ", file);
+  }
+  fmt::print("the machine for SMPI: smpirun -np {} {}-platform {} build/smpi/talus run SCENE ...\n\n",
+             machine.ranks, hosts, file);
+}
+
 void report(const ReplayOptions& options, const trace::Timeline& timeline, const trace::Machine& machine) {
   const trace::Trace& recorded = timeline.trace();
   const bool same = machine.ranks == recorded.ranks && machine.threads == recorded.threads &&
                     machine.map == trace::RankMap::block && machine.schedule == trace::Schedule::fixed &&
-                    machine.speed == 1 && machine.contacts == 1 && machine.noise == 0 && !machine.typical;
+                    machine.speed == 1 && machine.contacts == 1 && machine.noise == 0 && !machine.typical &&
+                    machine.quantile == 0;
   const char* label = same ? "" : "predicted";
   const trace::Replay played = trace::replay(timeline, machine, true);
   trace::Machine chain = machine;
@@ -95,6 +109,7 @@ int replay_command(ReplayOptions options) {
     machine.schedule = trace::schedule_named(options.schedule);
     machine.late_check = !options.blocking_check;
     validate(machine, recorded);
+    if (!options.smpi_platform.empty()) write_platform(options.smpi_platform, machine);
     const trace::Timeline timeline(recorded);
     report(options, timeline, machine);
   } catch (const std::exception& error) {

@@ -17,7 +17,8 @@ struct ReplayOptions {
   trace::Machine machine;       ///< all that has a number
   std::optional<double> steps;  ///< extrapolate to so many steps
   bool blocking_check = false;
-  std::string out;  ///< write what would have been as a trace; empty: nothing
+  std::string smpi_platform;  ///< write the machine for smpirun; empty: nothing
+  std::string out;            ///< write what would have been as a trace; empty: nothing
 };
 
 /// `talus replay`: a recorded run on a machine that is not there. Prints what it would take, and what bounds

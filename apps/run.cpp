@@ -21,6 +21,7 @@
 #include "io/recorder.hpp"
 #include "io/run_json.hpp"
 #include "io/scene.hpp"
+#include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "runtime/trace/order.hpp"
@@ -39,12 +40,10 @@ extern "C" void request_stop(int signal) {
 
 class Stopwatch {
  public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
+  double seconds() const { return std::chrono::duration<double>(graph::Clock::now() - start_).count(); }
 
  private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  graph::Clock::time_point start_ = graph::Clock::now();
 };
 
 /// When the next frame is due.
@@ -331,6 +330,7 @@ bool any_failed(bool failed, const graph::Communicator& ranks) {
 }
 
 int threads_of(const RunOptions& options) {
+  if (graph::simulated_ranks) return 1;
   return options.threads > 0 ? options.threads : omp_get_num_procs();
 }
 
@@ -397,6 +397,9 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+    if (graph::simulated_ranks && options.threads > 1)
+      throw std::invalid_argument(
+          fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
     if (!options.replay_order.empty()) order.emplace(order_of(options, ranks), ranks.rank());
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
@@ -404,12 +407,6 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
-    if (ranks.ranks() > 1 && scene.setup.solver.method == SolverMethod::admm)
-      throw std::invalid_argument(
-          fmt::format("solver.method = \"admm\" looks at the whole sample on one rank, and {} were started. "
-                      "Start one rank, "
-                      "or choose another method",
-                      ranks.ranks()));
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
       sample = build_sample(scene);

@@ -1,36 +1,22 @@
 #include "runtime/graph/communicator.hpp"
 
-// The C interface only: the C++ bindings of old are not linked.
-#define OMPI_SKIP_MPICXX
-#define MPICH_SKIP_MPICXX
-#include <mpi.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <utility>
 
+#include "runtime/graph/clock.hpp"
+#include "runtime/graph/detail/mpi_check.hpp"
 #include "runtime/trace/recorder.hpp"
 
 namespace talus::graph {
 
 namespace {
 
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-void check(int code, const char* call) {
-  if (code == MPI_SUCCESS) return;
-  char text[MPI_MAX_ERROR_STRING];
-  int length = 0;
-  MPI_Error_string(code, text, &length);
-  throw std::runtime_error(std::string(call) +
-                           " failed: " + std::string(text, static_cast<std::size_t>(length)));
-}
+using detail::check;
 
 /// Started by a launcher of some kind: Open MPI, MPICH and Intel MPI, or Slurm with PMIx.
 bool launched() {
+  if (simulated_ranks) return true;
   for (const char* name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"})
     if (std::getenv(name)) return true;
   return false;
@@ -222,6 +208,7 @@ std::unique_ptr<Communicator::PendingGather> Communicator::start_gather(
 }
 
 void Communicator::progress() const {
+  if (simulated_ranks) return;  // a simulated network needs nobody's help
   int flag = 0;
   MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_COMM_SELF, &flag, MPI_STATUS_IGNORE);
 }
@@ -229,71 +216,6 @@ void Communicator::progress() const {
 void Communicator::abort(int code) const {
   if (ranks_ > 1) MPI_Abort(MPI_COMM_WORLD, code);
   std::exit(code);
-}
-
-struct Communicator::Channel::Request {
-  MPI_Request handle = MPI_REQUEST_NULL;
-  std::span<double> buffer;
-  double delay = 0;
-  bool sends = false;
-  bool open = false;     ///< started and not yet done
-  bool arrived = false;  ///< received, but held back
-};
-
-Communicator::Channel::Channel(std::unique_ptr<Request> request) : request_(std::move(request)) {}
-
-Communicator::Channel::~Channel() {
-  if (!request_ || request_->handle == MPI_REQUEST_NULL) return;
-  if (request_->open && !request_->arrived) {
-    MPI_Cancel(&request_->handle);
-    MPI_Wait(&request_->handle, MPI_STATUS_IGNORE);
-  }
-  MPI_Request_free(&request_->handle);
-}
-
-void Communicator::Channel::start() {
-  Request& r = *request_;
-  if (r.sends && r.delay > 0) r.buffer.back() = now();
-  check(MPI_Start(&r.handle), "MPI_Start");
-  r.open = true;
-  r.arrived = false;
-}
-
-bool Communicator::Channel::done() {
-  Request& r = *request_;
-  if (!r.open) return true;
-  if (!r.arrived) {
-    int flag = 0;
-    check(MPI_Test(&r.handle, &flag, MPI_STATUS_IGNORE), "MPI_Test");
-    if (!flag) return false;
-    r.arrived = true;
-  }
-  if (!r.sends && r.delay > 0 && now() < r.buffer.back() + r.delay) return false;
-  r.open = false;
-  return true;
-}
-
-std::unique_ptr<Communicator::Channel> Communicator::open_send(int to, int tag,
-                                                               std::span<double> buffer) const {
-  auto request = std::make_unique<Channel::Request>();
-  request->buffer = buffer;
-  request->delay = options_.delay;
-  request->sends = true;
-  check(MPI_Send_init(buffer.data(), static_cast<int>(buffer.size()), MPI_DOUBLE, to, tag, MPI_COMM_WORLD,
-                      &request->handle),
-        "MPI_Send_init");
-  return std::unique_ptr<Channel>(new Channel(std::move(request)));
-}
-
-std::unique_ptr<Communicator::Channel> Communicator::open_receive(int from, int tag,
-                                                                  std::span<double> buffer) const {
-  auto request = std::make_unique<Channel::Request>();
-  request->buffer = buffer;
-  request->delay = options_.delay;
-  check(MPI_Recv_init(buffer.data(), static_cast<int>(buffer.size()), MPI_DOUBLE, from, tag, MPI_COMM_WORLD,
-                      &request->handle),
-        "MPI_Recv_init");
-  return std::unique_ptr<Channel>(new Channel(std::move(request)));
 }
 
 }  // namespace talus::graph

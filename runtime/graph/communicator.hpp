@@ -126,6 +126,8 @@ class Communicator::Channel {
   void start();
   /// True when the message has left, or has come; true as well when none was started.
   bool done();
+  /// Polls until done; ranks that share a core give way to one another.
+  void wait();
 
  private:
   friend class Communicator;

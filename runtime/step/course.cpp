@@ -142,11 +142,9 @@ void Iteration::choose_course() {
   }
 }
 
-/// About the sweeps of the present course that this step's problem takes. Several subdomains may be on
-/// several ranks, of which none sees the whole problem: drift is then taken at its word, on one rank too, for
-/// the same bits.
+/// About the sweeps of the present course that this step's problem takes. Collective.
 double Iteration::sweeps_needed() {
-  if (sweeps_needed_ < 0) sweeps_needed_ = state_.decomposition.several() ? 0 : admm_.sweeps_needed();
+  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
   // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
   const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
                        : course_.method == SolverMethod::nncg   ? 40
@@ -154,34 +152,62 @@ double Iteration::sweeps_needed() {
   return sweeps_needed_ / speed;
 }
 
+/// Whether this step's velocities are looked at as a whole: where that costs less than the sweeps that it may
+/// save, in problems that are stiff for their size; and in tiny ones.
+bool Iteration::looks_at_all() {
+  constexpr double cost = 100;
+  constexpr std::int64_t tiny = 64;
+  if (result_.stiff_calls > 0) return true;
+  if (result_.contacts <= tiny) return result_.contacts > 0;
+  return sweeps_needed() >= cost && 10 * sweeps_needed_ >= static_cast<double>(result_.contacts);
+}
+
+/// Judges the forces that walls and heavy bodies get. By the drift of wall forces, which sweeps show; or by
+/// the error of all velocities, which decides by itself. That is asked for again when the residual has fallen
+/// far enough, or a quarter more sweeps are done.
 bool Iteration::balanced() {
+  const double tolerance = settings_.balance_tolerance;
   result_.unbalance = result_.drift;
-  if (result_.stiff_calls > 0)
-    result_.unbalance += result_.stiff.balance_defect;
-  else if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
-    result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
-  return result_.unbalance <= settings_.balance_tolerance;
+  if (!looks_at_all()) {
+    if (result_.drift > 0 && result_.drift <= tolerance)
+      result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
+    return result_.unbalance <= tolerance;
+  }
+  const bool last = result_.iterations >= settings_.max_iterations;
+  const double guess = looked_.error * result_.error_rms / looked_.error_rms;
+  if (looked_.at < 0 || (looked_.at != result_.iterations &&
+                         (last || !(guess > tolerance) || 4 * result_.iterations > 5 * looked_.at)))
+    looked_ = {result_.iterations, result_.error_rms, admm_.velocity_error(0.2 * tolerance)};
+  result_.unbalance = looked_.at == result_.iterations ? looked_.error : guess;
+  return result_.unbalance <= tolerance;
 }
 
 /// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
 /// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
 bool Iteration::ask_admm() {
   constexpr int chance = 50, calls = 3;
-  if (!admm_.available()) return false;
   if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
-  const bool may = settings_.method == SolverMethod::admm ||
-                   (settings_.method == SolverMethod::automatic && !state_.decomposition.several());
+  const bool may = settings_.method == SolverMethod::admm || settings_.method == SolverMethod::automatic;
   if (!may) return false;
-  if (result_.stiff_calls == calls || balanced()) return false;
+  if (result_.stiff_calls == calls) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
   return since >= chance << (2 * result_.stiff_calls) &&
-         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff);
+         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff) && !balanced();
 }
 
+/// With several ranks behind the sweep that hid the sums: what it did is dropped.
 void Iteration::call_admm(int epoch) {
+  if (ranks_.ranks() > 1)
+    for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+      restore_impulses(state_.candidates, state_.chunks, c, state_.contacts);
+  sweeps_ = result_.iterations;
+  gluing_.forget_jumps();
   result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
+  looked_ = {};
+  // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone.
   begin_course(course_.method, course_.most);
+  course_.from = result_.iterations;
   before_segment_ = sweeps_;
   segment_ = epoch + 1;
 }

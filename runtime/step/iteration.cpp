@@ -3,11 +3,11 @@
 #include "runtime/step/task_kinds.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "kernels/balance.hpp"
+#include "runtime/graph/clock.hpp"
 
 namespace talus {
 
@@ -19,14 +19,6 @@ std::size_t memory_used(const StepState& state) {
          state.copies.capacity() * sizeof(WallCopy);
 }
 
-namespace {
-
-double clock_now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
-}  // namespace
-
 Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
                      const DecompositionSettings& decomposition, const graph::Communicator& ranks)
     : state_(state),
@@ -36,7 +28,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       ranks_(ranks),
       kernels_(settings.simd),
       gluing_(state, decomposition, ranks),
-      admm_(state, parameters, decomposition, ranks) {}
+      admm_(state, parameters, decomposition, gluing_, ranks) {}
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
@@ -55,6 +47,7 @@ void Iteration::begin() {
       state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
           static_cast<std::int32_t>(c));
   gluing_.begin();
+  gluing_.forget_jumps();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const WallState& wall = state_.wall_states[w];
     const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
@@ -64,7 +57,7 @@ void Iteration::begin() {
                       state_.decomposition.several();
   before_.resize(damped ? chunks.size() : 0);
   sums_.assign(chunks.size(), {});
-  began_ = clock_now();
+  began_ = graph::seconds_now();
   impulses_.clear();
   history_.clear();
   result_ = {};
@@ -75,6 +68,7 @@ void Iteration::begin() {
   sweeps_ = before_segment_ = 0;
   history_from_ = 0;
   sweeps_needed_ = -1;
+  looked_ = {};
   first_course();
 }
 
@@ -162,12 +156,12 @@ void Iteration::node(std::uint32_t node, int epoch) {
   const Work now = work(epoch);
   const std::size_t chunks = state_.chunks.size();
   if (node < chunks) {
-    const double start = busy_.empty() ? 0 : clock_now();
+    const double start = busy_.empty() ? 0 : graph::seconds_now();
     if (parameters_.friction)
       chunk<true>(node, epoch);
     else
       chunk<false>(node, epoch);
-    if (!busy_.empty()) busy_[node] += clock_now() - start;
+    if (!busy_.empty()) busy_[node] += graph::seconds_now() - start;
     // Long messages advance only while somebody calls MPI.
     if (ranks_.ranks() > 1 && node % 4 == 0) ranks_.progress();
     return;
@@ -326,7 +320,7 @@ bool Iteration::decide(int epoch) {
 /// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
 bool Iteration::measured(int epoch) {
   result_.iterations = sweeps_;
-  measured_ = clock_now();
+  measured_ = graph::seconds_now();
   const Decomposition& all = state_.decomposition;
   std::vector<double> rows = rows_of_subdomains();
   std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
@@ -356,6 +350,8 @@ bool Iteration::swept(int epoch) {
   add_up(pending_->wait());
   if (!judge())
     restore_at_ = epoch + 1;
+  else if (ask_admm())
+    call_admm(epoch);
   else
     plan_sweeps(sweeps_from_ - 1, sweeps_ahead());
   return true;

@@ -43,7 +43,8 @@ struct IterationResult {
 /// at a gate behind that sweep. If they say that the step was solved, `restore` brings back the impulses that
 /// were certified, so that results are the bits of one rank, where nothing has to be waited for.
 ///
-/// Where ADMM is called, the gate's thread does it alone: the next epoch is `accumulate`.
+/// Where ADMM is called, it is by the gate's threads of all ranks, on the impulses that were certified: the
+/// next epoch is `accumulate`.
 ///
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
 /// centre, and glue of every subdomain follow. Publish comes after the boundary chunks and before the inner
@@ -60,6 +61,8 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// Of threads that wait for decide(): ADMM's subdomains are shared out.
+  void assist() { admm_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
@@ -128,6 +131,7 @@ class Iteration {
   double impulse_scale() const;
   double drift() const;
   double sweeps_needed();
+  bool looks_at_all();
   bool balanced();
   bool ask_admm();
   void call_admm(int epoch);
@@ -157,6 +161,12 @@ class Iteration {
   double first_residual2_ = 0;       ///< at the first check of the step, or the first since ADMM [m^2/s^2]
   std::size_t history_from_ = 0;     ///< that check
   double sweeps_needed_ = -1;        ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  /// The last look at the error of all velocities.
+  struct Look {
+    int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
+    double error_rms = 0, error = 0;
+  };
+  Look looked_;
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment

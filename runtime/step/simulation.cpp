@@ -3,20 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
 
+#include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 
 namespace talus {
 
 namespace {
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 bool pushed(const Wall& wall) {
   return wall.load.drive == WallDrive::pressure || wall.load.drive == WallDrive::force;
@@ -223,7 +219,7 @@ struct Simulation::Implementation {
     report.iterations = result.iterations;
     report.error_rms = result.error_rms;
     report.error_max = result.error_max;
-    report.balance = std::max({result.drift, result.unbalance, defect});
+    report.balance = std::max(result.unbalance, defect);
     report.jump = result.jump;
     report.migrants = sums.migrants;
     report.imbalance = 1 + state.decomposition.imbalance;
@@ -370,14 +366,14 @@ SavedState Simulation::save() const {
 }
 
 const StepReport& Simulation::step() {
-  const double start = now();
+  const double start = graph::seconds_now();
   impl_->load_walls();
   double wall_energy_free = 0;
   for (std::size_t w = 0; w < impl_->state.walls.size(); ++w)
     wall_energy_free += energy_of(impl_->state.walls[w], impl_->state.wall_states[w].free_velocity);
   impl_->graph.run();
   impl_->check_for_runaway(wall_energy_free);
-  impl_->write_report(now() - start);
+  impl_->write_report(graph::seconds_now() - start);
   return impl_->report;
 }
 

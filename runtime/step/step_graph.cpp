@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+
+#include "runtime/graph/clock.hpp"
 
 namespace talus {
 
@@ -73,7 +74,7 @@ void StepGraph::build() {
 void StepGraph::run() {
   sums_ = {};
   ++steps_;
-  started_ = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  started_ = graph::seconds_now();
   trace::Recorder* const trace = executor_.trace();
   if (trace) trace->begin_step(static_cast<std::uint32_t>(steps_));
   executor_.run(graph_);

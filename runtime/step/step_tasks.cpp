@@ -1,12 +1,12 @@
 /// What the tasks of a step do; their order stands in step_graph.cpp.
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
 #include "kernels/release.hpp"
+#include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/order.hpp"
@@ -14,10 +14,6 @@
 namespace talus {
 
 namespace {
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 double speed(const Velocity& v) {
   return std::sqrt(v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2]);
@@ -155,12 +151,12 @@ void StepGraph::make_cells() {
       if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
     }
     make_room();
-    const double began = now();
+    const double began = graph::seconds_now();
     trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
                                    state_.candidates, anew);
     span.end();
-    sums_.times.dealing = now() - began;
+    sums_.times.dealing = graph::seconds_now() - began;
     cells_ = build_cells(around_.bodies.x, around_.reach);
     return;
   }
@@ -192,14 +188,14 @@ void StepGraph::make_chunks() {
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
-  const double began = now();
+  const double began = graph::seconds_now();
   if (several) {
     const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
                         state_.bodies, state_.candidates);
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
-    sums_.times.dealing += now() - began;
+    sums_.times.dealing += graph::seconds_now() - began;
   } else {
     match_impulses(state_.candidates, fresh);
     state_.candidates = std::move(fresh);
@@ -207,9 +203,9 @@ void StepGraph::make_chunks() {
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
-  const double planning = now();
+  const double planning = graph::seconds_now();
   iteration_.plan();
-  if (several) sums_.times.dealing += now() - planning;
+  if (several) sums_.times.dealing += graph::seconds_now() - planning;
   std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
   ranks_.sum(candidates);
   all_candidates_ = candidates[0];
@@ -222,10 +218,10 @@ void StepGraph::renew_slots() {
   const Bodies& bodies = state_.bodies;
   const double h = parameters_.time_step;
   state_.x_then = bodies.x;
-  state_.reach_then.resize(bodies.size());
-  for (std::size_t s = 0; s < bodies.size(); ++s)
-    state_.reach_then[s] =
-        around_.reach[static_cast<std::size_t>(around_.find(static_cast<std::int64_t>(bodies.id[s])))];
+  state_.reach_then.clear();
+  for (const SubdomainInterface& interface : state_.decomposition.interfaces)
+    for (Slot body : interface.bodies)
+      state_.reach_then.push_back(around_.reach[static_cast<std::size_t>(body)]);
   around_ = {};
   state_.free.u.resize(bodies.size());
   state_.free.w.resize(parameters_.turns ? bodies.size() : 0);
@@ -262,7 +258,7 @@ void StepGraph::plan_iteration() {
   iteration_.begin();
   if (!planned_) plan_epochs();
   followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));
-  iterating_ = now();
+  iterating_ = graph::seconds_now();
 }
 
 /// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the
@@ -362,7 +358,7 @@ void StepGraph::finish_lane(std::uint32_t lane) {
 }
 
 void StepGraph::finish_walls() {
-  iterated_ = now();
+  iterated_ = graph::seconds_now();
   // A wall without a copy here has its velocity from the ranks that hold one, or its free one.
   const std::size_t walls = state_.walls.size();
   std::vector<double> velocities(3 * walls, -std::numeric_limits<double>::infinity());
@@ -457,7 +453,7 @@ void StepGraph::sum_up() {
   sums_.candidates = all_candidates_;
   sums_.times.detection = iterating_ - started_;
   sums_.times.iteration = iterated_ - iterating_;
-  sums_.times.rest = now() - iterated_;
+  sums_.times.rest = graph::seconds_now() - iterated_;
 }
 
 }  // namespace talus

@@ -1,7 +1,6 @@
 #include "runtime/trace/clock.hpp"
 
 #include <limits>
-#include <thread>
 #include <vector>
 
 namespace talus::trace {
@@ -15,17 +14,14 @@ struct Line {
   Line(const graph::Communicator& ranks, int other)
       : sender(ranks.open_send(other, tag, out)), receiver(ranks.open_receive(other, tag, in)) {}
   void send(double first, double second) {
-    wait(*sender);
+    sender->wait();
     out[0] = first;
     out[1] = second;
     sender->start();
   }
   void receive() {
     receiver->start();
-    wait(*receiver);
-  }
-  static void wait(graph::Communicator::Channel& channel) {
-    while (!channel.done()) std::this_thread::yield();
+    receiver->wait();
   }
   std::vector<double> out = std::vector<double>(3), in = std::vector<double>(3);
   std::unique_ptr<graph::Communicator::Channel> sender, receiver;
@@ -42,7 +38,7 @@ ClockReading read_clock(const graph::Communicator& ranks, const Recorder& record
       line.send(now(), 0);
     }
     line.receive();
-    Line::wait(*line.sender);
+    line.sender->wait();
     return {line.in[0], line.in[1]};
   }
   for (int other = 1; other < ranks.ranks(); ++other) {
@@ -59,7 +55,7 @@ ClockReading read_clock(const graph::Communicator& ranks, const Recorder& record
       best = {line.in[0], asked + took / 2 - line.in[0]};
     }
     line.send(best.time, best.offset);
-    Line::wait(*line.sender);
+    line.sender->wait();
   }
   return {now(), 0};
 }

@@ -24,6 +24,7 @@
 #include <optional>
 #include <vector>
 
+#include "runtime/graph/clock.hpp"
 #include "runtime/trace/trace.hpp"
 
 namespace talus::trace {
@@ -90,8 +91,7 @@ class Recorder {
   bool active() const { return active_; }
   /// [ns] since the recorder was made.
   std::int64_t now() const {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - start_)
-        .count();
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(graph::Clock::now() - start_).count();
   }
   Lane& lane(int thread) { return lanes_[static_cast<std::size_t>(thread)]; }
   /// Of the calling thread of the team.
@@ -106,7 +106,7 @@ class Recorder {
   void hand_over(Lane& lane);
 
   const RecorderOptions options_;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  const graph::Clock::time_point start_ = graph::Clock::now();
   std::vector<Task> tasks_;
   std::vector<Lane> lanes_;
   std::optional<Plan> pending_;  ///< made while nothing was recorded

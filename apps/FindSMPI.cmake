@@ -1,0 +1,15 @@
+# SimGrid's SMPI (Debian: libsimgrid-dev) as MPI::MPI_C: ranks that are simulated, all in one process. Its wrapper smpicxx also
+# redirects the C library's clocks and heap; Talus looks at the clock in one place (runtime/graph/clock.hpp) and needs neither.
+find_path(SMPI_INCLUDE_DIR mpi.h PATH_SUFFIXES smpi NO_CMAKE_SYSTEM_PATH PATHS /usr/include /usr/local/include)
+find_path(SIMGRID_INCLUDE_DIR smpi/smpi.h)
+find_library(SIMGRID_LIBRARY simgrid)
+find_program(SMPI_RUN smpirun)
+include(FindPackageHandleStandardArgs)
+find_package_handle_standard_args(SMPI REQUIRED_VARS SMPI_INCLUDE_DIR SIMGRID_INCLUDE_DIR SIMGRID_LIBRARY SMPI_RUN)
+mark_as_advanced(SMPI_INCLUDE_DIR SIMGRID_INCLUDE_DIR SIMGRID_LIBRARY SMPI_RUN)
+if(SMPI_FOUND AND NOT TARGET MPI::MPI_C)
+  add_library(MPI::MPI_C INTERFACE IMPORTED)
+  target_include_directories(MPI::MPI_C SYSTEM INTERFACE ${SMPI_INCLUDE_DIR} ${SIMGRID_INCLUDE_DIR})
+  target_link_libraries(MPI::MPI_C INTERFACE ${SIMGRID_LIBRARY})
+  target_compile_definitions(MPI::MPI_C INTERFACE TALUS_SMPI)
+endif()

@@ -1,0 +1,130 @@
+#include "kernels/balance.hpp"
+
+#include <array>
+#include <vector>
+
+#include "kernels/body_solver.hpp"
+#include "kernels/stiffness.hpp"
+
+namespace talus {
+
+namespace {
+
+/// rho W_nn over estimate_stiffness. That looks at masses and layers only: in a wedge of half angle a the
+/// load excites an eigenvalue smaller by sin^2 a.
+constexpr double firmness = 1e4;
+/// Of the conjugate gradients' error over what they found.
+constexpr double linear_tolerance = 0.1;
+constexpr int max_linear = 100;
+/// They see a preconditioned residual, which is smaller than the error.
+constexpr double caution = 3;
+/// Of the impulses between walls, over those of the step: what is smaller is of no interest.
+constexpr double interest = 1e-2;
+
+/// What the contacts of one part that carry ask of the velocities.
+struct Wishes {
+  std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s]
+  double drive = 0;          ///< fastest drive among them [m/s]
+  double pressed = 0;        ///< sum of the impulses at walls [N s]
+};
+
+/// Drops the other contacts from `problem`.
+Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
+  Wishes wishes;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    ContactEquation c = problem.contacts[k];
+    const Vec3 r = problem.impulse[k], v = constrained(c, relative_velocity(c, V) + c.offset);
+    if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
+      wishes.pressed += std::abs(c.normal.dot(r));
+    const double m = effective_mass(problem, c);
+    const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
+    const Vec3 carried = project_on_cone(c, r - m * shifted);
+    if (carried == Vec3::Zero()) continue;
+    const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
+    Vec3 change = y - c.mu * slip.norm() * c.normal - v;
+    const double most = c.mu * c.normal.dot(carried);
+    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most) {
+      c.mu = 0;  // it slides: along the plane it asks for nothing
+      change = constrained(c, change);
+    }
+    if (c.second < 0) wishes.drive = std::max(wishes.drive, c.offset.norm());
+    wishes.change.push_back(change);
+    problem.contacts[kept] = c;
+    problem.impulse[kept++] = r;
+  }
+  problem.contacts.resize(kept);
+  problem.impulse.resize(kept);
+  return wishes;
+}
+
+/// |V - `from`|_M^2, `from` the free velocities or 0.
+double kinetic2(const BodyParts& parts, const PartField& V, bool from_free) {
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    for (std::size_t b = 0; b < V[p].size(); ++b) {
+      if (!parts[p].counted(b)) continue;
+      const BodyUnknown& body = parts[p].bodies[b];
+      row[0] += from_free ? talus::kinetic2(body, V[p][b].u - body.free.u, V[p][b].w - body.free.w)
+                          : talus::kinetic2(body, V[p][b].u, V[p][b].w);
+    }
+  })[0];
+}
+
+}  // namespace
+
+VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough) {
+  const BodyParts parts(problems, link);
+  const double kappa = firmness * estimate_stiffness(parts);
+  const PartField V = velocities_of(parts, impulses_of(parts));
+  std::vector<Wishes> wishes(parts.size());
+  std::vector<std::vector<double>> rho(parts.size());
+  parts.each([&](std::size_t p) {
+    wishes[p] = wishes_of(problems[p], V[p]);
+    for (const ContactEquation& c : problems[p].contacts)
+      rho[p].push_back(kappa * effective_mass(problems[p], c));
+  });
+
+  enum { contacts, mass, pressed, drive, width };
+  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
+    row[contacts] = static_cast<double>(wishes[p].change.size());
+    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
+      if (parts[p].counted(b)) row[mass] += parts[p].bodies[b].mass;
+    row[pressed] = wishes[p].pressed;
+    row[drive] = wishes[p].drive;
+  });
+  std::array<double, width> all{};
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    all[k % width] = k % width == drive ? std::max(all[drive], rows[k]) : all[k % width] + rows[k];
+  if (all[contacts] == 0) return {};
+  const double other = all[drive] > 0 ? all[mass] * all[drive] * all[drive]
+                                      : interest * interest * all[pressed] * all[pressed] / all[mass];
+  const double scale2 = std::max(kinetic2(parts, V, true), other);
+
+  PartField force = parts.field(), motion = parts.field();
+  parts.each([&](std::size_t p) {
+    for (std::size_t k = 0; k < rho[p].size(); ++k)
+      add_force(parts[p].contacts[k], rho[p][k] * wishes[p].change[k], force[p]);
+  });
+  link.sum_copies(force);
+  parts.each([&](std::size_t p) {
+    for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
+  });
+  BodySolver solver(parts, rho, 0);
+  VelocityError error;
+  double left = solver.begin(force, motion), found = 0;
+  const double least = enough * enough * scale2, part = linear_tolerance * linear_tolerance;
+  while (error.linear_iterations < max_linear && left > part * std::max(found, least)) {
+    left = solver.iterate(motion);
+    found = kinetic2(parts, motion, false);
+    ++error.linear_iterations;
+  }
+  error.relative = (std::sqrt(found) + caution * std::sqrt(left)) / std::sqrt(scale2);
+  return error;
+}
+
+VelocityError velocity_error(BodyProblem problem, double enough) {
+  const PartLink alone;
+  return velocity_error({&problem, 1}, alone, enough);
+}
+
+}  // namespace talus

@@ -1,0 +1,34 @@
+#pragma once
+
+/// The clock by which a run times itself.
+
+#include <chrono>
+
+namespace talus::graph {
+
+#ifdef TALUS_SMPI
+/// Ranks are simulated (SimGrid's SMPI): all of them are in one process, one runs at a time, and MPI's clock
+/// is that of the machine that is simulated.
+inline constexpr bool simulated_ranks = true;
+
+/// Time of the simulated machine: what ranks have computed, as measured, and what messages took, as modelled.
+/// The other clocks of the standard library show what the simulation takes.
+struct Clock {
+  using duration = std::chrono::nanoseconds;
+  using rep = duration::rep;
+  using period = duration::period;
+  using time_point = std::chrono::time_point<Clock>;
+  static constexpr bool is_steady = true;
+  static time_point now() noexcept;
+};
+#else
+inline constexpr bool simulated_ranks = false;
+using Clock = std::chrono::steady_clock;
+#endif
+
+/// [s] since some moment that is the same for the whole run.
+inline double seconds_now() {
+  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
+
+}  // namespace talus::graph

@@ -1,0 +1,80 @@
+/// The command built for simulated ranks (preset smpi), on machines that the command describes. Skipped where
+/// that build is not.
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "tests/mpi/launcher.hpp"
+
+namespace talus::test {
+namespace {
+
+class SimulatedRanks : public OnRanks {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(TALUS_SMPI_COMMAND)) GTEST_SKIP() << "there is no " << TALUS_SMPI_COMMAND;
+    write(at("scene.toml"), six_subdomains);
+    const Outcome one = run(1, "run scene.toml --out one --threads 1 --trace");
+    ASSERT_EQ(one.code, 3) << one.messages;
+  }
+
+  /// The machine of a replay with so many ranks, as smpirun wants it.
+  std::string machine(int ranks, const std::string& options = "") const {
+    const std::string file = fmt::format("machine{}.xml", ranks);
+    const Outcome replay =
+        run(1, fmt::format("replay one/trace.h5 --ranks {} {} --smpi-platform {}", ranks, options, file));
+    EXPECT_EQ(replay.code, 0) << replay.messages;
+    return fmt::format("-platform {}", file);
+  }
+
+  /// The code that smpirun ends with; what it says goes to OUT.txt.
+  int simulate(int ranks, const std::string& machine, const std::string& out) const {
+    const std::string line = fmt::format("cd '{}' && smpirun -np {} {} '" TALUS_SMPI_COMMAND
+                                         "' run scene.toml --out {} >{}.txt 2>&1",
+                                         folder_.path().string(), ranks, machine, out, out);
+    const int status = std::system(line.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+  /// Of the whole run on the simulated machine [s].
+  double seconds(const std::string& out) const { return summary(at(out)).at("wall_s"); }
+};
+
+TEST_F(SimulatedRanks, ChangeNoBitOfTheResults) {
+  for (int ranks : {1, 2, 6}) {
+    const std::string out = fmt::format("r{}", ranks);
+    EXPECT_EQ(simulate(ranks, machine(ranks), out), 3) << file(".", out + ".txt");
+    EXPECT_EQ(digest_of(out), digest_of("one")) << ranks;
+    EXPECT_EQ(file(out, "walls.csv"), file("one", "walls.csv")) << ranks;
+  }
+}
+
+// Clocks are those of the simulated machine: a network a thousand times slower takes so much longer, on the
+// same host, in the same run.
+TEST_F(SimulatedRanks, TakeTheTimeOfTheirNetwork) {
+  ASSERT_EQ(simulate(6, machine(6, "--latency 1e-3"), "slow"), 3) << file(".", "slow.txt");
+  EXPECT_EQ(digest_of("slow"), digest_of("one"));
+  const long iterations = summary(at("slow")).at("iterations");
+  // Each iteration has an exchange; its messages need a latency at least.
+  EXPECT_GT(seconds("slow"), 1e-3 * static_cast<double>(iterations));
+}
+
+TEST_F(SimulatedRanks, ShareNodesAsTheReplayDoes) {
+  machine(4, "--ranks-per-node 2");
+  EXPECT_EQ(file(".", "machine4.xml.hosts"), "node-0\nnode-0\nnode-1\nnode-1\n");
+  EXPECT_EQ(simulate(4, "-hostfile machine4.xml.hosts -platform machine4.xml", "r4"), 3)
+      << file(".", "r4.txt");
+  EXPECT_EQ(digest_of("r4"), digest_of("one"));
+}
+
+TEST_F(SimulatedRanks, RefuseAMachineThatSimGridHasNot) {
+  for (const char* option : {"--noise 0.1", "--threads 2", "--contacts-scale 2"}) {
+    const Outcome refused =
+        run(1, fmt::format("replay one/trace.h5 --ranks 2 {} --smpi-platform no.xml", option));
+    EXPECT_EQ(refused.code, 2) << option;
+    EXPECT_FALSE(fs::exists(at("no.xml"))) << option;
+  }
+}
+
+}  // namespace
+}  // namespace talus::test
