@@ -65,6 +65,15 @@ Truth wall_forces(std::vector<Vec3> exact) {
   };
 }
 
+Truth at_rest(Truth truth) {
+  return [truth = std::move(truth)](const StepView& step) -> std::optional<double> {
+    const double most = step.time_step() * step.gravity().norm() / 20;
+    const auto rests = [&](const Vec3& u) { return u.norm() <= most; };
+    if (!std::all_of(step.before.u.begin(), step.before.u.end(), rests)) return std::nullopt;
+    return truth(step);
+  };
+}
+
 Truth reference_velocities(const Problem& of) {
   Setup setup = of.setup;
   setup.solver.method = SolverMethod::nncg;

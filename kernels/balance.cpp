@@ -16,19 +16,23 @@ constexpr double firmness = 1e4;
 /// Of the conjugate gradients' error over what they found.
 constexpr double linear_tolerance = 0.1;
 constexpr int max_linear = 100;
-/// They see a preconditioned residual, which is smaller than the error.
+/// Of open contacts that join those that carry.
+constexpr int max_rounds = 6;
+/// The gradients see a preconditioned residual, which is smaller than the error.
 constexpr double caution = 3;
 /// Of the impulses between walls, over those of the step: what is smaller is of no interest.
 constexpr double interest = 1e-2;
 
-/// What the contacts of one part that carry ask of the velocities.
+/// What the contacts of one part that carry ask of the velocities, and those that do not carry.
 struct Wishes {
-  std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s]
-  double drive = 0;          ///< fastest drive among them [m/s]
-  double pressed = 0;        ///< sum of the impulses at walls [N s]
+  std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s], in order of contact
+  std::vector<ContactEquation> open;
+  std::vector<double> gap;  ///< of those: v_n, > 0 [m/s]
+  double drive = 0;         ///< fastest drive among those that carry [m/s]
+  double pressed = 0;       ///< sum of the impulses at walls [N s]
 };
 
-/// Drops the other contacts from `problem`.
+/// Keeps those that carry in `problem`.
 Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
   Wishes wishes;
   std::size_t kept = 0;
@@ -40,22 +44,48 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
     const double m = effective_mass(problem, c);
     const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
     const Vec3 carried = project_on_cone(c, r - m * shifted);
-    if (carried == Vec3::Zero()) continue;
     const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
     Vec3 change = y - c.mu * slip.norm() * c.normal - v;
     const double most = c.mu * c.normal.dot(carried);
-    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most) {
+    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most)
       c.mu = 0;  // it slides: along the plane it asks for nothing
-      change = constrained(c, change);
+    if (carried == Vec3::Zero()) {
+      c.mu = 0;
+      wishes.open.push_back(c);
+      wishes.gap.push_back(std::max(0.0, c.normal.dot(v)));
+      continue;
     }
     if (c.second < 0) wishes.drive = std::max(wishes.drive, c.offset.norm());
-    wishes.change.push_back(change);
+    wishes.change.push_back(constrained(c, change));
     problem.contacts[kept] = c;
     problem.impulse[kept++] = r;
   }
   problem.contacts.resize(kept);
   problem.impulse.resize(kept);
   return wishes;
+}
+
+/// Open contacts that `motion` closes and more join those that carry: they ask for no more than to close.
+/// Returns sum m v_n^2 of what it pushed them in [J].
+double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& wishes) {
+  double pushed2 = 0;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < wishes.open.size(); ++k) {
+    const ContactEquation c = wishes.open[k];
+    const double left = wishes.gap[k] + c.normal.dot(relative_velocity(c, motion));
+    if (left < 0) {
+      pushed2 += effective_mass(problem, c) * left * left;
+      problem.contacts.push_back(c);
+      problem.impulse.push_back(Vec3::Zero());
+      wishes.change.push_back(-wishes.gap[k] * c.normal);
+    } else {
+      wishes.open[kept] = c;
+      wishes.gap[kept++] = wishes.gap[k];
+    }
+  }
+  wishes.open.resize(kept);
+  wishes.gap.resize(kept);
+  return pushed2;
 }
 
 /// |V - `from`|_M^2, `from` the free velocities or 0.
@@ -77,12 +107,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   const double kappa = firmness * estimate_stiffness(parts);
   const PartField V = velocities_of(parts, impulses_of(parts));
   std::vector<Wishes> wishes(parts.size());
-  std::vector<std::vector<double>> rho(parts.size());
-  parts.each([&](std::size_t p) {
-    wishes[p] = wishes_of(problems[p], V[p]);
-    for (const ContactEquation& c : problems[p].contacts)
-      rho[p].push_back(kappa * effective_mass(problems[p], c));
-  });
+  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p]); });
 
   enum { contacts, mass, pressed, drive, width };
   const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
@@ -100,23 +125,35 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
                                       : interest * interest * all[pressed] * all[pressed] / all[mass];
   const double scale2 = std::max(kinetic2(parts, V, true), other);
 
-  PartField force = parts.field(), motion = parts.field();
-  parts.each([&](std::size_t p) {
-    for (std::size_t k = 0; k < rho[p].size(); ++k)
-      add_force(parts[p].contacts[k], rho[p][k] * wishes[p].change[k], force[p]);
-  });
-  link.sum_copies(force);
-  parts.each([&](std::size_t p) {
-    for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
-  });
-  BodySolver solver(parts, rho, 0);
   VelocityError error;
-  double left = solver.begin(force, motion), found = 0;
-  const double least = enough * enough * scale2, part = linear_tolerance * linear_tolerance;
-  while (error.linear_iterations < max_linear && left > part * std::max(found, least)) {
-    left = solver.iterate(motion);
-    found = kinetic2(parts, motion, false);
-    ++error.linear_iterations;
+  PartField motion = parts.field();
+  double left = 0, found = 0;
+  for (int round = 0; round < max_rounds; ++round) {
+    std::vector<std::vector<double>> rho(parts.size());
+    PartField force = parts.field();
+    parts.each([&](std::size_t p) {
+      for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
+        const ContactEquation& c = parts[p].contacts[k];
+        rho[p].push_back(kappa * effective_mass(parts[p], c));
+        add_force(c, rho[p][k] * wishes[p].change[k], force[p]);
+      }
+    });
+    link.sum_copies(force);
+    parts.each([&](std::size_t p) {
+      for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
+    });
+    BodySolver solver(parts, rho, 0);
+    left = solver.begin(force, motion);
+    const double least = enough * enough * scale2, part = linear_tolerance * linear_tolerance;
+    for (int k = 0; k < max_linear && left > part * std::max(found, least); ++k) {
+      left = solver.iterate(motion);
+      found = kinetic2(parts, motion, false);
+      ++error.linear_iterations;
+    }
+    const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
+      row[0] = close_open(problems[p], motion[p], wishes[p]);
+    })[0];
+    if (kappa * pushed2 <= part * std::max(found, least)) break;
   }
   error.relative = (std::sqrt(found) + caution * std::sqrt(left)) / std::sqrt(scale2);
   return error;

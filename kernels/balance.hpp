@@ -47,14 +47,15 @@ struct VelocityError {
 ///
 /// The contacts ask for changes of their velocities: y - v, with (r', y) the complementary pair next to (r,
 /// v), one projection away. Without friction, and with r and y complementary, any motion d of the bodies that
-/// grants the wishes, H^T d = y - v, bounds the error:
+/// grants the wishes of those that carry and closes the others at most, H^T d = y - v, bounds the error:
 ///
 ///   |V(r) - V*|_M^2 = (r - r*).(v - v*) <= (r - r*).(v - y) = -d.M (V(r) - V*) <= |d|_M |V(r) - V*|_M
 ///
 /// since (r - r*).(y - v*) = -r.v* - r*.y <= 0. The smallest one is sought: min |d|_M^2 + sum rho |H^T d - (y
 /// - v)|^2 over the contacts that carry, along the normal where they slide, rho far above what the problem
-/// needs: one linear solve (body_solver.hpp), which sees through chains where sweeps do not. What is
-/// heuristic: which contacts carry is taken from r, and rho is finite.
+/// needs: a linear solve (body_solver.hpp), which sees through chains where sweeps do not. Open contacts that
+/// d would push in are added and it is solved again. What is heuristic: friction, and that rho and the rounds
+/// are finite.
 ///
 /// By Cauchy and Schwarz the momentum that any part of the sample has still to gain, and with it the error of
 /// the force through any cut, is at most sqrt(M) |V(r) - V*|_M. The scale is |V(r) - V_free|_M, what the
