@@ -81,9 +81,9 @@ Truth wall_forces(std::vector<Vec3> exact);
 /// the heavy one then rightly falls.
 Truth at_rest(Truth truth);
 
-/// The velocities that the same step takes when it is solved to 1e-10 with conjugate gradients, in the norm
-/// of kinetic energy, over what the contacts change. Without friction they are unique. Nothing known beyond
-/// the first step, or when the reference itself falls short.
+/// The velocities that the same step takes when it is solved to 1e-10 with conjugate gradients: the sum of
+/// the bodies' errors of momentum over that of what the contacts change. Without friction they are unique.
+/// Nothing known beyond the first step, or when the reference itself falls short.
 Truth reference_velocities(const Problem& problem);
 
 }  // namespace talus::stability

@@ -88,14 +88,27 @@ double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& w
   return pushed2;
 }
 
-/// |V - `from`|_M^2, `from` the free velocities or 0.
-double kinetic2(const BodyParts& parts, const PartField& V, bool from_free) {
+/// Sum m |u| + (I/R^2) |w| of V, or of V - V_free [N s].
+double momentum(const BodyParts& parts, const PartField& V, bool gained) {
   return parts.total(1, [&](std::size_t p, std::span<double> row) {
     for (std::size_t b = 0; b < V[p].size(); ++b) {
       if (!parts[p].counted(b)) continue;
       const BodyUnknown& body = parts[p].bodies[b];
-      row[0] += from_free ? talus::kinetic2(body, V[p][b].u - body.free.u, V[p][b].w - body.free.w)
-                          : talus::kinetic2(body, V[p][b].u, V[p][b].w);
+      const Twist from = gained ? body.free : Twist{};
+      row[0] += body.mass * (V[p][b].u - from.u).norm() + body.spin_mass * (V[p][b].w - from.w).norm();
+    }
+  })[0];
+}
+
+/// What the motion is to make small: |d|_M^2 + sum rho |H^T d - change|^2 [J].
+double cost(const BodyParts& parts, const PartField& motion, std::span<const Wishes> wishes, double kappa) {
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    for (std::size_t b = 0; b < motion[p].size(); ++b)
+      if (parts[p].counted(b)) row[0] += kinetic2(parts[p].bodies[b], motion[p][b].u, motion[p][b].w);
+    for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
+      const ContactEquation& c = parts[p].contacts[k];
+      const Vec3 missed = constrained(c, relative_velocity(c, motion[p])) - wishes[p].change[k];
+      row[0] += kappa * effective_mass(parts[p], c) * missed.squaredNorm();
     }
   })[0];
 }
@@ -121,13 +134,18 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   for (std::size_t k = 0; k < rows.size(); ++k)
     all[k % width] = k % width == drive ? std::max(all[drive], rows[k]) : all[k % width] + rows[k];
   if (all[contacts] == 0) return {};
-  const double other = all[drive] > 0 ? all[mass] * all[drive] * all[drive]
-                                      : interest * interest * all[pressed] * all[pressed] / all[mass];
-  const double scale2 = std::max(kinetic2(parts, V, true), other);
+  const double scale =
+      std::max(momentum(parts, V, true), all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed]);
 
   VelocityError error;
-  PartField motion = parts.field();
+  // Two motions to begin from: none; and the stop of everything, which is the answer of a sample at rest.
+  PartField motion = parts.field(), stop = V;
+  parts.each([&](std::size_t p) {
+    for (Twist& v : stop[p]) v = {-v.u, -v.w};
+  });
   double left = 0, found = 0;
+  // By Cauchy and Schwarz: the most momentum in so much energy.
+  const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
   for (int round = 0; round < max_rounds; ++round) {
     std::vector<std::vector<double>> rho(parts.size());
     PartField force = parts.field();
@@ -142,20 +160,21 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     parts.each([&](std::size_t p) {
       for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
     });
+    if (cost(parts, stop, wishes, kappa) < cost(parts, motion, wishes, kappa)) motion = stop;
     BodySolver solver(parts, rho, 0);
     left = solver.begin(force, motion);
-    const double least = enough * enough * scale2, part = linear_tolerance * linear_tolerance;
-    for (int k = 0; k < max_linear && left > part * std::max(found, least); ++k) {
+    found = momentum(parts, motion, false);
+    for (int k = 0; k < max_linear && most(left) > linear_tolerance * std::max(found, enough * scale); ++k) {
       left = solver.iterate(motion);
-      found = kinetic2(parts, motion, false);
+      found = momentum(parts, motion, false);
       ++error.linear_iterations;
     }
     const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
       row[0] = close_open(problems[p], motion[p], wishes[p]);
     })[0];
-    if (kappa * pushed2 <= part * std::max(found, least)) break;
+    if (most(kappa * pushed2) <= linear_tolerance * std::max(found, enough * scale)) break;
   }
-  error.relative = (std::sqrt(found) + caution * std::sqrt(left)) / std::sqrt(scale2);
+  error.relative = (found + caution * most(left)) / scale;
   return error;
 }
 
