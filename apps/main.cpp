@@ -54,6 +54,9 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_flag(
       "--typical", replay.machine.typical,
       "tasks that took over three times their median of the step take the median: for noisy recordings");
+  app.add_option(
+      "--quantile", replay.machine.quantile,
+      "tasks take this quantile of their times in the step: for recordings on a busy machine [off]");
   app.add_flag("--blocking-check", replay.blocking_check, "convergence checks wait for their sums");
   app.add_option("--smpi-platform", replay.smpi_platform,
                  "write the machine for smpirun, which runs the real program on it (preset smpi)")

@@ -74,7 +74,7 @@ ScalingNetwork scaling_network(const std::string& name) {
 }
 
 std::vector<ScalingRow> predict(const ScalingTraces& traces, std::span<const ScalingMachine> machines,
-                                std::span<const ScalingNetwork> networks, bool typical) {
+                                std::span<const ScalingNetwork> networks, bool typical, double quantile) {
   // Rows of all repeats of a machine, each with the seconds of its own trace.
   std::vector<std::vector<ScalingRow>> repeats(machines.size() * networks.size());
   for (std::size_t k = 0; k < traces.files.size(); ++k) {
@@ -89,6 +89,7 @@ std::vector<ScalingRow> predict(const ScalingTraces& traces, std::span<const Sca
         // Ranks with several threads have as many cores as those with one.
         machine.ranks_per_node = std::max(1, machine.ranks_per_node / machine.threads);
         machine.typical = typical;
+        machine.quantile = quantile;
         const trace::Replay played = trace::replay(timeline, machine, true);
         ScalingRow row = row_of(traces.subject, machines[m], {traces.times[k]});
         row.source = ScalingSource::replay;

@@ -37,6 +37,6 @@ struct ScalingTraces {
 /// Plays every trace on every machine: a row per machine and network, medians over the traces. Machines have
 /// as many subdomains as the traces. Throws what read_trace and replay throw.
 std::vector<ScalingRow> predict(const ScalingTraces& traces, std::span<const ScalingMachine> machines,
-                                std::span<const ScalingNetwork> networks, bool typical);
+                                std::span<const ScalingNetwork> networks, bool typical, double quantile);
 
 }  // namespace talus

@@ -135,6 +135,10 @@ std::string introduction_of(const ScalingReport& report) {
   for (const ScalingNetwork& network : report.networks)
     text += fmt::format(" {}: {}.", network.name, network.description);
   if (report.typical) text += " Tasks that took over three times their median were given the median.";
+  if (report.quantile > 0)
+    text +=
+        fmt::format(" Tasks were given the {:g} quantile of their times in the step: the machine was busy.",
+                    report.quantile);
   return text;
 }
 

@@ -39,6 +39,7 @@ struct ScalingReport {
   std::int64_t first = 1, last = 1;
   int record = 1;
   bool typical = false;
+  double quantile = 0;
   ScalingCommands commands;
   std::vector<ScalingRow> rows;  ///< related
 };

@@ -13,6 +13,7 @@
 #include "io/csv_table.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
+#include "io/smpi_platform.hpp"
 
 namespace talus {
 
@@ -126,6 +127,22 @@ RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subj
   fs::create_directories(trace.parent_path());
   fs::rename(scratch.folder() / "out" / "trace.h5", trace);
   return times;
+}
+
+RunTimes simulate_once(const ScalingLauncher& launcher, const SimulatedLauncher& simulated,
+                       const ScalingSubject& subject, const trace::Machine& machine) {
+  const Scratch scratch(launcher.work);
+  const fs::path platform = scratch.folder() / "platform.xml", hosts = scratch.folder() / "hosts";
+  io::write_whole(platform, io::smpi_platform(machine));
+  io::write_whole(hosts, io::smpi_hosts(machine));
+  std::vector<std::string> words{
+      simulated.smpirun, "-np", fmt::format("{}", machine.ranks), "-hostfile", hosts, "-platform", platform};
+  ScalingLauncher inside = launcher;
+  inside.talus = fs::absolute(simulated.talus);
+  const std::vector<std::string> run =
+      run_words(inside, subject, {machine.ranks, 1, 1}, (scratch.folder() / "out").string());
+  words.insert(words.end(), run.begin(), run.end());
+  return start(launcher, words, scratch.folder());
 }
 
 std::vector<RecordedTrace> read_recordings(const fs::path& times_csv) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "apps/scaling_table.hpp"
+#include "runtime/trace/replay.hpp"
 
 namespace talus {
 
@@ -54,6 +55,16 @@ RunTimes run_once(const ScalingLauncher& launcher, const ScalingSubject& subject
 /// The same on one rank and thread with --trace; the trace is moved to `trace`.
 RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subject, int subdomains,
                      const std::filesystem::path& trace);
+
+/// How simulated ranks are started: the program built for them (preset smpi) and SimGrid's launcher.
+struct SimulatedLauncher {
+  std::string talus, smpirun;
+};
+
+/// Runs on `machine.ranks` simulated ranks with one thread each and as many subdomains. Times are those of
+/// the machine. Throws what run_once throws; std::invalid_argument for a machine that SimGrid does not have.
+RunTimes simulate_once(const ScalingLauncher& launcher, const SimulatedLauncher& simulated,
+                       const ScalingSubject& subject, const trace::Machine& machine);
 
 /// A recording that a study keeps.
 struct RecordedTrace {

@@ -45,6 +45,7 @@ struct ScalingPlan {
   std::int64_t first = 1, last = 1;
   int cores = 1;
   bool typical = false;
+  double quantile = 0;
   int repeat = 5, record = 1;
 };
 
@@ -111,6 +112,7 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
   if (!options.beside.empty()) plan.beside = read_speedups(options.beside);
   plan.record = options.record;
   plan.typical = options.typical;
+  plan.quantile = options.quantile;
   const std::string mpirun = options.mpirun.empty() ? "mpirun" : split_words(options.mpirun).front();
   if (plan.repeat > 0 && plan.cores > 1 && !program_exists(mpirun))
     refuse(
@@ -118,7 +120,8 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
                     "--mpirun, or ask for --cores 1",
                     mpirun));
   if (!options.smpi.empty()) {
-    if (!program_exists(options.smpi)) refuse(options.smpi + " cannot be started: no talus for --smpi");
+    if (!fs::is_regular_file(options.smpi))
+      refuse(options.smpi + " is not there: --smpi wants the talus of preset smpi");
     if (!program_exists(options.smpirun)) refuse(options.smpirun + " is not to be found; see --smpirun");
   }
   return plan;
@@ -130,6 +133,7 @@ class Study {
       : plan_(std::move(plan)),
         directory_(std::move(directory)),
         recordings_(read_recordings(directory_ / "traces" / "times.csv")) {
+    simulated_ = {options.smpi, options.smpirun};
     launcher_.talus = own_path();
     launcher_.mpirun = split_words(options.mpirun);
     launcher_.work = directory_ / "run";
@@ -152,6 +156,9 @@ class Study {
     }
     record(all);
     for (const ScalingTraces& traces : all) predict_from(traces);
+    if (!simulated_.talus.empty())
+      for (const int n : plan_.strong)
+        for (const ScalingNetwork& network : plan_.networks) simulate(subject, n, network);
   }
 
   void weak(const ScalingSubject& subject, int n) {
@@ -193,6 +200,16 @@ class Study {
     }
   }
 
+  void simulate(const ScalingSubject& subject, int n, const ScalingNetwork& network) {
+    trace::Machine machine = network.machine;
+    machine.ranks = n;
+    machine.ranks_per_node = std::min(machine.ranks_per_node, n);
+    ScalingRow row = row_of(subject, {n, n, 1}, {simulate_once(launcher_, simulated_, subject, machine)});
+    row.source = ScalingSource::smpi;
+    row.network = network.name;
+    add({row});
+  }
+
   /// Recordings take turns as runs do.
   void record(std::vector<ScalingTraces>& all) {
     for (int k = 1; k <= plan_.record; ++k)
@@ -229,32 +246,32 @@ class Study {
   void predict_from(const ScalingTraces& traces) {
     const int n = traces.subdomains;
     const ScalingMachine machines[] = {{n, n, 1}};
-    add(predict(traces, machines, plan_.networks, plan_.typical));
+    add(predict(traces, machines, plan_.networks, plan_.typical, plan_.quantile));
     // What was measured, predicted: how far the others can be believed.
     if (n <= plan_.cores && plan_.repeat > 0 && traces.subject.variant.empty()) {
       std::vector<ScalingMachine> here;
       for (const int ranks : rank_counts(n)) here.push_back({n, ranks, n / ranks});
       const ScalingNetwork node[] = {scaling_network("node")};
       if (std::ranges::find(plan_.networks, "node", &ScalingNetwork::name) == plan_.networks.end())
-        add(predict(traces, here, node, plan_.typical));
+        add(predict(traces, here, node, plan_.typical, plan_.quantile));
     }
     if (traces.subject.kind != ScalingKind::strong || !traces.subject.variant.empty() || n == 1 ||
         std::ranges::find(plan_.hybrid, n) == plan_.hybrid.end())
       return;
     std::vector<ScalingMachine> ways;
     for (const int ranks : rank_counts(n)) ways.push_back({n, ranks, n / ranks});
-    std::vector<ScalingRow> divided = predict(traces, ways, plan_.networks, plan_.typical);
+    std::vector<ScalingRow> divided = predict(traces, ways, plan_.networks, plan_.typical, plan_.quantile);
     for (ScalingRow& row : divided) row.kind = ScalingKind::hybrid;
     add(divided);
   }
 
   void add(const std::vector<ScalingRow>& rows) {
     for (const ScalingRow& row : rows) {
-      say(
-          fmt::format("{}, {} subdomains{}, {} ranks x {} threads, network {}: predicted {:.4g} s a step, "
-                      "{:.1f} iterations",
-                      name_of(row.kind), row.subdomains, row.variant.empty() ? "" : ", " + row.variant,
-                      row.ranks, row.threads, row.network, row.seconds, row.iterations));
+      say(fmt::format(
+          "{}, {} subdomains{}, {} ranks x {} threads, network {}: predicted by {}: {:.4g} s a step, "
+          "{:.1f} iterations",
+          name_of(row.kind), row.subdomains, row.variant.empty() ? "" : ", " + row.variant, row.ranks,
+          row.threads, row.network, name_of(row.source), row.seconds, row.iterations));
       rows_.push_back(row);
     }
   }
@@ -262,6 +279,7 @@ class Study {
   ScalingPlan plan_;
   fs::path directory_;
   ScalingLauncher launcher_;
+  SimulatedLauncher simulated_;
   std::vector<RecordedTrace> recordings_;
   std::vector<ScalingRow> rows_;
 };
@@ -333,6 +351,7 @@ int run_study(const StudyScalingOptions& options) {
   report.last = plan.last;
   report.record = plan.record;
   report.typical = plan.typical;
+  report.quantile = plan.quantile;
   Study study(options, plan, directory);
   const ScalingSubject subject{ScalingKind::strong, directory + "/strong.toml", "", sample.grains.size()};
   say(fmt::format("{}: {} grains, steps {} to {}", report.name, subject.grains, plan.first, plan.last));
@@ -407,11 +426,22 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
       ->check(CLI::PositiveNumber);
   app->add_flag("--typical", options.typical,
                 "tasks that took over three times their median take the median: for noisy recordings");
+  app->add_option(
+         "--quantile", options.quantile,
+         "tasks take this quantile of their times in the step: for recordings on a busy machine [off]")
+      ->type_name("Q")
+      ->check(CLI::Range(0.0, 1.0));
   app->add_option("--cores", options.cores, "cores for real runs [all]")
       ->type_name("N")
       ->check(CLI::PositiveNumber);
   app->add_option("--mpirun", options.mpirun, "words before -n RANKS [mpirun --bind-to core ...]")
       ->type_name("TEXT");
+  app->add_option("--smpi", options.smpi,
+                  "talus of preset smpi: predict by running it on simulated ranks too")
+      ->type_name("PROGRAM");
+  app->add_option("--smpirun", options.smpirun, "SimGrid's launcher")
+      ->type_name("PROGRAM")
+      ->capture_default_str();
   app->add_option("--beside", options.beside, "other speedups for the pictures: name,cores,speedup")
       ->type_name("CSV");
   app->add_option("--set", options.overrides, "override a key of the scene, may be repeated")

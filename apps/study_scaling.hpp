@@ -30,6 +30,7 @@ struct StudyScalingOptions {
   int repeat = 5;            ///< real runs of each machine; 0: none
   int record = 1;            ///< traces of each number of subdomains
   bool typical = false;      ///< Machine::typical
+  double quantile = 0;       ///< Machine::quantile
   std::optional<int> cores;  ///< for real runs [all]
   std::string mpirun;        ///< words before the command when there are ranks [mpirun, bound to cores]
   std::string beside;        ///< CSV of other speedups: name,cores,speedup

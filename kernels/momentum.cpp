@@ -47,6 +47,21 @@ void carry_numbers(Carry carry, double beta, double* values, std::array<double, 
     carry_one(carry, beta, values[k], last[k], step ? step + k : nullptr);
 }
 
+constexpr std::size_t record_numbers = sizeof(Velocity) / sizeof(double);
+using Record = std::array<double, record_numbers>;
+
+/// Masses, equal in both, come back to the bit: m - m = 0, 0 + m = m.
+template <int Sign>
+void add_records(std::span<const Slot> slots, std::span<const Velocity> from, std::vector<Velocity>& to) {
+  for (const Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    auto sum = std::bit_cast<Record>(to[s]);
+    const auto add = std::bit_cast<Record>(from[s]);
+    for (std::size_t k = 0; k < record_numbers; ++k) sum[k] += Sign * add[k];
+    to[s] = std::bit_cast<Velocity>(sum);
+  }
+}
+
 std::size_t bytes(const Trail::Impulses& impulses) {
   return sizeof(double) *
          (impulses.x.capacity() + impulses.y.capacity() + impulses.z.capacity() + impulses.n.capacity());
@@ -82,8 +97,6 @@ void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& cont
 
 void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std::span<Velocity> velocity,
                       Trail& trail) {
-  constexpr std::size_t numbers = sizeof(Velocity) / sizeof(double);
-  using Record = std::array<double, numbers>;
   for (const Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);
     const auto now = std::bit_cast<Record>(velocity[s]);
@@ -95,11 +108,11 @@ void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std
     const auto last = std::bit_cast<Record>(trail.last_v[s]);
     Record next;
     if (carry == Carry::momentum) {
-      for (std::size_t k = 0; k < numbers; ++k) next[k] = now[k] + beta * (now[k] - last[k]);
+      for (std::size_t k = 0; k < record_numbers; ++k) next[k] = now[k] + beta * (now[k] - last[k]);
       trail.last_v[s] = velocity[s];
     } else {
       auto step = std::bit_cast<Record>(trail.step_v[s]);
-      for (std::size_t k = 0; k < numbers; ++k) {
+      for (std::size_t k = 0; k < record_numbers; ++k) {
         next[k] = now[k] + beta * step[k];
         step[k] = next[k] - last[k];
       }
@@ -113,6 +126,19 @@ void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail) {
   carry_numbers(carry, beta, copy.velocity, trail.last_wall_v[chunk],
                 trail.step_wall_v.empty() ? nullptr : trail.step_wall_v[chunk].data(), 3);
+}
+
+void loosen(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail) {
+  add_records<-1>(slots, velocity, trail.last_v);
+}
+void fasten(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail) {
+  add_records<1>(slots, velocity, trail.last_v);
+}
+void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail) {
+  for (std::size_t k = 0; k < 3; ++k) trail.last_wall_v[chunk][k] -= copy.velocity[k];
+}
+void fasten(std::size_t chunk, const WallCopy& copy, Trail& trail) {
+  for (std::size_t k = 0; k < 3; ++k) trail.last_wall_v[chunk][k] += copy.velocity[k];
 }
 
 double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,

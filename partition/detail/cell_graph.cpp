@@ -94,7 +94,8 @@ Compressed compress(const CellGraph& graph, const CellTable& table) {
   }
   // Grains without candidates yet (the first partition of a run) share nothing: cells are then tied by their
   // faces, all alike. Without ties METIS deals cells out like cards.
-  const bool tied = std::any_of(graph.shared.begin(), graph.shared.end(), [](std::int64_t s) { return s > 0; });
+  const bool tied =
+      std::any_of(graph.shared.begin(), graph.shared.end(), [](std::int64_t s) { return s > 0; });
   const auto shared_by = [&](std::size_t cell, std::size_t d) {
     if (tied) return graph.shared[13 * cell + d];
     const auto& step = half_neighbours[d];

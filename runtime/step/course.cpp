@@ -1,6 +1,7 @@
 /// How a step's sweeps are carried on, and when that changes: docs/decisions/0009-methods.md, 0012-stiff.md.
 
 #include <algorithm>
+#include <cmath>
 
 #include "kernels/balance.hpp"
 #include "runtime/step/iteration.hpp"
@@ -59,6 +60,12 @@ void Iteration::begin_course(SolverMethod method, double most) {
   changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
 }
 
+std::span<const Slot> Iteration::owned(std::size_t c) const {
+  const auto from = static_cast<std::size_t>(state_.chunks.owned_begin[c]),
+             to = static_cast<std::size_t>(state_.chunks.owned_begin[c + 1]);
+  return std::span(state_.chunks.owned).subspan(from, to - from);
+}
+
 /// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
 /// write, and its wall copy.
 void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
@@ -66,20 +73,52 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
   carry_impulses(carry, beta, range, state_.contacts, trail_);
-  const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-  carry_velocities(
-      carry, beta,
-      std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-      state_.bodies.velocity, trail_);
-  if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
+  const bool at_wall = chunks.wall[c] >= 0;
+  if (epoch == sweeps_from_) {
+    fasten(owned(c), state_.bodies.velocity, trail_);
+    if (at_wall) fasten(c, state_.copies[c], trail_);
+  }
+  carry_velocities(carry, beta, owned(c), state_.bodies.velocity, trail_);
+  if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
-void Iteration::plan_sweeps(int epoch) {
-  int sweeps = std::max(settings_.check_every, sweeps_ / 4);
+/// The last check that tells something about the present course besides the newest: at least check_every
+/// sweeps before it, since errors of neighbouring sweeps go up and down. Null when there is none.
+const Iteration::Check* Iteration::check_before() const {
+  for (std::size_t k = history_.size() - 1; k-- > history_from_;) {
+    if (history_[k].iterations + 1 < course_.from) return nullptr;
+    if (history_[k].iterations + settings_.check_every <= history_.back().iterations) return &history_[k];
+  }
+  return nullptr;
+}
+
+/// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,
+/// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
+/// by little; at most half of what was done, so that a wrong guess costs no more.
+int Iteration::sweeps_ahead() const {
+  const int done = result_.iterations;
+  int sweeps = std::max(settings_.check_every, done / 2);
   if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
-  sweeps = std::min(sweeps, settings_.max_iterations - sweeps_);
-  before_segment_ = sweeps_;
-  sweeps_ += sweeps;
+  const double error = history_.back().error_rms;
+  const Check* const before = check_before();
+  if (before && error > settings_.tolerance && error < before->error_rms) {
+    const double log_error = std::log(before->error_rms / error),
+                 log_missing = std::log(error / settings_.tolerance);
+    const double to_go =
+        before->iterations > 0
+            ? done * std::expm1(log_missing / log_error * std::log(double(done) / before->iterations))
+            : done * log_missing / log_error;
+    sweeps = std::max(least_sweeps, static_cast<int>(std::ceil(std::min<double>(sweeps, to_go))));
+  }
+  const int exchange = decomposition_.sweeps_per_exchange;
+  sweeps = (sweeps + exchange - 1) / exchange * exchange;
+  return std::min(sweeps, settings_.max_iterations - done);
+}
+
+/// The sweeps behind the check of this epoch: `sweeps_` done.
+void Iteration::plan_sweeps(int epoch, int sweeps) {
+  before_segment_ = result_.iterations;
+  sweeps_ = before_segment_ + sweeps;
   sweeps_from_ = epoch + 1;
   segment_ = epoch + 1 + sweeps;
 }
@@ -87,9 +126,9 @@ void Iteration::plan_sweeps(int epoch) {
 /// After a check: momentum that has made it worse (sliding contacts turn its modes complex, and those grow)
 /// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
 void Iteration::choose_course() {
-  const std::size_t checks = history_.size();
-  if (checks < history_from_ + 2) return;
-  const double growth = history_[checks - 1].error_rms / history_[checks - 2].error_rms;
+  const Check* const before = check_before();
+  if (!before) return;
+  const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
     if (settings_.method == SolverMethod::automatic && growth < hopeless_growth)

@@ -80,6 +80,7 @@ class Gluing {
   double exposed() const;
 
  private:
+  struct Link;
   struct Side;
   struct Subdomain;
   struct Centre;

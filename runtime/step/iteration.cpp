@@ -107,10 +107,11 @@ void Iteration::chunk(std::size_t c, int epoch) {
     case Work::restore:
     case Work::accumulate: {
       if (work == Work::restore) restore_impulses(state_.candidates, chunks, c, contacts);
-      const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-      reset_to_free(
-          std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-          state_.free, velocity);
+      if (course_.method != SolverMethod::nlgs) {
+        loosen(owned(c), velocity, trail_);
+        if (at_wall) loosen(c, copy, trail_);
+      }
+      reset_to_free(owned(c), state_.free, velocity);
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
@@ -332,10 +333,11 @@ bool Iteration::measured(int epoch) {
     if (ask_admm())
       call_admm(epoch);
     else
-      plan_sweeps(epoch);
+      plan_sweeps(epoch, sweeps_ahead());
     return true;
   }
-  plan_sweeps(epoch);
+  // One for sure; how many more follows when it is known how this check came out.
+  plan_sweeps(epoch, std::min(least_sweeps, settings_.max_iterations - sweeps_));
   read_at_ = epoch + 1;
   return true;
 }
@@ -350,6 +352,8 @@ bool Iteration::swept(int epoch) {
     restore_at_ = epoch + 1;
   else if (ask_admm())
     call_admm(epoch);
+  else
+    plan_sweeps(sweeps_from_ - 1, sweeps_ahead());
   return true;
 }
 

@@ -37,7 +37,7 @@ struct IterationResult {
 ///
 /// `accumulate` makes V afresh from r, so that the error is never that of a drifted V and the step ends on
 /// what was certified. At a gate one thread adds the chunks' sums in order, by subdomain, and decides whether
-/// to go on; the distance n of the gates grows with the iterations done.
+/// to go on, and for how many sweeps n: to where the tolerance is expected to be met.
 ///
 /// With several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read
 /// at a gate behind that sweep. If they say that the step was solved, `restore` brings back the impulses that
@@ -88,6 +88,9 @@ class Iteration {
   const std::vector<Check>& history() const { return history_; }
 
  private:
+  /// Between two checks at least: one costs about 1.5 of them. Two, so that what several ranks learn of a
+  /// check behind the first sweep comes before the last one.
+  static constexpr int least_sweeps = 2;
   enum class Work { accumulate, measure, sweep, restore };
   Work work(int epoch) const {
     return epoch == restore_at_ ? Work::restore
@@ -100,6 +103,7 @@ class Iteration {
   void chunk(std::size_t c, int epoch);
   template <bool Friction>
   void sweep(std::size_t c, ContactRange range, double mu);
+  std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
   /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
   struct Course {
@@ -120,7 +124,9 @@ class Iteration {
   void add_up(std::span<const double> rows);
   bool judge();
   void choose_course();
-  void plan_sweeps(int epoch);
+  const Check* check_before() const;
+  int sweeps_ahead() const;
+  void plan_sweeps(int epoch, int sweeps);
   void turn_conjugate();
   double impulse_scale() const;
   double drift() const;

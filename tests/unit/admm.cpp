@@ -291,13 +291,14 @@ TEST(Balance, WeighsDriftByTheSweepsThatTheProblemNeeds) {
 }
 
 TEST(AdmmStep, BringsAHeavyPlateToRest) {
-  for (const SolverMethod method : {SolverMethod::admm, SolverMethod::automatic}) {
-    const PlateOutcome outcome = plate_on_block(method, 1e6);
-    EXPECT_TRUE(outcome.report.converged);
-    EXPECT_GE(outcome.iterations.stiff_calls, 1);
-    EXPECT_LT(outcome.velocity, 0.01);
-    EXPECT_NEAR(outcome.force, 1, 0.01);
-  }
+  for (const SolverMethod method : {SolverMethod::admm, SolverMethod::automatic})
+    for (const int subdomains : {1, 5, 12}) {
+      const PlateOutcome outcome = plate_on_block(method, 1e6, subdomains);
+      EXPECT_TRUE(outcome.report.converged) << subdomains;
+      EXPECT_GE(outcome.iterations.stiff_calls, 1);
+      EXPECT_LT(outcome.velocity, 0.01) << subdomains;
+      EXPECT_NEAR(outcome.force, 1, 0.01) << subdomains;
+    }
 }
 
 TEST(AdmmStep, NeedsNoMoreIterationsInSubdomains) {

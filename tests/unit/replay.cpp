@@ -152,6 +152,24 @@ TEST(Replay, TypicalTimesLeaveInterruptedTasksOfSubdomainsOut) {
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 5 * 8 + 10);
 }
 
+TEST(Replay, AQuantileStandsForAllTimesOfANode) {
+  // Ten epochs of 10 ns, seven of them on a busy machine.
+  Trace trace = test::one_loop({0}, {}, {10}, 10);
+  std::int64_t late = 0;
+  for (Record& record : trace.lanes[0].records) {
+    record.begin += late;
+    if (record.kind() != test::sweep || record.epoch < 3) continue;
+    record.duration = 25;
+    late += 15;
+  }
+  Machine machine = bare(1, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 3 * 10 + 7 * 25);
+  machine.quantile = 0.2;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 10 * 10);
+  machine.quantile = 1.5;
+  EXPECT_THROW(makespan(trace, machine), std::invalid_argument);
+}
+
 TEST(Replay, ChecksAfterEverySweepAreReadASweepLater) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.lanes[0].records;

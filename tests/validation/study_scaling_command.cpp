@@ -104,7 +104,7 @@ TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
   ASSERT_EQ(run(command).code, 0);
   const std::string trace = content(at("s/traces/strong-2-1.h5"));
   const Table before = read_table(at("s/strong_scaling.csv"));
-  const Outcome again = run(command + "--reuse --latency 1e-4");
+  const Outcome again = run(command + "--reuse --latency 1e-4 --ranks-per-node 1");
   ASSERT_EQ(again.code, 0) << again.messages;
   EXPECT_EQ(again.messages.find("recorded"), std::string::npos) << again.messages;
   EXPECT_EQ(content(at("s/traces/strong-2-1.h5")), trace);
@@ -116,6 +116,24 @@ TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
   EXPECT_EQ(other.code, 2);
   EXPECT_NE(other.messages.find("another scene"), std::string::npos) << other.messages;
   EXPECT_EQ(files_below(at("s")), files);
+}
+
+// The program itself on simulated ranks, where that build is.
+TEST_F(StudyScaling, PredictsBySimulatedRanksToo) {
+  if (!fs::exists(TALUS_SMPI_COMMAND)) GTEST_SKIP() << "there is no " << TALUS_SMPI_COMMAND;
+  const Outcome outcome =
+      run("study scaling scene.toml --out s --steps 2:3 --subdomains 4 --repeat 0 --no-weak "
+          "--smpi " TALUS_SMPI_COMMAND);
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  const Table table = read_table(at("s/strong_scaling.csv"));
+  ASSERT_EQ(table.rows.size(), 4U) << "1 and 4 subdomains, by replay and by SMPI";
+  for (std::size_t k = 2; k < 4; ++k) {
+    EXPECT_EQ(table.rows[k].at("source"), "smpi");
+    EXPECT_EQ(table.rows[k].at("result"), "predicted");
+    // Iterations differ by the sweep that several ranks need to hear of each other's errors.
+    EXPECT_GT(table.number(k, "seconds"), 0);
+  }
+  EXPECT_EQ(table.number(2, "speedup"), 1);
 }
 
 TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
@@ -136,6 +154,7 @@ TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
   refused("--variant decomposition.exchnage=ccs", "exchange");
   refused("--cores 2 --mpirun no-such-program", "no-such-program");
   refused("--cores 2", "mpirun is not to be found", "PATH=/nowhere");
+  refused("--smpi no-such-talus", "no-such-talus");
   refused("--beside scene.toml", "name,cores,speedup");
 }
 
