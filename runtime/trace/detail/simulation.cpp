@@ -94,8 +94,10 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
 }
 
 double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
-  const std::uint32_t messages =
-      layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  const SimNode& of = layout.nodes[node];
+  double messages = layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  if (of.role == Role::publish && layout.to_centre[of.rank].bytes > 0)
+    messages += 1.0 / layout.publishes[of.rank];
   return messages * stage.network.overhead() + 0.5e9 * stage.machine.line / 64 * layout.handed[node];
 }
 
