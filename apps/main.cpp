@@ -11,6 +11,7 @@
 #include "apps/run.hpp"
 #include "apps/solve.hpp"
 #include "apps/study_error.hpp"
+#include "apps/study_scaling.hpp"
 #include "apps/study_stability.hpp"
 #include "apps/trace_command.hpp"
 #include "io/scene.hpp"
@@ -53,6 +54,9 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_flag(
       "--typical", replay.machine.typical,
       "tasks that took over three times their median of the step take the median: for noisy recordings");
+  app.add_option(
+      "--quantile", replay.machine.quantile,
+      "tasks take this quantile of their times in the step: for recordings on a busy machine [off]");
   app.add_flag("--blocking-check", replay.blocking_check, "convergence checks wait for their sums");
   app.add_option("--smpi-platform", replay.smpi_platform,
                  "write the machine for smpirun, which runs the real program on it (preset smpi)")
@@ -206,6 +210,8 @@ int main(int argc, char** argv) {
   study_app->require_subcommand(1);
   StudyErrorOptions study_error;
   CLI::App* study_error_app = add_study_error(*study_app, study_error);
+  StudyScalingOptions study_scaling;
+  CLI::App* study_scaling_app = add_study_scaling(*study_app, study_scaling);
   StabilityOptions stability;
   CLI::App* stability_app = study_app->add_subcommand(
       "stability", "stiff and extreme scenes with known answers: true errors against certificates");
@@ -259,6 +265,7 @@ int main(int argc, char** argv) {
   if (*export_app) return trace_export_command(trace_export);
   if (*replay_app) return replay_command(std::move(replay));
   if (*study_error_app) return study_error_command(study_error);
+  if (*study_scaling_app) return study_scaling_command(study_scaling);
   if (*stability_app) return stability_command(stability);
   if (*reference_app) std::fputs(io::scene_reference().c_str(), stdout);
   return exit_done;

@@ -407,12 +407,6 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
-    if (ranks.ranks() > 1 && scene.setup.solver.method == SolverMethod::admm)
-      throw std::invalid_argument(
-          fmt::format("solver.method = \"admm\" looks at the whole sample on one rank, and {} were started. "
-                      "Start one rank, "
-                      "or choose another method",
-                      ranks.ranks()));
     if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
     if (ranks.rank() == 0) {
       sample = build_sample(scene);

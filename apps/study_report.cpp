@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
+#include <string_view>
 
 #include "io/csv_table.hpp"
 #include "io/output_directory.hpp"
@@ -89,11 +91,6 @@ io::Chart solve_chart(const std::vector<Row>& rows, const StudyPlan& plan, io::C
   return chart;
 }
 
-void add_chart(StudyReport& report, io::Chart chart, const std::string& sentence, io::HtmlTable table = {}) {
-  report.sections.push_back({chart.title, sentence, io::draw_chart(chart), std::move(table)});
-  report.charts.push_back(std::move(chart));
-}
-
 /// Seconds and sweeps that each curve took to each tolerance.
 io::HtmlTable times_to_tolerance(const std::vector<io::ChartSeries>& in_seconds,
                                  const std::vector<io::ChartSeries>& in_sweeps, const StudyPlan& plan) {
@@ -117,6 +114,11 @@ io::HtmlTable times_to_tolerance(const std::vector<io::ChartSeries>& in_seconds,
 }
 
 }  // namespace
+
+void add_chart(StudyReport& report, io::Chart chart, const std::string& sentence, io::HtmlTable table) {
+  report.sections.push_back({chart.title, sentence, io::draw_chart(chart), std::move(table)});
+  report.charts.push_back(std::move(chart));
+}
 
 void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyReport& report) {
   io::CsvTable residual(
@@ -367,12 +369,46 @@ void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
 
 namespace {
 
-constexpr std::array<std::string_view, 5> table_names{"residual.csv", "true_error.csv", "runs.csv",
-                                                      "solves.csv", "profile.csv"};
-constexpr std::array<std::string_view, 9> chart_names{
-    "residual_seconds",   "residual_sweeps",      "velocity_seconds",
-    "velocity_sweeps",    "wall_forces_seconds",  "velocity_residual",
-    "run_stress_seconds", "run_position_seconds", "profile"};
+constexpr std::array<std::string_view, 9> table_names{
+    "residual.csv",       "true_error.csv",   "runs.csv",   "solves.csv", "profile.csv",
+    "strong_scaling.csv", "weak_scaling.csv", "hybrid.csv", "beside.csv"};
+constexpr std::array<std::string_view, 15> chart_names{"residual_seconds",
+                                                       "residual_sweeps",
+                                                       "velocity_seconds",
+                                                       "velocity_sweeps",
+                                                       "wall_forces_seconds",
+                                                       "velocity_residual",
+                                                       "run_stress_seconds",
+                                                       "run_position_seconds",
+                                                       "profile",
+                                                       "speedup",
+                                                       "efficiency",
+                                                       "efficiency_iterations",
+                                                       "efficiency_sweeps",
+                                                       "weak_efficiency",
+                                                       "hybrid"};
+constexpr std::array<std::string_view, 7> other_names{
+    "plot.gp", "report.html", "commands.sh", "slurm.sh", "strong.toml", "strong.csv", "traces/times.csv"};
+
+bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+/// "weak-12.csv", "traces/strong-4-variant1-2.h5": a stem, numbers and dashes, an ending.
+bool is_of_scaling(std::string_view name) {
+  for (const std::string_view stem : {"weak-", "traces/strong-", "traces/weak-"}) {
+    if (!name.starts_with(stem)) continue;
+    const std::string_view rest = name.substr(stem.size()),
+                           ending = rest.substr(std::min(rest.find('.'), rest.size()));
+    const bool trace = stem.starts_with("traces/");
+    if (trace ? ending != ".h5" : ending != ".toml" && ending != ".csv") return false;
+    std::string numbers(rest.substr(0, rest.size() - ending.size()));
+    if (const std::size_t at = numbers.find("variant"); trace && at != std::string::npos)
+      numbers.erase(at, 7);
+    return !numbers.empty() && numbers.find_first_not_of("0123456789-") == std::string::npos;
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -388,8 +424,7 @@ void write_report(const std::filesystem::path& directory, const StudyReport& rep
 bool is_study_name(const std::filesystem::path& relative) {
   std::string name = relative.generic_string();
   if (name.ends_with(".part")) name.resize(name.size() - 5);
-  if (name == "plot.gp" || name == "report.html") return true;
-  if (std::ranges::find(table_names, name) != table_names.end()) return true;
+  if (is_one_of(name, table_names) || is_one_of(name, other_names) || is_of_scaling(name)) return true;
   return std::ranges::any_of(chart_names, [&](std::string_view chart) {
     return name == std::string(chart) + ".svg" || name == std::string(chart) + ".gnuplot.svg";
   });

@@ -28,10 +28,14 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyRepor
 void report_runs(const RunStudy& study, const StudyPlan& plan, StudyReport& report);
 void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report);
 
+/// A picture, on the page under its title with a sentence above and a table below.
+void add_chart(StudyReport& report, io::Chart chart, const std::string& sentence, io::HtmlTable table = {});
+
 /// Writes the tables, NAME.svg for every chart, plot.gp and report.html. Throws io::FileError.
 void write_report(const std::filesystem::path& directory, const StudyReport& report);
 
-/// True for the names that write_report may have written.
+/// True for the names that a study may have written: those of write_report, and the scenes, traces and
+/// scripts of `talus study scaling`.
 bool is_study_name(const std::filesystem::path& relative);
 
 }  // namespace talus

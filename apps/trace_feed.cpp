@@ -11,14 +11,13 @@
 
 namespace talus {
 
-StepRange parse_steps(const std::string& text) {
+StepRange parse_steps(const std::string& text, const std::string& option) {
   const auto number = [&](std::string_view part, std::uint32_t otherwise) {
     if (part.empty()) return otherwise;
     std::uint32_t value = 0;
     const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
     if (error != std::errc{} || end != part.data() + part.size())
-      throw std::invalid_argument(
-          fmt::format("--trace-steps wants FIRST:LAST, e.g. 100:120, not '{}'", text));
+      throw std::invalid_argument(fmt::format("{} wants FIRST:LAST, e.g. 100:120, not '{}'", option, text));
     return value;
   };
   const std::string_view view = text;
@@ -29,7 +28,7 @@ StepRange parse_steps(const std::string& text) {
   range.last = colon == std::string_view::npos ? range.first : number(view.substr(colon + 1), range.last);
   if (range.first < 1 || range.last < range.first || range.last > trace::largest_step)
     throw std::invalid_argument(
-        fmt::format("--trace-steps {}: steps count from 1, the first comes before the last", text));
+        fmt::format("{} {}: steps count from 1, the first comes before the last", option, text));
   return range;
 }
 

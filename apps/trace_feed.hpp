@@ -12,12 +12,12 @@
 
 namespace talus {
 
-/// The steps that `talus run --trace-steps a:b` names, both included; either may be left out. Throws
-/// std::invalid_argument with the remedy for anything else.
+/// The steps that an option like `--trace-steps a:b` names, both included; either may be left out. Throws
+/// std::invalid_argument with the name of the option and the remedy for anything else.
 struct StepRange {
   std::uint32_t first = 1, last = trace::largest_step;
 };
-StepRange parse_steps(const std::string& text);
+StepRange parse_steps(const std::string& text, const std::string& option = "--trace-steps");
 
 /// The way of a trace from the recorder to DIR/trace.h5: full buffers are written on the executor's
 /// background lane. Each rank writes a file of its own, which rank 0 puts together in the end.

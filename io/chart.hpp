@@ -18,6 +18,7 @@ struct ChartSeries {
   std::size_t dash = 0;  ///< 0: full line; others: patterns, repeated likewise
   /// Cells that a row of the table must have to be of this series: column and text.
   std::vector<std::pair<std::string, std::string>> where = {};
+  std::string table = {};  ///< file name of a table of its own with the chart's columns; "": the chart's
 };
 
 /// A horizontal line that says what a value means.

@@ -34,9 +34,9 @@ std::string plot_of(const Chart& chart, const ChartSeries& series) {
   return fmt::format(
       "{} using ({} ? column({}) : NaN):(column({})) with {} linecolor rgb '{}' linewidth 2 dashtype {} "
       "title {}",
-      quoted(chart.table), rows, quoted(chart.x_column), quoted(chart.y_column),
-      chart.staircase ? "steps" : "linespoints pointtype 7 pointsize 0.4", detail::hue(series.hue), dash_type,
-      quoted(series.name));
+      quoted(series.table.empty() ? chart.table : series.table), rows, quoted(chart.x_column),
+      quoted(chart.y_column), chart.staircase ? "steps" : "linespoints pointtype 7 pointsize 0.4",
+      detail::hue(series.hue), dash_type, quoted(series.name));
 }
 
 }  // namespace

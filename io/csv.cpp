@@ -7,6 +7,9 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "io/detail/csv_cell.hpp"
+#include "io/output_directory.hpp"
+
 #include "io/scene_error.hpp"
 
 namespace talus::io {
@@ -110,6 +113,33 @@ Sample read_bodies(const std::string& path, double density, bool turns) {
   }
   if (sample.size() == 0) throw SceneError(path, place.line, "", "no bodies in the file");
   return sample;
+}
+
+void write_bodies(const std::filesystem::path& path, const Sample& sample) {
+  write_whole(path, [&](const WriteText& out) {
+    const std::size_t count = sample.velocity.empty() ? 5 : columns.size();
+    std::string text;
+    for (std::size_t k = 0; k < count; ++k) text += fmt::format("{}{}", k > 0 ? "," : "", columns[k]);
+    text += '\n';
+    for (std::size_t k = 0; k < sample.size(); ++k) {
+      detail::put(text, static_cast<std::int64_t>(sample.id_of(k)));
+      const auto add = [&](double value) {
+        text += ',';
+        detail::put(text, value);
+      };
+      for (Eigen::Index axis = 0; axis < 3; ++axis) add(sample.x[k][axis]);
+      add(sample.radius[k]);
+      if (count > 5)
+        for (std::size_t i = 0; i < 6; ++i)
+          add(i < 3 ? sample.velocity[k][i] : sample.velocity[k][i] / sample.radius[k]);
+      text += '\n';
+      if (text.size() > (1U << 16)) {
+        out(text);
+        text.clear();
+      }
+    }
+    out(text);
+  });
 }
 
 }  // namespace talus::io

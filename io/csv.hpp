@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "kernels/sample.hpp"
@@ -13,5 +14,9 @@ namespace talus::io {
 /// a missing file, an unknown header, a wrong number of fields, a field that is not a finite number, a radius
 /// <= 0, and an id that occurs twice or is negative.
 Sample read_bodies(const std::string& path, double density, bool turns = true);
+
+/// The same grains as a file that read_bodies reads back bit for bit, but for spins, which are rounded: the
+/// file has w = (R omega) / R. Throws FileError.
+void write_bodies(const std::filesystem::path& path, const Sample& sample);
 
 }  // namespace talus::io

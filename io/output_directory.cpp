@@ -48,7 +48,7 @@ bool is_dump(std::string_view name) {
 /// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
 std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
   std::vector<fs::path> found;
-  for (const fs::path& folder : {directory, directory / "fields"}) {
+  for (const fs::path& folder : {directory, directory / "fields", directory / "traces"}) {
     if (!fs::is_directory(folder)) continue;
     for (const auto& entry : fs::directory_iterator(folder)) {
       if (entry.is_symlink() || !entry.is_regular_file()) continue;

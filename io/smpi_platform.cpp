@@ -10,7 +10,8 @@ namespace talus::io {
 
 std::string smpi_platform(const trace::Machine& machine) {
   const trace::Machine plain;
-  if (machine.noise != plain.noise || machine.contacts != plain.contacts || machine.typical)
+  if (machine.noise != plain.noise || machine.contacts != plain.contacts || machine.typical ||
+      machine.quantile != 0)
     throw std::invalid_argument(
         "a platform for SMPI has no noise, no scale of contacts and no typical times: SMPI measures the real "
         "program");

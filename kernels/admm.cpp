@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kernels/body_system.hpp"
-#include "kernels/coarse_level.hpp"
+#include "kernels/body_solver.hpp"
 
 namespace talus {
 
@@ -16,296 +15,163 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
-  const double w_nn =
-      1 / problem.bodies[at(c.first)].mass + (c.second >= 0 ? 1 / problem.bodies[at(c.second)].mass : 0);
-  return 1 / w_nn;
-}
+/// What the iteration carries along, of one part: an entry per contact.
+struct PartState {
+  std::span<const double> rho;
+  std::vector<Vec3> y;        ///< aim of the contact velocity, with its shift
+  std::vector<double> shift;  ///< mu |y_t|
+  double gap2 = 0, weight = 0;
 
-/// Projection on the Coulomb cone about n.
-Vec3 project(const Vec3& z, const Vec3& n, double mu) {
-  const double z_n = n.dot(z);
-  if (mu == 0) return std::max(0.0, z_n) * n;
-  const Vec3 t = z - z_n * n;
-  const double length = t.norm();
-  if (mu * length <= -z_n) return Vec3::Zero();
-  if (length <= mu * z_n) return z;
-  const double r_n = (z_n + mu * length) / (1 + mu * mu);
-  return r_n * n + (mu * r_n / length) * t;
-}
+  explicit PartState(std::span<const double> weights)
+      : rho(weights), y(weights.size()), shift(weights.size()) {}
 
-/// What counts of a vector at a contact: without friction its normal part.
-Vec3 constrained(const ContactEquation& c, const Vec3& v) {
-  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
-}
-
-double dot(std::span<const Twist> a, std::span<const Twist> b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += talus::dot(a[k], b[k]);
-  return sum;
-}
-
-/// |x|_M^2.
-double kinetic2(const BodyProblem& problem, std::span<const Twist> x) {
-  double sum = 0;
-  for (std::size_t b = 0; b < x.size(); ++b)
-    sum += problem.bodies[b].mass * x[b].u.squaredNorm() + problem.bodies[b].spin_mass * x[b].w.squaredNorm();
-  return sum;
-}
-
-/// A V = f by conjugate gradients, from V; preconditioned by one V-cycle: forward Gauss-Seidel, the coarse
-/// level, backward Gauss-Seidel.
-class LinearSolver {
- public:
-  LinearSolver(const BodyProblem& problem, std::span<const double> rho, int aggregate)
-      : aggregates_(grow_aggregates(problem, aggregate)),
-        system_(problem, rho),
-        coarse_(problem, aggregates_, rho),
-        residual_(problem.bodies.size()),
-        z_(residual_.size()),
-        direction_(residual_.size()),
-        product_(residual_.size()),
-        rest_(residual_.size()) {}
-
-  void scale(double factor) {
-    system_.scale(factor);
-    coarse_.scale(factor);
-  }
-
-  int solve(std::span<const Twist> f, std::span<Twist> V, double tolerance, int max_iterations) {
-    system_.multiply(V, product_);
-    for (std::size_t b = 0; b < residual_.size(); ++b) {
-      residual_[b].u = f[b].u - product_[b].u;
-      residual_[b].w = f[b].w - product_[b].w;
+  /// The aims that impulses and velocities suggest.
+  void begin(const BodyProblem& problem, std::span<const Twist> V, std::span<Vec3> r) {
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      const ContactEquation& c = problem.contacts[k];
+      r[k] = project_on_cone(c, r[k]);
+      const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
+      shift[k] = c.mu * tangential(c, v).norm();
+      y[k] = v + shift[k] * c.normal + project_on_cone(c, -v);
     }
-    precondition();
-    direction_ = z_;
-    double rz = dot(residual_, z_);
-    const double goal = tolerance * tolerance * rz;
-    int k = 0;
-    while (k < max_iterations && rz > goal) {
-      system_.multiply(direction_, product_);
-      const double curvature = dot(direction_, product_);
-      if (!(curvature > 0)) break;
-      const double step = rz / curvature;
-      for (std::size_t b = 0; b < residual_.size(); ++b) {
-        V[b].u += step * direction_[b].u;
-        V[b].w += step * direction_[b].w;
-        residual_[b].u -= step * product_[b].u;
-        residual_[b].w -= step * product_[b].w;
-      }
-      ++k;
-      precondition();
-      const double next = dot(residual_, z_);
-      const double beta = next / rz;
-      rz = next;
-      for (std::size_t b = 0; b < residual_.size(); ++b) {
-        direction_[b].u = z_[b].u + beta * direction_[b].u;
-        direction_[b].w = z_[b].w + beta * direction_[b].w;
-      }
-    }
-    return k;
   }
 
- private:
-  void precondition() {
-    system_.smooth_forward(residual_, z_, rest_);
-    coarse_.correct(rest_, z_);
-    system_.smooth_backward(residual_, z_);
-  }
-
-  Aggregates aggregates_;
-  BodySystem system_;
-  CoarseLevel coarse_;
-  std::vector<Twist> residual_, z_, direction_, product_, rest_;
-};
-
-}  // namespace
-
-double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse) {
-  std::vector<Twist> gained = velocities_of(problem, impulse);
-  for (std::size_t b = 0; b < gained.size(); ++b) {
-    gained[b].u -= problem.bodies[b].free.u;
-    gained[b].w -= problem.bodies[b].free.w;
-  }
-  const double kinetic = kinetic2(problem, gained);
-  double sum = 0;
-  for (std::size_t k = 0; k < impulse.size(); ++k)
-    sum += impulse[k].squaredNorm() / effective_mass(problem, problem.contacts[k]);
-  return kinetic > 0 ? sum / kinetic : 0;
-}
-
-double estimate_stiffness(const BodyProblem& problem) {
-  // Layers: distance over contacts from the driven walls.
-  const std::size_t count = problem.bodies.size();
-  std::vector<std::size_t> begin(count + 1, 0);
-  for (const ContactEquation& c : problem.contacts)
-    if (c.second >= 0) {
-      ++begin[at(c.first) + 1];
-      ++begin[at(c.second) + 1];
-    }
-  for (std::size_t b = 0; b < count; ++b) begin[b + 1] += begin[b];
-  std::vector<std::int32_t> other(begin.back());
-  std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-  for (const ContactEquation& c : problem.contacts)
-    if (c.second >= 0) {
-      other[next[at(c.first)]++] = c.second;
-      other[next[at(c.second)]++] = c.first;
-    }
-  std::vector<std::int32_t> depth(count, -1), queue;
-  const auto reach = [&](std::size_t body, std::int32_t layer) {
-    if (depth[body] >= 0) return;
-    depth[body] = layer;
-    queue.push_back(static_cast<std::int32_t>(body));
-  };
-  for (const ContactEquation& c : problem.contacts)
-    if (c.second < 0) reach(at(c.first), 1);
-  if (queue.empty() && count > 0) {
-    std::size_t heaviest = 0;
-    for (std::size_t b = 1; b < count; ++b)
-      if (problem.bodies[b].mass > problem.bodies[heaviest].mass) heaviest = b;
-    reach(heaviest, 0);  // what the others come to rest on
-  }
-  for (std::size_t head = 0; head < queue.size(); ++head) {
-    const std::size_t b = at(queue[head]);
-    for (std::size_t e = begin[b]; e < begin[b + 1]; ++e) reach(at(other[e]), depth[b] + 1);
-  }
-  // Backwards, each body hands what it carries to its contacts of the layer below, in equal parts.
-  std::vector<double> load(count, 0), parts(count, 0);
-  double total = 0;
-  for (std::size_t b = 0; b < count; ++b)
-    if (depth[b] >= 1) total += load[b] = problem.bodies[b].mass;
-  const auto below = [&](std::int32_t from, std::int32_t to) {
-    return to < 0 ? depth[at(from)] == 1 : depth[at(to)] == depth[at(from)] - 1;
-  };
-  for (const ContactEquation& c : problem.contacts) {
-    if (below(c.first, c.second)) ++parts[at(c.first)];
-    if (c.second >= 0 && below(c.second, c.first)) ++parts[at(c.second)];
-  }
-  for (std::size_t k = queue.size(); k-- > 0;) {
-    const std::size_t b = at(queue[k]);
-    for (std::size_t e = begin[b]; e < begin[b + 1]; ++e)
-      if (depth[at(other[e])] == depth[b] - 1 && depth[b] > 1) load[at(other[e])] += load[b] / parts[b];
-  }
-  double sum = 0;
-  for (const ContactEquation& c : problem.contacts) {
-    double r = 0;
-    if (below(c.first, c.second)) r = load[at(c.first)] / parts[at(c.first)];
-    if (c.second >= 0 && below(c.second, c.first)) r = load[at(c.second)] / parts[at(c.second)];
-    sum += r * r / effective_mass(problem, c);
-  }
-  return total > 0 ? sum / total : 0;
-}
-
-namespace {
-
-/// Velocities of the iterate V against those that its impulses give.
-void measure(const BodyProblem& problem, std::span<const Twist> V, std::span<const Vec3> r, double gap,
-             std::span<const std::int32_t> heavy, BodyAdmmResult& result) {
-  std::vector<Twist> gained = velocities_of(problem, r), defect(gained.size());
-  double speed2 = 0;
-  for (std::size_t b = 0; b < gained.size(); ++b) {
-    defect[b].u = gained[b].u - V[b].u;
-    defect[b].w = gained[b].w - V[b].w;
-    gained[b].u -= problem.bodies[b].free.u;
-    gained[b].w -= problem.bodies[b].free.w;
-    speed2 += gained[b].u.squaredNorm();
-  }
-  const double gained2 = kinetic2(problem, gained);
-  result.momentum_defect = gained2 > 0 ? std::sqrt(kinetic2(problem, defect) / gained2) : 0;
-  // Each body counts alike: the heaviest would hide the rest.
-  const double speed = std::sqrt(speed2 / static_cast<double>(gained.size()));
-  result.contact_defect = speed > 0 ? gap / speed : 0;
-  result.balance_defect = 0;
-  for (std::int32_t b : heavy) {
-    const double own = gained[at(b)].u.norm();
-    if (own > 0) result.balance_defect = std::max(result.balance_defect, defect[at(b)].u.norm() / own);
-  }
-  if (!heavy.empty()) return;
-  Vec3 sample = Vec3::Zero();
-  double scale = 0;
-  for (std::size_t b = 0; b < gained.size(); ++b) {
-    sample += problem.bodies[b].mass * defect[b].u;
-    scale += problem.bodies[b].mass * gained[b].u.norm();
-  }
-  if (scale > 0) result.balance_defect = std::max(result.balance_defect, sample.norm() / scale);
-}
-
-}  // namespace
-
-BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings) {
-  BodyAdmmResult result;
-  const std::size_t contacts = problem.contacts.size(), bodies = problem.bodies.size();
-  if (contacts == 0) {
-    result.converged = true;
-    return result;
-  }
-  double kappa = settings.stiffness;
-  if (kappa <= 0) kappa = estimate_stiffness(problem);
-  std::vector<double> rho(contacts);
-  for (std::size_t k = 0; k < contacts; ++k) rho[k] = kappa * effective_mass(problem, problem.contacts[k]);
-  LinearSolver linear(problem, rho,
-                      settings.aggregate > 0 ? settings.aggregate : aggregate_target(problem.grains));
-
-  std::vector<Vec3>& r = problem.impulse;
-  std::vector<Vec3> y(contacts);        // aim of the contact velocity, with its shift
-  std::vector<double> shift(contacts);  // mu |y_t|
-  std::vector<Twist> V = velocities_of(problem, r), force(bodies);
-  const std::vector<std::int32_t> heavy = heavy_unknowns(problem);
-  std::array<double, 8> worst;
-  worst.fill(std::numeric_limits<double>::infinity());
-  const auto split = [&](std::size_t k, const Vec3& v) {
-    const Vec3& n = problem.contacts[k].normal;
-    return Vec3(v - n.dot(v) * n);
-  };
-  for (std::size_t k = 0; k < contacts; ++k) {
-    const ContactEquation& c = problem.contacts[k];
-    r[k] = project(r[k], c.normal, c.mu);
-    const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
-    shift[k] = c.mu * split(k, v).norm();
-    y[k] = v + shift[k] * c.normal + project(-v, c.normal, c.mu);
-  }
-  for (result.iterations = 0; result.iterations < settings.max_iterations;) {
-    for (std::size_t b = 0; b < bodies; ++b) force[b] = Twist{};
-    for (std::size_t k = 0; k < contacts; ++k) {
+  /// H (r + rho (y - c)): what the contacts here add to the right-hand side.
+  void add_aims(const BodyProblem& problem, std::span<const Vec3> r, std::span<Twist> force) const {
+    std::fill(force.begin(), force.end(), Twist{});
+    for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
       add_force(c, constrained(c, r[k] + rho[k] * (y[k] - shift[k] * c.normal - c.offset)), force);
     }
-    for (std::size_t b = 0; b < bodies; ++b) {
-      restrict_to_freedoms(problem.bodies[b], force[b]);
-      force[b].u += problem.bodies[b].mass * problem.bodies[b].free.u;
-      force[b].w += problem.bodies[b].spin_mass * problem.bodies[b].free.w;
-    }
-    result.linear_iterations += linear.solve(force, V, settings.linear_tolerance, settings.max_linear);
-    ++result.iterations;
+  }
 
-    double gap2 = 0, weight = 0;
-    for (std::size_t k = 0; k < contacts; ++k) {
+  /// New impulses and aims from the velocities.
+  void update(const BodyProblem& problem, std::span<const Twist> V, double relaxation, double kappa,
+              std::span<Vec3> r) {
+    gap2 = weight = 0;
+    for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
       const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset) + shift[k] * c.normal;
-      const Vec3 x = settings.relaxation * v + (1 - settings.relaxation) * y[k];
-      const Vec3 r_new = project(r[k] - rho[k] * x, c.normal, c.mu);
+      const Vec3 x = relaxation * v + (1 - relaxation) * y[k];
+      const Vec3 r_new = project_on_cone(c, r[k] - rho[k] * x);
       y[k] = x + (r_new - r[k]) / rho[k];
       r[k] = r_new;
       const double m = rho[k] / kappa;
       gap2 += m * (v - y[k]).squaredNorm();
       weight += m;
-      const double next_shift = c.mu * split(k, y[k]).norm();
+      const double next_shift = c.mu * tangential(c, y[k]).norm();
       y[k] += (next_shift - shift[k]) * c.normal;
       shift[k] = next_shift;
     }
-    measure(problem, V, r, std::sqrt(gap2 / weight), heavy, result);
+  }
+};
+
+/// Velocities of the iterate V against those that its impulses give.
+void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
+             std::span<const PartState> states, std::span<const std::vector<std::int32_t>> heavy,
+             BodyAdmmResult& result) {
+  const PartField made = velocities_of(parts, r);
+  enum { gained2, defect2, speed2, count, gap2, weight, scale, sample, worst = sample + 3, heavies, width };
+  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
+    const BodyProblem& problem = parts[p];
+    for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+      if (!problem.counted(b)) continue;
+      const BodyUnknown& body = problem.bodies[b];
+      const Vec3 defect = made[p][b].u - V[p][b].u, gained = made[p][b].u - body.free.u;
+      row[gained2] += kinetic2(body, gained, made[p][b].w - body.free.w);
+      row[defect2] += kinetic2(body, defect, made[p][b].w - V[p][b].w);
+      row[speed2] += gained.squaredNorm();
+      row[count] += 1;
+      row[scale] += body.mass * gained.norm();
+      for (std::size_t k = 0; k < 3; ++k) row[sample + k] += body.mass * defect[static_cast<Eigen::Index>(k)];
+    }
+    row[gap2] = states[p].gap2;
+    row[weight] = states[p].weight;
+    row[heavies] = static_cast<double>(heavy[p].size());
+    for (std::int32_t b : heavy[p]) {
+      const double own = (made[p][at(b)].u - problem.bodies[at(b)].free.u).norm();
+      if (own > 0) row[worst] = std::max(row[worst], (made[p][at(b)].u - V[p][at(b)].u).norm() / own);
+    }
+  });
+  std::array<double, width> sum{};
+  double most = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    sum[k % width] += rows[k];
+    if (k % width == worst) most = std::max(most, rows[k]);
+  }
+  result.momentum_defect = sum[gained2] > 0 ? std::sqrt(sum[defect2] / sum[gained2]) : 0;
+  // Each body counts alike: the heaviest would hide the rest.
+  const double speed = std::sqrt(sum[speed2] / sum[count]);
+  result.contact_defect = speed > 0 ? std::sqrt(sum[gap2] / sum[weight]) / speed : 0;
+  result.balance_defect = most;
+  if (sum[heavies] == 0 && sum[scale] > 0)
+    result.balance_defect = Vec3(sum[sample], sum[sample + 1], sum[sample + 2]).norm() / sum[scale];
+}
+
+bool any_contact(const BodyParts& parts) {
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    row[0] = static_cast<double>(parts[p].contacts.size());
+  })[0] > 0;
+}
+
+}  // namespace
+
+BodyAdmmResult solve_admm(std::span<BodyProblem> problems, const PartLink& link,
+                          const BodyAdmmSettings& settings) {
+  const BodyParts parts(problems, link);
+  BodyAdmmResult result;
+  if (!any_contact(parts)) {
+    result.converged = true;
+    return result;
+  }
+  const double kappa = settings.stiffness > 0 ? settings.stiffness : estimate_stiffness(parts);
+  std::vector<std::vector<double>> rho(parts.size());
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (const ContactEquation& c : parts[p].contacts) rho[p].push_back(kappa * effective_mass(parts[p], c));
+  std::vector<PartState> states(rho.begin(), rho.end());
+  BodySolver linear(parts, rho, settings.aggregate);
+
+  PartImpulses r = impulses_of(parts);
+  PartField V = velocities_of(parts, r), force = parts.field();
+  const std::vector<std::vector<std::int32_t>> heavy = heavy_unknowns(parts);
+  const bool has_heavy = parts.total(1, [&](std::size_t p, std::span<double> row) {
+    row[0] = static_cast<double>(heavy[p].size());
+  })[0] > 0;
+  std::array<double, 8> worst;
+  worst.fill(std::numeric_limits<double>::infinity());
+  parts.each([&](std::size_t p) { states[p].begin(parts[p], V[p], r[p]); });
+  for (result.iterations = 0; result.iterations < settings.max_iterations;) {
+    parts.each([&](std::size_t p) { states[p].add_aims(parts[p], r[p], force[p]); });
+    link.sum_copies(force);
+    parts.each([&](std::size_t p) {
+      for (std::size_t b = 0; b < force[p].size(); ++b) {
+        const BodyUnknown& body = parts[p].bodies[b];
+        restrict_to_freedoms(body, force[p][b]);
+        force[p][b].u += body.mass * body.free.u;
+        force[p][b].w += body.spin_mass * body.free.w;
+      }
+    });
+    result.linear_iterations += linear.solve(force, V, settings.linear_tolerance, settings.max_linear);
+    ++result.iterations;
+    parts.each([&](std::size_t p) { states[p].update(parts[p], V[p], settings.relaxation, kappa, r[p]); });
+    measure(parts, V, r, states, heavy, result);
     worst[static_cast<std::size_t>(result.iterations) % worst.size()] = result.balance_defect;
     result.balance_defect = *std::max_element(worst.begin(), worst.end());
-    const bool balanced = !heavy.empty() && result.balance_defect <= settings.balance_tolerance;
+    const bool balanced = has_heavy && result.balance_defect <= settings.balance_tolerance;
     if (balanced ||
         (result.momentum_defect <= settings.tolerance && result.contact_defect <= settings.tolerance)) {
       result.converged = true;
       break;
     }
   }
+  for (std::size_t p = 0; p < parts.size(); ++p) problems[p].impulse = std::move(r[p]);
   result.stiffness = kappa;
   return result;
+}
+
+BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings) {
+  const PartLink alone;
+  return solve_admm({&problem, 1}, alone, settings);
 }
 
 }  // namespace talus

@@ -6,7 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/body_problem.hpp"
+#include "kernels/body_parts.hpp"
+#include "kernels/stiffness.hpp"
 
 namespace talus {
 
@@ -33,26 +34,19 @@ struct BodyAdmmResult {
   bool converged = false;
 };
 
-/// Improves `problem.impulse`, from which it starts. Alternating direction method of multipliers on
+/// Improves the impulses, from which it starts. Alternating direction method of multipliers on
 ///
 ///   min 1/2 |V - V_free|_M^2 + indicator(y in K_mu*),   y = H^T V + c,   c = offset + mu |y_t| n
 ///
-///   V  <- (M + H rho H^T)^-1 (M V_free + H (r + rho (y - c)))     conjugate gradients, coarse_level.hpp
+///   V  <- (M + H rho H^T)^-1 (M V_free + H (r + rho (y - c)))     conjugate gradients, body_solver.hpp
 ///   x  <- a (H^T V + c) + (1 - a) y                               over-relaxation a
 ///   r' <- P_Kmu(r - rho x),   y <- x + (r' - r)/rho
 ///
 /// with the De Saxce shift of the last y (Boyd et al. 2011; Acary et al. 2018 for the shift). rho = kappa /
-/// W_nn: see `estimate_stiffness`. Deterministic, one thread.
+/// W_nn: see `estimate_stiffness`. The same bits and the same result wherever the parts lie.
+BodyAdmmResult solve_admm(std::span<BodyProblem> parts, const PartLink& link,
+                          const BodyAdmmSettings& settings);
+/// The whole problem in one part.
 BodyAdmmResult solve_admm(BodyProblem& problem, const BodyAdmmSettings& settings);
-
-/// kappa of rho = kappa/W_nn from impulses that carry the load: sum W_nn r^2 / |M^-1/2 H r|^2, about the
-/// inverse of the smallest eigenvalue of W that the load excites, in effective masses of a contact. A column
-/// of N grains: N^2/3; a plate of T grain masses over L layers of c contacts: T L/c. 0 without impulses.
-double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse);
-
-/// The same before any impulse is known: the momentum that stops every body at once is passed on, layer by
-/// layer over the contacts, to the driven walls; or from the heaviest body outwards if there is none. Also
-/// about the number of Gauss-Seidel sweeps that the problem needs. 0 without contacts.
-double estimate_stiffness(const BodyProblem& problem);
 
 }  // namespace talus

@@ -1,5 +1,7 @@
 #include "kernels/body_problem.hpp"
 
+#include <algorithm>
+
 #include "kernels/measures.hpp"
 
 namespace talus {
@@ -23,17 +25,23 @@ BodyUnknown unknown_of_slot(const BodyProblemSource& source, std::size_t slot) {
   return body;
 }
 
-}  // namespace
-
-BodyProblem gather_problem(const BodyProblemSource& source) {
+/// `part` null: all of it.
+BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part) {
   BodyProblem problem;
-  const auto unknown = [&](std::size_t slot) {
-    return source.unknown.empty() ? static_cast<Slot>(slot) : source.unknown[slot];
-  };
-  problem.bodies.reserve(source.velocity.size() + source.walls.size());
-  for (std::size_t slot = 0; slot < source.velocity.size(); ++slot)
-    if (at(unknown(slot)) == problem.bodies.size()) problem.bodies.push_back(unknown_of_slot(source, slot));
-  problem.grains = problem.bodies.size();
+  const std::size_t begin_slot = part ? part->begin : 0;
+  const std::size_t end_slot = part ? part->end : source.velocity.size();
+  problem.grains = end_slot - begin_slot;
+  problem.subdomain = part ? part->subdomain : 0;
+  problem.bodies.reserve(problem.grains + source.walls.size());
+  for (std::size_t slot = begin_slot; slot < end_slot; ++slot) {
+    if (part) {
+      problem.counts.push_back(part->counts[slot]);
+      if (part->multiplicity[slot] > 1)
+        problem.shared.push_back(static_cast<std::int32_t>(problem.bodies.size()));
+    }
+    problem.bodies.push_back(unknown_of_slot(source, slot));
+  }
+  const auto unknown = [&](Slot slot) { return slot - static_cast<Slot>(begin_slot); };
   std::vector<std::int32_t> wall_unknown(source.walls.size(), -1);
   for (std::size_t w = 0; w < source.walls.size(); ++w) {
     const WallMotion& wall = source.walls[w];
@@ -44,15 +52,22 @@ BodyProblem gather_problem(const BodyProblemSource& source) {
     body.wall = true;
     body.axis = wall.normal;
     body.free.u = wall.normal.dot(wall.free_velocity) * wall.normal;
+    if (part) {
+      problem.counts.push_back(part->subdomain == 0 ? 1 : 0);
+      problem.shared.push_back(wall_unknown[w]);
+    }
     problem.bodies.push_back(body);
   }
 
   const Contacts& contacts = source.contacts;
+  const auto here = [&](std::size_t c) { return !part || source.chunks.subdomain[c] == part->local; };
   std::size_t count = 0;
-  for (std::int32_t n : contacts.count) count += at(n);
+  for (std::size_t c = 0; c < source.chunks.size(); ++c)
+    if (here(c)) count += at(contacts.count[c]);
   problem.contacts.reserve(count);
   problem.impulse.reserve(count);
   for (std::size_t c = 0; c < source.chunks.size(); ++c) {
+    if (!here(c)) continue;
     const std::int32_t w = source.chunks.wall[c];
     const std::size_t begin = at(source.chunks.begin[c]);
     for (std::size_t k = begin; k < begin + at(contacts.count[c]); ++k) {
@@ -60,9 +75,9 @@ BodyProblem gather_problem(const BodyProblemSource& source) {
       contact.normal = contact_normal(contacts, k);
       contact.offset = contacts.bias[k] * contact.normal;
       contact.mu = contacts.rn.empty() ? (w < 0 ? source.mu_grains : source.mu_walls) : 0;
-      contact.first = unknown(at(contacts.first[k]));
+      contact.first = unknown(contacts.first[k]);
       if (w < 0) {
-        contact.second = unknown(at(contacts.second[k]));
+        contact.second = unknown(contacts.second[k]);
       } else {
         contact.second = wall_unknown[at(w)];
         const Vec3& drive = source.walls[at(w)].free_velocity;
@@ -76,6 +91,16 @@ BodyProblem gather_problem(const BodyProblemSource& source) {
     }
   }
   return problem;
+}
+
+}  // namespace
+
+BodyProblem gather_problem(const BodyProblemSource& source) {
+  return gather(source, nullptr);
+}
+
+BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part) {
+  return gather(source, &part);
 }
 
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts) {
@@ -95,31 +120,19 @@ void scatter_impulses(const BodyProblem& problem, Contacts& contacts) {
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse) {
   std::vector<Twist> V(problem.bodies.size());
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) add_force(problem.contacts[k], impulse[k], V);
-  for (std::size_t b = 0; b < V.size(); ++b) {
-    const BodyUnknown& body = problem.bodies[b];
-    restrict_to_freedoms(body, V[b]);
-    V[b].u = body.free.u + V[b].u / body.mass;
-    V[b].w = body.spin_mass > 0 ? Vec3(body.free.w + V[b].w / body.spin_mass) : Vec3::Zero();
-  }
+  for (std::size_t b = 0; b < V.size(); ++b) velocity_from_force(problem.bodies[b], V[b]);
   return V;
 }
 
-std::vector<std::int32_t> heavy_unknowns(const BodyProblem& problem, double ratio) {
-  std::vector<double> around(problem.bodies.size(), 0);
-  std::vector<int> neighbours(problem.bodies.size(), 0);
-  for (const ContactEquation& c : problem.contacts) {
-    if (c.second < 0) continue;
-    around[at(c.first)] += problem.bodies[at(c.second)].mass;
-    around[at(c.second)] += problem.bodies[at(c.first)].mass;
-    ++neighbours[at(c.first)];
-    ++neighbours[at(c.second)];
-  }
-  std::vector<std::int32_t> heavy;
-  for (std::size_t b = 0; b < problem.bodies.size(); ++b)
-    if (neighbours[b] > 0 &&
-        (problem.bodies[b].wall || problem.bodies[b].mass * neighbours[b] > ratio * around[b]))
-      heavy.push_back(static_cast<std::int32_t>(b));
-  return heavy;
+Vec3 project_on_cone(const ContactEquation& c, const Vec3& z) {
+  const double z_n = c.normal.dot(z);
+  if (c.mu == 0) return std::max(0.0, z_n) * c.normal;
+  const Vec3 t = z - z_n * c.normal;
+  const double length = t.norm();
+  if (c.mu * length <= -z_n) return Vec3::Zero();
+  if (length <= c.mu * z_n) return z;
+  const double r_n = (z_n + c.mu * length) / (1 + c.mu * c.mu);
+  return r_n * c.normal + (c.mu * r_n / length) * t;
 }
 
 }  // namespace talus

@@ -5,7 +5,7 @@
 ///   min 1/2 (V - V_free)^T M (V - V_free),   H^T V + b n + mu |v_t| n  in  K_mu*  at every contact
 ///
 /// (design.md §4). Unknowns are the grains, 6 numbers each, then the walls of finite mass, 1 each along its
-/// normal. Driven walls are data. Copies of a body in several subdomains are one unknown.
+/// normal. Driven walls are data. With several subdomains each holds a part of the problem (body_parts.hpp).
 
 #include <Eigen/Geometry>
 #include <cstdint>
@@ -51,11 +51,18 @@ struct ContactEquation {
   std::int32_t place = -1;   ///< in `Contacts`
 };
 
+/// The whole problem, or the part of it that one subdomain holds: its contacts and the bodies that stand in
+/// it, masses whole, and in every part all walls of finite mass.
 struct BodyProblem {
   std::vector<BodyUnknown> bodies;
   std::vector<ContactEquation> contacts;
-  std::vector<Vec3> impulse;  ///< r on the first body [N s], one per contact
-  std::size_t grains = 0;     ///< unknowns before the first wall
+  std::vector<Vec3> impulse;         ///< r on the first body [N s], one per contact
+  std::size_t grains = 0;            ///< unknowns before the first wall
+  std::int32_t subdomain = 0;        ///< of all, whose part it is
+  std::vector<char> counts;          ///< per unknown: of its copies this one counts; empty: all do
+  std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
+
+  bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
 };
 
 /// A wall as the problem sees it; `inv_mass` [1/kg] is 0 when it is driven.
@@ -76,12 +83,24 @@ struct BodyProblemSource {
   const Contacts& contacts;
   double mu_grains = 0;
   double mu_walls = 0;
-  Multiplicities multiplicity;    ///< of the slots when copies carry M/m; empty when they carry M
-  std::span<const Slot> unknown;  ///< per slot: its unknown, ascending where first met; empty: the slot
+  Multiplicities multiplicity;  ///< of the slots when copies carry M/m; empty when they carry M
 };
 
-/// Gathers the problem, contacts in order of chunk, with the impulses that `contacts` hold.
+/// The slots and chunks of one subdomain among those of a step.
+struct BodyProblemPart {
+  std::int32_t subdomain = 0;      ///< of all
+  std::int32_t local = 0;          ///< the same as in Chunks
+  std::size_t begin = 0, end = 0;  ///< its slots
+  std::span<const char> counts;    ///< per slot of the step: of the body's copies this one counts
+  std::span<const std::uint16_t> multiplicity;  ///< per slot of the step: in how many subdomains it stands
+};
+
+/// Gathers the problem, contacts in order of chunk, with the impulses that `contacts` hold. Unknowns are the
+/// slots, then the walls.
 BodyProblem gather_problem(const BodyProblemSource& source);
+
+/// The same for one subdomain. The walls count in the first of all.
+BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part);
 
 /// Writes the impulses back.
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
@@ -89,16 +108,29 @@ void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
 /// V = V_free + M^-1 H r, one entry per unknown, summed in order of contact.
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse);
 
-/// Unknowns much heavier than what they touch: walls of finite mass, and bodies of more than `ratio` times
-/// the mean mass of their neighbours; ascending.
-std::vector<std::int32_t> heavy_unknowns(const BodyProblem& problem, double ratio = 10);
-
 /// v - offset: the relative velocity at a contact before drives and bias.
 inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
   const Twist& a = V[static_cast<std::size_t>(c.first)];
   if (c.second < 0) return a.u + c.normal.cross(a.w);
   const Twist& b = V[static_cast<std::size_t>(c.second)];
   return a.u - b.u + c.normal.cross(a.w + b.w);
+}
+
+/// What counts of a vector at a contact: without friction its normal part.
+inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
+  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
+}
+
+inline Vec3 tangential(const ContactEquation& c, const Vec3& v) {
+  return v - c.normal.dot(v) * c.normal;
+}
+
+/// Projection of z on the Coulomb cone of the contact.
+Vec3 project_on_cone(const ContactEquation& c, const Vec3& z);
+
+/// m |u|^2 + (I/R^2) |w|^2 [J].
+inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
+  return body.mass * u.squaredNorm() + body.spin_mass * w.squaredNorm();
 }
 
 /// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_axis`.
@@ -117,6 +149,13 @@ inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> 
 inline void restrict_to_freedoms(const BodyUnknown& body, Twist& f) {
   if (body.wall) f.u = body.axis.dot(f.u) * body.axis;
   if (body.wall || body.spin_mass == 0) f.w.setZero();
+}
+
+/// In place, from the sum of forces on a body: V = V_free + M^-1 F.
+inline void velocity_from_force(const BodyUnknown& body, Twist& f) {
+  restrict_to_freedoms(body, f);
+  f.u = body.free.u + f.u / body.mass;
+  f.w = body.spin_mass > 0 ? Vec3(body.free.w + f.w / body.spin_mass) : Vec3::Zero();
 }
 
 }  // namespace talus

@@ -27,6 +27,10 @@ Eigen::Matrix<double, 6, 6> own_block(const Vec3& m, double rho, bool slick) {
   return rho * transposed.transpose() * transposed;
 }
 
+void restrict_all(const BodyProblem& problem, std::span<Twist> f) {
+  for (std::size_t b = 0; b < f.size(); ++b) restrict_to_freedoms(problem.bodies[b], f[b]);
+}
+
 }  // namespace
 
 /// f += or -= the row's part from the other body.
@@ -39,26 +43,42 @@ inline void BodySystem::couple(const Edge& edge, const Twist& x, Twist& f) {
   f.w -= edge.m.cross(v);
 }
 
+template <bool Add>
+void BodySystem::couple_ties(std::span<const Twist> x, std::span<Twist> f) const {
+  for (const Tie& tie : ties_) {
+    const Edge back{-tie.edge.m, tie.edge.rho, tie.first, tie.edge.slick};
+    couple<Add>(tie.edge, x[at(tie.edge.other)], f[at(tie.first)]);
+    couple<Add>(back, x[at(tie.first)], f[at(tie.edge.other)]);
+  }
+}
+
 BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     : problem_(problem),
       begin_(problem.bodies.size() + 1, 0),
       middle_(problem.bodies.size(), 0),
       diagonal_(problem.bodies.size(), Matrix6::Zero()),
-      inverse_(problem.bodies.size()) {
+      inverse_(problem.bodies.size(), Matrix6::Zero()) {
   const auto& contacts = problem.contacts;
+  const auto row = [&](std::int32_t body) { return at(body) < problem.grains && problem.counted(at(body)); };
+  const auto edge = [&](const ContactEquation& c) { return c.second >= 0 && row(c.first) && row(c.second); };
+  std::size_t ties = 0;
   for (const ContactEquation& c : contacts) {
-    if (c.second < 0) continue;
+    if (!edge(c)) {
+      ties += c.second >= 0 ? 1 : 0;
+      continue;
+    }
     ++begin_[at(c.first) + 1];
     ++begin_[at(c.second) + 1];
   }
   for (std::size_t b = 0; b < size(); ++b) begin_[b + 1] += begin_[b];
   edges_.resize(begin_.back());
+  ties_.reserve(ties);
   // Lower unknowns first, in order of contact: two passes.
   std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
   for (const bool lower : {true, false}) {
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       const ContactEquation& c = contacts[k];
-      if (c.second < 0) continue;
+      if (!edge(c)) continue;
       const std::int32_t slick = c.mu == 0 ? 1 : 0;
       if ((c.second < c.first) == lower) edges_[next[at(c.first)]++] = {c.normal, rho[k], c.second, slick};
       if ((c.first < c.second) == lower) edges_[next[at(c.second)]++] = {-c.normal, rho[k], c.first, slick};
@@ -67,20 +87,16 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
   }
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactEquation& c = contacts[k];
+    if (c.second >= 0 && !edge(c))
+      ties_.push_back({{c.normal, rho[k], c.second, c.mu == 0 ? 1 : 0}, c.first});
     diagonal_[at(c.first)] += own_block(c.normal, rho[k], c.mu == 0);
     if (c.second >= 0) diagonal_[at(c.second)] += own_block(-c.normal, rho[k], c.mu == 0);
   }
-  invert_diagonal();
 }
 
-void BodySystem::scale(double factor) {
-  for (Edge& edge : edges_) edge.rho *= factor;
-  for (Matrix6& block : diagonal_) block *= factor;
-  invert_diagonal();
-}
-
-void BodySystem::invert_diagonal() {
+void BodySystem::close() {
   for (std::size_t b = 0; b < size(); ++b) {
+    if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];
     Matrix6 inverse = Matrix6::Zero();
     if (body.wall) {
@@ -117,37 +133,55 @@ inline Twist times(const Eigen::Matrix<double, 6, 6>& A, const Twist& x) {
 
 void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
   for (std::size_t b = 0; b < size(); ++b) {
+    y[b] = Twist{};
+    if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];
     Twist sum = times(diagonal_[b], x[b]);
     sum.u += body.mass * x[b].u;
     sum.w += body.spin_mass * x[b].w;
     for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e)
       couple<true>(edges_[e], x[at(edges_[e].other)], sum);
-    restrict_to_freedoms(body, sum);
     y[b] = sum;
   }
+  couple_ties<true>(x, y);
+  restrict_all(problem_, y);
 }
 
-void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x, std::span<Twist> rest) const {
+void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) const {
   for (std::size_t b = 0; b < size(); ++b) {
+    x[b] = Twist{};
+    if (!problem_.counted(b)) continue;
     Twist sum = f[b];
     for (std::size_t e = begin_[b]; e < middle_[b]; ++e)
       couple<false>(edges_[e], x[at(edges_[e].other)], sum);
     x[b] = times(inverse_[b], sum);
   }
-  // f - (D + L + U) x = -U x.
+}
+
+// f - (D + L + U + T) x = -(U + T) x.
+void BodySystem::rest_of_forward(std::span<const Twist> x, std::span<Twist> rest) const {
   for (std::size_t b = 0; b < size(); ++b) {
     Twist sum;
     for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e)
       couple<false>(edges_[e], x[at(edges_[e].other)], sum);
-    restrict_to_freedoms(problem_.bodies[b], sum);
     rest[b] = sum;
   }
+  couple_ties<false>(x, rest);
+  restrict_all(problem_, rest);
 }
 
-void BodySystem::smooth_backward(std::span<const Twist> f, std::span<Twist> x) const {
+void BodySystem::take_ties(std::span<const Twist> f, std::span<const Twist> x, std::span<Twist> rest) const {
+  for (std::size_t b = 0; b < size(); ++b) rest[b] = problem_.counted(b) ? f[b] : Twist{};
+  couple_ties<false>(x, rest);
+}
+
+void BodySystem::smooth_backward(std::span<const Twist> rest, std::span<Twist> x) const {
   for (std::size_t b = size(); b-- > 0;) {
-    Twist sum = f[b];
+    if (!problem_.counted(b)) {
+      x[b] = Twist{};
+      continue;
+    }
+    Twist sum = rest[b];
     for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e)
       couple<false>(edges_[e], x[at(edges_[e].other)], sum);
     x[b] = times(inverse_[b], sum);

@@ -1,6 +1,7 @@
 #pragma once
 
-/// The matrix A = M + H rho H^T over bodies, never assembled, and its block Gauss-Seidel passes.
+/// The matrix A = M + H rho H^T over the bodies of one part, never assembled, and its block Gauss-Seidel
+/// passes.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -11,48 +12,70 @@
 
 namespace talus {
 
-/// A as rows of bodies: every contact stands with both of its bodies, so that a row is computed by itself
-/// (rows can be dealt to threads, and sums do not depend on how). Per contact and product: 2 records of 48
-/// bytes and 2 gathered twists, about 80 flop. 380 bytes a body and 96 a contact.
+/// What one part adds to A. A contact between two grains that count here stands with both of them, as rows:
+/// those are what the Gauss-Seidel passes walk over. Every other contact of two bodies, at a wall of finite
+/// mass or with a grain that counts elsewhere, is a `tie`: between parts, and between grains and walls, the
+/// passes are block Jacobi. They converge for any such split: with D the blocks on the diagonal, of all
+/// contacts of a body, and T the ties, D - T = M + sum rho |H_i^T x_i - H_j^T x_j|^2 > 0.
+/// Per contact and product: 2 records of 48 bytes and 2 gathered twists, about 80 flop. 600 bytes a body and
+/// 96 a contact.
 ///
 /// With m = +-n pointing to the body of the row, seen from there the relative velocity is
 /// v = (u_i - u_j) + m x (w_i + w_j), and the row gains rho (v, -m x v). Where a contact has no friction only
 /// (m.v) m counts.
 class BodySystem {
  public:
-  /// Keeps a reference to `problem`. `rho` [kg]: one per contact, > 0.
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+  /// Keeps a reference to `problem`. `rho` [kg]: one per contact, > 0. Until `close` is called, `diagonal`
+  /// holds the blocks of H rho H^T that the contacts of this part give.
   BodySystem(const BodyProblem& problem, std::span<const double> rho);
 
-  /// Multiplies every rho by `factor`.
-  void scale(double factor);
+  std::vector<Matrix6>& diagonal() { return diagonal_; }
+  /// Once `diagonal` holds what the contacts of all parts give.
+  void close();
 
-  /// y = A x. All twists are restricted to the freedoms of their bodies.
+  // Twists are restricted to the freedoms of their bodies. Results are parts of a sum over the copies of a
+  // body, unless said otherwise.
+
+  /// y = A x.
   void multiply(std::span<const Twist> x, std::span<Twist> y) const;
 
-  /// First half of the symmetric smoother from x = 0: x = (D + L)^-1 f, and what is left, f - A x.
-  void smooth_forward(std::span<const Twist> f, std::span<Twist> x, std::span<Twist> rest) const;
-  /// Second half: one backward Gauss-Seidel pass on A x = f.
-  void smooth_backward(std::span<const Twist> f, std::span<Twist> x) const;
+  /// First half of the symmetric smoother, from 0: x = (D + L)^-1 f.
+  void smooth_forward(std::span<const Twist> f, std::span<Twist> x) const;
+  /// What it left, f - A x, of the summed x.
+  void rest_of_forward(std::span<const Twist> x, std::span<Twist> rest) const;
+  /// f less what ties add to A x, for the second half.
+  void take_ties(std::span<const Twist> f, std::span<const Twist> x, std::span<Twist> rest) const;
+  /// Second half: one backward pass from x, whose `rest` is summed.
+  void smooth_backward(std::span<const Twist> rest, std::span<Twist> x) const;
 
   std::size_t size() const { return diagonal_.size(); }
 
  private:
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
   struct Edge {
     Vec3 m;
     double rho;
     std::int32_t other;  ///< unknown
     std::int32_t slick;  ///< 1: normal part only
   };
-  void invert_diagonal();
+  /// A contact from its first body's side: to the second m is -m.
+  struct Tie {
+    Edge edge;
+    std::int32_t first;
+  };
   template <bool Add>
   static void couple(const Edge& edge, const Twist& x, Twist& f);
+  template <bool Add>
+  void couple_ties(std::span<const Twist> x, std::span<Twist> f) const;
 
   const BodyProblem& problem_;
   std::vector<std::size_t> begin_, middle_;  ///< per body + 1; edges to lower unknowns stand before middle_
   std::vector<Edge> edges_;
+  std::vector<Tie> ties_;
   std::vector<Matrix6> diagonal_;  ///< of H rho H^T
-  std::vector<Matrix6> inverse_;   ///< of the blocks of A, on the freedoms of each body
+  std::vector<Matrix6> inverse_;   ///< of the blocks of A, on the freedoms of each body; 0 where it counts
+                                   ///< elsewhere
 };
 
 }  // namespace talus

@@ -246,9 +246,17 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
   std::vector<std::size_t> order(candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto split = order.begin() + static_cast<std::ptrdiff_t>(grains);
-  std::sort(order.begin(), split, [&](std::size_t a, std::size_t b) {
-    return before(candidates.grain_pairs[a], candidates.grain_pairs[b]);
-  });
+  // A body is first in a few pairs only: counting by the first leaves short runs.
+  std::vector<std::size_t> begin(place.size() + 2, 0);
+  for (const GrainPair& pair : candidates.grain_pairs) ++begin[index(pair.first) + 2];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  for (std::size_t k = 0; k < grains; ++k) order[begin[index(candidates.grain_pairs[k].first) + 1]++] = k;
+  for (std::size_t body = 0; body < place.size(); ++body)
+    std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin[body]),
+              order.begin() + static_cast<std::ptrdiff_t>(begin[body + 1]),
+              [&](std::size_t a, std::size_t b) {
+                return candidates.grain_pairs[a].second < candidates.grain_pairs[b].second;
+              });
   std::sort(split, order.end(), [&](std::size_t a, std::size_t b) {
     return before(candidates.wall_pairs[a - grains], candidates.wall_pairs[b - grains]);
   });

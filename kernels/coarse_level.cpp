@@ -11,6 +11,11 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
+/// Grains that a part makes aggregates of.
+bool grain_here(const BodyProblem& problem, std::int32_t body) {
+  return body >= 0 && at(body) < problem.grains && problem.counted(at(body));
+}
+
 /// Neighbours of every grain, in order of contact: begin (one more than grains) and the list.
 struct Adjacency {
   std::vector<std::size_t> begin;
@@ -19,9 +24,10 @@ struct Adjacency {
 
 Adjacency grain_neighbours(const BodyProblem& problem) {
   Adjacency graph;
-  const auto grains = static_cast<std::int32_t>(problem.grains);
   graph.begin.assign(problem.grains + 1, 0);
-  const auto between_grains = [&](const ContactEquation& c) { return c.second >= 0 && c.second < grains; };
+  const auto between_grains = [&](const ContactEquation& c) {
+    return grain_here(problem, c.first) && grain_here(problem, c.second);
+  };
   for (const ContactEquation& c : problem.contacts)
     if (between_grains(c)) {
       ++graph.begin[at(c.first) + 1];
@@ -38,25 +44,27 @@ Adjacency grain_neighbours(const BodyProblem& problem) {
   return graph;
 }
 
+/// The largest of a count that each part has.
+std::size_t longest(const BodyParts& parts, const std::function<std::size_t(std::size_t)>& count) {
+  const std::vector<double> counts =
+      parts.rows(1, [&](std::size_t p, std::span<double> row) { row[0] = static_cast<double>(count(p)); });
+  return static_cast<std::size_t>(*std::max_element(counts.begin(), counts.end()));
+}
+
 }  // namespace
 
 int aggregate_target(std::size_t bodies) {
-  return static_cast<int>(std::clamp<std::size_t>(bodies / 125, 16, 256));
+  constexpr std::size_t most_aggregates = 2048;
+  return static_cast<int>(std::max(std::clamp<std::size_t>(bodies / 125, 16, 256), bodies / most_aggregates));
 }
 
-Aggregates grow_aggregates(const BodyProblem& problem, int target) {
+Aggregates grow_aggregates(const BodyProblem& problem, std::span<const char> touched, int target) {
   const Adjacency graph = grain_neighbours(problem);
   Aggregates result;
   result.of_body.assign(problem.bodies.size(), -1);
-  std::vector<char> touched(problem.grains, 0);
-  for (const ContactEquation& c : problem.contacts) {
-    touched[at(c.first)] = 1;
-    if (c.second >= 0 && at(c.second) < problem.grains) touched[at(c.second)] = 1;
-  }
-  std::vector<int> size;
   std::vector<std::int32_t> members;
   for (std::size_t seed = 0; seed < problem.grains; ++seed) {
-    if (!touched[seed] || result.of_body[seed] >= 0) continue;
+    if (!touched[seed] || !problem.counted(seed) || result.of_body[seed] >= 0) continue;
     const std::int32_t own = result.count;
     members.assign(1, static_cast<std::int32_t>(seed));
     result.of_body[seed] = own;
@@ -87,36 +95,84 @@ Aggregates grow_aggregates(const BodyProblem& problem, int target) {
   return result;
 }
 
-CoarseLevel::CoarseLevel(const BodyProblem& problem, const Aggregates& aggregates,
-                         std::span<const double> rho)
-    : problem_(problem), aggregates_(aggregates) {
-  const auto count = static_cast<std::size_t>(aggregates.count);
-  centre_.assign(count, Vec3::Zero());
-  length_.assign(count, 0);
-  std::vector<double> members(count, 0);
-  for (std::size_t b = 0; b < problem.grains; ++b)
-    if (const std::int32_t a = aggregates.of_body[b]; a >= 0) {
-      centre_[at(a)] += problem.bodies[b].x;
-      members[at(a)] += 1;
-    }
-  for (std::size_t a = 0; a < count; ++a) centre_[a] /= members[a];
-  for (std::size_t b = 0; b < problem.grains; ++b)
-    if (const std::int32_t a = aggregates.of_body[b]; a >= 0)
-      length_[at(a)] += ((problem.bodies[b].x - centre_[at(a)]).squaredNorm() +
-                         problem.bodies[b].radius * problem.bodies[b].radius) /
-                        members[at(a)];
-  for (double& length : length_) length = std::sqrt(length);
+CoarseLevel::CoarseLevel(const BodyParts& parts, std::span<const std::vector<char>> touched,
+                         std::span<const std::vector<double>> rho, int target)
+    : parts_(parts), members_(parts.size()), groups_(parts.size()) {
+  join(touched, target);
+  list_groups();
+  size_ = first(aggregates_ + walls_);
+  if (size_ > 0) factorise(rho);
+}
 
-  assemble(rho);
-  if (size() > 0) {
-    solver_.analyzePattern(Matrix(mass_ + stiffness_));
-    factorise();
-  }
+/// Aggregates grow within the parts and are numbered through all of them; each body that counts tells its
+/// copies how it moves with its own.
+void CoarseLevel::join(std::span<const std::vector<char>> touched, int target) {
+  std::vector<Aggregates> own(parts_.size());
+  const std::vector<double> counts = parts_.rows(1, [&](std::size_t p, std::span<double> row) {
+    own[p] = grow_aggregates(parts_[p], touched[p], target);
+    row[0] = own[p].count;
+  });
+  std::vector<std::int64_t> begin(counts.size() + 1, 0);
+  for (std::size_t k = 0; k < counts.size(); ++k)
+    begin[k + 1] = begin[k] + static_cast<std::int64_t>(counts[k]);
+  aggregates_ = begin.back();
+  walls_ = static_cast<std::int64_t>(parts_[0].bodies.size() - parts_[0].grains);
+
+  PartField arm = parts_.field(), name = parts_.field();
+  parts_.each([&](std::size_t p) {
+    const BodyProblem& problem = parts_[p];
+    const auto count = at(own[p].count);
+    std::vector<Vec3> centre(count, Vec3::Zero());
+    std::vector<double> length2(count, 0), members(count, 0);
+    for (std::size_t b = 0; b < problem.grains; ++b)
+      if (const std::int32_t a = own[p].of_body[b]; a >= 0) {
+        centre[at(a)] += problem.bodies[b].x;
+        members[at(a)] += 1;
+      }
+    for (std::size_t a = 0; a < count; ++a) centre[a] /= members[a];
+    for (std::size_t b = 0; b < problem.grains; ++b)
+      if (const std::int32_t a = own[p].of_body[b]; a >= 0) {
+        const BodyUnknown& body = problem.bodies[b];
+        arm[p][b].u = body.x - centre[at(a)];
+        length2[at(a)] += (arm[p][b].u.squaredNorm() + body.radius * body.radius) / members[at(a)];
+      }
+    const auto first = static_cast<double>(begin[at(problem.subdomain)]);
+    for (std::size_t b = 0; b < problem.grains; ++b)
+      if (const std::int32_t a = own[p].of_body[b]; a >= 0)
+        name[p][b].u = Vec3(first + a + 1, std::sqrt(length2[at(a)]), 0);
+  });
+  parts_.link().sum_copies(arm);
+  parts_.link().sum_copies(name);
+  parts_.each([&](std::size_t p) {
+    members_[p].resize(parts_[p].bodies.size());
+    for (std::size_t b = 0; b < parts_[p].grains; ++b)
+      members_[p][b] = {static_cast<std::int32_t>(name[p][b].u[0]) - 1, -1, arm[p][b].u, name[p][b].u[1]};
+  });
+}
+
+/// Which aggregates a part adds to: those of its bodies.
+void CoarseLevel::list_groups() {
+  parts_.each([&](std::size_t p) {
+    std::vector<std::int32_t>& groups = groups_[p];
+    for (const Member& member : members_[p])
+      if (member.group >= 0) groups.push_back(member.group);
+    std::sort(groups.begin(), groups.end());
+    groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+    for (Member& member : members_[p])
+      if (member.group >= 0)
+        member.local = static_cast<std::int32_t>(
+            std::lower_bound(groups.begin(), groups.end(), member.group) - groups.begin());
+  });
+  most_ = longest(parts_, [&](std::size_t p) { return groups_[p].size(); });
+  groups_of_all_ = parts_.rows(most_, [&](std::size_t p, std::span<double> row) {
+    std::fill(row.begin(), row.end(), -1.0);
+    std::copy(groups_[p].begin(), groups_[p].end(), row.begin());
+  });
 }
 
 namespace {
 
-using Block = Eigen::Matrix<double, 6, 6>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 /// The matrix of Omega -> Omega x r.
 Eigen::Matrix3d rotation(const Vec3& r) {
@@ -125,155 +181,169 @@ Eigen::Matrix3d rotation(const Vec3& r) {
   return m;
 }
 
-/// Symmetric matrix of blocks: on the diagonal, and of pairs (key = higher x count + lower, sorted).
-struct Blocks {
-  std::vector<Block> diagonal;
-  std::vector<std::size_t> key;
-  std::vector<Block> pair;  ///< rows of the higher group
-};
-
 }  // namespace
 
-/// A group is an aggregate, 6 coarse unknowns, or a wall, 1.
-void CoarseLevel::assemble(std::span<const double> rho) {
-  const auto aggregates = at(aggregates_.count);
-  const std::size_t groups = aggregates + problem_.bodies.size() - problem_.grains;
-  const auto first = [&](std::size_t group) {
-    return static_cast<Eigen::Index>(group < aggregates ? 6 * group : 5 * aggregates + group);
-  };
-  const auto width = [&](std::size_t group) { return Eigen::Index{group < aggregates ? 6 : 1}; };
+/// Of the lower triangle: rows of the higher group. A wall has one row.
+struct CoarseLevel::Block {
+  std::int64_t high, low;
+  Matrix6 values = Matrix6::Zero();
+};
+
+/// What a part adds to P^T A P, by ascending (high, low).
+std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<const double> rho) const {
+  const BodyProblem& problem = parts_[p];
+  const std::int64_t groups = aggregates_ + walls_;
   const auto group_of = [&](std::int32_t body) {
-    return problem_.bodies[at(body)].wall ? aggregates + at(body) - problem_.grains
-                                          : at(aggregates_.of_body[at(body)]);
+    return at(body) < problem.grains ? std::int64_t{members_[p][at(body)].group}
+                                     : aggregates_ + static_cast<std::int64_t>(at(body) - problem.grains);
   };
+  std::vector<std::int64_t> keys;
+  for (const ContactEquation& c : problem.contacts) {
+    const std::int64_t one = group_of(c.first), other = c.second < 0 ? one : group_of(c.second);
+    keys.insert(keys.end(), {one * groups + one, other * groups + other,
+                             std::max(one, other) * groups + std::min(one, other)});
+  }
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+    if (const std::int64_t g = group_of(static_cast<std::int32_t>(b)); problem.counted(b) && g >= 0)
+      keys.push_back(g * groups + g);
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  std::vector<Block> blocks;
+  for (std::int64_t key : keys) blocks.push_back({key / groups, key % groups});
+  const auto block = [&](std::int64_t high, std::int64_t low) -> Matrix6& {
+    const auto place = std::lower_bound(keys.begin(), keys.end(), high * groups + low) - keys.begin();
+    return blocks[static_cast<std::size_t>(place)].values;
+  };
+
   /// Relative velocity at a contact as a function of the motion of a body's group.
   using Part = Eigen::Matrix<double, 3, 6>;
   const auto part_of = [&](std::int32_t index, double sign, const Vec3& n) {
-    const BodyUnknown& body = problem_.bodies[at(index)];
+    const BodyUnknown& body = problem.bodies[at(index)];
     Part part = Part::Zero();
     if (body.wall) {
       part.col(0) = sign * body.axis;
       return part;
     }
+    const Member& member = members_[p][at(index)];
     part.leftCols<3>() = sign * Eigen::Matrix3d::Identity();
-    part.rightCols<3>() = sign * rotation(arm(at(index)));
+    part.rightCols<3>() = sign * rotation(member.arm);
     if (body.spin_mass > 0) part.rightCols<3>() -= body.radius * rotation(n);  // n x (R Omega)
-    part.rightCols<3>() /= length_[at(aggregates_.of_body[at(index)])];
+    part.rightCols<3>() /= member.length;
     return part;
   };
-
-  Blocks blocks;
-  for (const ContactEquation& c : problem_.contacts) {
-    if (c.second < 0) continue;
-    const std::size_t p = group_of(c.first), q = group_of(c.second);
-    if (p != q) blocks.key.push_back(std::max(p, q) * groups + std::min(p, q));
-  }
-  std::sort(blocks.key.begin(), blocks.key.end());
-  blocks.key.erase(std::unique(blocks.key.begin(), blocks.key.end()), blocks.key.end());
-  blocks.pair.assign(blocks.key.size(), Block::Zero());
-  blocks.diagonal.assign(groups, Block::Zero());
-  for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
-    const ContactEquation& c = problem_.contacts[k];
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
     const Eigen::Matrix3d weight = c.mu > 0 ? Eigen::Matrix3d(rho[k] * Eigen::Matrix3d::Identity())
                                             : Eigen::Matrix3d(rho[k] * c.normal * c.normal.transpose());
-    const std::size_t p = group_of(c.first), q = c.second < 0 ? p : group_of(c.second);
+    const std::int64_t one = group_of(c.first), other = c.second < 0 ? one : group_of(c.second);
     Part a = part_of(c.first, 1, c.normal);
     if (c.second >= 0) {
       const Part b = part_of(c.second, -1, c.normal);
-      if (p == q) {
+      if (one == other) {
         a += b;
       } else {
-        blocks.diagonal[q] += b.transpose() * weight * b;
-        const auto place =
-            std::lower_bound(blocks.key.begin(), blocks.key.end(), std::max(p, q) * groups + std::min(p, q)) -
-            blocks.key.begin();
-        Block& pair = blocks.pair[static_cast<std::size_t>(place)];
-        if (p > q)
-          pair += a.transpose() * weight * b;
+        block(other, other) += b.transpose() * weight * b;
+        if (one > other)
+          block(one, other) += a.transpose() * weight * b;
         else
-          pair += b.transpose() * weight * a;
+          block(other, one) += b.transpose() * weight * a;
       }
     }
-    blocks.diagonal[p] += a.transpose() * weight * a;
+    block(one, one) += a.transpose() * weight * a;
   }
 
-  // The lower triangle is all that the factorisation reads.
-  const auto size = first(groups);
-  std::vector<Eigen::Triplet<double>> entries;
-  const auto write = [&](std::size_t p, std::size_t q, const Block& block) {
-    for (Eigen::Index i = 0; i < width(p); ++i)
-      for (Eigen::Index j = 0; j < width(q); ++j)
-        entries.emplace_back(first(p) + i, first(q) + j, block(i, j));
-  };
-  for (std::size_t g = 0; g < groups; ++g) write(g, g, blocks.diagonal[g]);
-  for (std::size_t k = 0; k < blocks.key.size(); ++k)
-    write(blocks.key[k] / groups, blocks.key[k] % groups, blocks.pair[k]);
-  stiffness_.resize(size, size);
-  stiffness_.setFromTriplets(entries.begin(), entries.end());
-
-  blocks.diagonal.assign(groups, Block::Zero());
-  for (std::size_t b = 0; b < problem_.bodies.size(); ++b) {
-    const BodyUnknown& body = problem_.bodies[b];
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+    const BodyUnknown& body = problem.bodies[b];
+    const std::int64_t g = group_of(static_cast<std::int32_t>(b));
+    if (!problem.counted(b) || g < 0) continue;
     if (body.wall) {
-      blocks.diagonal[aggregates + b - problem_.grains](0, 0) = body.mass;
+      block(g, g)(0, 0) += body.mass;
       continue;
     }
-    const std::int32_t a = aggregates_.of_body[b];
-    if (a < 0) continue;
-    const double length = length_[at(a)], relative = body.radius / length;
+    const Member& member = members_[p][b];
+    const double relative = body.radius / member.length;
     Part part;
-    part << Eigen::Matrix3d::Identity(), rotation(arm(b)) / length;
-    Block& block = blocks.diagonal[at(a)];
-    block += body.mass * part.transpose() * part;
+    part << Eigen::Matrix3d::Identity(), rotation(member.arm) / member.length;
+    Matrix6 mass = body.mass * part.transpose() * part;
     // A little inertia also where nothing turns: grains in a row would leave a rotation without any.
-    block.diagonal().tail<3>().array() += std::max(body.spin_mass * relative * relative, 1e-6 * body.mass);
+    mass.diagonal().tail<3>().array() += std::max(body.spin_mass * relative * relative, 1e-6 * body.mass);
+    block(g, g) += mass;
   }
-  entries.clear();
-  for (std::size_t g = 0; g < groups; ++g) write(g, g, blocks.diagonal[g]);
-  mass_.resize(size, size);
-  mass_.setFromTriplets(entries.begin(), entries.end());
+  return blocks;
 }
 
-Vec3 CoarseLevel::arm(std::size_t body) const {
-  return problem_.bodies[body].x - centre_[at(aggregates_.of_body[body])];
-}
-
-void CoarseLevel::factorise() {
-  solver_.factorize(Matrix(mass_ + factor_ * stiffness_));
-}
-
-void CoarseLevel::scale(double factor) {
-  factor_ *= factor;
-  if (size() > 0) factorise();
-}
-
-void CoarseLevel::correct(std::span<const Twist> f, std::span<Twist> x) const {
-  if (size() == 0 || solver_.info() != Eigen::Success) return;
-  Eigen::VectorXd force = Eigen::VectorXd::Zero(size());
-  for (std::size_t b = 0; b < f.size(); ++b) {
-    const BodyUnknown& body = problem_.bodies[b];
-    if (body.wall) {
-      force[wall_unknown(b)] += body.axis.dot(f[b].u);
-      continue;
+/// Blocks of all parts, added in order of subdomain.
+void CoarseLevel::factorise(std::span<const std::vector<double>> rho) {
+  constexpr std::size_t numbers = 2 + 36;
+  std::vector<std::vector<Block>> blocks(parts_.size());
+  parts_.each([&](std::size_t p) { blocks[p] = blocks_of(p, rho[p]); });
+  const std::size_t most = longest(parts_, [&](std::size_t p) { return blocks[p].size(); });
+  const std::vector<double> all = parts_.rows(numbers * most, [&](std::size_t p, std::span<double> row) {
+    std::fill(row.begin(), row.end(), -1.0);
+    double* out = row.data();
+    for (const Block& block : blocks[p]) {
+      *out++ = static_cast<double>(block.high);
+      *out++ = static_cast<double>(block.low);
+      out = std::copy_n(block.values.data(), 36, out);
     }
-    const std::int32_t a = aggregates_.of_body[b];
-    if (a < 0) continue;
-    force.segment<3>(6 * a) += f[b].u;
-    force.segment<3>(6 * a + 3) += (arm(b).cross(f[b].u) + body.radius * f[b].w) / length_[at(a)];
+  });
+  const auto width = [&](std::int64_t group) { return Eigen::Index{group < aggregates_ ? 6 : 1}; };
+  // Entries that come twice are added in the order in which they come.
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t k = 0; k < all.size(); k += numbers) {
+    if (all[k] < 0) continue;
+    const auto high = static_cast<std::int64_t>(all[k]), low = static_cast<std::int64_t>(all[k + 1]);
+    const Eigen::Map<const Matrix6> values(&all[k + 2]);
+    for (Eigen::Index i = 0; i < width(high); ++i)
+      for (Eigen::Index j = 0; j < width(low); ++j)
+        entries.emplace_back(first(high) + i, first(low) + j, values(i, j));
+  }
+  Eigen::SparseMatrix<double> matrix(size_, size_);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  solver_.compute(matrix);
+}
+
+void CoarseLevel::correct(const PartField& f, PartField& x) const {
+  if (size_ == 0 || solver_.info() != Eigen::Success) return;
+  const auto walls = static_cast<std::size_t>(walls_);
+  const std::size_t width = 6 * most_ + walls;
+  const std::vector<double> rows = parts_.rows(width, [&](std::size_t p, std::span<double> row) {
+    const BodyProblem& problem = parts_[p];
+    for (std::size_t b = 0; b < problem.grains; ++b) {
+      const Member& member = members_[p][b];
+      if (member.group < 0) continue;
+      Eigen::Map<Eigen::Matrix<double, 6, 1>> force(&row[6 * at(member.local)]);
+      force.head<3>() += f[p][b].u;
+      force.tail<3>() += (member.arm.cross(f[p][b].u) + problem.bodies[b].radius * f[p][b].w) / member.length;
+    }
+    for (std::size_t w = 0; w < walls; ++w)
+      row[6 * most_ + w] = problem.bodies[problem.grains + w].axis.dot(f[p][problem.grains + w].u);
+  });
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(size_);
+  for (std::size_t part = 0; part * width < rows.size(); ++part) {
+    const double* const row = &rows[part * width];
+    const double* const groups = groups_of_all_.data() + part * most_;
+    for (std::size_t k = 0; k < most_ && groups[k] >= 0; ++k)
+      force.segment<6>(first(static_cast<std::int64_t>(groups[k]))) +=
+          Eigen::Map<const Eigen::Matrix<double, 6, 1>>(row + 6 * k);
+    for (std::size_t w = 0; w < walls; ++w)
+      force[first(aggregates_ + static_cast<std::int64_t>(w))] += row[6 * most_ + w];
   }
   const Eigen::VectorXd motion = solver_.solve(force);
-  for (std::size_t b = 0; b < f.size(); ++b) {
-    const BodyUnknown& body = problem_.bodies[b];
-    if (body.wall) {
-      x[b].u += motion[wall_unknown(b)] * body.axis;
-      continue;
+  parts_.each([&](std::size_t p) {
+    const BodyProblem& problem = parts_[p];
+    for (std::size_t b = 0; b < problem.grains; ++b) {
+      const Member& member = members_[p][b];
+      if (member.group < 0) continue;
+      const Eigen::Index begin = first(member.group);
+      const Vec3 turn = motion.segment<3>(begin + 3) / member.length;
+      x[p][b].u += motion.segment<3>(begin) + turn.cross(member.arm);
+      if (problem.bodies[b].spin_mass > 0) x[p][b].w += problem.bodies[b].radius * turn;
     }
-    const std::int32_t a = aggregates_.of_body[b];
-    if (a < 0) continue;
-    const Vec3 turn = motion.segment<3>(6 * a + 3) / length_[at(a)];
-    x[b].u += motion.segment<3>(6 * a) + turn.cross(arm(b));
-    if (body.spin_mass > 0) x[b].w += body.radius * turn;
-  }
+    for (std::size_t w = 0; w < walls; ++w)
+      x[p][problem.grains + w].u +=
+          motion[first(aggregates_ + static_cast<std::int64_t>(w))] * problem.bodies[problem.grains + w].axis;
+  });
 }
 
 }  // namespace talus

@@ -6,7 +6,7 @@
 
 #include "kernels/bodies.hpp"
 #include "kernels/contacts.hpp"
-#include "kernels/sweep.hpp"
+#include "kernels/sweep_kernels.hpp"
 
 namespace talus {
 
@@ -37,14 +37,25 @@ struct Trail {
 void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
 
 /// Applies the rule to the impulses of a range; beta = 0 begins a new trail.
-void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& contacts, Trail& trail);
+void carry_impulses(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
+                    Contacts& contacts, Trail& trail);
 
 /// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
-void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std::span<Velocity> velocity,
-                      Trail& trail);
+void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
+                      std::span<Velocity> velocity, Trail& trail);
 
 /// Applies the rule to the wall copy of a chunk.
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);
+
+/// When velocities are made afresh from the impulses, what drifted from them is gone at once, but not from
+/// what the trail remembers: the rule would take the difference for motion, and carry it on beta/(1 - beta)
+/// times as large, at every refresh. So the trail goes along: `loosen` before the velocities are reset,
+/// `fasten` when they stand.
+void loosen(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail);
+void fasten(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail);
+/// The same with the wall copy of a chunk.
+void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail);
+void fasten(std::size_t chunk, const WallCopy& copy, Trail& trail);
 
 /// Sum of W_nn |s - y|^2 over a range [J]: the square of what the sweep changed, in the metric of the sweep.
 /// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls.

@@ -255,7 +255,10 @@ std::int32_t leaf_of(const CutTree& tree, const Coordinates& q) {
   std::int32_t k = 0;
   while (k >= 0) {
     const CutTree::Cut& cut = tree.cuts[at(k)];
-    k = cut_key(q, cut.axis) < cut.key ? cut.below : cut.above;
+    // The two other coordinates only tell points of the very plane of the cut apart.
+    const std::uint64_t along = q[at(cut.axis)], plane = cut.key >> (2 * IntegerFrame::bits);
+    const bool below = along != plane ? along < plane : cut_key(q, cut.axis) < cut.key;
+    k = below ? cut.below : cut.above;
   }
   return -1 - k;
 }

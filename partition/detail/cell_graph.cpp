@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -91,6 +92,15 @@ Compressed compress(const CellGraph& graph, const CellTable& table) {
     result.cell.push_back(static_cast<std::int32_t>(c));
     result.vertex_weight.push_back(static_cast<idx_t>(graph.weight[c]));
   }
+  // Grains without candidates yet (the first partition of a run) share nothing: cells are then tied by their
+  // faces, all alike. Without ties METIS deals cells out like cards.
+  const bool tied =
+      std::any_of(graph.shared.begin(), graph.shared.end(), [](std::int64_t s) { return s > 0; });
+  const auto shared_by = [&](std::size_t cell, std::size_t d) {
+    if (tied) return graph.shared[13 * cell + d];
+    const auto& step = half_neighbours[d];
+    return std::int64_t{std::abs(step[0]) + std::abs(step[1]) + std::abs(step[2]) == 1};
+  };
   std::int64_t scale = 1;  // two ties a point: their sum may reach twice the weight, METIS adds further
   for (std::int64_t shared : graph.shared) total += shared;
   while (total / scale >= std::numeric_limits<idx_t>::max() / 4) scale *= 2;
@@ -104,8 +114,8 @@ Compressed compress(const CellGraph& graph, const CellTable& table) {
     for (std::size_t d = 0; d < half_neighbours.size(); ++d) {
       const auto& step = half_neighbours[d];
       const std::int64_t before = neighbour(table, place, {-step[0], -step[1], -step[2]});
-      if (before >= 0) tie(before, graph.shared[13 * at(before) + d]);
-      tie(neighbour(table, place, step), graph.shared[13 * at(cell) + d]);
+      if (before >= 0) tie(before, shared_by(at(before), d));
+      tie(neighbour(table, place, step), shared_by(at(cell), d));
     }
     result.begin.push_back(static_cast<idx_t>(result.to.size()));
   }

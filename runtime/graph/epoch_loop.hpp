@@ -11,6 +11,9 @@
 ///     graph.build(conflicts, owner, executor.threads());
 ///     step.team("iterate", accesses, [&](Worker& me) { run_epochs(graph, me, sweep); });
 ///
+/// A program may also have `void assist()`: threads that wait for a decision call it again and again, so that
+/// decide() can share out work (crew.hpp).
+///
 /// Epochs count from 0 in every call. The loop ends only in decide(), so some gate must be true sooner or
 /// later. gate(epoch) is asked by every thread at the beginning of its epoch and must be the same on all: it
 /// may depend on the epoch and on what decide() wrote. Between gates there is no barrier: threads are in
@@ -124,7 +127,10 @@ bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
       decision.store(2 * (now + 1) + (goes_on ? 0 : 1), std::memory_order_release);
     } else {
       std::int64_t decided = 0;
-      if (!me.wait([&] { return (decided = decision.load(std::memory_order_acquire)) >= 2 * (now + 1); }))
+      if (!me.wait([&] {
+            if constexpr (requires { program.assist(); }) program.assist();
+            return (decided = decision.load(std::memory_order_acquire)) >= 2 * (now + 1);
+          }))
         return false;
       goes_on =
           decided % 2 == 0;  // of this very epoch: thread 0 cannot pass the next gate without this thread

@@ -2,70 +2,151 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
+#include <utility>
+
+#include "kernels/balance.hpp"
 
 namespace talus {
 
 namespace {
 
-/// Unknown of every slot, counted where a body is first met; empty when each body has one slot.
-std::vector<Slot> number_bodies(const Bodies& bodies, const Decomposition& decomposition) {
-  std::vector<Slot> unknown;
-  if (!decomposition.several()) return unknown;
-  std::unordered_map<std::int64_t, Slot> of_body;
-  of_body.reserve(bodies.size());
-  unknown.reserve(bodies.size());
-  for (const BodyId id : bodies.id)
-    unknown.push_back(
-        of_body.try_emplace(static_cast<std::int64_t>(id), static_cast<Slot>(of_body.size())).first->second);
-  return unknown;
+/// The copies agree by the messages of the gluing; rows travel to all ranks; threads share the subdomains.
+class StepLink final : public PartLink {
+ public:
+  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew)
+      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew) {}
+
+  void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
+    crew_.share(parts, work);
+  }
+
+  void sum_copies(PartField& field) const override {
+    if (state_.decomposition.several()) gluing_.sum_copies(field);
+  }
+
+  std::vector<double> gather(std::vector<std::vector<double>> rows) const override {
+    const Decomposition& all = state_.decomposition;
+    const std::size_t width = rows.front().size();
+    std::vector<double> here;
+    here.reserve(rows.size() * width);
+    for (const std::vector<double>& row : rows) here.insert(here.end(), row.begin(), row.end());
+    if (ranks_.ranks() == 1) return here;
+    std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
+    for (std::int32_t rank : all.rank_of) lengths[static_cast<std::size_t>(rank)] += width;
+    const auto pending = ranks_.start_gather(std::move(here), lengths);
+    const std::vector<double>& by_rank = pending->wait();
+    // Within a rank rows stand in order of subdomain.
+    std::vector<std::size_t> next(lengths.size(), 0);
+    for (std::size_t r = 1; r < next.size(); ++r) next[r] = next[r - 1] + lengths[r - 1];
+    std::vector<double> sorted;
+    sorted.reserve(by_rank.size());
+    for (std::int32_t rank : all.rank_of) {
+      const auto begin = by_rank.begin() + static_cast<std::ptrdiff_t>(next[static_cast<std::size_t>(rank)]);
+      sorted.insert(sorted.end(), begin, begin + static_cast<std::ptrdiff_t>(width));
+      next[static_cast<std::size_t>(rank)] += width;
+    }
+    return sorted;
+  }
+
+ private:
+  const StepState& state_;
+  Gluing& gluing_;
+  const graph::Communicator& ranks_;
+  graph::Crew& crew_;
+};
+
+/// The fastest that impulses make a body.
+double fastest_of(const BodyParts& parts) {
+  const PartField velocity = velocities_of(parts, impulses_of(parts));
+  const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
+    for (const Twist& v : velocity[p]) row[0] = std::max({row[0], v.u.norm(), v.w.norm()});
+  });
+  return *std::max_element(rows.begin(), rows.end());
 }
 
-double fastest_of(std::span<const Twist> velocity) {
-  double fastest = 0;
-  for (const Twist& v : velocity) fastest = std::max({fastest, v.u.norm(), v.w.norm()});
-  return fastest;
+/// The fastest body without contacts, or gap that a contact closes.
+double fastest_without(const BodyParts& parts) {
+  const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
+    for (const BodyUnknown& body : parts[p].bodies) row[0] = std::max(row[0], body.free.u.norm());
+    for (const ContactEquation& c : parts[p].contacts) row[0] = std::max(row[0], c.offset.norm());
+  });
+  return *std::max_element(rows.begin(), rows.end());
 }
 
 }  // namespace
 
 Admm::Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
-           const graph::Communicator& ranks)
-    : state_(state), parameters_(parameters), decomposition_(decomposition), ranks_(ranks) {}
+           Gluing& gluing, const graph::Communicator& ranks)
+    : state_(state),
+      parameters_(parameters),
+      decomposition_(decomposition),
+      ranks_(ranks),
+      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_)) {}
 
-BodyProblem Admm::gather() const {
+std::vector<BodyProblem> Admm::gather() const {
   std::vector<WallMotion> walls;
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     walls.push_back(
         {state_.walls[w].normal, state_.wall_states[w].free_velocity, state_.walls[w].inv_mass()});
-  const std::vector<Slot> unknown = number_bodies(state_.bodies, state_.decomposition);
-  const bool split = decomposition_.coupling == Coupling::nscdd && state_.decomposition.several();
-  return gather_problem({state_.bodies.x, state_.bodies.radius, state_.bodies.velocity, state_.free, walls,
-                         state_.chunks, state_.contacts, parameters_.law.mu_grains, parameters_.law.mu_walls,
-                         split ? Multiplicities(state_.decomposition.multiplicity) : Multiplicities(),
-                         unknown});
+  const Decomposition& all = state_.decomposition;
+  const bool split = decomposition_.coupling == Coupling::nscdd && all.several();
+  const BodyProblemSource source{state_.bodies.x,
+                                 state_.bodies.radius,
+                                 state_.bodies.velocity,
+                                 state_.free,
+                                 walls,
+                                 state_.chunks,
+                                 state_.contacts,
+                                 parameters_.law.mu_grains,
+                                 parameters_.law.mu_walls,
+                                 split ? Multiplicities(all.multiplicity) : Multiplicities()};
+  std::vector<BodyProblem> parts;
+  if (!all.several()) {
+    parts.push_back(gather_problem(source));
+    return parts;
+  }
+  for (std::size_t e = 0; e < all.here.size(); ++e)
+    parts.push_back(gather_problem(source, {all.here[e], static_cast<std::int32_t>(e), all.slot_begin[e],
+                                            all.slot_begin[e + 1], all.counts, all.multiplicity}));
+  return parts;
 }
 
 double Admm::sweeps_needed() const {
-  return estimate_stiffness(gather());
+  const std::vector<BodyProblem> parts = gather();
+  return estimate_stiffness(BodyParts(parts, *link_));
+}
+
+double Admm::velocity_error(double enough) const {
+  std::vector<BodyProblem> problems = gather();
+  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
+    for (BodyProblem& problem : problems)
+      for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+        const auto place = static_cast<std::size_t>(problem.contacts[k].place);
+        const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
+        const double* kept =
+            &state_.candidates.impulse[from * static_cast<std::size_t>(state_.candidates.components)];
+        problem.impulse[k] = state_.candidates.components == 3 ? Vec3(Eigen::Map<const Vec3>(kept))
+                                                               : Vec3(kept[0] * problem.contacts[k].normal);
+      }
+  return talus::velocity_error(problems, *link_, enough).relative;
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {
-  BodyProblem problem = gather();
+  std::vector<BodyProblem> problems = gather();
+  const BodyParts parts(problems, *link_);
   BodyAdmmSettings settings;
   settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
   settings.balance_tolerance = std::ldexp(std::min(settings.balance_tolerance, 0.1 * tolerance), -2 * calls);
   // Contacts make nothing much faster than what comes in or than the gap that it closes, but what ADMM leaves
   // of a heavy body to light ones until sweeps follow.
   constexpr double sound = 1e6;
-  double fastest = fastest_of(velocities_of(problem, problem.impulse));
-  for (const BodyUnknown& body : problem.bodies) fastest = std::max(fastest, body.free.u.norm());
-  for (const ContactEquation& contact : problem.contacts) fastest = std::max(fastest, contact.offset.norm());
-  BodyAdmmResult result = solve_admm(problem, settings);
+  const double fastest = std::max(fastest_of(parts), fastest_without(parts));
+  BodyAdmmResult result = solve_admm(problems, *link_, settings);
   // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped,
-  // and the step is not balanced by it. Comparisons are false for NaN.
-  if (result.momentum_defect <= 1 && fastest_of(velocities_of(problem, problem.impulse)) <= sound * fastest)
-    scatter_impulses(problem, state_.contacts);
+  // and the step is not balanced by it. The defect is near 1 where light bodies have yet to follow a heavy
+  // one. Comparisons are false for NaN.
+  if (result.momentum_defect <= 2 && fastest_of(parts) <= sound * fastest)
+    for (const BodyProblem& problem : problems) scatter_impulses(problem, state_.contacts);
   else
     result.balance_defect = 1;
   if (!std::isfinite(result.balance_defect)) result.balance_defect = 1;  // too few iterations to know it

@@ -1,27 +1,39 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "kernels/admm.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/graph/crew.hpp"
+#include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
 
-/// ADMM (kernels/admm.hpp) on the contacts of a step, whatever subdomains this rank's copies stand in: a body
-/// is one unknown, its mass whole. On one rank; on several `available` is false and nothing is called.
+/// ADMM (kernels/admm.hpp) on the contacts of a step. Each subdomain is a part of the problem: it holds its
+/// own contacts and bodies, masses whole; what copies have to agree on goes the way of the gluing, and sums
+/// are gathered as rows by subdomain. So the bits depend on the partition alone, and a rank holds no more
+/// than its own subdomains and the coarse level.
 ///
-///   between two epochs, on one thread:  admm.improve();  next epoch: V afresh from r, then sweeps
+///   between two epochs, at a gate of all ranks:  admm.improve();  next epoch: V afresh from r, then sweeps
+///   threads that wait at the gate:               admm.assist()
 class Admm {
  public:
   /// Keeps references.
   Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
-       const graph::Communicator& ranks);
+       Gluing& gluing, const graph::Communicator& ranks);
 
-  bool available() const { return ranks_.ranks() == 1; }
+  /// Of a thread that waits for the one that calls: takes its share of the subdomains.
+  void assist() { crew_.help(); }
 
+  // Collective.
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
+
+  /// Relative error of the velocities that the impulses of the last check give, with several ranks those that
+  /// the candidates keep (kernels/balance.hpp); what is below `enough` is not told apart.
+  double velocity_error(double enough) const;
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
@@ -29,12 +41,14 @@ class Admm {
   BodyAdmmResult improve(double tolerance, int calls);
 
  private:
-  BodyProblem gather() const;
+  std::vector<BodyProblem> gather() const;
 
   StepState& state_;
   const StepParameters& parameters_;
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
+  graph::Crew crew_;
+  std::unique_ptr<PartLink> link_;
 };
 
 }  // namespace talus

@@ -1,6 +1,7 @@
 /// How a step's sweeps are carried on, and when that changes: docs/decisions/0009-methods.md, 0012-stiff.md.
 
 #include <algorithm>
+#include <cmath>
 
 #include "kernels/balance.hpp"
 #include "runtime/step/iteration.hpp"
@@ -9,12 +10,16 @@ namespace talus {
 
 namespace {
 
-/// Beyond 0.9 momentum stalls on packings with friction.
-constexpr double most_momentum = 0.9;
+/// The largest beta. What a run of n sweeps can use is 1 - beta = c/n, and the tolerance says about how many
+/// they will be: on packings of 16,000 grains with friction 0.92 was best to 1e-3, 0.94 to 1e-4, 0.97 to 1e-6
+/// (docs/decisions/0009-methods.md). Without friction problems are easier, and 0.9 was best to 1e-6.
+double most_momentum(bool friction, double tolerance) {
+  if (!friction) return 0.9;
+  return std::clamp(1 - 0.08 * std::pow(tolerance / 1e-3, 0.15), 0.9, 0.97);
+}
+
 /// Between two checks; what makes it so much worse is no method for this problem.
 constexpr double hopeless_growth = 4;
-/// With friction momentum gets this far at twice the speed of conjugate gradients, and then falls behind.
-constexpr double momentum_reach = 5e-5;
 /// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
 constexpr int plain_sweeps = 3;
 /// What momentum makes worse shows within as many sweeps.
@@ -32,14 +37,12 @@ void Iteration::first_course() {
   SolverMethod method = settings_.method;
   if (method == SolverMethod::automatic) {
     // Damped Schwarz is no descent: what is carried on from it need not go down.
-    const bool far = parameters_.friction && settings_.tolerance < momentum_reach;
     method = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several()
                  ? SolverMethod::nlgs
-             : far ? SolverMethod::nncg
-                   : SolverMethod::momentum;
+                 : SolverMethod::momentum;
   }
   if (method == SolverMethod::admm) method = SolverMethod::nlgs;
-  begin_course(method, most_momentum);
+  begin_course(method, most_momentum(parameters_.friction, settings_.tolerance));
   result_.iterations = 0;
 }
 
@@ -59,42 +62,78 @@ void Iteration::begin_course(SolverMethod method, double most) {
   changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
 }
 
+std::span<const Slot> Iteration::owned(std::size_t c) const {
+  const auto from = static_cast<std::size_t>(state_.chunks.owned_begin[c]),
+             to = static_cast<std::size_t>(state_.chunks.owned_begin[c + 1]);
+  return std::span(state_.chunks.owned).subspan(from, to - from);
+}
+
 /// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
 /// write, and its wall copy.
 void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Chunks& chunks = state_.chunks;
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
-  carry_impulses(carry, beta, range, state_.contacts, trail_);
-  const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-  carry_velocities(
-      carry, beta,
-      std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-      state_.bodies.velocity, trail_);
-  if (chunks.wall[c] >= 0) carry_wall(carry, beta, c, state_.copies[c], trail_);
+  carry_impulses(kernels_, carry, beta, range, state_.contacts, trail_);
+  const bool at_wall = chunks.wall[c] >= 0;
+  if (epoch == sweeps_from_) {
+    fasten(owned(c), state_.bodies.velocity, trail_);
+    if (at_wall) fasten(c, state_.copies[c], trail_);
+  }
+  carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, trail_);
+  if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
-void Iteration::plan_sweeps(int epoch) {
-  int sweeps = std::max(settings_.check_every, sweeps_ / 4);
+/// The last check that tells something about the present course besides the newest: at least check_every
+/// sweeps before it, since errors of neighbouring sweeps go up and down. Null when there is none.
+const Iteration::Check* Iteration::check_before() const {
+  for (std::size_t k = history_.size() - 1; k-- > history_from_;) {
+    if (history_[k].iterations + 1 < course_.from) return nullptr;
+    if (history_[k].iterations + settings_.check_every <= history_.back().iterations) return &history_[k];
+  }
+  return nullptr;
+}
+
+/// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,
+/// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
+/// by little; at most half of what was done, so that a wrong guess costs no more.
+int Iteration::sweeps_ahead() const {
+  const int done = result_.iterations;
+  int sweeps = std::max(settings_.check_every, done / 2);
   if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
-  sweeps = std::min(sweeps, settings_.max_iterations - sweeps_);
-  before_segment_ = sweeps_;
-  sweeps_ += sweeps;
+  const double error = history_.back().error_rms;
+  const Check* const before = check_before();
+  if (before && error > settings_.tolerance && error < before->error_rms) {
+    const double log_error = std::log(before->error_rms / error),
+                 log_missing = std::log(error / settings_.tolerance);
+    const double to_go =
+        before->iterations > 0
+            ? done * std::expm1(log_missing / log_error * std::log(double(done) / before->iterations))
+            : done * log_missing / log_error;
+    sweeps = std::max(least_sweeps, static_cast<int>(std::ceil(std::min<double>(sweeps, to_go))));
+  }
+  const int exchange = decomposition_.sweeps_per_exchange;
+  sweeps = (sweeps + exchange - 1) / exchange * exchange;
+  return std::min(sweeps, settings_.max_iterations - done);
+}
+
+/// The sweeps behind the check of this epoch: `sweeps_` done.
+void Iteration::plan_sweeps(int epoch, int sweeps) {
+  before_segment_ = result_.iterations;
+  sweeps_ = before_segment_ + sweeps;
   sweeps_from_ = epoch + 1;
   segment_ = epoch + 1 + sweeps;
 }
 
-/// After a check: momentum that has made it worse (sliding contacts turn its modes complex, and those grow)
-/// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
+/// After a check: momentum that has made it worse begins anew with less, which also ends what it swings by;
+/// what fails altogether gives way to plain sweeps.
 void Iteration::choose_course() {
-  const std::size_t checks = history_.size();
-  if (checks < history_from_ + 2) return;
-  const double growth = history_[checks - 1].error_rms / history_[checks - 2].error_rms;
+  const Check* const before = check_before();
+  if (!before) return;
+  const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
-    if (settings_.method == SolverMethod::automatic && growth < hopeless_growth)
-      begin_course(SolverMethod::nncg, 0);
-    else if (less > 0 && growth < hopeless_growth)
+    if (less > 0 && growth < hopeless_growth)
       begin_course(SolverMethod::momentum, less);
     else
       begin_course(SolverMethod::nlgs, 0);
@@ -103,11 +142,9 @@ void Iteration::choose_course() {
   }
 }
 
-/// About the sweeps of the present course that this step's problem takes. Several subdomains may be on
-/// several ranks, of which none sees the whole problem: drift is then taken at its word, on one rank too, for
-/// the same bits.
+/// About the sweeps of the present course that this step's problem takes. Collective.
 double Iteration::sweeps_needed() {
-  if (sweeps_needed_ < 0) sweeps_needed_ = state_.decomposition.several() ? 0 : admm_.sweeps_needed();
+  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
   // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
   const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
                        : course_.method == SolverMethod::nncg   ? 40
@@ -115,34 +152,62 @@ double Iteration::sweeps_needed() {
   return sweeps_needed_ / speed;
 }
 
+/// Whether this step's velocities are looked at as a whole: where that costs less than the sweeps that it may
+/// save, in problems that are stiff for their size; and in tiny ones.
+bool Iteration::looks_at_all() {
+  constexpr double cost = 100;
+  constexpr std::int64_t tiny = 64;
+  if (result_.stiff_calls > 0) return true;
+  if (result_.contacts <= tiny) return result_.contacts > 0;
+  return sweeps_needed() >= cost && 10 * sweeps_needed_ >= static_cast<double>(result_.contacts);
+}
+
+/// Judges the forces that walls and heavy bodies get. By the drift of wall forces, which sweeps show; or by
+/// the error of all velocities, which decides by itself. That is asked for again when the residual has fallen
+/// far enough, or a quarter more sweeps are done.
 bool Iteration::balanced() {
+  const double tolerance = settings_.balance_tolerance;
   result_.unbalance = result_.drift;
-  if (result_.stiff_calls > 0)
-    result_.unbalance += result_.stiff.balance_defect;
-  else if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
-    result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
-  return result_.unbalance <= settings_.balance_tolerance;
+  if (!looks_at_all()) {
+    if (result_.drift > 0 && result_.drift <= tolerance)
+      result_.unbalance = unbalance(result_.drift, result_.iterations, sweeps_needed());
+    return result_.unbalance <= tolerance;
+  }
+  const bool last = result_.iterations >= settings_.max_iterations;
+  const double guess = looked_.error * result_.error_rms / looked_.error_rms;
+  if (looked_.at < 0 || (looked_.at != result_.iterations &&
+                         (last || !(guess > tolerance) || 4 * result_.iterations > 5 * looked_.at)))
+    looked_ = {result_.iterations, result_.error_rms, admm_.velocity_error(0.2 * tolerance)};
+  result_.unbalance = looked_.at == result_.iterations ? looked_.error : guess;
+  return result_.unbalance <= tolerance;
 }
 
 /// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
 /// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
 bool Iteration::ask_admm() {
   constexpr int chance = 50, calls = 3;
-  if (!admm_.available()) return false;
   if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
-  const bool may = settings_.method == SolverMethod::admm ||
-                   (settings_.method == SolverMethod::automatic && !state_.decomposition.several());
+  const bool may = settings_.method == SolverMethod::admm || settings_.method == SolverMethod::automatic;
   if (!may) return false;
-  if (result_.stiff_calls == calls || balanced()) return false;
+  if (result_.stiff_calls == calls) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
   return since >= chance << (2 * result_.stiff_calls) &&
-         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff);
+         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff) && !balanced();
 }
 
+/// With several ranks behind the sweep that hid the sums: what it did is dropped.
 void Iteration::call_admm(int epoch) {
+  if (ranks_.ranks() > 1)
+    for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+      restore_impulses(state_.candidates, state_.chunks, c, state_.contacts);
+  sweeps_ = result_.iterations;
+  gluing_.forget_jumps();
   result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
+  looked_ = {};
+  // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone.
   begin_course(course_.method, course_.most);
+  course_.from = result_.iterations;
   before_segment_ = sweeps_;
   segment_ = epoch + 1;
 }

@@ -251,12 +251,17 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
   take(
       around.reach, [&](std::size_t s) { return reach[s]; },
       [](const BodyRecord& record) { return record.reach; });
+  around.of_slot.assign(bodies.size(), -1);
+  for (std::size_t k = 0; k < count; ++k)
+    if (order[k].source < own) around.of_slot[at(gathered.own[order[k].source])] = static_cast<Slot>(k);
   release(order);
   gathered = {};
   around.by_id.reserve(count);
   for (std::size_t k = 0; k < count; ++k)
     around.by_id.emplace_back(static_cast<std::int64_t>(around.bodies.id[k]), static_cast<Slot>(k));
   std::sort(around.by_id.begin(), around.by_id.end());
+  for (std::size_t s = 0; s < bodies.size(); ++s)
+    if (around.of_slot[s] < 0) around.of_slot[s] = around.find(static_cast<std::int64_t>(bodies.id[s]));
   return around;
 }
 

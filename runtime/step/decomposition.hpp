@@ -57,6 +57,7 @@ Reduction reduction_over(const graph::Communicator& ranks);
 struct Surroundings {
   Bodies bodies;
   std::vector<double> reach;                         ///< [m]
+  std::vector<Slot> of_slot;                         ///< where the body of a slot is now; -1: not here
   std::vector<std::pair<std::int64_t, Slot>> by_id;  ///< sorted
   Slot find(std::int64_t id) const;                  ///< -1 when it is not among them
 };

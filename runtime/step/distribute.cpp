@@ -39,42 +39,50 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
   const std::size_t grains = candidates.grain_pairs.size();
   Candidates old;
   old.components = candidates.components;
-  std::vector<double> at_walls;
-  const auto take = [&](const ImpulseRecord& record) {
-    const Slot first = around.find(record.first);
-    const bool wall = record.second < 0;
-    if (wall)
-      old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first});
-    else
-      old.grain_pairs.push_back({first, around.find(record.second)});
-    std::vector<double>& impulse = wall ? at_walls : old.impulse;
-    impulse.insert(impulse.end(), record.r, record.r + components);
-  };
   old.grain_pairs.reserve(grains);
   old.impulse.reserve(components * candidates.size());
+  std::vector<double> at_walls;
+  const auto push = [components](std::vector<double>& impulse, const double* r) {
+    for (std::size_t c = 0; c < components; ++c) impulse.push_back(r[c]);
+  };
   std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     const double* r = &candidates.impulse[components * k];
     if (std::all_of(r, r + components, [](double value) { return value == 0; })) continue;
-    ImpulseRecord record{};
-    if (k < grains) {
-      record.first = static_cast<std::int64_t>(bodies.id[at(candidates.grain_pairs[k].first)]);
-      record.second = static_cast<std::int64_t>(bodies.id[at(candidates.grain_pairs[k].second)]);
-    } else {
-      record.first = static_cast<std::int64_t>(bodies.id[at(candidates.wall_pairs[k - grains].body)]);
-      record.second = -1 - std::int64_t{candidates.wall_pairs[k - grains].wall};
+    const bool wall = k >= grains;
+    const GrainPair pair = wall ? GrainPair{} : candidates.grain_pairs[k];
+    const WallPair at_wall = wall ? candidates.wall_pairs[k - grains] : WallPair{};
+    const std::int32_t rank =
+        ranks.ranks() == 1
+            ? 0
+            : decomposition
+                  .rank_of[at(decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x)))];
+    if (rank == ranks.rank()) {
+      if (wall)
+        old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)]});
+      else
+        old.grain_pairs.push_back({around.of_slot[at(pair.first)], around.of_slot[at(pair.second)]});
+      push(wall ? at_walls : old.impulse, r);
+      continue;
     }
+    ImpulseRecord record{};
+    record.first = static_cast<std::int64_t>(bodies.id[at(wall ? at_wall.body : pair.first)]);
+    record.second =
+        wall ? -1 - std::int64_t{at_wall.wall} : static_cast<std::int64_t>(bodies.id[at(pair.second)]);
     std::copy_n(r, components, record.r);
-    const std::int32_t subdomain = decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x));
-    const std::int32_t rank = decomposition.rank_of[at(subdomain)];
-    if (rank == ranks.rank())
-      take(record);
-    else
-      to[at(rank)].push_back(record);
+    to[at(rank)].push_back(record);
   }
   candidates = {};
   for (const auto& part : ranks.exchange_records(std::move(to)))
-    for (const ImpulseRecord& record : part) take(record);
+    for (const ImpulseRecord& record : part) {
+      const Slot first = around.find(record.first);
+      const bool wall = record.second < 0;
+      if (wall)
+        old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first});
+      else
+        old.grain_pairs.push_back({first, around.find(record.second)});
+      push(wall ? at_walls : old.impulse, record.r);
+    }
   old.impulse.insert(old.impulse.end(), at_walls.begin(), at_walls.end());
   std::vector<Slot> same(around.bodies.size());
   std::iota(same.begin(), same.end(), 0);
@@ -82,45 +90,39 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
   return old;
 }
 
-/// Copies that stand in a subdomain now and did not before.
-std::int64_t arrivals(std::span<const BodyId> before, std::span<const BodyId> now) {
-  const auto sorted = [](std::span<const BodyId> ids) {
-    std::vector<BodyId> copy(ids.begin(), ids.end());
-    std::sort(copy.begin(), copy.end());
-    return copy;
-  };
-  const std::vector<BodyId> a = sorted(before), b = sorted(now);
+/// Bodies of the surroundings that stand in a subdomain of this rank now and did not before, each counted per
+/// subdomain. `slot_begin`: of the slots before.
+std::int64_t arrivals(const Decomposition& decomposition, const Surroundings& around,
+                      std::span<const std::size_t> slot_begin) {
   std::int64_t count = 0;
-  auto old = a.begin();
-  for (BodyId id : b) {
-    while (old != a.end() && *old < id) ++old;
-    if (old == a.end() || *old != id) ++count;
+  std::vector<std::int32_t> stood_in(around.by_id.size(), -1);
+  for (std::size_t e = 0; e < decomposition.interfaces.size(); ++e) {
+    const auto local = static_cast<std::int32_t>(e);
+    for (std::size_t s = slot_begin[e]; s < slot_begin[e + 1]; ++s)
+      if (around.of_slot[s] >= 0) stood_in[at(around.of_slot[s])] = local;
+    const std::vector<Slot>& now = decomposition.interfaces[e].bodies;
+    count += std::count_if(now.begin(), now.end(), [&](Slot body) { return stood_in[at(body)] != local; });
   }
   return count;
 }
 
-/// A candidate of this rank and where it goes: grain pairs by subdomain, those at the interface first; then
-/// wall pairs by wall.
-struct Key {
-  std::int32_t wall, local, inner, candidate;
+/// The candidates of this rank in the order of its groups: grain pairs by subdomain, those at the interface
+/// first; then wall pairs by wall, by subdomain, and those at the interface first again.
+struct OwnCandidates {
+  std::vector<std::int32_t> candidate;  ///< among the found
+  std::vector<std::size_t> begin;       ///< of group ((wall + 1) x here + local) x 2 + inner, wall -1: grains
 };
 
-std::vector<Key> sort_own(const Decomposition& decomposition, const Candidates& found,
-                          std::span<const std::int32_t> subdomain, const BodySubdomains& standings,
-                          std::span<const char> glued) {
-  const std::size_t grains = found.grain_pairs.size();
+OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& found,
+                       std::span<const std::int32_t> subdomain, const BodySubdomains& standings,
+                       std::span<const char> glued) {
+  const std::size_t grains = found.grain_pairs.size(), here = decomposition.here.size();
   std::vector<std::int32_t> local_of(at(decomposition.partition.subdomains), -1);
-  for (std::size_t e = 0; e < decomposition.here.size(); ++e)
-    local_of[at(decomposition.here[e])] = static_cast<std::int32_t>(e);
+  for (std::size_t e = 0; e < here; ++e) local_of[at(decomposition.here[e])] = static_cast<std::int32_t>(e);
   const auto shared = [&](Slot body) { return standings.multiplicity(at(body)) > 1; };
-  std::vector<Key> keys;
-  keys.reserve(found.size());
-  // Candidates come in ascending order, so that counting by the rest sorts them.
-  const std::size_t here = decomposition.here.size();
-  std::vector<std::size_t> place(2 * here * (glued.size() + 1) + 1, 0);
-  const auto bucket = [&](const Key& key) {
-    return (static_cast<std::size_t>(key.wall + 1) * here + at(key.local)) * 2 + at(key.inner);
-  };
+  std::vector<std::int32_t> group(found.size(), -1);
+  OwnCandidates own;
+  own.begin.assign(2 * here * (glued.size() + 1) + 1, 0);
   for (std::size_t k = 0; k < found.size(); ++k) {
     const std::int32_t local = local_of[at(subdomain[k])];
     if (local < 0) continue;
@@ -128,13 +130,16 @@ std::vector<Key> sort_own(const Decomposition& decomposition, const Candidates& 
     const bool boundary = k < grains
                               ? shared(found.grain_pairs[k].first) || shared(found.grain_pairs[k].second)
                               : glued[at(wall)] != 0 || shared(found.wall_pairs[k - grains].body);
-    keys.push_back({wall, local, boundary ? 0 : 1, static_cast<std::int32_t>(k)});
-    ++place[bucket(keys.back()) + 1];
+    group[k] = ((wall + 1) * static_cast<std::int32_t>(here) + local) * 2 + (boundary ? 0 : 1);
+    ++own.begin[at(group[k]) + 1];
   }
-  std::partial_sum(place.begin(), place.end(), place.begin());
-  std::vector<Key> sorted(keys.size());
-  for (const Key& key : keys) sorted[place[bucket(key)]++] = key;
-  return sorted;
+  std::partial_sum(own.begin.begin(), own.begin.end(), own.begin.begin());
+  own.candidate.resize(own.begin.back());
+  // Candidates come in ascending order, so that counting sorts them.
+  std::vector<std::size_t> next = own.begin;
+  for (std::size_t k = 0; k < found.size(); ++k)
+    if (group[k] >= 0) own.candidate[next[at(group[k])]++] = static_cast<std::int32_t>(k);
+  return own;
 }
 
 /// Multiplicities of the copies, who counts, and where each subdomain's begin.
@@ -196,7 +201,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   release(bodies.x);
 
   std::vector<std::int64_t> load(at(partition.subdomains), 0);
-  std::vector<Key> keys;
+  OwnCandidates own;
   const std::vector<std::size_t> slot_begin_before = decomposition.slot_begin;
   const bool first = decomposition.interfaces.empty();
   {
@@ -209,54 +214,46 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     const std::int32_t hubs = settings.exchange == ExchangeScheme::ccs ? 2 : 9;
     decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
     list_copies(decomposition, standings, around.bodies.id);
-    keys = sort_own(decomposition, found, subdomain, standings, glued);
-    for (const Key& key : keys) ++load[at(subdomain[at(key.candidate)])];
+    own = sort_own(decomposition, found, subdomain, standings, glued);
+    for (std::int32_t k : own.candidate) ++load[at(subdomain[at(k)])];
   }
   ranks.sum(load);
   // As large as without subdomains: small chunks have poor batches, and subdomains run beside one another.
   const int target =
       chunk_target(static_cast<std::size_t>(std::accumulate(load.begin(), load.end(), std::int64_t{0})));
 
-  // Slot of a body in its subdomain: bodies of an interface stand in the order of the surroundings.
-  const auto slot_in = [&](std::int32_t local, Slot body) {
-    const auto& list = decomposition.interfaces[at(local)].bodies;
-    return static_cast<Slot>(decomposition.slot_begin[at(local)]) +
-           static_cast<Slot>(std::lower_bound(list.begin(), list.end(), body) - list.begin());
-  };
+  // Of the bodies of the subdomain at hand.
+  std::vector<Slot> slot(around.bodies.size());
   Candidates cut;
   cut.components = found.components;
   const auto components = static_cast<std::size_t>(found.components);
-  cut.impulse.reserve(components * keys.size());
-  cut.grain_pairs.reserve(static_cast<std::size_t>(
-      std::count_if(keys.begin(), keys.end(), [](const Key& key) { return key.wall < 0; })));
+  cut.impulse.reserve(components * own.candidate.size());
+  cut.grain_pairs.reserve(own.begin[2 * decomposition.here.size()]);
   std::vector<CandidateGroup> groups;
-  const Key* last = nullptr;
-  for (const Key& key : keys) {
-    if (!last || key.wall != last->wall || key.local != last->local || key.inner != last->inner) {
-      const auto begin = static_cast<std::int32_t>(cut.size());
-      groups.push_back({begin, begin, key.wall, key.local, key.inner == 0, target});
+  for (std::size_t group = 0; group + 1 < own.begin.size(); ++group) {
+    const auto begin = static_cast<std::int32_t>(own.begin[group]);
+    const auto end = static_cast<std::int32_t>(own.begin[group + 1]);
+    if (begin == end) continue;
+    const std::size_t local = group / 2 % decomposition.here.size();
+    const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
+    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), group % 2 == 0, target});
+    auto next = static_cast<Slot>(decomposition.slot_begin[local]);
+    for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
+    for (std::int32_t place = begin; place < end; ++place) {
+      const std::size_t k = at(own.candidate[at(place)]);
+      if (wall < 0)
+        cut.grain_pairs.push_back(
+            {slot[at(found.grain_pairs[k].first)], slot[at(found.grain_pairs[k].second)]});
+      else
+        cut.wall_pairs.push_back({wall, slot[at(found.wall_pairs[k - grains].body)]});
+      for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
     }
-    last = &key;
-    const std::size_t k = at(key.candidate);
-    if (k < grains)
-      cut.grain_pairs.push_back(
-          {slot_in(key.local, found.grain_pairs[k].first), slot_in(key.local, found.grain_pairs[k].second)});
-    else
-      cut.wall_pairs.push_back({key.wall, slot_in(key.local, found.wall_pairs[k - grains].body)});
-    for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
-    ++groups.back().end;
   }
-  release(keys);
+  own = {};
   found = {};
 
   Bodies copies = make_copies(decomposition, settings.coupling == Coupling::nscdd, around.bodies);
-  std::int64_t migrants[1] = {0};
-  for (std::size_t e = 0; e < decomposition.here.size(); ++e) {
-    const auto part = [e](const std::vector<BodyId>& id, const std::vector<std::size_t>& begin) {
-      return std::span(id).subspan(begin[e], begin[e + 1] - begin[e]);
-    };
-    migrants[0] += arrivals(part(bodies.id, slot_begin_before), part(copies.id, decomposition.slot_begin));
-  }
+  std::int64_t migrants[1] = {arrivals(decomposition, around, slot_begin_before)};
   ranks.sum(migrants);
   decomposition.migrants = first ? 0 : migrants[0];
   decomposition.imbalance = imbalance(load);

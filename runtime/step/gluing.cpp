@@ -193,7 +193,7 @@ void Gluing::publish(std::size_t e, Mode mode) {
   }
   for (Side& side : mine.sides)
     if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
-  for (std::size_t g = 0; g < walls_.size(); ++g) {
+  for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);
     for (std::int32_t c : mine.wall_copies[g])
@@ -213,7 +213,7 @@ void Gluing::publish(std::size_t e, Mode mode) {
 
 void Gluing::glue(std::size_t e, Mode mode) {
   Subdomain& mine = subdomains_[e];
-  for (std::size_t g = 0; g < walls_.size(); ++g) {
+  for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     const auto& copies = mine.wall_copies[g];
     if (copies.empty()) continue;
     if (mode == Mode::local) {
@@ -242,7 +242,7 @@ void Gluing::glue(std::size_t e, Mode mode) {
       for (std::size_t k = 0; k < width_; ++k)
         base[k] = k < 3 ? state_.free.u[slot][k] : state_.free.w[slot][k - 3];
     for (std::size_t k = 0; k < width_; ++k)
-      next[k] = schwarz ? base[k] + (sum[k] - m * base[k]) : sum[k] / m;
+      next[k] = mode == Mode::sum ? sum[k] : schwarz ? base[k] + (sum[k] - m * base[k]) : sum[k] / m;
     if (mode == Mode::measured) {
       const auto& whole = state_.decomposition.whole[slot];
       for (std::size_t k = 0; k < width_; ++k) {
@@ -255,9 +255,9 @@ void Gluing::glue(std::size_t e, Mode mode) {
     }
     std::copy_n(next.begin(), 3, v.u);
     if (width_ == 6) std::copy_n(next.begin() + 3, 3, v.w);
-    if (schwarz) std::copy_n(next.begin(), width_, base);
+    if (schwarz && mode != Mode::sum) std::copy_n(next.begin(), width_, base);
   };
-  if (!schwarz && mode != Mode::measured) {
+  if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
     const auto means = width_ == 6 ? take_means<6> : take_means<3>;
     means(state_.bodies.velocity, mine.shared, interface.copies_begin, mine.sources.data());
   } else {
@@ -278,6 +278,43 @@ void Gluing::glue(std::size_t e, Mode mode) {
   for (Side& side : mine.sides)
     if (side.link.receiver) side.link.receiver->start();
   if (mode == Mode::measured) jumps_[e] = jump;
+}
+
+/// The velocities of the shared copies lend themselves as what is exchanged.
+void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
+  const Decomposition& all = state_.decomposition;
+  const auto each_shared = [&](const auto& work) {
+    std::size_t k = 0;
+    for (std::size_t e = 0; e < subdomains_.size(); ++e)
+      for (const std::size_t slot : subdomains_[e].shared)
+        work(state_.bodies.velocity[slot], field[e][slot - all.slot_begin[e]], k++);
+  };
+  const auto wall = [&](std::size_t e, std::size_t g) -> Vec3& {
+    return field[e][field[e].size() - walls_.size() + g].u;
+  };
+  kept_.clear();
+  each_shared([&](Velocity& v, const Twist& twist, std::size_t) {
+    kept_.push_back(v);
+    std::copy_n(twist.u.data(), 3, v.u);
+    std::copy_n(twist.w.data(), 3, v.w);
+  });
+  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+    for (std::size_t g = 0; g < walls_.size(); ++g)
+      std::copy_n(wall(e, g).data(), 3, &subdomains_[e].partial[3 * g]);
+    publish(e, Mode::sum);
+  }
+  if (tasks_of_rank() > 1) collect(Mode::sum);
+  centre(Mode::sum);
+  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+    glue(e, Mode::sum);
+    for (std::size_t g = 0; g < walls_.size(); ++g)
+      wall(e, g) = Eigen::Map<const Vec3>(&centre_->sums[3 * g]);
+  }
+  each_shared([&](Velocity& v, Twist& twist, std::size_t k) {
+    std::copy_n(v.u, 3, twist.u.data());
+    if (width_ == 6) std::copy_n(v.w, 3, twist.w.data());
+    v = kept_[k];
+  });
 }
 
 std::vector<trace::Message> Gluing::message_plan() const {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "kernels/body_problem.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/trace/trace.hpp"
@@ -63,13 +64,20 @@ class Gluing {
     iterate,   ///< after a sweep
     measured,  ///< after a sweep, with the jump measured
     local,     ///< between two exchanges: only the walls' copies of each subdomain
+    sum,       ///< of sum_copies
   };
+  /// A gate's thread alone, collective: each copy of a shared body gets the sum of what `field` has for all
+  /// copies, in order of subdomain; likewise each copy of a wall of finite mass. Per subdomain here its
+  /// bodies in order of slot, then those walls; w is summed only if plan() was told of rotation.
+  void sum_copies(std::span<std::vector<Twist>> field);
+
   void publish(std::size_t e, Mode mode);
   void collect(Mode mode);
   void centre(Mode mode);
   void glue(std::size_t e, Mode mode);
 
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
+  void forget_jumps() { jumps_.assign(jumps_.size(), {}); }
   const MessageCount& messages() const { return messages_; }
   /// What each subdomain here sends, and gets from the centre, as if alone on its rank; of an exchange.
   std::vector<trace::Message> message_plan() const;
@@ -97,6 +105,7 @@ class Gluing {
   std::unique_ptr<Centre> centre_;
   std::vector<JumpSums> jumps_;
   MessageCount messages_;
+  std::vector<Velocity> kept_;  ///< by sum_copies
 };
 
 }  // namespace talus

@@ -28,7 +28,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       ranks_(ranks),
       kernels_(settings.simd),
       gluing_(state, decomposition, ranks),
-      admm_(state, parameters, decomposition, ranks) {}
+      admm_(state, parameters, decomposition, gluing_, ranks) {}
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
@@ -47,6 +47,7 @@ void Iteration::begin() {
       state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
           static_cast<std::int32_t>(c));
   gluing_.begin();
+  gluing_.forget_jumps();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const WallState& wall = state_.wall_states[w];
     const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
@@ -67,6 +68,7 @@ void Iteration::begin() {
   sweeps_ = before_segment_ = 0;
   history_from_ = 0;
   sweeps_needed_ = -1;
+  looked_ = {};
   first_course();
 }
 
@@ -105,10 +107,11 @@ void Iteration::chunk(std::size_t c, int epoch) {
     case Work::restore:
     case Work::accumulate: {
       if (work == Work::restore) restore_impulses(state_.candidates, chunks, c, contacts);
-      const auto owned = static_cast<std::size_t>(chunks.owned_begin[c]);
-      reset_to_free(
-          std::span(chunks.owned).subspan(owned, static_cast<std::size_t>(chunks.owned_begin[c + 1]) - owned),
-          state_.free, velocity);
+      if (course_.method != SolverMethod::nlgs) {
+        loosen(owned(c), velocity, trail_);
+        if (at_wall) loosen(c, copy, trail_);
+      }
+      reset_to_free(owned(c), state_.free, velocity);
       if (at_wall) {
         const Vec3& free = state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].free_velocity;
         std::copy_n(free.data(), 3, copy.velocity);
@@ -335,10 +338,11 @@ bool Iteration::measured(int epoch) {
     if (ask_admm())
       call_admm(epoch);
     else
-      plan_sweeps(epoch);
+      plan_sweeps(epoch, sweeps_ahead());
     return true;
   }
-  plan_sweeps(epoch);
+  // One for sure; how many more follows when it is known how this check came out.
+  plan_sweeps(epoch, std::min(least_sweeps, settings_.max_iterations - sweeps_));
   read_at_ = epoch + 1;
   return true;
 }
@@ -349,7 +353,12 @@ bool Iteration::swept(int epoch) {
   if (epoch != read_at_) return true;
   read_at_ = -1;
   add_up(pending_->wait());
-  if (!judge()) restore_at_ = epoch + 1;
+  if (!judge())
+    restore_at_ = epoch + 1;
+  else if (ask_admm())
+    call_admm(epoch);
+  else
+    plan_sweeps(sweeps_from_ - 1, sweeps_ahead());
   return true;
 }
 

@@ -21,7 +21,7 @@ struct IterationResult {
   double jump = 0;  ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
   double drift =
       0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
-  double unbalance = 0;  ///< estimate of the relative error of the forces on walls and heavy bodies
+  double unbalance = 0;  ///< estimate of the relative error of the forces: Iteration::balanced
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
   std::int64_t contacts = 0, active = 0;
@@ -37,13 +37,14 @@ struct IterationResult {
 ///
 /// `accumulate` makes V afresh from r, so that the error is never that of a drifted V and the step ends on
 /// what was certified. At a gate one thread adds the chunks' sums in order, by subdomain, and decides whether
-/// to go on; the distance n of the gates grows with the iterations done.
+/// to go on, and for how many sweeps n: to where the tolerance is expected to be met.
 ///
 /// With several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read
 /// at a gate behind that sweep. If they say that the step was solved, `restore` brings back the impulses that
 /// were certified, so that results are the bits of one rank, where nothing has to be waited for.
 ///
-/// Where ADMM is called, the gate's thread does it alone: the next epoch is `accumulate`.
+/// Where ADMM is called, it is by the gate's threads of all ranks, on the impulses that were certified: the
+/// next epoch is `accumulate`.
 ///
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
 /// centre, and glue of every subdomain follow. Publish comes after the boundary chunks and before the inner
@@ -60,6 +61,8 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// Of threads that wait for decide(): ADMM's subdomains are shared out.
+  void assist() { admm_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
@@ -85,6 +88,9 @@ class Iteration {
   const std::vector<Check>& history() const { return history_; }
 
  private:
+  /// Between two checks at least: one costs about 1.5 of them. Two, so that what several ranks learn of a
+  /// check behind the first sweep comes before the last one.
+  static constexpr int least_sweeps = 2;
   enum class Work { accumulate, measure, sweep, restore };
   Work work(int epoch) const {
     return epoch == restore_at_ ? Work::restore
@@ -97,6 +103,7 @@ class Iteration {
   void chunk(std::size_t c, int epoch);
   template <bool Friction>
   void sweep(std::size_t c, ContactRange range, double mu);
+  std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
   /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
   struct Course {
@@ -117,11 +124,14 @@ class Iteration {
   void add_up(std::span<const double> rows);
   bool judge();
   void choose_course();
-  void plan_sweeps(int epoch);
+  const Check* check_before() const;
+  int sweeps_ahead() const;
+  void plan_sweeps(int epoch, int sweeps);
   void turn_conjugate();
   double impulse_scale() const;
   double drift() const;
   double sweeps_needed();
+  bool looks_at_all();
   bool balanced();
   bool ask_admm();
   void call_admm(int epoch);
@@ -151,6 +161,12 @@ class Iteration {
   double first_residual2_ = 0;       ///< at the first check of the step, or the first since ADMM [m^2/s^2]
   std::size_t history_from_ = 0;     ///< that check
   double sweeps_needed_ = -1;        ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  /// The last look at the error of all velocities.
+  struct Look {
+    int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
+    double error_rms = 0, error = 0;
+  };
+  Look looked_;
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment

@@ -219,7 +219,7 @@ struct Simulation::Implementation {
     report.iterations = result.iterations;
     report.error_rms = result.error_rms;
     report.error_max = result.error_max;
-    report.balance = std::max({result.drift, result.unbalance, defect});
+    report.balance = std::max(result.unbalance, defect);
     report.jump = result.jump;
     report.migrants = sums.migrants;
     report.imbalance = 1 + state.decomposition.imbalance;

@@ -219,10 +219,10 @@ void StepGraph::renew_slots() {
   const Bodies& bodies = state_.bodies;
   const double h = parameters_.time_step;
   state_.x_then = bodies.x;
-  state_.reach_then.resize(bodies.size());
-  for (std::size_t s = 0; s < bodies.size(); ++s)
-    state_.reach_then[s] =
-        around_.reach[static_cast<std::size_t>(around_.find(static_cast<std::int64_t>(bodies.id[s])))];
+  state_.reach_then.clear();
+  for (const SubdomainInterface& interface : state_.decomposition.interfaces)
+    for (Slot body : interface.bodies)
+      state_.reach_then.push_back(around_.reach[static_cast<std::size_t>(body)]);
   around_ = {};
   state_.free.u.resize(bodies.size());
   state_.free.w.resize(parameters_.turns ? bodies.size() : 0);

@@ -91,6 +91,8 @@ void validate(const Machine& machine, const Trace& trace) {
   demand_positive(machine.node_bandwidth, "node bandwidth");
   demand_not_negative(machine.line, "line");
   demand_not_negative(machine.noise, "noise");
+  demand_not_negative(machine.quantile, "quantile");
+  if (machine.quantile > 1) refuse(fmt::format("quantile must not be above 1, got {}", machine.quantile));
   demand_positive(machine.speed, "speed");
   demand_positive(machine.contacts, "contacts scale");
 }

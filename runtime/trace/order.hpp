@@ -68,6 +68,9 @@ class Ordered {
     program_.node(node, epoch);
   }
   bool gate(int epoch) { return program_.gate(epoch); }
+  void assist() {
+    if constexpr (requires { program_.assist(); }) program_.assist();
+  }
   bool decide(int epoch) { return program_.decide(epoch); }
   std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
 

@@ -66,7 +66,11 @@ class Player {
       const StepIndex index = stage_.timeline.index(step);
       lay_out_step(index);
       stage_.log.begin_step(step);
-      if (machine_.typical) stage_.typical = typical_times(stage_.timeline, index);
+      if (usual_times()) {
+        const double part = machine_.quantile > 0 ? machine_.quantile : 0.5;
+        stage_.typical = typical_times(stage_.timeline, index, part);
+        typical_tasks_ = typical_tasks(stage_.timeline, index, part);
+      }
       play_step(index, now);
     }
     out_.makespan = *std::max_element(now.begin(), now.end());
@@ -83,6 +87,8 @@ class Player {
   }
 
  private:
+  bool usual_times() const { return machine_.typical || machine_.quantile > 0; }
+
   void lay_out_step(const StepIndex& index) {
     std::vector<const Plan*> plans;
     for (const StepIndex::Rank& rank : index.ranks) {
@@ -131,8 +137,15 @@ class Player {
     for (const SimTask::Source& source : task.sources) {
       const StepIndex::Rank& recorded = index.ranks[static_cast<std::size_t>(source.rank)];
       const Place part = recorded.part[source.task];
-      const double own = stage_.timeline.self(recorded.task[source.task]),
-                   inside = stage_.timeline.self(part);
+      double own = stage_.timeline.self(recorded.task[source.task]), inside = stage_.timeline.self(part);
+      if (usual_times() && task.task.group >= 0) {
+        const double usual = typical_tasks_[static_cast<std::size_t>(source.rank)].at(task.task.kind);
+        if (own + inside > (machine_.quantile > 0 ? 0 : 3 * usual)) {
+          const double part_left = usual / (own + inside);
+          own *= part_left;
+          inside *= part_left;
+        }
+      }
       if (task.task.group >= 0 || info.shared) {
         const double of_rank = task.task.group >= 0 ? 1 : share(r, static_cast<std::size_t>(source.rank));
         timed.work += of_rank * (own + inside);
@@ -286,6 +299,7 @@ class Player {
   std::vector<std::uint32_t> rank_of_;  ///< per group
   std::vector<std::vector<SimTask>> tasks_;
   LoopLayout layout_;
+  std::vector<std::map<Kind, float>> typical_tasks_;  ///< where usual_times(), of the step
 };
 
 }  // namespace

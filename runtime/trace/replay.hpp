@@ -45,8 +45,12 @@ struct Machine {
   double speed = 1;        ///< of a core, relative to the recorded one
   double contacts = 1;   ///< per subdomain, relative to the recorded ones: chunks take longer in proportion,
                          ///< messages grow as the faces, with the power 2/3
-  bool typical = false;  ///< a node that took more than three times its median of the step took the median:
-                         ///< the recorded machine was shared with other programs
+  bool typical = false;  ///< a node that took more than three times its median of the step took the median,
+                         ///< and a task of a subdomain that of all its like: the recorded machine was shared
+                         ///< with other programs
+  double quantile = 0;  ///< in (0, 1]: every node takes this quantile of its times of the step instead, and a
+                        ///< task of a subdomain that of all its like: a machine so busy that most times are
+                        ///< too long; imbalance between coarse tasks is lost. 0: off
   bool late_check =
       true;  ///< with several ranks the sums of a convergence check travel behind the next sweep
   bool unbounded =

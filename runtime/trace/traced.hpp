@@ -39,6 +39,9 @@ class Traced {
     lane_.at_epoch(epoch);
     return program_.gate(epoch);
   }
+  void assist() {
+    if constexpr (requires { program_.assist(); }) program_.assist();
+  }
   bool decide(int epoch) {
     const std::int64_t begin = recorder_.now();
     const bool goes_on = program_.decide(epoch);

@@ -124,7 +124,6 @@ struct Scene {
                            sample.contacts,
                            mu,
                            mu,
-                           {},
                            {}});
   }
 };
@@ -241,7 +240,9 @@ void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod m
   Simulation simulation(setup, bodies, executor);
   fmt::print("plate of 1e6 on 16k, whole steps, {} subdomains\n", subdomains);
   while (!simulation.finished()) {
+    const double start = cpu_now();
     const StepReport& report = simulation.step();
+    const double seconds = cpu_now() - start;
     const IterationResult& r = simulation.iterations();
     const WallReport plate = simulation.walls()[5];
     fmt::print(
@@ -249,11 +250,55 @@ void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod m
         "heavy "
         "{:.1e}), {:.2f} s{}  velocity {:.2e} of g h, force {:.4f} of the weight\n",
         report.step, report.iterations, r.error_rms, r.unbalance, r.drift, r.stiff_calls, r.stiff.iterations,
-        r.stiff.linear_iterations, r.stiff.balance_defect, report.wall_s, report.converged ? "" : " MISSED",
+        r.stiff.linear_iterations, r.stiff.balance_defect, seconds, report.converged ? "" : " MISSED",
         plate.velocity / free, plate.force.norm() / setup.walls[5].load.force);
     std::fflush(stdout);
     simulation.begin_next_stage();
   }
+}
+
+/// One step of the whole program with a column, cut in slices.
+void run_column(int grains, double top, int subdomains) {
+  const Scene scene = column_scene(grains, top);
+  Setup setup;
+  setup.walls = scene.sample.walls;
+  Stage stage;
+  stage.name = "column";
+  stage.time_step = scene.time_step;
+  stage.gravity = Vec3(0, 0, -gravity);
+  stage.law = {mu, mu, 0};
+  stage.end.steps = 1;
+  setup.stages = {stage};
+  setup.solver.max_iterations = 2000;
+  setup.decomposition.subdomains = subdomains;
+  graph::Executor executor({.threads = 1});
+  Bodies bodies = scene.sample.bodies;
+  const std::vector<double> mass = [&] {
+    std::vector<double> each;
+    for (std::size_t b = 0; b < bodies.size(); ++b) each.push_back(bodies.mass(b));
+    return each;
+  }();
+  Simulation simulation(setup, std::move(bodies), executor);
+  const double start = cpu_now();
+  const StepReport& report = simulation.step();
+  const double seconds = cpu_now() - start;
+  const IterationResult& r = simulation.iterations();
+  const Frame frame = simulation.frame();
+  double error = 0;
+  for (std::size_t k = 0; k < frame.contact_force.size(); ++k) {
+    // Ids count from the bottom; a wall's are negative.
+    const auto [one, other] = frame.contact_bodies[k];
+    double weight = 0;
+    for (std::size_t b = static_cast<std::size_t>(std::max(one, other)); b < mass.size(); ++b)
+      weight += gravity * mass[b];
+    error = std::max(error, std::abs(std::abs(frame.contact_force[k][2]) - weight));
+  }
+  const double due = gravity * std::accumulate(mass.begin(), mass.end(), 0.0);
+  fmt::print(
+      "column of {}, top {:g}, one step, {:>2} subdomains: {:>5} sweeps, unbalance {:.1e}, admm {} x ({} it, "
+      "{} cg), {:.2f} s{}, force error {:.1e}\n",
+      grains, top, subdomains, report.iterations, r.unbalance, r.stiff_calls, r.stiff.iterations,
+      r.stiff.linear_iterations, seconds, report.converged ? "" : " MISSED", error / due);
 }
 
 void compare(const std::string& name, const Scene& scene, int sweeps,
@@ -305,6 +350,8 @@ int main(int argc, char** argv) {
     compare(fmt::format("column of {}, top {:g}", grains, top), scene, sweeps > 0 ? sweeps : 10000, chains,
             force);
   }
+  for (const double top : {1.0, 1e6})
+    for (const int subdomains : {1, 12, 96}) run_column(1000, top, subdomains);
   if (argc < 2) return 0;
   const Packing packing = bench::read_packing(argv[1]);
   for (bool closed : {true, false}) {

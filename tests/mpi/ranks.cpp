@@ -162,12 +162,6 @@ TEST_F(Ranks, MoreThanSubdomainsAreRefusedByAll) {
   EXPECT_FALSE(fs::exists(at("refused")));
 }
 
-TEST_F(Ranks, RefuseTheMethodThatNeedsTheWholeSample) {
-  const Outcome outcome = run(2, "run scene.toml --out refused --threads 1 --set solver.method=admm");
-  EXPECT_EQ(outcome.code, 2) << outcome.messages;
-  EXPECT_NE(outcome.messages.find("admm"), std::string::npos) << outcome.messages;
-}
-
 TEST_F(Ranks, EndTogetherOnBadInput) {
   const Outcome outcome = run(2, "run missing.toml --threads 1");
   EXPECT_EQ(outcome.code, 2) << outcome.messages;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "runtime/trace/analysis.hpp"
@@ -129,6 +130,60 @@ TEST(Replay, TypicalTimesLeaveInterruptionsOut) {
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 1040);
   machine.typical = true;
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 50);
+}
+
+TEST(Replay, TypicalTimesLeaveInterruptedTasksOfSubdomainsOut) {
+  // Five alike before the loop, one of them interrupted.
+  Trace trace = test::one_loop({0}, {}, {10});
+  trace.tasks[0].clear();
+  std::vector<Record> before;
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    trace.tasks[0].push_back({"task", test::task, 0, false, {}});
+    before.push_back({100 * i, i == 2 ? 90.0F : 8.0F, i, -1, pack(1, test::task)});
+  }
+  trace.tasks[0].push_back({"loop", kind_team, -1, true, {0, 1, 2, 3, 4}});
+  std::vector<Record>& records = trace.lanes[0].records;
+  std::erase_if(records, [](const Record& record) { return record.epoch < 0; });
+  for (Record& record : records) record.begin += 1000;
+  records.insert(records.begin(), before.begin(), before.end());
+  Machine machine = bare(1, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 4 * 8 + 90 + 10);
+  machine.typical = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 5 * 8 + 10);
+}
+
+TEST(Replay, AQuantileStandsForAllTimesOfANode) {
+  // Ten epochs of 10 ns, seven of them on a busy machine.
+  Trace trace = test::one_loop({0}, {}, {10}, 10);
+  std::int64_t late = 0;
+  for (Record& record : trace.lanes[0].records) {
+    record.begin += late;
+    if (record.kind() != test::sweep || record.epoch < 3) continue;
+    record.duration = 25;
+    late += 15;
+  }
+  Machine machine = bare(1, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 3 * 10 + 7 * 25);
+  machine.quantile = 0.2;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 10 * 10);
+  machine.quantile = 1.5;
+  EXPECT_THROW(makespan(trace, machine), std::invalid_argument);
+}
+
+TEST(Replay, ChecksAfterEverySweepAreReadASweepLater) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  const auto second =
+      std::find_if(records.begin(), records.end(), [](const Record& r) { return r.epoch == 1; });
+  records.insert(second, {second->begin, 0, 0, 0, pack(1, kind_check)});
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.late_check = true;
+    const double late = makespan(trace, machine);
+    machine.late_check = false;
+    EXPECT_DOUBLE_EQ(late, 2 * makespan(trace, machine)) << "a sweep more, and one to undo it";
+  }
 }
 
 TEST(Replay, NoiseIsTheSameForTheSameSeed) {

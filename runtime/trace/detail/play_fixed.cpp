@@ -221,10 +221,11 @@ class FixedLoop {
     const std::size_t round = epoch.reads_before;
     rank.waits = epoch.reads;
     rank.time = now;
+    // With a check after every sweep, this one may post a round and read the one before.
     const bool last = epoch.posts && rounds_.post(epoch.posts_before, rank.ready);
     if (!epoch.reads)
       agenda_.add(rank.ready, gate_opens, r);
-    else if (rounds_.complete(round) && !last)
+    else if (rounds_.complete(round) && !(last && epoch.posts_before == round))
       agenda_.add(std::max(rank.ready, rounds_.known(round)), gate_opens, r);
     if (last)
       for (std::uint32_t other = 0; other < ranks_.size(); ++other)

@@ -162,10 +162,11 @@ class ListLoop {
     rank.time = now;
     rank.decided = now + check_work(stage_, index_, epoch);
     rank.waits = epoch.reads;
+    // With a check after every sweep, this one may post a round and read the one before.
     const bool last = epoch.posts && rounds_.post(epoch.posts_before, rank.decided);
     if (!epoch.reads)
       agenda_.add(rank.decided, gate_opens, r);
-    else if (rounds_.complete(epoch.reads_before) && !last)
+    else if (rounds_.complete(epoch.reads_before) && !(last && epoch.posts_before == epoch.reads_before))
       agenda_.add(std::max(rank.decided, rounds_.known(epoch.reads_before)), gate_opens, r);
     if (last)
       for (std::uint32_t other = 0; other < ranks_.size(); ++other)

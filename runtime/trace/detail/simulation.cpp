@@ -34,16 +34,29 @@ NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node
                        stage.stretch(index.step, number, number_of_epoch);
   const Kind kind = stage.timeline.record(place).kind();
   double work = stage.timeline.self(place);
-  if (stage.machine.typical) {
-    const auto median = static_cast<double>(
+  if (stage.machine.typical || stage.machine.quantile > 0) {
+    const auto usual = static_cast<double>(
         stage.typical[static_cast<std::size_t>(node.source_rank)].at(kind)[node.source_node]);
-    if (work > 3 * median) work = median;
+    if (stage.machine.quantile > 0 || work > 3 * usual) work = usual;
   }
   return {work * scale, true, kind};
 }
 
+namespace {
+
+/// The value below which `part` of the list lies; the list is not empty, and is reordered.
+float quantile_of(std::vector<float>& list, double part) {
+  const auto place =
+      std::min(list.size() - 1, static_cast<std::size_t>(part * static_cast<double>(list.size())));
+  const auto at = list.begin() + static_cast<std::ptrdiff_t>(place);
+  std::nth_element(list.begin(), at, list.end());
+  return *at;
+}
+
+}  // namespace
+
 std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
-                                                              const StepIndex& index) {
+                                                              const StepIndex& index, double quantile) {
   std::vector<std::map<Kind, std::vector<float>>> typical;
   std::map<Kind, std::vector<float>> times;
   for (const StepIndex::Rank& rank : index.ranks) {
@@ -55,13 +68,27 @@ std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& ti
           times[timeline.record(place).kind()].push_back(static_cast<float>(timeline.self(place)));
       for (auto& [kind, list] : times) {
         if (list.empty()) continue;
-        const auto middle = list.begin() + static_cast<std::ptrdiff_t>(list.size() / 2);
-        std::nth_element(list.begin(), middle, list.end());
         auto& of_kind = medians[kind];
         of_kind.resize(rank.nodes, 0);
-        of_kind[n] = *middle;
+        of_kind[n] = quantile_of(list, quantile);
       }
     }
+  }
+  return typical;
+}
+
+std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const StepIndex& index,
+                                                 double quantile) {
+  std::vector<std::map<Kind, float>> typical;
+  for (std::size_t r = 0; r < index.ranks.size(); ++r) {
+    const std::vector<Task>& tasks = timeline.trace().tasks[r];
+    std::map<Kind, std::vector<float>> times;
+    for (std::size_t i = 0; i < tasks.size(); ++i)
+      if (tasks[i].group >= 0)
+        times[tasks[i].kind].push_back(static_cast<float>(timeline.self(index.ranks[r].task[i]) +
+                                                          timeline.self(index.ranks[r].part[i])));
+    auto& medians = typical.emplace_back();
+    for (auto& [kind, list] : times) medians[kind] = quantile_of(list, quantile);
   }
   return typical;
 }
@@ -78,6 +105,16 @@ double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& ep
   double work = 0;
   for (const StepIndex::Rank& rank : index.ranks)
     work = std::max(work, stage.timeline.self(rank.check[epoch.source]));
+  if (stage.machine.typical || stage.machine.quantile > 0) {
+    std::vector<float> all;  // of the step: there are few
+    for (const StepIndex::Rank& rank : index.ranks)
+      for (const Place check : rank.check)
+        if (check.exists()) all.push_back(static_cast<float>(stage.timeline.self(check)));
+    if (!all.empty() && stage.machine.quantile > 0)
+      work = static_cast<double>(quantile_of(all, stage.machine.quantile));
+    else if (!all.empty())
+      work = std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
+  }
   return work / stage.machine.speed;
 }
 

@@ -48,7 +48,8 @@ struct Stage {
   const Machine& machine;
   Network network;
   Log log;
-  /// With Machine::typical, of the step: per recorded rank and kind, the median of each node [ns].
+  /// With Machine::typical or quantile, of the step: per recorded rank and kind, the median of each node, or
+  /// that quantile [ns].
   std::vector<std::map<Kind, std::vector<float>>> typical{};
   double dispatch = 0;  ///< from the end of one node to the beginning of the next on a thread [ns]
 
@@ -58,7 +59,12 @@ struct Stage {
 
 /// What Stage::typical holds for a step.
 std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
-                                                              const StepIndex& index);
+                                                              const StepIndex& index, double quantile);
+
+/// Per recorded rank and kind of the step's tasks of single subdomains, which are like one another: the
+/// quantile of their times, those of the spans within included. [ns]
+std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const StepIndex& index,
+                                                 double quantile);
 
 /// An epoch of the loop on the machine.
 struct SimEpoch {

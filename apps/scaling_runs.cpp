@@ -1,0 +1,204 @@
+#include "apps/scaling_runs.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "apps/child_process.hpp"
+#include "apps/exit_codes.hpp"
+#include "apps/study_variants.hpp"
+#include "io/csv_table.hpp"
+#include "io/error.hpp"
+#include "io/output_directory.hpp"
+#include "io/smpi_platform.hpp"
+
+namespace talus {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Removes a folder that a run has made, whatever becomes of the run.
+class Scratch {
+ public:
+  explicit Scratch(fs::path folder) : folder_(std::move(folder)) { fs::create_directories(folder_); }
+  ~Scratch() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  const fs::path& folder() const { return folder_; }
+
+ private:
+  fs::path folder_;
+};
+
+RunTimes start(const ScalingLauncher& launcher, const std::vector<std::string>& words,
+               const fs::path& folder) {
+  const fs::path log = folder / "log";
+  const int code = run_child(words, log);
+  if (code != exit_done && code != exit_tolerance_missed)
+    throw std::runtime_error(fmt::format("exit code {} of {}{}", code, shell_line(words), tail_of(log)));
+  return read_times(folder / "out" / "steps.csv", launcher.first, launcher.last);
+}
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::istringstream in(line);
+  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+  return cells;
+}
+
+}  // namespace
+
+std::vector<std::string> run_words(const ScalingLauncher& launcher, const ScalingSubject& subject,
+                                   const ScalingMachine& machine, const std::string& out) {
+  std::vector<std::string> words;
+  if (machine.ranks > 1) {
+    words = launcher.mpirun.empty() ? std::vector<std::string>{"mpirun", "--bind-to", "core", "--map-by",
+                                                               fmt::format("slot:PE={}", machine.threads)}
+                                    : launcher.mpirun;
+    words.insert(words.end(), {"-n", fmt::format("{}", machine.ranks)});
+  }
+  words.insert(words.end(), {launcher.talus, "run", subject.scene, "--out", out, "--threads",
+                             fmt::format("{}", machine.threads), "--steps", fmt::format("{}", launcher.last),
+                             "--set", fmt::format("decomposition.subdomains={}", machine.subdomains)});
+  for (const std::string& override_text : split_words(subject.variant))
+    words.insert(words.end(), {"--set", override_text});
+  return words;
+}
+
+RunTimes read_times(const fs::path& steps_csv, std::int64_t first, std::int64_t last) {
+  std::ifstream in(steps_csv);
+  std::string line;
+  if (!std::getline(in, line)) throw io::FileError(steps_csv.string(), "the run left no table of its steps");
+  const std::vector<std::string> names = cells_of(line);
+  const auto column = [&](const char* name) {
+    const auto at = std::ranges::find(names, name);
+    if (at == names.end()) throw io::FileError(steps_csv.string(), fmt::format("has no column {}", name));
+    return static_cast<std::size_t>(at - names.begin());
+  };
+  const std::size_t step = column("step"), iterations = column("iterations"), contacts = column("contacts"),
+                    seconds = column("wall_s"), converged = column("converged");
+  RunTimes sum;
+  std::int64_t counted = 0;
+  while (std::getline(in, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    if (cells.size() != names.size()) continue;  // cut off by a kill
+    const std::int64_t number = std::stoll(cells[step]);
+    if (number < first || number > last) continue;
+    ++counted;
+    sum.seconds += std::stod(cells[seconds]);
+    sum.iterations += std::stod(cells[iterations]);
+    sum.contacts += std::stod(cells[contacts]);
+    if (cells[converged] == "0") ++sum.missed;
+  }
+  if (counted != last - first + 1)
+    throw io::FileError(steps_csv.string(),
+                        fmt::format("has {} of the steps {} to {}: the scene ends before. Ask for earlier "
+                                    "ones with --steps",
+                                    counted, first, last));
+  const auto count = static_cast<double>(counted);
+  sum.seconds /= count;
+  sum.iterations /= count;
+  sum.contacts /= count;
+  return sum;
+}
+
+RunTimes run_once(const ScalingLauncher& launcher, const ScalingSubject& subject,
+                  const ScalingMachine& machine) {
+  const Scratch scratch(launcher.work);
+  return start(launcher, run_words(launcher, subject, machine, (scratch.folder() / "out").string()),
+               scratch.folder());
+}
+
+RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subject, int subdomains,
+                     const fs::path& trace) {
+  const Scratch scratch(launcher.work);
+  std::vector<std::string> words =
+      run_words(launcher, subject, {subdomains, 1, 1}, (scratch.folder() / "out").string());
+  words.insert(words.end(),
+               {"--trace", "--trace-steps", fmt::format("{}:{}", launcher.first, launcher.last)});
+  const RunTimes times = start(launcher, words, scratch.folder());
+  fs::create_directories(trace.parent_path());
+  fs::rename(scratch.folder() / "out" / "trace.h5", trace);
+  return times;
+}
+
+RunTimes simulate_once(const ScalingLauncher& launcher, const SimulatedLauncher& simulated,
+                       const ScalingSubject& subject, const trace::Machine& machine) {
+  const Scratch scratch(launcher.work);
+  const fs::path platform = scratch.folder() / "platform.xml", hosts = scratch.folder() / "hosts";
+  io::write_whole(platform, io::smpi_platform(machine));
+  io::write_whole(hosts, io::smpi_hosts(machine));
+  std::vector<std::string> words{
+      simulated.smpirun, "-np", fmt::format("{}", machine.ranks), "-hostfile", hosts, "-platform", platform};
+  ScalingLauncher inside = launcher;
+  inside.talus = fs::absolute(simulated.talus);
+  const std::vector<std::string> run =
+      run_words(inside, subject, {machine.ranks, 1, 1}, (scratch.folder() / "out").string());
+  words.insert(words.end(), run.begin(), run.end());
+  return start(launcher, words, scratch.folder());
+}
+
+std::vector<RecordedTrace> read_recordings(const fs::path& times_csv) {
+  std::vector<RecordedTrace> recorded;
+  std::ifstream in(times_csv);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    try {
+      if (cells.size() != 6) throw std::invalid_argument(line);
+      recorded.push_back(
+          {cells[0], cells[2], cells[1], {std::stod(cells[3]), std::stod(cells[4]), std::stod(cells[5]), 0}});
+    } catch (const std::logic_error&) {
+      throw io::FileError(times_csv.string(), fmt::format("'{}' is no line of a list of recordings", line));
+    }
+  }
+  return recorded;
+}
+
+void write_recordings(const fs::path& times_csv, const std::vector<RecordedTrace>& recorded) {
+  io::CsvTable table({"file", "variant", "steps", "seconds", "iterations", "contacts"});
+  for (const RecordedTrace& r : recorded)
+    table.row(r.file, r.variant, r.steps, r.times.seconds, r.times.iterations, r.times.contacts);
+  io::write_whole(times_csv, table.text());
+}
+
+std::vector<int> rank_counts(int cores) {
+  std::vector<int> counts;
+  for (int ranks = 1; ranks <= cores; ++ranks)
+    if (cores % ranks == 0) counts.push_back(ranks);
+  return counts;
+}
+
+ScalingRow row_of(const ScalingSubject& subject, const ScalingMachine& machine,
+                  const std::vector<RunTimes>& times) {
+  ScalingRow row;
+  row.kind = subject.kind;
+  row.variant = subject.variant;
+  row.subdomains = machine.subdomains;
+  row.ranks = machine.ranks;
+  row.threads = machine.threads;
+  row.grains = subject.grains;
+  row.repeats = static_cast<int>(times.size());
+  const auto values = [&](double RunTimes::*member) {
+    std::vector<double> all;
+    for (const RunTimes& time : times) all.push_back(time.*member);
+    return all;
+  };
+  const std::vector<double> seconds = values(&RunTimes::seconds);
+  row.seconds = median(seconds);
+  row.fastest = std::ranges::min(seconds);
+  row.slowest = std::ranges::max(seconds);
+  row.iterations = median(values(&RunTimes::iterations));
+  row.contacts = median(values(&RunTimes::contacts));
+  return row;
+}
+
+}  // namespace talus

@@ -1,0 +1,31 @@
+#pragma once
+
+/// How stiff a problem is, before it is solved: what rho of ADMM is chosen from.
+
+#include <span>
+
+#include "kernels/body_parts.hpp"
+
+namespace talus {
+
+/// kappa of rho = kappa/W_nn from impulses that carry the load: sum W_nn r^2 / |M^-1/2 H r|^2, about the
+/// inverse of the smallest eigenvalue of W that the load excites, in effective masses of a contact. A column
+/// of N grains: 2 N^2/3; a plate of T grain masses over L layers of c contacts: T L/c. 0 without impulses.
+double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse);
+
+/// The same before any impulse is known: the momentum that stops every body at once is passed on, layer by
+/// layer over the contacts, to the driven walls; or from the heaviest body outwards if there is none. Also
+/// about the number of Gauss-Seidel sweeps that the problem needs. 0 without contacts. With several parts, an
+/// exchange for each layer on the way out and one on the way back.
+double estimate_stiffness(const BodyParts& parts);
+double estimate_stiffness(const BodyProblem& problem);
+
+/// 1/W_nn of a contact [kg].
+inline double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
+  const auto mobility = [&](std::int32_t body) {
+    return body < 0 ? 0 : 1 / problem.bodies[static_cast<std::size_t>(body)].mass;
+  };
+  return 1 / (mobility(c.first) + mobility(c.second));
+}
+
+}  // namespace talus

@@ -1,0 +1,117 @@
+// The arithmetic of scaling studies.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "apps/child_process.hpp"
+#include "apps/scaling_runs.hpp"
+#include "apps/scaling_table.hpp"
+#include "io/error.hpp"
+#include "tests/unit/output_helpers.hpp"
+
+namespace talus {
+namespace {
+
+ScalingRow row(ScalingKind kind, int ranks, double seconds, double iterations, std::size_t grains = 1000) {
+  ScalingRow out;
+  out.kind = kind;
+  out.ranks = out.subdomains = ranks;
+  out.seconds = seconds;
+  out.iterations = iterations;
+  out.grains = grains;
+  return out;
+}
+
+TEST(Scaling, StrongEfficiencyIsIterationsTimesTimeOfAnIteration) {
+  std::vector<ScalingRow> rows{row(ScalingKind::strong, 1, 8, 100), row(ScalingKind::strong, 4, 2.5, 125)};
+  relate(rows);
+  EXPECT_DOUBLE_EQ(rows[0].speedup, 1);
+  EXPECT_DOUBLE_EQ(rows[1].speedup, 3.2);
+  EXPECT_DOUBLE_EQ(rows[1].efficiency, 0.8);
+  EXPECT_DOUBLE_EQ(rows[1].of_iterations, 0.8);
+  EXPECT_DOUBLE_EQ(rows[1].of_sweeps, 1);
+  EXPECT_EQ(bound_of(rows[1]), "more iterations (0.80)");
+}
+
+TEST(Scaling, WeakEfficiencyComparesTimesPerGrain) {
+  // Four times the grains in 2.5 instead of 2 s; a thousandth more than four times must not count as loss.
+  std::vector<ScalingRow> rows{row(ScalingKind::weak, 1, 2, 100), row(ScalingKind::weak, 4, 2.5, 100, 4004)};
+  relate(rows);
+  EXPECT_DOUBLE_EQ(rows[1].efficiency, 2 / 2.5 * 4004 / 4000);
+  EXPECT_DOUBLE_EQ(rows[1].speedup, 4 * rows[1].efficiency);
+}
+
+TEST(Scaling, FactorsOfAPredictionMultiplyToItsEfficiency) {
+  std::vector<ScalingRow> rows{row(ScalingKind::strong, 1, 8, 100), row(ScalingKind::strong, 4, 2.5, 100)};
+  for (ScalingRow& r : rows) r.source = ScalingSource::replay;
+  rows[0].balance = rows[0].communication = rows[0].within = 1;
+  rows[1].balance = 0.95;
+  rows[1].communication = 0.9;
+  rows[1].within = 0.98;
+  relate(rows);
+  EXPECT_NEAR(rows[1].work * 0.95 * 0.9 * 0.98, rows[1].efficiency, 1e-12);
+  EXPECT_EQ(bound_of(rows[1]), "exposed messages (0.90)");
+  EXPECT_EQ(bound_of(rows[0]), "nothing");
+}
+
+TEST(Scaling, AVariantIsHeldAgainstItsOwnOneCoreAndElseAgainstThePlainOne) {
+  ScalingRow plain = row(ScalingKind::strong, 1, 8, 100), own = plain,
+             changed = row(ScalingKind::strong, 2, 3, 100);
+  own.seconds = 6;
+  own.variant = changed.variant = "solver.method=nlgs";
+  std::vector<ScalingRow> both{plain, own, changed}, without{plain, changed};
+  relate(both);
+  relate(without);
+  EXPECT_DOUBLE_EQ(both[2].speedup, 2);
+  EXPECT_DOUBLE_EQ(without[1].speedup, 8.0 / 3);
+}
+
+TEST(Scaling, PredictionsAreNeverHeldAgainstMeasurements) {
+  std::vector<ScalingRow> rows{row(ScalingKind::strong, 1, 8, 100), row(ScalingKind::strong, 4, 2, 100)};
+  rows[1].source = ScalingSource::replay;
+  relate(rows);
+  EXPECT_TRUE(std::isnan(rows[1].speedup));
+  EXPECT_EQ(bound_of(rows[1]), "");
+}
+
+TEST(Scaling, RanksAndThreadsShareTheCoresEvenly) {
+  EXPECT_EQ(rank_counts(1), (std::vector<int>{1}));
+  EXPECT_EQ(rank_counts(12), (std::vector<int>{1, 2, 3, 4, 6, 12}));
+}
+
+TEST(Scaling, TimesAreMeansOverTheStepsThatCount) {
+  const test::ScratchDirectory folder;
+  const auto file = folder.path() / "steps.csv";
+  std::ofstream(file)
+      << "step,contacts,iterations,wall_s,converged\n1,5,1000,9,0\n2,10,30,1,1\n3,20,50,2,0\n4,1";
+  const RunTimes times = read_times(file, 2, 3);
+  EXPECT_DOUBLE_EQ(times.seconds, 1.5);
+  EXPECT_DOUBLE_EQ(times.iterations, 40);
+  EXPECT_DOUBLE_EQ(times.contacts, 15);
+  EXPECT_EQ(times.missed, 1);
+  EXPECT_THROW(read_times(file, 2, 4), io::FileError) << "the last line was cut off";
+}
+
+TEST(ChildProcess, TellsHowItEndedAndWhatItSaid) {
+  const test::ScratchDirectory folder;
+  const auto log = folder.path() / "log";
+  EXPECT_EQ(run_child({"sh", "-c", "echo one; echo two >&2; exit 3"}, log), 3);
+  EXPECT_EQ(tail_of(log, 1), "\n  two");
+  EXPECT_EQ(run_child({"sh", "-c", "kill -9 $$"}, log), 128 + 9);
+  EXPECT_THROW(run_child({"no-such-program"}, log), std::runtime_error);
+  EXPECT_TRUE(program_exists("sh"));
+  EXPECT_FALSE(program_exists("no-such-program"));
+}
+
+TEST(ChildProcess, LinesForAShellSurviveIt) {
+  const test::ScratchDirectory folder;
+  const auto log = folder.path() / "log";
+  const std::string word = "a'b \"c\" $HOME";
+  EXPECT_EQ(run_child({"sh", "-c", shell_line({"test", word, "=", word})}, log), 0);
+  EXPECT_EQ(shell_line({"talus", "--set", "a.b=1e-3"}), "talus --set a.b=1e-3");
+}
+
+}  // namespace
+}  // namespace talus

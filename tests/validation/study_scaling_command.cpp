@@ -1,0 +1,186 @@
+/// `talus study scaling` as a user meets it.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus {
+namespace {
+
+using namespace test;
+
+class StudyScaling : public testing::Test {
+ protected:
+  void SetUp() override { write(at("scene.toml"), pressed_box); }
+  Outcome run(const std::string& arguments, const std::string& before = "") {
+    return test::run(folder_.path(), arguments,
+                     "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " + before);
+  }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+  ScratchDirectory folder_;
+};
+
+constexpr const char* small = "study scaling scene.toml --out s --steps 2:3 --subdomains 1,4 ";
+
+TEST_F(StudyScaling, MeasuresPredictsAndWritesEverything) {
+  write(at("others.csv"), "name,cores,speedup\nelsewhere,96,88\n");
+  const Outcome outcome = run(std::string(small) +
+                              "--repeat 2 --cores 2 --network today,2012 --beside others.csv --variant "
+                              "decomposition.exchange=ccs --mpirun 'mpirun --oversubscribe --bind-to none'");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  for (const std::string name :
+       {"report.html", "plot.gp", "speedup.svg", "efficiency.svg", "efficiency_iterations.svg",
+        "efficiency_sweeps.svg", "weak_efficiency.svg", "hybrid.svg", "commands.sh", "slurm.sh",
+        "strong.toml", "strong.csv", "beside.csv", "traces/strong-4-1.h5", "traces/strong-4-variant1-1.h5"})
+    EXPECT_TRUE(fs::exists(at("s/" + name))) << name;
+  EXPECT_FALSE(fs::exists(at("s/run"))) << "runs leave their times only";
+  const std::string page = content(at("s/report.html"));
+  EXPECT_NE(page.find("elsewhere"), std::string::npos);
+  EXPECT_NE(content(at("s/plot.gp")).find("'beside.csv'"), std::string::npos);
+  EXPECT_NE(outcome.output.find("#SBATCH"), std::string::npos);
+  EXPECT_NE(outcome.output.find("talus replay"), std::string::npos);
+
+  int measured = 0, predicted = 0;
+  for (const std::string name : {"strong_scaling.csv", "weak_scaling.csv", "hybrid.csv"}) {
+    const Table table = read_table(at("s/" + name));
+    for (std::size_t k = 0; k < table.rows.size(); ++k) {
+      const auto& row = table.rows[k];
+      const bool run = row.at("source") == "run";
+      ++(run ? measured : predicted);
+      EXPECT_EQ(row.at("result"), run ? "measured" : "predicted") << name << k;
+      EXPECT_EQ(row.at("curve").find("predicted") == std::string::npos, run) << row.at("curve");
+      EXPECT_NE(page.find(row.at("curve")), std::string::npos) << row.at("curve");
+      EXPECT_LE(table.number(k, "fastest"), table.number(k, "seconds"));
+      EXPECT_GE(table.number(k, "slowest"), table.number(k, "seconds"));
+      EXPECT_NEAR(table.number(k, "efficiency"),
+                  table.number(k, "of_iterations") * table.number(k, "of_sweeps"), 1e-9);
+      EXPECT_NEAR(table.number(k, "speedup"), table.number(k, "efficiency") * table.number(k, "cores"), 1e-9);
+      if (row.at("source") != "replay") continue;
+      EXPECT_NEAR(table.number(k, "of_sweeps"),
+                  table.number(k, "work") * table.number(k, "balance") * table.number(k, "communication") *
+                      table.number(k, "within"),
+                  1e-9);
+      EXPECT_FALSE(row.at("bound").empty());
+    }
+  }
+  // Strong and weak: 1 x 1, 1 x 2, 2 x 1.
+  EXPECT_EQ(measured, 6);
+  // Strong: 1, 2 and 4 subdomains on two networks, 2 and 4 with CCS; 1 x 1, 1 x 2, 2 x 1 on one node, as
+  // measured. Hybrid: 1 x 4, 2 x 2, 4 x 1. Weak: 1, 2 and 4, and what fits on one node.
+  EXPECT_EQ(predicted, (3 + 2 + 3) * 2 + 3 + 3 * 2 + 3);
+}
+
+TEST_F(StudyScaling, WeakSamplesHaveAsManyGrainsPerCore) {
+  ASSERT_EQ(run(std::string(small) + "--repeat 0").code, 0);
+  const Table weak = read_table(at("s/weak_scaling.csv"));
+  ASSERT_EQ(weak.rows.size(), 2U);
+  EXPECT_EQ(weak.rows[0].at("grains"), "100");
+  EXPECT_EQ(weak.rows[1].at("grains"), "400");
+  // Four times the grains on four times the cores: 1 were the same time of a step.
+  EXPECT_NEAR(weak.number(1, "efficiency"), weak.number(0, "seconds") / weak.number(1, "seconds"), 1e-9);
+}
+
+TEST_F(StudyScaling, BeginsFromTheEndOfARun) {
+  ASSERT_EQ(run("run scene.toml --out r --threads 1 --steps 6 --set allow_unconverged=true").code, 0);
+  const Outcome outcome = run(std::string(small) + "--repeat 0 --from r/results.h5 --stage shear");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("no weak scaling"), std::string::npos);
+  EXPECT_FALSE(fs::exists(at("s/weak_scaling.csv")));
+  const std::string scene = content(at("s/strong.toml"));
+  EXPECT_EQ(scene.find("\"press\""), std::string::npos) << "stages before it are over";
+  // What a study has written is a scene like any other.
+  EXPECT_EQ(run("run s/strong.toml --dry-run").code, 0);
+  EXPECT_EQ(run("study scaling scene.toml --out t --from r/results.h5 --stage nothing").code, 2);
+  EXPECT_EQ(run("study scaling scene.toml --out t --from r/results.h5 --weak 2").code, 2);
+  EXPECT_FALSE(fs::exists(at("t")));
+}
+
+TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
+  const std::string command =
+      "study scaling scene.toml --out s --steps 2:3 --subdomains 2 --repeat 0 --no-weak ";
+  ASSERT_EQ(run(command).code, 0);
+  const std::string trace = content(at("s/traces/strong-2-1.h5"));
+  const Table before = read_table(at("s/strong_scaling.csv"));
+  const Outcome again = run(command + "--reuse --latency 1e-4 --ranks-per-node 1");
+  ASSERT_EQ(again.code, 0) << again.messages;
+  EXPECT_EQ(again.messages.find("recorded"), std::string::npos) << again.messages;
+  EXPECT_EQ(content(at("s/traces/strong-2-1.h5")), trace);
+  const Table after = read_table(at("s/strong_scaling.csv"));
+  EXPECT_EQ(after.rows[0].at("seconds"), before.rows[0].at("seconds")) << "one core sends nothing";
+  EXPECT_GT(after.number(1, "seconds"), before.number(1, "seconds"));
+  const auto files = files_below(at("s"));
+  const Outcome other = run(command + "--reuse --set material.friction=0.1");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.messages.find("another scene"), std::string::npos) << other.messages;
+  EXPECT_EQ(files_below(at("s")), files);
+}
+
+// The program itself on simulated ranks, where that build is.
+TEST_F(StudyScaling, PredictsBySimulatedRanksToo) {
+  if (!fs::exists(TALUS_SMPI_COMMAND)) GTEST_SKIP() << "there is no " << TALUS_SMPI_COMMAND;
+  const Outcome outcome =
+      run("study scaling scene.toml --out s --steps 2:3 --subdomains 4 --repeat 0 --no-weak "
+          "--smpi " TALUS_SMPI_COMMAND);
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  const Table table = read_table(at("s/strong_scaling.csv"));
+  ASSERT_EQ(table.rows.size(), 4U) << "1 and 4 subdomains, by replay and by SMPI";
+  for (std::size_t k = 2; k < 4; ++k) {
+    EXPECT_EQ(table.rows[k].at("source"), "smpi");
+    EXPECT_EQ(table.rows[k].at("result"), "predicted");
+    // Iterations differ by the sweep that several ranks need to hear of each other's errors.
+    EXPECT_GT(table.number(k, "seconds"), 0);
+  }
+  EXPECT_EQ(table.number(2, "speedup"), 1);
+}
+
+TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
+  const auto refused = [&](const std::string& arguments, const std::string& word,
+                           const std::string& before = "") {
+    const Outcome outcome = run("study scaling scene.toml --out s " + arguments, before);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_NE(outcome.messages.find(word), std::string::npos) << outcome.messages;
+    EXPECT_FALSE(fs::exists(at("s"))) << arguments;
+  };
+  refused("--steps 0:0", "--steps");
+  refused("--steps 3:", "--steps");
+  refused("--subdomains 0", "--subdomains");
+  refused("--subdomains 1000", "1000 subdomains for 400 grains");
+  refused("--hybrid 7", "--hybrid 7");
+  refused("--network carrier-pigeon", "today");
+  refused("--variant decomposition.subdomains=3", "--subdomains");
+  refused("--variant decomposition.exchnage=ccs", "exchange");
+  refused("--cores 2 --mpirun no-such-program", "no-such-program");
+  refused("--cores 2", "mpirun is not to be found", "PATH=/nowhere");
+  refused("--smpi no-such-talus", "no-such-talus");
+  refused("--beside scene.toml", "name,cores,speedup");
+}
+
+TEST_F(StudyScaling, SaysWhichStepsTheSceneDoesNotHave) {
+  const Outcome outcome = run("study scaling scene.toml --out s --steps 50:60 --subdomains 2 --repeat 0");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.messages.find("--steps"), std::string::npos) << outcome.messages;
+  EXPECT_FALSE(fs::exists(at("s/run")));
+}
+
+TEST_F(StudyScaling, OverwritesItsOwnFilesOnlyAndOnlyWhenAsked) {
+  ASSERT_EQ(run(std::string(small) + "--repeat 0 --no-weak").code, 0);
+  write(at("s/notes.txt"), "mine");
+  write(at("s/traces/mine.h5"), "mine");
+  const auto before = files_below(at("s"));
+  const Outcome refused = run(std::string(small) + "--repeat 0 --no-weak");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.messages.find("--force"), std::string::npos) << refused.messages;
+  EXPECT_EQ(files_below(at("s")), before);
+  ASSERT_EQ(
+      run("study scaling scene.toml --out s --force --steps 2:3 --subdomains 2 --repeat 0 --no-weak").code,
+      0);
+  EXPECT_EQ(content(at("s/notes.txt")), "mine");
+  EXPECT_EQ(content(at("s/traces/mine.h5")), "mine");
+  EXPECT_FALSE(fs::exists(at("s/traces/strong-4-1.h5"))) << "of the earlier study";
+}
+
+}  // namespace
+}  // namespace talus
