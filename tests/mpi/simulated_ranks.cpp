@@ -47,7 +47,7 @@ TEST_F(SimulatedRanks, ChangeNoBitOfTheResults) {
     const std::string out = fmt::format("r{}", ranks);
     EXPECT_EQ(simulate(ranks, machine(ranks), out), 3) << file(".", out + ".txt");
     EXPECT_EQ(digest_of(out), digest_of("one")) << ranks;
-    EXPECT_EQ(file(out, "walls.csv"), file("one", "walls.csv")) << ranks;
+    EXPECT_TRUE(file(out, "walls.csv") == file("one", "walls.csv")) << ranks;
   }
 }
 
