@@ -66,7 +66,8 @@ double message_seconds(std::size_t bytes, const graph::Communicator& ranks) {
     const auto start = std::chrono::steady_clock::now();
     receive->start();
     send->start();
-    while (!send->done() || !receive->done()) ranks.progress();
+    receive->wait();
+    send->wait();
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   return median(std::move(seconds));

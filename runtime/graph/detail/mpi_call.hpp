@@ -7,9 +7,10 @@ inline constexpr double host_flops = 1e9;
 
 #ifdef TALUS_SMPI
 /// Around calls of MPI on simulated ranks: what the rank has computed since it left the last one passes on
-/// the simulated machine, by a clock that is read in 20 ns. SMPI would do that with the clock of the thread's
-/// CPU time, 0.6 us a reading, which is as much as the chunks between two messages; so the platform tells it
-/// not to (io::smpi_platform). May be nested; the outermost counts.
+/// the simulated machine, by a clock that is read in 20 ns, or by the thread's processor time where that is
+/// less: the host was busy elsewhere. SMPI would do that by processor time alone, 0.6 us a reading, which is
+/// as much as the chunks between two messages; so the platform tells it not to (io::smpi_platform). May be
+/// nested; the outermost counts.
 class MpiCall {
  public:
   MpiCall();
