@@ -329,7 +329,7 @@ Section<SolverSettings> solver_keys() {
                               &SolverSettings::tolerance),
           key<SolverSettings>(
               "balance_tolerance", "", positive,
-              "Bound on the relative drift of the wall forces and on the momentum defect (balance).",
+              "Bound on the estimated error of the forces and on the momentum defect (balance).",
               &SolverSettings::balance_tolerance),
           key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
                               &SolverSettings::max_iterations),

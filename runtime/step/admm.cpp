@@ -143,8 +143,9 @@ BodyAdmmResult Admm::improve(double tolerance, int calls) {
   const double fastest = std::max(fastest_of(parts), fastest_without(parts));
   BodyAdmmResult result = solve_admm(problems, *link_, settings);
   // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped,
-  // and the step is not balanced by it. Comparisons are false for NaN.
-  if (result.momentum_defect <= 1 && fastest_of(parts) <= sound * fastest)
+  // and the step is not balanced by it. The defect is near 1 where light bodies have yet to follow a heavy
+  // one. Comparisons are false for NaN.
+  if (result.momentum_defect <= 2 && fastest_of(parts) <= sound * fastest)
     for (const BodyProblem& problem : problems) scatter_impulses(problem, state_.contacts);
   else
     result.balance_defect = 1;

@@ -215,7 +215,7 @@ TEST(BodyParts, CarryTheLoadOfTheWhole) {
   for (const double mu : {0.35, 0.0}) {
     BodyProblem whole = block(3, 10, mu, 1e4);
     const double load = 1e4 * 0.01 + static_cast<double>(whole.grains) * 0.01;
-    const BodyAdmmSettings settings{.tolerance = 1e-7, .balance_tolerance = 0, .max_iterations = 300};
+    const BodyAdmmSettings settings{.tolerance = 1e-7, .balance_tolerance = 1e-4, .max_iterations = 300};
     const auto on_the_floor = [&](std::span<const Vec3> r) {
       double sum = 0;
       for (std::size_t k = 0; k < whole.contacts.size(); ++k)
@@ -224,13 +224,13 @@ TEST(BodyParts, CarryTheLoadOfTheWhole) {
     };
     const BodyProblem cold = whole;
     const int alone = solve_admm(whole, settings).iterations;
-    EXPECT_NEAR(on_the_floor(whole.impulse), load, 1e-5 * load);
+    EXPECT_NEAR(on_the_floor(whole.impulse), load, 1e-3 * load);
     for (const std::size_t count : {std::size_t{4}, std::size_t{9}}) {
       Cut cut(cold, by_height(cold, count), count);
       const BodyAdmmResult result = solve_admm(cut.parts, cut, settings);
       EXPECT_TRUE(result.converged);
       EXPECT_LE(result.iterations, 2 * alone);
-      EXPECT_NEAR(on_the_floor(cut.impulses(cold.contacts.size())), load, 1e-5 * load);
+      EXPECT_NEAR(on_the_floor(cut.impulses(cold.contacts.size())), load, 1e-3 * load);
     }
   }
 }
