@@ -18,6 +18,8 @@ double most_momentum(bool friction, double tolerance) {
   return std::clamp(1 - 0.08 * std::pow(tolerance / 1e-3, 0.15), 0.9, 0.97);
 }
 
+/// With less than this conjugate gradients are faster.
+constexpr double least_momentum = 0.85;
 /// Between two checks; what makes it so much worse is no method for this problem.
 constexpr double hopeless_growth = 4;
 /// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
@@ -126,14 +128,17 @@ void Iteration::plan_sweeps(int epoch, int sweeps) {
 }
 
 /// After a check: momentum that has made it worse begins anew with less, which also ends what it swings by;
-/// what fails altogether gives way to plain sweeps.
+/// when little is left, `automatic` takes conjugate gradients. What fails altogether gives way to plain
+/// sweeps.
 void Iteration::choose_course() {
   const Check* const before = check_before();
   if (!before) return;
   const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
-    if (less > 0 && growth < hopeless_growth)
+    if (growth < hopeless_growth && less < least_momentum && settings_.method == SolverMethod::automatic)
+      begin_course(SolverMethod::nncg, 0);
+    else if (less > 0 && growth < hopeless_growth)
       begin_course(SolverMethod::momentum, less);
     else
       begin_course(SolverMethod::nlgs, 0);
