@@ -59,13 +59,15 @@ Cost sweep_first_step(Setup setup, const Bodies& bodies, graph::Executor& execut
 double message_seconds(std::size_t bytes, const graph::Communicator& ranks) {
   constexpr int turns = 200;
   std::vector<double> out(std::max<std::size_t>(bytes / sizeof(double), 1) + 1), in(out.size());
-  const auto receive = ranks.open_receive(ranks.rank(), 1, in), send = ranks.open_send(ranks.rank(), 1, out);
+  const auto receive = ranks.open_receive(ranks.rank(), graph::Communicator::first_tag, in),
+             send = ranks.open_send(ranks.rank(), graph::Communicator::first_tag, out);
   std::vector<double> seconds;
   for (int k = 0; k < turns; ++k) {
     const auto start = std::chrono::steady_clock::now();
     receive->start();
     send->start();
-    while (!send->done() || !receive->done()) ranks.progress();
+    receive->wait();
+    send->wait();
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   return median(std::move(seconds));

@@ -19,8 +19,8 @@ struct ScalingNetwork {
   trace::Machine machine;
 };
 
-/// "today": 100 Gbit/s, nodes of 32 ranks; "2012": InfiniBand QDR, nodes of 12 ranks, as of the computer of
-/// Visseq, Alart and Dureisseix (2013); "node": all ranks on one node.
+/// "today": 100 Gbit/s, nodes of 32 ranks; "2012": InfiniBand QDR, nodes of 12 ranks, as was usual when the
+/// paper was written; "node": all ranks on one node.
 const std::vector<ScalingNetwork>& scaling_networks();
 
 /// Throws std::invalid_argument that lists the names there are.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "apps/child_process.hpp"
 #include "io/csv_table.hpp"
 #include "io/output_directory.hpp"
 #include "io/run_json.hpp"
@@ -16,15 +17,26 @@ namespace talus {
 
 namespace {
 
+/// The overrides of a variant without the tables of their keys, which would not fit beside a picture.
+std::string short_name(const std::string& variant) {
+  std::string text;
+  for (const std::string& word : split_words(variant)) {
+    const std::size_t equals = std::min(word.find('='), word.size()), dot = word.rfind('.', equals);
+    text += " " + (dot == std::string::npos ? word : word.substr(dot + 1));
+  }
+  return text;
+}
+
 /// What curve of the pictures a row belongs to; predicted ones say so.
 std::string curve_of(const ScalingRow& row) {
-  std::string name = row.predicted() ? fmt::format("predicted by {} [{}]", name_of(row.source), row.network)
-                                     : std::string("measured");
+  std::string name =
+      !row.predicted()
+          ? std::string("measured")
+          : fmt::format("predicted{} [{}]", row.source == ScalingSource::smpi ? " by SMPI" : "", row.network);
   if (row.kind == ScalingKind::hybrid) name = fmt::format("{} cores: {}", row.cores(), name);
   if (row.kind != ScalingKind::hybrid && row.threads > 1)
     name += row.ranks == 1 ? " threads" : " ranks x threads";
-  if (!row.variant.empty()) name += " " + row.variant;
-  return name;
+  return name + short_name(row.variant);
 }
 
 std::string table_of(const std::vector<ScalingRow>& rows, ScalingKind kind) {
@@ -161,25 +173,18 @@ void add_strong(const ScalingReport& report, StudyReport& page) {
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.speedup; }, speedup);
   add_other_curves(report.beside, false, speedup);
-  double most = 1;
-  for (const ScalingRow& r : rows)
-    if (r.kind == ScalingKind::strong) most = std::max(most, cores(r));
-  speedup.levels.push_back({most, "cores"});
-  add_chart(
-      page, std::move(speedup),
-      "Time of a step on one core over that on more, for the same sample. The line at the top is the number "
-      "of cores of the largest machine.",
-      efficiency_table(rows, ScalingKind::strong));
+  add_chart(page, std::move(speedup), "Time of a step on one core over that on more, for the same sample.",
+            efficiency_table(rows, ScalingKind::strong));
   io::Chart efficiency = chart_of("efficiency", "Strong scaling: efficiency", "cores",
                                   "speedup over cores  [1]", "strong_scaling.csv", "cores", "efficiency");
   efficiency.log_y = false;
-  efficiency.levels.push_back({1, "ideal"});
   io::Chart iterations = efficiency, sweeps = efficiency;
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.efficiency; }, efficiency);
   add_other_curves(report.beside, true, efficiency);
   add_chart(page, std::move(efficiency),
             "The same per core. It is the product of the two factors in the pictures below.");
+  iterations.levels = sweeps.levels = {{1, "ideal"}};
   iterations.name = "efficiency_iterations";
   iterations.title = "Strong scaling: iterations on one core over those on more";
   iterations.y_column = "of_iterations";
@@ -200,18 +205,26 @@ void add_strong(const ScalingReport& report, StudyReport& page) {
       share_table(rows));
 }
 
-StudyReport page_of(const ScalingReport& report) {
+/// As many times faster as there are cores, up to the largest machine.
+std::vector<OtherSpeedup> ideal(const std::vector<ScalingRow>& rows) {
+  double most = 1;
+  for (const ScalingRow& r : rows)
+    if (r.kind == ScalingKind::strong) most = std::max(most, cores(r));
+  return {{"ideal", 1, 1}, {"ideal", most, most}};
+}
+
+StudyReport page_of(ScalingReport report) {
   StudyReport page;
+  const std::vector<OtherSpeedup> best = ideal(report.rows);
+  report.beside.insert(report.beside.end(), best.begin(), best.end());
   page.title = fmt::format("{}: scaling", report.name);
   page.introduction = introduction_of(report);
   const std::vector<ScalingRow>& rows = report.rows;
   page.tables.emplace_back("strong_scaling.csv", table_of(rows, ScalingKind::strong));
-  if (!report.beside.empty()) {
-    io::CsvTable others({"name", "cores", "speedup", "efficiency"});
-    for (const OtherSpeedup& other : report.beside)
-      others.row(other.name, other.cores, other.speedup, other.speedup / other.cores);
-    page.tables.emplace_back("beside.csv", others.text());
-  }
+  io::CsvTable others({"name", "cores", "speedup", "efficiency"});
+  for (const OtherSpeedup& other : report.beside)
+    others.row(other.name, other.cores, other.speedup, other.speedup / other.cores);
+  page.tables.emplace_back("beside.csv", others.text());
   add_strong(report, page);
   if (any_of_kind(rows, ScalingKind::weak)) {
     page.tables.emplace_back("weak_scaling.csv", table_of(rows, ScalingKind::weak));

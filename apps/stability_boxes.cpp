@@ -42,7 +42,7 @@ Problem plate_on_columns(int n, double ratio, int subdomains) {
   fill_with_lattice(made, n);
   add_plate(made, 2 * radius * n, ratio);
   const double weight = earth * total_mass(made), load = made.setup.walls.back().load.force;
-  made.truth = wall_forces({{0, 0, weight + load}, {0, 0, -load}});
+  made.truth = at_rest(wall_forces({{0, 0, weight + load}, {0, 0, -load}}));
   return made;
 }
 
@@ -114,7 +114,7 @@ Problem tripod(double ratio) {
     add_grain(made, {arm * std::cos(angle), arm * std::sin(angle), r}, r, sphere_mass(r));
   }
   add_grain(made, {0, 0, r + (large + r) * std::cos(tilt)}, large, sphere_mass(large));
-  made.truth = wall_forces({{0, 0, earth * total_mass(made)}});
+  made.truth = at_rest(wall_forces({{0, 0, earth * total_mass(made)}}));
   return made;
 }
 

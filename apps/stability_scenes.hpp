@@ -76,9 +76,14 @@ double sphere_mass(double r);  ///< [kg] at the usual density
 /// Largest error of the walls' forces against `exact` [N], over the largest of `exact`.
 Truth wall_forces(std::vector<Vec3> exact);
 
-/// The velocities that the same step takes when it is solved to 1e-10 with conjugate gradients, in the norm
-/// of kinetic energy, over what the contacts change. Without friction they are unique. Nothing known beyond
-/// the first step, or when the reference itself falls short.
+/// `truth` as long as every step begins at rest: no body faster than a twentieth of g h. What a light grain
+/// keeps of its velocity under a heavy body is little of the step's impulses and yet opens gaps, into which
+/// the heavy one then rightly falls.
+Truth at_rest(Truth truth);
+
+/// The velocities that the same step takes when it is solved to 1e-10 with conjugate gradients: the sum of
+/// the bodies' errors of momentum over that of what the contacts change. Without friction they are unique.
+/// Nothing known beyond the first step, or when the reference itself falls short.
 Truth reference_velocities(const Problem& problem);
 
 }  // namespace talus::stability

@@ -4,6 +4,8 @@
 
 #include <stdexcept>
 
+#include "runtime/graph/detail/mpi_call.hpp"
+
 namespace talus::io {
 
 std::string smpi_platform(const trace::Machine& machine) {
@@ -27,10 +29,9 @@ std::string smpi_platform(const trace::Machine& machine) {
   set("network/crosstraffic", "0");
   set("network/weight-S", "0");
   set("network/TCP-gamma", "0");
-  // A second of a rank on the measuring machine is a second on a core of speed 1.
-  constexpr double flops = 1e9;
+  constexpr double flops = graph::detail::host_flops;
   set("smpi/host-speed", fmt::format("{}f", flops));
-  set("smpi/cpu-threshold", "0");
+  set("smpi/simulate-computation", "no");  // the program takes its own time (graph::detail::MpiCall)
   for (const char* key : {"smpi/os", "smpi/ois", "smpi/or"})
     set(key, fmt::format("0:{}:0", machine.overhead));
   for (const char* key : {"smpi/test", "smpi/iprobe", "smpi/wtime"}) set(key, "0");

@@ -12,7 +12,7 @@ namespace talus::io {
 /// measuring machine's speed times machine.speed, and the network of trace::Network: a link each way per
 /// node, with the latency of the message split between the two; nothing shared inside a node; the overhead as
 /// what a rank waits at each message it sends or takes. Messages leave at once, whether somebody waits for
-/// them or not; times however short are counted; MPI's polls cost nothing. The file holds all settings of
+/// them or not; MPI's polls cost nothing. The file holds all settings of
 /// SMPI. What SimGrid does not have (noise, line, contacts) must be at its default: throws
 /// std::invalid_argument.
 std::string smpi_platform(const trace::Machine& machine);

@@ -16,19 +16,23 @@ constexpr double firmness = 1e4;
 /// Of the conjugate gradients' error over what they found.
 constexpr double linear_tolerance = 0.1;
 constexpr int max_linear = 100;
-/// They see a preconditioned residual, which is smaller than the error.
+/// Of open contacts that join those that carry.
+constexpr int max_rounds = 6;
+/// The gradients see a preconditioned residual, which is smaller than the error.
 constexpr double caution = 3;
 /// Of the impulses between walls, over those of the step: what is smaller is of no interest.
 constexpr double interest = 1e-2;
 
-/// What the contacts of one part that carry ask of the velocities.
+/// What the contacts of one part that carry ask of the velocities, and those that do not carry.
 struct Wishes {
-  std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s]
-  double drive = 0;          ///< fastest drive among them [m/s]
-  double pressed = 0;        ///< sum of the impulses at walls [N s]
+  std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s], in order of contact
+  std::vector<ContactEquation> open;
+  std::vector<double> gap;  ///< of those: v_n, > 0 [m/s]
+  double drive = 0;         ///< fastest drive among those that carry [m/s]
+  double pressed = 0;       ///< sum of the impulses at walls [N s]
 };
 
-/// Drops the other contacts from `problem`.
+/// Keeps those that carry in `problem`.
 Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
   Wishes wishes;
   std::size_t kept = 0;
@@ -40,16 +44,19 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
     const double m = effective_mass(problem, c);
     const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
     const Vec3 carried = project_on_cone(c, r - m * shifted);
-    if (carried == Vec3::Zero()) continue;
     const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
     Vec3 change = y - c.mu * slip.norm() * c.normal - v;
     const double most = c.mu * c.normal.dot(carried);
-    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most) {
+    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most)
       c.mu = 0;  // it slides: along the plane it asks for nothing
-      change = constrained(c, change);
+    if (carried == Vec3::Zero()) {
+      c.mu = 0;
+      wishes.open.push_back(c);
+      wishes.gap.push_back(std::max(0.0, c.normal.dot(v)));
+      continue;
     }
     if (c.second < 0) wishes.drive = std::max(wishes.drive, c.offset.norm());
-    wishes.change.push_back(change);
+    wishes.change.push_back(constrained(c, change));
     problem.contacts[kept] = c;
     problem.impulse[kept++] = r;
   }
@@ -58,14 +65,50 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
   return wishes;
 }
 
-/// |V - `from`|_M^2, `from` the free velocities or 0.
-double kinetic2(const BodyParts& parts, const PartField& V, bool from_free) {
+/// Open contacts that `motion` closes and more join those that carry: they ask for no more than to close.
+/// Returns sum m v_n^2 of what it pushed them in [J].
+double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& wishes) {
+  double pushed2 = 0;
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < wishes.open.size(); ++k) {
+    const ContactEquation c = wishes.open[k];
+    const double left = wishes.gap[k] + c.normal.dot(relative_velocity(c, motion));
+    if (left < 0) {
+      pushed2 += effective_mass(problem, c) * left * left;
+      problem.contacts.push_back(c);
+      problem.impulse.push_back(Vec3::Zero());
+      wishes.change.push_back(-wishes.gap[k] * c.normal);
+    } else {
+      wishes.open[kept] = c;
+      wishes.gap[kept++] = wishes.gap[k];
+    }
+  }
+  wishes.open.resize(kept);
+  wishes.gap.resize(kept);
+  return pushed2;
+}
+
+/// Sum m |u| + (I/R^2) |w| of V, or of V - V_free [N s].
+double momentum(const BodyParts& parts, const PartField& V, bool gained) {
   return parts.total(1, [&](std::size_t p, std::span<double> row) {
     for (std::size_t b = 0; b < V[p].size(); ++b) {
       if (!parts[p].counted(b)) continue;
       const BodyUnknown& body = parts[p].bodies[b];
-      row[0] += from_free ? talus::kinetic2(body, V[p][b].u - body.free.u, V[p][b].w - body.free.w)
-                          : talus::kinetic2(body, V[p][b].u, V[p][b].w);
+      const Twist from = gained ? body.free : Twist{};
+      row[0] += body.mass * (V[p][b].u - from.u).norm() + body.spin_mass * (V[p][b].w - from.w).norm();
+    }
+  })[0];
+}
+
+/// What the motion is to make small: |d|_M^2 + sum rho |H^T d - change|^2 [J].
+double cost(const BodyParts& parts, const PartField& motion, std::span<const Wishes> wishes, double kappa) {
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    for (std::size_t b = 0; b < motion[p].size(); ++b)
+      if (parts[p].counted(b)) row[0] += kinetic2(parts[p].bodies[b], motion[p][b].u, motion[p][b].w);
+    for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
+      const ContactEquation& c = parts[p].contacts[k];
+      const Vec3 missed = constrained(c, relative_velocity(c, motion[p])) - wishes[p].change[k];
+      row[0] += kappa * effective_mass(parts[p], c) * missed.squaredNorm();
     }
   })[0];
 }
@@ -77,12 +120,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   const double kappa = firmness * estimate_stiffness(parts);
   const PartField V = velocities_of(parts, impulses_of(parts));
   std::vector<Wishes> wishes(parts.size());
-  std::vector<std::vector<double>> rho(parts.size());
-  parts.each([&](std::size_t p) {
-    wishes[p] = wishes_of(problems[p], V[p]);
-    for (const ContactEquation& c : problems[p].contacts)
-      rho[p].push_back(kappa * effective_mass(problems[p], c));
-  });
+  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p]); });
 
   enum { contacts, mass, pressed, drive, width };
   const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
@@ -96,29 +134,47 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   for (std::size_t k = 0; k < rows.size(); ++k)
     all[k % width] = k % width == drive ? std::max(all[drive], rows[k]) : all[k % width] + rows[k];
   if (all[contacts] == 0) return {};
-  const double other = all[drive] > 0 ? all[mass] * all[drive] * all[drive]
-                                      : interest * interest * all[pressed] * all[pressed] / all[mass];
-  const double scale2 = std::max(kinetic2(parts, V, true), other);
+  const double scale =
+      std::max(momentum(parts, V, true), all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed]);
 
-  PartField force = parts.field(), motion = parts.field();
-  parts.each([&](std::size_t p) {
-    for (std::size_t k = 0; k < rho[p].size(); ++k)
-      add_force(parts[p].contacts[k], rho[p][k] * wishes[p].change[k], force[p]);
-  });
-  link.sum_copies(force);
-  parts.each([&](std::size_t p) {
-    for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
-  });
-  BodySolver solver(parts, rho, 0);
   VelocityError error;
-  double left = solver.begin(force, motion), found = 0;
-  const double least = enough * enough * scale2, part = linear_tolerance * linear_tolerance;
-  while (error.linear_iterations < max_linear && left > part * std::max(found, least)) {
-    left = solver.iterate(motion);
-    found = kinetic2(parts, motion, false);
-    ++error.linear_iterations;
+  // Two motions to begin from: none; and the stop of everything, which is the answer of a sample at rest.
+  PartField motion = parts.field(), stop = V;
+  parts.each([&](std::size_t p) {
+    for (Twist& v : stop[p]) v = {-v.u, -v.w};
+  });
+  double left = 0, found = 0;
+  // By Cauchy and Schwarz: the most momentum in so much energy.
+  const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
+  for (int round = 0; round < max_rounds; ++round) {
+    std::vector<std::vector<double>> rho(parts.size());
+    PartField force = parts.field();
+    parts.each([&](std::size_t p) {
+      for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
+        const ContactEquation& c = parts[p].contacts[k];
+        rho[p].push_back(kappa * effective_mass(parts[p], c));
+        add_force(c, rho[p][k] * wishes[p].change[k], force[p]);
+      }
+    });
+    link.sum_copies(force);
+    parts.each([&](std::size_t p) {
+      for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
+    });
+    if (cost(parts, stop, wishes, kappa) < cost(parts, motion, wishes, kappa)) motion = stop;
+    BodySolver solver(parts, rho, 0);
+    left = solver.begin(force, motion);
+    found = momentum(parts, motion, false);
+    for (int k = 0; k < max_linear && most(left) > linear_tolerance * std::max(found, enough * scale); ++k) {
+      left = solver.iterate(motion);
+      found = momentum(parts, motion, false);
+      ++error.linear_iterations;
+    }
+    const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
+      row[0] = close_open(problems[p], motion[p], wishes[p]);
+    })[0];
+    if (most(kappa * pushed2) <= linear_tolerance * std::max(found, enough * scale)) break;
   }
-  error.relative = (std::sqrt(found) + caution * std::sqrt(left)) / std::sqrt(scale2);
+  error.relative = (found + caution * most(left)) / scale;
   return error;
 }
 

@@ -38,29 +38,29 @@ inline double unbalance(double change, int sweeps, double sweeps_needed) {
 
 /// How far the velocities that a step's impulses give are from those of its answer.
 struct VelocityError {
-  double relative = 0;        ///< |V(r) - V*|_M over the scale of the step
+  double relative = 0;        ///< sum m |V(r) - V*| over the scale of the step
   int linear_iterations = 0;  ///< conjugate gradients
 };
 
 /// Estimate of it, from the impulses of the problem, whose contacts it uses up; `enough`: what need not be
-/// known more exactly.
+/// known more exactly. It is the momentum that bodies have still to gain or lose: force carried against force
+/// due, for every wall, every heavy body and through every cut of the sample. In sum m |u| + (I/R^2) |w|.
 ///
 /// The contacts ask for changes of their velocities: y - v, with (r', y) the complementary pair next to (r,
 /// v), one projection away. Without friction, and with r and y complementary, any motion d of the bodies that
-/// grants the wishes, H^T d = y - v, bounds the error:
+/// grants the wishes of those that carry and closes the others at most, H^T d = y - v, bounds the error:
 ///
 ///   |V(r) - V*|_M^2 = (r - r*).(v - v*) <= (r - r*).(v - y) = -d.M (V(r) - V*) <= |d|_M |V(r) - V*|_M
 ///
 /// since (r - r*).(y - v*) = -r.v* - r*.y <= 0. The smallest one is sought: min |d|_M^2 + sum rho |H^T d - (y
 /// - v)|^2 over the contacts that carry, along the normal where they slide, rho far above what the problem
-/// needs: one linear solve (body_solver.hpp), which sees through chains where sweeps do not. What is
-/// heuristic: which contacts carry is taken from r, and rho is finite.
+/// needs: a linear solve (body_solver.hpp), which sees through chains where sweeps do not. Open contacts that
+/// d would push in are added and it is solved again. What is heuristic: friction, that rho and the rounds are
+/// finite, and that the momentum of d, whose kinetic norm is bounded, is taken for that of the error.
 ///
-/// By Cauchy and Schwarz the momentum that any part of the sample has still to gain, and with it the error of
-/// the force through any cut, is at most sqrt(M) |V(r) - V*|_M. The scale is |V(r) - V_free|_M, what the
-/// contacts do; or the speed of driven walls for the whole mass, if that is more; where no wall is driven, at
-/// least a hundredth of what the impulses between walls would do to the sample, as grains pressed at rest
-/// gain nothing. Takes about as long as a hundred sweeps.
+/// The scale is sum m |V(r) - V_free|, what the contacts do; or the speed of driven walls times the whole
+/// mass, if that is more; where no wall is driven, at least a hundredth of the impulses between walls, as
+/// grains pressed at rest gain nothing. Takes about as long as a hundred sweeps.
 VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough);
 /// The whole problem in one part.
 VelocityError velocity_error(BodyProblem problem, double enough);

@@ -23,21 +23,16 @@ inline void carry_one(Carry carry, double beta, double& value, double& last, dou
   last = value;
 }
 
-void carry_values(Carry carry, double beta, ContactRange range, std::vector<double>& values,
-                  std::vector<double>& last, std::vector<double>& step) {
-  double* const v = values.data();
-  double* const l = last.data();
-  double* const p = step.empty() ? nullptr : step.data();
+void carry_values(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
+                  std::vector<double>& values, std::vector<double>& last, std::vector<double>& step) {
   if (carry == Carry::momentum && beta != 0) {
-    for (std::size_t k = range.begin; k < range.end; ++k) {
-      const double s = v[k];
-      v[k] = s + beta * (s - l[k]);
-      l[k] = s;
-    }
+    const std::size_t count = range.end - range.begin;
+    kernels.advance(std::span(values).subspan(range.begin, count),
+                    std::span(last).subspan(range.begin, count), beta);
     return;
   }
   for (std::size_t k = range.begin; k < range.end; ++k)
-    carry_one(carry, beta, v[k], l[k], p ? p + k : nullptr);
+    carry_one(carry, beta, values[k], last[k], step.empty() ? nullptr : &step[k]);
 }
 
 template <std::size_t N>
@@ -85,41 +80,34 @@ void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t b
   trail.step_wall_v.resize(conjugate ? chunks : 0);
 }
 
-void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& contacts, Trail& trail) {
+void carry_impulses(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
+                    Contacts& contacts, Trail& trail) {
   if (contacts.rx.empty()) {
-    carry_values(carry, beta, range, contacts.rn, trail.last.n, trail.step.n);
+    carry_values(kernels, carry, beta, range, contacts.rn, trail.last.n, trail.step.n);
     return;
   }
-  carry_values(carry, beta, range, contacts.rx, trail.last.x, trail.step.x);
-  carry_values(carry, beta, range, contacts.ry, trail.last.y, trail.step.y);
-  carry_values(carry, beta, range, contacts.rz, trail.last.z, trail.step.z);
+  carry_values(kernels, carry, beta, range, contacts.rx, trail.last.x, trail.step.x);
+  carry_values(kernels, carry, beta, range, contacts.ry, trail.last.y, trail.step.y);
+  carry_values(kernels, carry, beta, range, contacts.rz, trail.last.z, trail.step.z);
 }
 
-void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std::span<Velocity> velocity,
-                      Trail& trail) {
+void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
+                      std::span<Velocity> velocity, Trail& trail) {
+  if (carry == Carry::momentum && beta != 0) return kernels.advance(slots, velocity, trail.last_v, beta);
   for (const Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);
-    const auto now = std::bit_cast<Record>(velocity[s]);
-    if (beta == 0) {
-      trail.last_v[s] = velocity[s];
-      if (carry == Carry::conjugate) trail.step_v[s] = std::bit_cast<Velocity>(Record{});
-      continue;
-    }
-    const auto last = std::bit_cast<Record>(trail.last_v[s]);
-    Record next;
-    if (carry == Carry::momentum) {
-      for (std::size_t k = 0; k < record_numbers; ++k) next[k] = now[k] + beta * (now[k] - last[k]);
-      trail.last_v[s] = velocity[s];
-    } else {
-      auto step = std::bit_cast<Record>(trail.step_v[s]);
-      for (std::size_t k = 0; k < record_numbers; ++k) {
-        next[k] = now[k] + beta * step[k];
-        step[k] = next[k] - last[k];
+    if (carry == Carry::conjugate) {
+      auto now = std::bit_cast<Record>(velocity[s]);
+      const auto last = std::bit_cast<Record>(trail.last_v[s]);
+      auto step = beta == 0 ? Record{} : std::bit_cast<Record>(trail.step_v[s]);
+      for (std::size_t k = 0; k < record_numbers && beta != 0; ++k) {
+        now[k] += beta * step[k];
+        step[k] = now[k] - last[k];
       }
+      velocity[s] = std::bit_cast<Velocity>(now);
       trail.step_v[s] = std::bit_cast<Velocity>(step);
-      trail.last_v[s] = std::bit_cast<Velocity>(next);
     }
-    velocity[s] = std::bit_cast<Velocity>(next);
+    trail.last_v[s] = velocity[s];
   }
 }
 

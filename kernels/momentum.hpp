@@ -6,7 +6,7 @@
 
 #include "kernels/bodies.hpp"
 #include "kernels/contacts.hpp"
-#include "kernels/sweep.hpp"
+#include "kernels/sweep_kernels.hpp"
 
 namespace talus {
 
@@ -37,11 +37,12 @@ struct Trail {
 void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
 
 /// Applies the rule to the impulses of a range; beta = 0 begins a new trail.
-void carry_impulses(Carry carry, double beta, ContactRange range, Contacts& contacts, Trail& trail);
+void carry_impulses(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
+                    Contacts& contacts, Trail& trail);
 
 /// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
-void carry_velocities(Carry carry, double beta, std::span<const Slot> slots, std::span<Velocity> velocity,
-                      Trail& trail);
+void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
+                      std::span<Velocity> velocity, Trail& trail);
 
 /// Applies the rule to the wall copy of a chunk.
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);

@@ -24,9 +24,11 @@ const double* records(std::span<const Velocity> velocity) {
   return reinterpret_cast<const double*>(velocity.data());
 }
 
-/// `contacts` is written by the sweeps only.
-ContactView view(const Contacts& contacts, ContactRange range) {
-  Contacts& c = const_cast<Contacts&>(contacts);
+ImpulseView impulses(Contacts& c) {
+  return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
+}
+
+ContactView view(const Contacts& c, ContactRange range) {
   return {c.nx.data(),
           c.ny.data(),
           c.nz.data(),
@@ -99,14 +101,15 @@ template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 double mu) const {
   if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
-  lanes_[Friction]->sweep_grains(view(contacts, range), records(velocity), mu);
+  lanes_[Friction]->sweep_grains(view(contacts, range), impulses(contacts), records(velocity), mu);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                               WallCopy& wall) const {
   if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
-  lanes_[Friction]->sweep_wall(view(contacts, range), records(velocity), mu, wall.velocity, wall.inv_mass);
+  lanes_[Friction]->sweep_wall(view(contacts, range), impulses(contacts), records(velocity), mu,
+                               wall.velocity, wall.inv_mass);
 }
 
 template <bool Friction>
@@ -142,6 +145,30 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
   return sums_of(lanes_[Friction]->error_wall(view(contacts, range), records(velocity), mu, wall.velocity,
                                               wall_inv_mass, multiplicity.data()),
                  range);
+}
+
+void SweepKernels::advance(std::span<double> values, std::span<double> last, double beta) const {
+  if (lanes_[1]) return lanes_[1]->advance(values.data(), last.data(), values.size(), beta);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const double s = values[k];
+    values[k] = s + beta * (s - last[k]);
+    last[k] = s;
+  }
+}
+
+void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velocity,
+                           std::span<Velocity> last, double beta) const {
+  if (lanes_[1])
+    return lanes_[1]->advance_bodies(records(velocity), records(last), slots.data(), slots.size(), beta);
+  for (const Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    const Velocity now = velocity[s];
+    for (std::size_t k = 0; k < 3; ++k) {
+      velocity[s].u[k] = now.u[k] + beta * (now.u[k] - last[s].u[k]);
+      velocity[s].w[k] = now.w[k] + beta * (now.w[k] - last[s].w[k]);
+    }
+    last[s] = now;
+  }
 }
 
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;

@@ -58,6 +58,12 @@ class SweepKernels {
                        double mu, const WallCopy& wall, double wall_inv_mass,
                        Multiplicities multiplicity = {}) const;
 
+  /// Momentum: s goes on to s + beta (s - last), and `last` becomes s. Of numbers, and of whole records at
+  /// `slots`, whose masses, equal in both, stay to the bit.
+  void advance(std::span<double> values, std::span<double> last, double beta) const;
+  void advance(std::span<const Slot> slots, std::span<Velocity> velocity, std::span<Velocity> last,
+               double beta) const;
+
  private:
   InstructionSet set_;
   const LaneKernels* lanes_[2];  ///< without and with friction; null: the scalar kernels

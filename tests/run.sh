@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Every test: installs what is missing, checks the format of the sources, builds preset `ci` (warnings are errors), runs ctest.
 # Further arguments go to ctest, e.g. -L unit. With TALUS_SANITIZERS=1 the tests of units and of several ranks run again
-# under the address and undefined-behaviour sanitizers. Exit code 0 only if all of it passed.
+# under the address and undefined-behaviour sanitizers; with TALUS_SMPI=1 the command is built for simulated ranks as well (some
+# minutes), and its tests are not skipped. Exit code 0 only if all of it passed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -20,6 +21,10 @@ else
   status=1
 fi
 
+if [ "${TALUS_SMPI:-0}" = 1 ]; then
+  cmake --preset smpi
+  cmake --build --preset smpi
+fi
 cmake --preset ci
 cmake --build --preset ci
 ctest --preset ci -j2 "$@" || status=$?

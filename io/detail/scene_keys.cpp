@@ -322,15 +322,14 @@ Section<SolverSettings> solver_keys() {
               "method", {"auto", "nlgs", "nlgs+momentum", "nncg", "admm"},
               "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
               "ended; `nncg`: nonsmooth conjugate gradients; `admm`: for long chains and heavy bodies, "
-              "then sweeps; `auto`: momentum, or nncg for tight tolerances with friction and where momentum has "
-              "made it worse, and admm where sweeps leave forces out of balance.",
+              "then sweeps; `auto`: momentum, and admm where sweeps leave forces out of balance.",
               &SolverSettings::method),
           key<SolverSettings>("tolerance", "", positive,
                               "Bound on the relative error of the contact law (error_rms).",
                               &SolverSettings::tolerance),
           key<SolverSettings>(
               "balance_tolerance", "", positive,
-              "Bound on the relative drift of the wall forces and on the momentum defect (balance).",
+              "Bound on the estimated error of the forces and on the momentum defect (balance).",
               &SolverSettings::balance_tolerance),
           key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
                               &SolverSettings::max_iterations),

@@ -11,11 +11,17 @@ namespace talus {
 /// Contacts [begin, end) of one chunk, arrays as in `Contacts`.
 struct ContactView {
   const double *nx, *ny, *nz, *bias;
-  double *rx, *ry, *rz;  ///< with friction
-  double* rn;            ///< without
+  const double *rx, *ry, *rz;  ///< with friction
+  const double* rn;            ///< without
   const std::int32_t *first, *second;
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
+};
+
+/// The impulses of `ContactView`, where they are written.
+struct ImpulseView {
+  double *x, *y, *z;  ///< with friction
+  double* n;          ///< without
 };
 
 /// Sums of the error as in `ErrorSums`.
@@ -28,14 +34,19 @@ struct ErrorTotals {
 /// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
 /// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be null.
 struct LaneKernels {
-  void (*sweep_grains)(const ContactView&, double* bodies, double mu);
-  void (*sweep_wall)(const ContactView&, double* bodies, double mu, double* wall, double wall_inv_mass);
+  void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu);
+  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
+                     double wall_inv_mass);
   void (*accumulate_grains)(const ContactView&, double* bodies);
   void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,
                               const std::uint16_t* multiplicity);
   ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const double* wall,
                             double wall_inv_mass, const std::uint16_t* multiplicity);
+  /// Momentum: of `count` numbers, and of whole records at `slots`.
+  void (*advance)(double* values, double* last, std::size_t count, double beta);
+  void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
+                         double beta);
 };
 
 /// Kernels of one instruction set, with and without friction.

@@ -3,6 +3,7 @@
 /// The error of kernels/sweep.hpp on W = 4 or 8 contacts at a time. It reads only, so that any contacts may
 /// stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever W is.
 
+#include "kernels/detail/advance_lanes.hpp"
 #include "kernels/detail/sweep_lanes.hpp"
 
 namespace talus {
@@ -89,9 +90,9 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
 /// Adds up the error of `count` <= W contacts from k on, whose arrays are `own` and whose bodies are a, b.
 template <bool Friction, bool AtWall, int W>
 [[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
-                                               const Slice& own, double* const* a, double* const* b,
-                                               double mu, const double* wall, double wall_inv_mass,
-                                               const std::uint16_t* multiplicity,
+                                               const Slice& own, const double* const* a,
+                                               const double* const* b, double mu, const double* wall,
+                                               double wall_inv_mass, const std::uint16_t* multiplicity,
                                                ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
   const Space<V> n = load_normal<V>(own, 0);
@@ -115,17 +116,17 @@ template <bool Friction, bool AtWall, int W>
                                                    const std::uint16_t* multiplicity) {
   const ContactView c = view;
   ErrorLanes<Lanes<W>> sums[8 / W];
-  double* records = const_cast<double*>(bodies);  // addresses are those that a sweep would write to
   std::size_t k = c.begin, lanes = 0;
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
-    double *a[W], *b[W];
-    find_bodies<W>(records, c.first + k, a);
-    if constexpr (!AtWall) find_bodies<W>(records, c.second + k, b);
+    if (!AtWall && (k - c.begin) % group_size == 0) prefetch_group(c, k, bodies);
+    const double *a[W], *b[W];
+    find_bodies<W>(bodies, c.first + k, a);
+    if constexpr (!AtWall) find_bodies<W>(bodies, c.second + k, b);
     error_block<Friction, AtWall, W>(c, k, W, slice(c, k), a, b, mu, wall, wall_inv_mass, multiplicity,
                                      sums[lanes]);
   }
   if (k < c.end) {
-    Part<Friction, W> part(c, k, c.end - k, records, !AtWall);
+    Part<Friction, W, const double> part(c, k, c.end - k, bodies, !AtWall);
     // A lane without a contact sees no motion, and so no error.
     if constexpr (AtWall) __builtin_memcpy(part.grain, wall, 3 * sizeof(double));
     error_block<Friction, AtWall, W>(c, k, c.end - k, part.slice(), part.a, part.b, mu, wall, wall_inv_mass,
@@ -146,9 +147,14 @@ ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, co
 }
 
 template <bool Friction, int W>
-constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,      sweep_wall<Friction, W>,
-                                          accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,
-                                          error_grains<Friction, W>,      error_wall<Friction, W>};
+constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
+                                          sweep_wall<Friction, W>,
+                                          accumulate_grains<Friction, W>,
+                                          accumulate_wall<Friction, W>,
+                                          error_grains<Friction, W>,
+                                          error_wall<Friction, W>,
+                                          advance<W>,
+                                          advance_bodies<W>};
 
 }  // namespace
 }  // namespace talus

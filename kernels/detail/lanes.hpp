@@ -99,7 +99,7 @@ template <class V>
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// Swaps rows and columns within each half of four: c0 becomes the first elements of the rows, and so on.
+/// 4 x 4: swaps rows and columns: c0 becomes the first elements of the rows, and so on.
 [[gnu::always_inline]] inline void swap_rows_and_columns(Quad& c0, Quad& c1, Quad& c2, Quad& c3) {
   const Quad a = __builtin_shufflevector(c0, c1, 0, 4, 2, 6), b = __builtin_shufflevector(c0, c1, 1, 5, 3, 7);
   const Quad c = __builtin_shufflevector(c2, c3, 0, 4, 2, 6), d = __builtin_shufflevector(c2, c3, 1, 5, 3, 7);
@@ -108,17 +108,6 @@ template <class V>
   c2 = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   c3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
-[[gnu::always_inline]] inline void swap_rows_and_columns(Octet& c0, Octet& c1, Octet& c2, Octet& c3) {
-  const Octet a = __builtin_shufflevector(c0, c1, 0, 8, 2, 10, 4, 12, 6, 14);
-  const Octet b = __builtin_shufflevector(c0, c1, 1, 9, 3, 11, 5, 13, 7, 15);
-  const Octet c = __builtin_shufflevector(c2, c3, 0, 8, 2, 10, 4, 12, 6, 14);
-  const Octet d = __builtin_shufflevector(c2, c3, 1, 9, 3, 11, 5, 13, 7, 15);
-  c0 = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
-  c1 = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
-  c2 = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
-  c3 = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
-}
-
 /// 8 x 8: rows become columns, in 24 shuffles.
 [[gnu::always_inline]] inline void transpose(Octet (&v)[8]) {
   Octet pair[8], four[8];
@@ -155,22 +144,6 @@ template <class V>
 [[gnu::always_inline]] inline V flip(V v, V pattern) {
   using Bits = decltype(v < v);
   return reinterpret_cast<V>(reinterpret_cast<Bits>(v) ^ reinterpret_cast<Bits>(pattern));
-}
-
-/// Half records a and b side by side.
-[[gnu::always_inline]] inline Octet join(const double* a, const double* b) {
-#ifdef __AVX512F__
-  return reinterpret_cast<Octet>(
-      _mm512_maskz_insertf64x4(0xff, _mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1));
-#else
-  return __builtin_shufflevector(load<Quad>(a), load<Quad>(b), 0, 1, 2, 3, 4, 5, 6, 7);
-#endif
-}
-[[gnu::always_inline]] inline Quad lower(Octet v) {
-  return __builtin_shufflevector(v, v, 0, 1, 2, 3);
-}
-[[gnu::always_inline]] inline Quad upper(Octet v) {
-  return __builtin_shufflevector(v, v, 4, 5, 6, 7);
 }
 
 }  // namespace

@@ -26,12 +26,20 @@ constexpr std::size_t wall_lanes = 8;   ///< copies of a wall inside a chunk
 
 /// Contacts that a kernel works on at once: W x blocks of them, from `k` on.
 struct Slice {
-  const double *nx, *ny, *nz, *bias;
-  double *rx, *ry, *rz, *rn;
+  const double *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn;
+};
+
+/// Where their impulses are written.
+struct Target {
+  double *x, *y, *z, *n;
 };
 
 [[gnu::always_inline]] inline Slice slice(const ContactView& c, std::size_t k) {
   return {c.nx + k, c.ny + k, c.nz + k, c.bias + k, c.rx + k, c.ry + k, c.rz + k, c.rn + k};
+}
+
+[[gnu::always_inline]] inline Target target(const ImpulseView& r, std::size_t k) {
+  return {r.x + k, r.y + k, r.z + k, r.n + k};
 }
 
 template <bool Friction, class V>
@@ -88,24 +96,15 @@ template <bool Friction, bool Pair>
 
 template <bool Friction, bool Pair>
 [[gnu::always_inline]] inline Meeting<Octet> gather(const double* const* a, const double* const* b, Octet) {
+  static_assert(Friction, "half records fill lanes of 4 better");
+  const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   Octet column[8];
-  if constexpr (Friction) {
-    const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
 #pragma GCC unroll 8
-    for (int l = 0; l < 8; ++l) {
-      column[l] = load<Octet>(a[l]);
-      if constexpr (Pair) column[l] = column[l] + flip(load<Octet>(b[l]), velocity);
-    }
-    transpose(column);
-  } else {
-    const Octet velocity = {-0.0, -0.0, -0.0, 0.0, -0.0, -0.0, -0.0, 0.0};
-#pragma GCC unroll 4
-    for (int l = 0; l < 4; ++l) {
-      column[l] = join(a[l], a[l + 4]);
-      if constexpr (Pair) column[l] = column[l] + flip(join(b[l], b[l + 4]), velocity);
-    }
-    swap_rows_and_columns(column[0], column[1], column[2], column[3]);
+  for (int l = 0; l < 8; ++l) {
+    column[l] = load<Octet>(a[l]);
+    if constexpr (Pair) column[l] = column[l] + flip(load<Octet>(b[l]), velocity);
   }
+  transpose(column);
   return meeting_of<Friction>(column);
 }
 
@@ -118,8 +117,9 @@ template <bool Friction, class V>
 /// The impulse that solves the law, less the old one; stores the new one. Without friction only the first
 /// component is meant, along the normal.
 template <bool Friction, class V>
-[[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, std::size_t at, const Space<V>& n,
-                                                 const Space<V>& v, V w_nn, V w_tt, double mu) {
+[[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, const Target& out, std::size_t at,
+                                                 const Space<V>& n, const Space<V>& v, V w_nn, V w_tt,
+                                                 double mu) {
   const V bias = load<V>(c.bias + at), v_n = dot(v, n);
   if constexpr (Friction) {
     const Space<V> r = load_impulse<true, V>(c, at, n);
@@ -129,14 +129,14 @@ template <bool Friction, class V>
     const V t2 = dot(t, t);
     const V scale = t2 > limit * limit ? limit / root(t2) : V{} + 1.0;
     const Space<V> r_new = r_n_new * n + scale * t;
-    store(c.rx + at, r_new.x);
-    store(c.ry + at, r_new.y);
-    store(c.rz + at, r_new.z);
+    store(out.x + at, r_new.x);
+    store(out.y + at, r_new.y);
+    store(out.z + at, r_new.z);
     return r_new - r;
   } else {
     const V r_n = load<V>(c.rn + at), next = r_n - (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next));
-    store(c.rn + at, r_n_new);
+    store(out.n + at, r_n_new);
     return (r_n_new - r_n) * n;
   }
 }
@@ -175,32 +175,18 @@ template <bool Friction, bool Pair>
 template <bool Friction, bool Pair>
 [[gnu::always_inline]] inline void scatter(double* const* a, double* const* b, const Space<Octet>& n,
                                            const Space<Octet>& dr) {
-  if constexpr (Friction) {
-    const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-    const Space<Octet> turn = cross(dr, n);
-    Octet row[8] = {dr.x, dr.y, dr.z, Octet{}, turn.x, turn.y, turn.z, Octet{}};
-    transpose(row);
+  static_assert(Friction, "half records fill lanes of 4 better");
+  const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  const Space<Octet> turn = cross(dr, n);
+  Octet row[8] = {dr.x, dr.y, dr.z, Octet{}, turn.x, turn.y, turn.z, Octet{}};
+  transpose(row);
 #pragma GCC unroll 8
-    for (int l = 0; l < 8; ++l) {
-      const Octet i = load<Octet>(a[l]);
-      store(a[l], i + spread_last(i) * row[l]);
-      if constexpr (Pair) {
-        const Octet j = load<Octet>(b[l]);
-        store(b[l], j + spread_last(j) * flip(row[l], velocity));
-      }
-    }
-  } else {
-    Octet row[4] = {dr.x, dr.y, dr.z, Octet{}};
-    swap_rows_and_columns(row[0], row[1], row[2], row[3]);
-#pragma GCC unroll 8
-    for (int l = 0; l < 8; ++l) {
-      const Quad push = l < 4 ? lower(row[l % 4]) : upper(row[l % 4]);
-      const Quad i = load<Quad>(a[l]);
-      store(a[l], i + spread_last(i) * push);
-      if constexpr (Pair) {
-        const Quad j = load<Quad>(b[l]);
-        store(b[l], j - spread_last(j) * push);
-      }
+  for (int l = 0; l < 8; ++l) {
+    const Octet i = load<Octet>(a[l]);
+    store(a[l], i + spread_last(i) * row[l]);
+    if constexpr (Pair) {
+      const Octet j = load<Octet>(b[l]);
+      store(b[l], j + spread_last(j) * flip(row[l], velocity));
     }
   }
 }
@@ -212,8 +198,8 @@ template <class V>
 
 /// Blocks x W contacts in three phases.
 template <bool Friction, int W, int Blocks>
-[[gnu::always_inline]] inline void sweep_block(const Slice& c, double* const* a, double* const* b,
-                                               double mu) {
+[[gnu::always_inline]] inline void sweep_block(const Slice& c, const Target& out, double* const* a,
+                                               double* const* b, double mu) {
   using V = Lanes<W>;
   Meeting<V> m[Blocks];
   Space<V> dr[Blocks];
@@ -225,7 +211,7 @@ template <bool Friction, int W, int Blocks>
     const Space<V> n = load_normal<V>(c, at);
     V w_tt{};
     if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
-    dr[k] = solve_law<Friction>(c, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu);
+    dr[k] = solve_law<Friction>(c, out, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)
@@ -239,16 +225,15 @@ constexpr std::size_t minimum(std::size_t a, std::size_t b) {
   return a < b ? a : b;
 }
 
-[[gnu::always_inline]] inline double* body(double* bodies, std::int32_t slot) {
-  return bodies + record * static_cast<std::size_t>(slot);
-}
-[[gnu::always_inline]] inline const double* body(const double* bodies, std::int32_t slot) {
+/// `Number` is double, or const double where bodies are only read.
+template <class Number>
+[[gnu::always_inline]] inline Number* body(Number* bodies, std::int32_t slot) {
   return bodies + record * static_cast<std::size_t>(slot);
 }
 
 /// Addresses of bodies. Slots are not negative: without a sign the address takes one instruction less.
-template <std::size_t Count>
-[[gnu::always_inline]] inline void find_bodies(double* bodies, const std::int32_t* slot, double** address) {
+template <std::size_t Count, class Number>
+[[gnu::always_inline]] inline void find_bodies(Number* bodies, const std::int32_t* slot, Number** address) {
 #pragma GCC unroll 16
   for (std::size_t l = 0; l < Count; ++l)
     address[l] = bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]));
@@ -256,8 +241,9 @@ template <std::size_t Count>
 
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
 /// them coming, and with 200,000 grains they stand beyond its second cache.
-[[gnu::always_inline]] inline void prefetch_group(const ContactView& c, std::size_t k, double* bodies) {
-  std::size_t ahead = k + 2 * group_size;
+template <class Number>
+[[gnu::always_inline]] inline void prefetch_group(const ContactView& c, std::size_t k, Number* bodies) {
+  const std::size_t ahead = k + 2 * group_size;
   if (ahead + group_size > c.end) return;
 #pragma GCC unroll 16
   for (std::size_t l = 0; l < group_size; ++l) {
@@ -268,13 +254,13 @@ template <std::size_t Count>
 
 /// A copy of contacts [k, k + count), count < W. The lanes behind them have n = r = bias = 0 and a grain of
 /// mass 1 at rest, so that nothing happens there.
-template <bool Friction, int W>
+template <bool Friction, int W, class Number = double>
 struct Part {
   double nx[W], ny[W], nz[W], bias[W], rx[W], ry[W], rz[W], rn[W];
   double grain[record] = {0, 0, 0, 1, 0, 0, 0, 0};
-  double *a[W], *b[W];
+  Number *a[W], *b[W];
 
-  [[gnu::always_inline]] Part(const ContactView& c, std::size_t k, std::size_t count, double* bodies,
+  [[gnu::always_inline]] Part(const ContactView& c, std::size_t k, std::size_t count, Number* bodies,
                               bool pairs) {
     for (std::size_t l = 0; l < W; ++l) {
       const bool real = l < count;
@@ -295,25 +281,27 @@ struct Part {
     }
   }
 
-  [[gnu::always_inline]] Slice slice() { return {nx, ny, nz, bias, rx, ry, rz, rn}; }
+  [[gnu::always_inline]] Slice slice() const { return {nx, ny, nz, bias, rx, ry, rz, rn}; }
+  [[gnu::always_inline]] Target target() { return {rx, ry, rz, rn}; }
 
-  [[gnu::always_inline]] void copy_out(const ContactView& c, std::size_t k, std::size_t count) const {
+  [[gnu::always_inline]] void copy_out(const ImpulseView& r, std::size_t k, std::size_t count) const {
     for (std::size_t l = 0; l < count; ++l) {
       if constexpr (Friction) {
-        c.rx[k + l] = rx[l];
-        c.ry[k + l] = ry[l];
-        c.rz[k + l] = rz[l];
+        r.x[k + l] = rx[l];
+        r.y[k + l] = ry[l];
+        r.z[k + l] = rz[l];
       } else {
-        c.rn[k + l] = rn[l];
+        r.n[k + l] = rn[l];
       }
     }
   }
 };
 
 template <bool Friction, int W>
-void sweep_grains(const ContactView& view, double* bodies, double mu) {
+void sweep_grains(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu) {
   constexpr std::size_t at_once = W * blocks_at_once;
-  const ContactView c = view;  // a local one, so that no store can change it
+  const ContactView c = view;  // local ones, so that no store can change them
+  const ImpulseView r = impulses;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
@@ -322,18 +310,18 @@ void sweep_grains(const ContactView& view, double* bodies, double mu) {
       double *a[at_once], *b[at_once];
       find_bodies<at_once>(bodies, c.first + k, a);
       find_bodies<at_once>(bodies, c.second + k, b);
-      sweep_block<Friction, W, blocks_at_once>(slice(c, k), a, b, mu);
+      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu);
     }
     for (; k + W <= end; k += W) {
       double *a[W], *b[W];
       find_bodies<W>(bodies, c.first + k, a);
       find_bodies<W>(bodies, c.second + k, b);
-      sweep_block<Friction, W, 1>(slice(c, k), a, b, mu);
+      sweep_block<Friction, W, 1>(slice(c, k), target(r, k), a, b, mu);
     }
     if (k == end) continue;
     Part<Friction, W> part(c, k, end - k, bodies, true);
-    sweep_block<Friction, W, 1>(part.slice(), part.a, part.b, mu);
-    part.copy_out(c, k, end - k);
+    sweep_block<Friction, W, 1>(part.slice(), part.target(), part.a, part.b, mu);
+    part.copy_out(r, k, end - k);
     k = end;
   }
 }
@@ -399,8 +387,8 @@ struct SplitWall {
 
 /// A block of W grains against as many copies of a wall.
 template <bool Friction, int W>
-[[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, double* const* a, double mu,
-                                                    std::size_t lanes, SplitWall<W>& wall) {
+[[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, const Target& out, double* const* a,
+                                                    double mu, std::size_t lanes, SplitWall<W>& wall) {
   using V = Lanes<W>;
   Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
   m.du = m.du - wall.velocity[lanes];
@@ -408,25 +396,27 @@ template <bool Friction, int W>
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
   const Space<V> dr =
-      solve_law<Friction>(c, 0, n, relative_velocity<Friction>(m, n), m.w_nn + wall.inv_mass, w_tt, mu);
+      solve_law<Friction>(c, out, 0, n, relative_velocity<Friction>(m, n), m.w_nn + wall.inv_mass, w_tt, mu);
   scatter<Friction, false>(a, nullptr, n, dr);
   wall.push(lanes, n, dr);
 }
 
 template <bool Friction, int W>
-void sweep_wall(const ContactView& view, double* bodies, double mu, double* wall, double wall_inv_mass) {
+void sweep_wall(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu, double* wall,
+                double wall_inv_mass) {
   const ContactView c = view;
+  const ImpulseView r = impulses;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
   std::size_t k = c.begin, lanes = 0;
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
     double* a[W];
     find_bodies<W>(bodies, c.first + k, a);
-    sweep_wall_block<Friction, W>(slice(c, k), a, mu, lanes, split);
+    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, lanes, split);
   }
   if (k < c.end) {
     Part<Friction, W> part(c, k, c.end - k, bodies, false);
-    sweep_wall_block<Friction, W>(part.slice(), part.a, mu, lanes, split);
-    part.copy_out(c, k, c.end - k);
+    sweep_wall_block<Friction, W>(part.slice(), part.target(), part.a, mu, lanes, split);
+    part.copy_out(r, k, c.end - k);
   }
   split.glue(wall);
 }

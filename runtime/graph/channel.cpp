@@ -43,12 +43,14 @@ void Communicator::Channel::start() {
   r.arrived = false;
 }
 
-void Communicator::Channel::wait() {
+double Communicator::Channel::wait() {
+  const double start = seconds_now();
   for (int polls = 0; !done(); ++polls)
     if (polls < 256)
       pause();
     else
       std::this_thread::yield();
+  return seconds_now() - start;
 }
 
 bool Communicator::Channel::done() {

@@ -6,6 +6,8 @@
 
 #ifdef TALUS_SMPI
 
+#include <simgrid/engine.h>
+
 #include <utility>
 
 #include "runtime/graph/detail/mpi_check.hpp"
@@ -27,6 +29,7 @@ Communicator::Channel::~Channel() = default;
 
 void Communicator::Channel::start() {
   const Request& r = *request_;
+  const detail::MpiCall call;
   if (r.sends)
     check(MPI_Send(r.buffer.data(), static_cast<int>(r.buffer.size()), MPI_DOUBLE, r.other, r.tag,
                    MPI_COMM_WORLD),
@@ -38,13 +41,16 @@ bool Communicator::Channel::done() {
   return !request_->open;
 }
 
-void Communicator::Channel::wait() {
+double Communicator::Channel::wait() {
   const Request& r = *request_;
-  if (!r.open) return;
+  if (!r.open) return 0;
+  const detail::MpiCall call;
+  const double start = simgrid_get_clock();
   check(MPI_Recv(r.buffer.data(), static_cast<int>(r.buffer.size()), MPI_DOUBLE, r.other, r.tag,
                  MPI_COMM_WORLD, MPI_STATUS_IGNORE),
         "MPI_Recv");
   request_->open = false;
+  return simgrid_get_clock() - start;
 }
 
 std::unique_ptr<Communicator::Channel> Communicator::open_send(int to, int tag,

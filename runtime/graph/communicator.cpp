@@ -13,6 +13,7 @@ namespace talus::graph {
 namespace {
 
 using detail::check;
+using detail::MpiCall;
 
 /// Started by a launcher of some kind: Open MPI, MPICH and Intel MPI, or Slurm with PMIx.
 bool launched() {
@@ -29,6 +30,7 @@ MpiSession::MpiSession(int* argc, char*** argv, bool always) {
   int level = 0;
   check(MPI_Init_thread(argc, argv, MPI_THREAD_MULTIPLE, &level), "MPI_Init_thread");
   started_ = true;
+  MpiCall::begin_rank();
 }
 
 MpiSession::~MpiSession() {
@@ -39,6 +41,7 @@ Communicator::Communicator() = default;
 
 Communicator::Communicator(const MpiSession& session, CommunicatorOptions options) : options_(options) {
   if (!session.started()) return;
+  const MpiCall call;
   check(MPI_Comm_rank(MPI_COMM_WORLD, &rank_), "MPI_Comm_rank");
   check(MPI_Comm_size(MPI_COMM_WORLD, &ranks_), "MPI_Comm_size");
   int level = 0;
@@ -75,6 +78,7 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
   const auto n = static_cast<std::size_t>(ranks_), own = static_cast<std::size_t>(rank_);
   if (to.size() != n) throw std::invalid_argument("Communicator::exchange wants one part per rank");
   if (n == 1) return;
+  const MpiCall call;
   const trace::Span span(trace_, trace::kind_collective);
   std::vector<std::uint64_t> out_bytes(n, 0), in_bytes(n);
   for (std::size_t r = 0; r < n; ++r)
@@ -101,6 +105,7 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
 
 void Communicator::sum(std::span<std::int64_t> values) const {
   if (ranks_ == 1) return;
+  const MpiCall call;
   const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_INT64_T, MPI_SUM,
                       MPI_COMM_WORLD),
@@ -109,6 +114,7 @@ void Communicator::sum(std::span<std::int64_t> values) const {
 
 void Communicator::max(std::span<double> values) const {
   if (ranks_ == 1) return;
+  const MpiCall call;
   const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX,
                       MPI_COMM_WORLD),
@@ -117,6 +123,7 @@ void Communicator::max(std::span<double> values) const {
 
 std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) const {
   if (ranks_ == 1) return {part.begin(), part.end()};
+  const MpiCall call;
   const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(part.size()));
   const auto n = static_cast<std::size_t>(ranks_);
   const int own = static_cast<int>(part.size());
@@ -135,6 +142,11 @@ void Communicator::to_first(std::span<const std::byte> part, std::size_t piece,
   const auto in_pieces = [piece](std::size_t bytes, const auto& work) {
     for (std::size_t begin = 0; begin < bytes; begin += piece) work(begin, std::min(piece, bytes - begin));
   };
+  if (ranks_ == 1) {
+    in_pieces(part.size(), [&](std::size_t begin, std::size_t size) { take(part.subspan(begin, size)); });
+    return;
+  }
+  const MpiCall call;
   if (rank_ != 0) {
     const std::uint64_t bytes = part.size();
     check(MPI_Send(&bytes, 1, MPI_UINT64_T, 0, 0, MPI_COMM_WORLD), "MPI_Send");
@@ -157,54 +169,6 @@ void Communicator::to_first(std::span<const std::byte> part, std::size_t piece,
       take(received);
     });
   }
-}
-
-struct Communicator::PendingGather::Request {
-  MPI_Request handle = MPI_REQUEST_NULL;
-  std::vector<double> part, all;
-  std::vector<int> lengths, begin;
-  trace::Recorder* trace = nullptr;
-};
-
-Communicator::PendingGather::PendingGather(std::unique_ptr<Request> request) : request_(std::move(request)) {}
-
-Communicator::PendingGather::~PendingGather() = default;
-
-bool Communicator::PendingGather::done() {
-  if (request_->handle == MPI_REQUEST_NULL) return true;
-  int flag = 0;
-  check(MPI_Test(&request_->handle, &flag, MPI_STATUS_IGNORE), "MPI_Test");
-  return flag != 0;
-}
-
-const std::vector<double>& Communicator::PendingGather::wait() {
-  if (request_->handle == MPI_REQUEST_NULL) return request_->all;
-  const trace::Span span(request_->trace, trace::kind_collective);
-  check(MPI_Wait(&request_->handle, MPI_STATUS_IGNORE), "MPI_Wait");
-  return request_->all;
-}
-
-std::unique_ptr<Communicator::PendingGather> Communicator::start_gather(
-    std::vector<double> part, std::span<const std::size_t> lengths) const {
-  auto request = std::make_unique<PendingGather::Request>();
-  PendingGather::Request& r = *request;
-  if (ranks_ == 1) {
-    r.all = std::move(part);
-    return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
-  }
-  r.part = std::move(part);
-  r.trace = trace_;
-  int end = 0;
-  for (std::size_t length : lengths) {
-    r.begin.push_back(end);
-    r.lengths.push_back(static_cast<int>(length));
-    end += static_cast<int>(length);
-  }
-  r.all.resize(static_cast<std::size_t>(end));
-  check(MPI_Iallgatherv(r.part.data(), static_cast<int>(r.part.size()), MPI_DOUBLE, r.all.data(),
-                        r.lengths.data(), r.begin.data(), MPI_DOUBLE, MPI_COMM_WORLD, &r.handle),
-        "MPI_Iallgatherv");
-  return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
 }
 
 void Communicator::progress() const {

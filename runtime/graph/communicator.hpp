@@ -37,7 +37,8 @@ class MpiSession {
 
 struct CommunicatorOptions {
   /// Every channel message is held back until this time after it was sent [s]: a slow network on one machine,
-  /// for tests and benchmarks. Ranks must share a clock then, as those of one machine do.
+  /// for tests and benchmarks. Ranks must share a clock then, as those of one machine do. Simulated ranks
+  /// have a network of their own.
   double delay = 0;
 };
 
@@ -72,8 +73,8 @@ class Communicator {
   void max(std::span<double> values) const;
   /// The parts of all ranks in order of rank.
   std::vector<std::byte> gather(std::span<const std::byte> part) const;
-  /// The same, begun now and read later (MPI_Iallgatherv): other work goes on in between. `lengths`: how many
-  /// numbers each rank brings.
+  /// The same, begun now and read later: its first message travels while other work goes on, the other
+  /// log2(ranks) are waited for. `lengths`: how many numbers each rank brings.
   class PendingGather;
   std::unique_ptr<PendingGather> start_gather(std::vector<double> part,
                                               std::span<const std::size_t> lengths) const;
@@ -98,7 +99,8 @@ class Communicator {
   template <class Record, class Take>
   void records_to_first(std::span<const Record> part, const Take& take) const;
 
-  // Channels. Of one rank: used by one thread at a time.
+  // Channels. Of one rank: used by one thread at a time. Tags from first_tag on are theirs.
+  static constexpr int gather_tag = 1, first_tag = 2;
   /// A message of fixed length that is sent again and again (MPI's persistent requests).
   class Channel;
   /// Opens the sending and the receiving end; both ranks must name the same tag and length. `buffer` must
@@ -124,10 +126,11 @@ class Communicator::Channel {
   Channel(const Channel&) = delete;
   Channel& operator=(const Channel&) = delete;
   void start();
-  /// True when the message has left, or has come; true as well when none was started.
+  /// True when the message has left, or has come; true as well when none was started. A simulated receiver
+  /// (clock.hpp) is done only when it has waited.
   bool done();
-  /// Polls until done; ranks that share a core give way to one another.
-  void wait();
+  /// Until done; ranks that share a core give way to one another. Returns what it took [s].
+  double wait();
 
  private:
   friend class Communicator;
@@ -142,7 +145,6 @@ class Communicator::PendingGather {
   ~PendingGather();
   PendingGather(const PendingGather&) = delete;
   PendingGather& operator=(const PendingGather&) = delete;
-  bool done();
   /// The parts of all ranks in order of rank.
   const std::vector<double>& wait();
 

@@ -10,12 +10,18 @@ namespace talus {
 
 namespace {
 
-/// Beyond 0.9 momentum stalls on packings with friction.
-constexpr double most_momentum = 0.9;
+/// The largest beta. What a run of n sweeps can use is 1 - beta = c/n, and the tolerance says about how many
+/// they will be: on packings of 16,000 grains with friction 0.92 was best to 1e-3, 0.94 to 1e-4, 0.97 to 1e-6
+/// (docs/decisions/0009-methods.md). Without friction problems are easier, and 0.9 was best to 1e-6.
+double most_momentum(bool friction, double tolerance) {
+  if (!friction) return 0.9;
+  return std::clamp(1 - 0.08 * std::pow(tolerance / 1e-3, 0.15), 0.9, 0.97);
+}
+
+/// With less than this conjugate gradients are faster.
+constexpr double least_momentum = 0.85;
 /// Between two checks; what makes it so much worse is no method for this problem.
 constexpr double hopeless_growth = 4;
-/// With friction momentum gets this far at twice the speed of conjugate gradients, and then falls behind.
-constexpr double momentum_reach = 5e-5;
 /// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
 constexpr int plain_sweeps = 3;
 /// What momentum makes worse shows within as many sweeps.
@@ -33,14 +39,12 @@ void Iteration::first_course() {
   SolverMethod method = settings_.method;
   if (method == SolverMethod::automatic) {
     // Damped Schwarz is no descent: what is carried on from it need not go down.
-    const bool far = parameters_.friction && settings_.tolerance < momentum_reach;
     method = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several()
                  ? SolverMethod::nlgs
-             : far ? SolverMethod::nncg
-                   : SolverMethod::momentum;
+                 : SolverMethod::momentum;
   }
   if (method == SolverMethod::admm) method = SolverMethod::nlgs;
-  begin_course(method, most_momentum);
+  begin_course(method, most_momentum(parameters_.friction, settings_.tolerance));
   result_.iterations = 0;
 }
 
@@ -72,13 +76,13 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Chunks& chunks = state_.chunks;
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
-  carry_impulses(carry, beta, range, state_.contacts, trail_);
+  carry_impulses(kernels_, carry, beta, range, state_.contacts, trail_);
   const bool at_wall = chunks.wall[c] >= 0;
   if (epoch == sweeps_from_) {
     fasten(owned(c), state_.bodies.velocity, trail_);
     if (at_wall) fasten(c, state_.copies[c], trail_);
   }
-  carry_velocities(carry, beta, owned(c), state_.bodies.velocity, trail_);
+  carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, trail_);
   if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
@@ -123,15 +127,16 @@ void Iteration::plan_sweeps(int epoch, int sweeps) {
   segment_ = epoch + 1 + sweeps;
 }
 
-/// After a check: momentum that has made it worse (sliding contacts turn its modes complex, and those grow)
-/// goes on with less, or gives way to conjugate gradients; what fails altogether, to plain sweeps.
+/// After a check: momentum that has made it worse begins anew with less, which also ends what it swings by;
+/// when little is left, `automatic` takes conjugate gradients. What fails altogether gives way to plain
+/// sweeps.
 void Iteration::choose_course() {
   const Check* const before = check_before();
   if (!before) return;
   const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
-    if (settings_.method == SolverMethod::automatic && growth < hopeless_growth)
+    if (growth < hopeless_growth && less < least_momentum && settings_.method == SolverMethod::automatic)
       begin_course(SolverMethod::nncg, 0);
     else if (less > 0 && growth < hopeless_growth)
       begin_course(SolverMethod::momentum, less);

@@ -21,7 +21,7 @@ struct StepReport {
   std::int64_t active = 0;              ///< normal impulse > 0
   int iterations = 0;                   ///< sweeps
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale
-  double balance = 0;  ///< drift of the wall forces, or momentum defect of the sample, whichever is larger
+  double balance = 0;  ///< estimated error of the forces, or momentum defect of the sample, the larger
   double jump = 0;     ///< interface jump (several subdomains)
   double penetration_mean = 0, penetration_max = 0;      ///< over smallest radius, at the end of the step
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]

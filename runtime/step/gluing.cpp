@@ -1,33 +1,18 @@
+#include "runtime/step/gluing.hpp"
+
 #include <algorithm>
 #include <array>
 
-#include "runtime/graph/clock.hpp"
 #include "runtime/step/detail/gluing_parts.hpp"
-#include "runtime/trace/recorder.hpp"
 
 namespace talus {
 
+using detail::at;
+using detail::await;
+using detail::start;
+using detail::tag_of;
+
 namespace {
-
-using Channel = graph::Communicator::Channel;
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
-/// Adds the time it took to `waited`.
-void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
-  if (channel.done()) return;
-  const trace::Span span(trace, trace::kind_receive, message);
-  const double start = graph::seconds_now();
-  channel.wait();
-  waited += graph::seconds_now() - start;
-}
-
-void start(Channel& channel, trace::Recorder* trace, std::uint32_t message) {
-  const trace::Span span(trace, trace::kind_send, message);
-  channel.start();
-}
 
 template <std::size_t Width>
 void read_velocity(const Velocity& v, double* out) {
@@ -72,6 +57,100 @@ Gluing::Gluing(StepState& state, const DecompositionSettings& settings, const gr
 
 Gluing::~Gluing() = default;
 
+void Gluing::plan(bool rotation) {
+  const Decomposition& all = state_.decomposition;
+  width_ = rotation ? 6 : 3;
+  walls_.clear();
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    if (state_.walls[w].inv_mass() > 0) walls_.push_back(static_cast<std::int32_t>(w));
+  needed_ = all.several() || !walls_.empty();
+  // Channels of the plan before must be closed on all ranks before new ones of the same tag are used.
+  subdomains_.clear();
+  centre_.reset();
+  subdomains_.resize(all.here.size());
+  jumps_.assign(all.here.size(), {});
+  messages_ = {};
+  if (!needed_) return;
+  for (std::size_t e = 0; e < subdomains_.size(); ++e) plan_sides(e);
+  for (Subdomain& subdomain : subdomains_)
+    for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
+      Side& side = subdomain.sides[n];
+      if (side.local < 0) continue;
+      const auto e = static_cast<std::int32_t>(&subdomain - subdomains_.data());
+      for (const Side& back : subdomains_[at(side.local)].sides)
+        if (back.local == e) side.source = back.link.out.data();
+    }
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e)
+    for (const CopySource& copy : all.interfaces[e].copies)
+      subdomains_[e].sources.push_back(copy.neighbour < 0 ? nullptr
+                                                          : subdomains_[e].sides[at(copy.neighbour)].source +
+                                                                at(copy.place) * width_);
+  plan_centre();
+  count_messages();
+}
+
+void Gluing::plan_sides(std::size_t e) {
+  const Decomposition& all = state_.decomposition;
+  Subdomain& mine = subdomains_[e];
+  mine.wall_copies.resize(walls_.size());
+  if (!all.several()) return;
+  const SubdomainInterface& interface = all.interfaces[e];
+  const std::size_t begin = all.slot_begin[e];
+  for (std::int32_t s : interface.shared) mine.shared.push_back(begin + at(s));
+  if (settings_.coupling == Coupling::schwarz) mine.base.resize(mine.shared.size() * width_);
+  mine.sides.resize(interface.neighbours.size());
+  for (std::size_t n = 0; n < mine.sides.size(); ++n) {
+    const Neighbour& neighbour = interface.neighbours[n];
+    Side& side = mine.sides[n];
+    for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
+      side.slots.push_back(begin + at(interface.exchange[at(k)]));
+    const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
+    const std::size_t length = side.slots.size() * width_;
+    side.link.out.resize(length + 1);
+    if (rank == ranks_.rank()) {
+      side.local = static_cast<std::int32_t>(
+          std::lower_bound(all.here.begin(), all.here.end(), neighbour.subdomain) - all.here.begin());
+      continue;
+    }
+    side.link.in.resize(length + 1);
+    side.source = side.link.in.data();
+    const std::int32_t count = all.partition.subdomains;
+    side.link.sender =
+        ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
+    side.link.receiver =
+        ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
+    side.link.out_name = trace::message_name(static_cast<std::uint32_t>(interface.subdomain),
+                                             static_cast<std::uint32_t>(neighbour.subdomain));
+    side.link.in_name = trace::message_name(static_cast<std::uint32_t>(neighbour.subdomain),
+                                            static_cast<std::uint32_t>(interface.subdomain));
+    side.link.receiver->start();
+  }
+}
+
+void Gluing::count_messages() {
+  std::array<std::int64_t, 4> count{};
+  const auto add = [&](std::size_t doubles, bool between) {
+    count[0] += 1;
+    count[1] += static_cast<std::int64_t>(8 * doubles);
+    count[2] += between ? 1 : 0;
+    count[3] += between ? static_cast<std::int64_t>(8 * doubles) : 0;
+  };
+  const Decomposition& all = state_.decomposition;
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
+    const Subdomain& subdomain = subdomains_[e];
+    for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local < 0);
+    if (subdomain.partial.empty()) continue;
+    add(subdomain.partial.size(), false);                                // to the centre
+    add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
+  }
+  if (centre_ && centre_->up) {
+    count[2] += 2;
+    count[3] += static_cast<std::int64_t>(8 * (centre_->up->out.size() + centre_->up->in.size() - 2));
+  }
+  ranks_.sum(count);
+  messages_ = {count[0], count[1], count[2], count[3]};
+}
+
 void Gluing::begin() {
   for (Subdomain& subdomain : subdomains_) {
     subdomain.waited = 0;
@@ -111,8 +190,9 @@ void Gluing::publish(std::size_t e, Mode mode) {
       write_velocities<6>(state_.bodies.velocity, side.slots, side.link.out.data());
     else
       write_velocities<3>(state_.bodies.velocity, side.slots, side.link.out.data());
-    if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   }
+  for (Side& side : mine.sides)
+    if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);
@@ -124,48 +204,11 @@ void Gluing::publish(std::size_t e, Mode mode) {
     for (std::size_t h = 0; h < interface.hubs.size(); ++h)
       write_velocity(mine.shared[at(interface.hubs[h])], &mine.partial[3 * walls_.size() + h * width_]);
   }
-  if (!centre_->to_centre) return;
-  // The last of this rank's subdomains sends for all: its count has seen what the others wrote.
+  if (!centre_->up || !centre_->links.empty()) return;
+  // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
   if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
   centre_->published.store(0, std::memory_order_relaxed);
-  Link& link = *centre_->to_centre;
-  await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
-  auto out = link.out.begin();
-  for (const Subdomain& subdomain : subdomains_)
-    out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  start(*link.sender, ranks_.trace(), link.out_name);
-}
-
-void Gluing::centre(Mode mode) {
-  if (mode == Mode::local || centre_->sums.empty()) return;
-  Centre& centre = *centre_;
-  if (centre.to_centre) {
-    Link& link = *centre.to_centre;
-    await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);
-    std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
-    link.receiver->start();
-    return;
-  }
-  for (const auto& link : centre.links) await(*link->receiver, centre.waited, ranks_.trace(), link->in_name);
-  std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
-  const std::size_t at_walls = 3 * walls_.size();
-  for (const Centre::Contribution& contribution : centre.contributions) {
-    for (std::size_t k = 0; k < at_walls; ++k) centre.sums[k] += contribution.partial[k];
-    for (std::size_t h = 0; h < contribution.item.size(); ++h)
-      for (std::size_t k = 0; k < width_; ++k)
-        centre.sums[at_walls + contribution.item[h] * width_ + k] +=
-            contribution.partial[at_walls + h * width_ + k];
-  }
-  for (std::size_t r = 0; r < centre.links.size(); ++r) {
-    Link& link = *centre.links[r];
-    link.receiver->start();
-    await(*link.sender, centre.waited, ranks_.trace(), link.out_name);
-    auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
-    for (std::size_t item : centre.items_of_rank[r])
-      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
-                        out);
-    start(*link.sender, ranks_.trace(), link.out_name);
-  }
+  send_up();
 }
 
 void Gluing::glue(std::size_t e, Mode mode) {
@@ -260,6 +303,7 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
       std::copy_n(wall(e, g).data(), 3, &subdomains_[e].partial[3 * g]);
     publish(e, Mode::sum);
   }
+  if (tasks_of_rank() > 1) collect(Mode::sum);
   centre(Mode::sum);
   for (std::size_t e = 0; e < subdomains_.size(); ++e) {
     glue(e, Mode::sum);
@@ -271,6 +315,24 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
     if (width_ == 6) std::copy_n(v.w, 3, twist.w.data());
     v = kept_[k];
   });
+}
+
+std::vector<trace::Message> Gluing::message_plan() const {
+  const Decomposition& all = state_.decomposition;
+  std::vector<trace::Message> plan;
+  const auto add = [&](std::int32_t from, std::int32_t to, std::size_t doubles) {
+    plan.push_back({static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(to),
+                    static_cast<std::uint32_t>(8 * doubles)});
+  };
+  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
+    const Subdomain& subdomain = subdomains_[e];
+    for (std::size_t n = 0; n < subdomain.sides.size(); ++n)
+      add(all.here[e], all.interfaces[e].neighbours[n].subdomain, subdomain.sides[n].slots.size() * width_);
+    if (subdomain.partial.empty()) continue;
+    add(all.here[e], trace::centre_group, subdomain.partial.size());
+    add(trace::centre_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
+  }
+  return plan;
 }
 
 double Gluing::exposed() const {

@@ -30,6 +30,7 @@ struct JumpSums {
 /// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in three kinds of tasks:
 ///
 ///   publish[e]   after the boundary chunks of subdomain e: its interface velocities leave
+///   collect      on ranks between rank 0 and the leaves of the tree: what came from below goes up
 ///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >= 9
 ///                always, so that k copies cost O(k) messages)
 ///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
@@ -55,6 +56,9 @@ class Gluing {
   /// Subdomains here (index among those) whose glue reads what e publishes; ascending, without e.
   std::vector<std::uint32_t> readers_here(std::size_t e) const;
 
+  /// Tasks between publish and glue: the centre, behind collect where there is one.
+  std::size_t tasks_of_rank() const;
+
   enum class Mode {
     fresh,     ///< velocities were made afresh from the impulses
     iterate,   ///< after a sweep
@@ -68,6 +72,7 @@ class Gluing {
   void sum_copies(std::span<std::vector<Twist>> field);
 
   void publish(std::size_t e, Mode mode);
+  void collect(Mode mode);
   void centre(Mode mode);
   void glue(std::size_t e, Mode mode);
 
@@ -80,13 +85,14 @@ class Gluing {
   double exposed() const;
 
  private:
-  struct Link;
   struct Side;
   struct Subdomain;
   struct Centre;
   void plan_sides(std::size_t e);
   void plan_centre();
   void count_messages();
+  void send_up();
+  void answer();
   void write_velocity(std::size_t slot, double* out) const;
 
   StepState& state_;

@@ -168,13 +168,16 @@ void Iteration::node(std::uint32_t node, int epoch) {
   }
   if (now == Work::measure) return;
   const Gluing::Mode mode = gluing_mode(epoch);
-  const std::size_t here = state_.decomposition.here.size(), task = node - chunks;
+  const std::size_t here = state_.decomposition.here.size(), of_rank = gluing_.tasks_of_rank(),
+                    task = node - chunks;
   if (task < here)
     gluing_.publish(task, mode);
-  else if (task == here)
+  else if (task < here + of_rank - 1)
+    gluing_.collect(mode);
+  else if (task < here + of_rank)
     gluing_.centre(mode);
   else
-    gluing_.glue(task - here - 1, mode);
+    gluing_.glue(task - here - of_rank, mode);
 }
 
 std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {
@@ -183,7 +186,9 @@ std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const 
   if (node >= chunks) {
     if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
     const std::size_t task = node - chunks;
-    return kind_of(task < here ? TaskKind::publish : task == here ? TaskKind::centre : TaskKind::glue);
+    return kind_of(task < here                             ? TaskKind::publish
+                   : task < here + gluing_.tasks_of_rank() ? TaskKind::centre
+                                                           : TaskKind::glue);
   }
   switch (now) {
     case Work::accumulate:

@@ -21,7 +21,7 @@ struct IterationResult {
   double jump = 0;  ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
   double drift =
       0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
-  double unbalance = 0;  ///< estimate of the relative error of the forces on walls and heavy bodies
+  double unbalance = 0;  ///< estimate of the relative error of the forces: Iteration::balanced
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
   std::int64_t contacts = 0, active = 0;

@@ -51,7 +51,7 @@ struct DetectionSettings {
 
 /// What makes of sweeps a solver.
 enum class SolverMethod {
-  automatic,  ///< momentum; or NNCG for tight tolerances with friction, and where momentum made it worse;
+  automatic,  ///< momentum (plain sweeps for Schwarz, whose damped iteration is no descent);
               ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
   nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
   momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
@@ -66,7 +66,7 @@ struct SolverSettings {
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/balance.hpp)
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
-      10;  ///< sweeps between the first checks; later ones are spaced by 1/4 of what is done, >= 1
+      10;  ///< sweeps between the first checks; later ones stand where the tolerance is expected, >= 1
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0

@@ -7,6 +7,7 @@
 
 #include "kernels/release.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/tree.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/order.hpp"
@@ -262,29 +263,27 @@ void StepGraph::plan_iteration() {
 }
 
 /// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the
-/// centre behind all chunks, glue[e] last (iteration.hpp).
+/// centre and, where the tree has one, collect behind them, glue[e] last (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
   const std::size_t count = chunks.size(), here = state_.decomposition.here.size();
-  const std::size_t nodes = count + (gluing.needed() ? 2 * here + 1 : 0);
+  const std::size_t of_rank = gluing.tasks_of_rank(),
+                    nodes = count + (gluing.needed() ? 2 * here + of_rank : 0);
   const auto publish = [&](std::size_t e) { return static_cast<std::uint32_t>(count + e); };
-  const auto centre = static_cast<std::uint32_t>(count + here);
-  const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + 1 + e); };
+  const auto centre = static_cast<std::uint32_t>(count + here + of_rank - 1);
+  const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + of_rank + e); };
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here);
-  // Even colours are those of chunks, inner ones shifted behind publish. The rank that is the centre does its
-  // part half-way through the inner chunks, so that the way there and the way back are both hidden. Inner
-  // chunks share nothing with the gluing: before or behind it, the bits are the same.
+  // Even colours are those of chunks, inner ones shifted behind publish. Rank 0 does its part half-way
+  // through the inner chunks, so that the way there and the way back are both hidden. Inner chunks share
+  // nothing with the gluing: before or behind it, the bits are the same.
   const auto first_inner = static_cast<std::uint32_t>(2 * chunks.boundary_colours);
   const auto end = static_cast<std::uint32_t>(2 * chunks.colours);
   const std::uint32_t shift = decomposition_.overlap ? 2 : 4;
-  const std::uint32_t half_way = (first_inner / 2 + end / 2) / 2 * 2 + 3;
-  const std::uint32_t centre_colour = !decomposition_.overlap ? first_inner + 1
-                                      : ranks_.rank() == 0    ? std::min(half_way, end + 1)
-                                                              : end + 1;
   const std::uint32_t glue_colour = decomposition_.overlap ? end + 2 : first_inner + 2;
+  const auto in_tree = graph::tree::colours(ranks_.rank(), ranks_.ranks(), first_inner, glue_colour);
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
     const bool at_interface = gluing.needed() && chunks.boundary[c] != 0;
@@ -302,12 +301,18 @@ void StepGraph::plan_epochs() {
     for (std::size_t e = 0; e < here; ++e) {
       colour[publish(e)] = first_inner;
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
-      neighbour.push_back(centre);
+      for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
+        neighbour.push_back(task);
       neighbour.push_back(glue(e));
       for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(glue(reader));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
-    colour[centre] = centre_colour;
+    if (of_rank > 1) {
+      colour[count + here] = in_tree.up;
+      for (std::size_t e = 0; e < here; ++e) neighbour.push_back(publish(e));
+      offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
+    }
+    colour[centre] = in_tree.down;
     for (std::size_t e = 0; e < here; ++e) {
       neighbour.push_back(publish(e));
       neighbour.push_back(glue(e));

@@ -68,14 +68,15 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
       continue;
     }
     const std::size_t task = node - count;
-    const bool centre = task == here.size();
+    const std::size_t of_rank = iteration_.gluing().tasks_of_rank();
+    const bool centre = task >= here.size() && task < here.size() + of_rank;
     const trace::Role role = centre               ? trace::Role::centre
                              : task < here.size() ? trace::Role::publish
                                                   : trace::Role::glue;
     plan.role.push_back(static_cast<std::uint8_t>(role));
     plan.group.push_back(
         centre ? trace::centre_group
-               : static_cast<std::uint32_t>(here[task - (task < here.size() ? 0 : here.size() + 1)]));
+               : static_cast<std::uint32_t>(here[task - (task < here.size() ? 0 : here.size() + of_rank)]));
     plan.weight.push_back(0);
     plan.place.push_back(0);
   }

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/graph/tree.hpp"
 #include "runtime/trace/analysis.hpp"
 
 namespace talus::trace {
@@ -141,15 +142,21 @@ class Walker {
     const std::uint32_t from = received.node >> 16, to = received.node & 0xffffU;
     const auto epoch = static_cast<std::size_t>(received.epoch);
     Place best;
+    // What goes down the tree is named after the lower rank, and its parent sends it.
+    const auto has = [](const StepIndex::Rank& rank, std::uint32_t group) {
+      return rank.plan &&
+             std::find(rank.plan->group.begin(), rank.plan->group.end(), group) != rank.plan->group.end();
+    };
+    const StepIndex::Rank* speaks = nullptr;
+    for (std::size_t r = 1; r < index_.ranks.size() && from == centre_group; ++r)
+      if (has(index_.ranks[r], to))
+        speaks = &index_.ranks[static_cast<std::size_t>(graph::tree::parent(static_cast<int>(r)))];
     for (const StepIndex::Rank& rank : index_.ranks) {
       if (!rank.plan || epoch >= rank.epochs) continue;
-      if (from == centre_group && &rank != &index_.ranks.front()) continue;
-      const bool has = from == centre_group || std::find(rank.plan->group.begin(), rank.plan->group.end(),
-                                                         from) != rank.plan->group.end();
-      if (!has) continue;
+      if (from == centre_group ? &rank != speaks : !has(rank, from)) continue;
       for (std::size_t n = 0; n < rank.nodes; ++n) {
         const Role role = static_cast<Role>(rank.plan->role[n]);
-        const bool sends = from == centre_group
+        const bool sends = from == centre_group || (to == centre_group && role == Role::centre)
                                ? role == Role::centre
                                : role == Role::publish && (to == centre_group || rank.plan->group[n] == from);
         if (sends) keep_later(best, rank.at(epoch, n), received.end());

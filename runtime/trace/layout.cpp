@@ -10,6 +10,7 @@
 #include <set>
 
 #include "runtime/graph/epoch_graph.hpp"
+#include "runtime/graph/tree.hpp"
 
 namespace talus::trace {
 namespace {
@@ -115,7 +116,7 @@ class Builder {
       const auto found = first_owner.find(g);
       return worker(found == first_owner.end() ? 0 : found->second);
     };
-    std::uint32_t glue_colour = 0, publishes = 0;
+    std::uint32_t publish_colour = 0, glue_colour = 0, publishes = 0;
     bool glued = false;
     for (std::size_t g : mine) {
       if (group_[g].publish == none) continue;
@@ -123,15 +124,23 @@ class Builder {
       out_.nodes.back().worker = owner_of(g);
       ++publishes;
       const Plan& plan = *plans_[static_cast<std::size_t>(group_[g].source)];
+      publish_colour = std::max(publish_colour, plan.colour[group_[g].publish]);
       glue_colour = std::max(glue_colour, plan.colour[group_[g].glue]);
       glued = true;
     }
     out_.publishes.push_back(publishes);
     centre_.push_back(none);
+    collect_.push_back(none);
     if (!glued) return;
-    centre_.back() = static_cast<std::uint32_t>(out_.nodes.size());
-    out_.nodes.push_back(centre_node(rank, glue_colour));
-    out_.nodes.back().worker = worker(0);
+    const int own = static_cast<int>(rank);
+    const auto colours = graph::tree::colours(own, machine_.ranks, publish_colour, glue_colour);
+    const auto add = [&](std::uint32_t colour) {
+      out_.nodes.push_back(centre_node(rank, colour));
+      out_.nodes.back().worker = worker(0);
+      return static_cast<std::uint32_t>(out_.nodes.size() - 1);
+    };
+    if (graph::tree::relays(own, machine_.ranks)) collect_.back() = add(colours.up);
+    centre_.back() = add(colours.down);
     for (std::size_t g : mine) {
       if (group_[g].glue == none) continue;
       group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);
@@ -141,17 +150,16 @@ class Builder {
     }
   }
 
-  /// Rank 0 is the centre; the others take its answer as late as they can, and work no more than that.
-  SimNode centre_node(std::uint32_t rank, std::uint32_t glue_colour) const {
+  /// Rank 0 is the centre; the others hand on what goes up and down, and work no more than that.
+  SimNode centre_node(std::uint32_t rank, std::uint32_t colour) const {
     const std::size_t recorded = rank > 0 && plans_.size() > 1 ? 1 : 0;
-    SimNode node{-1, 0, Role::centre, centre_group, rank, 0, glue_colour - 1};
+    SimNode node{-1, 0, Role::centre, centre_group, rank, 0, colour};
     node.waits_only = rank > 0 && recorded == 0;
     const Plan& plan = *plans_[recorded];
     for (std::uint32_t n = 0; n < plan.size(); ++n)
       if (static_cast<Role>(plan.role[n]) == Role::centre) {
         node.source_rank = static_cast<std::int32_t>(recorded);
         node.source_node = n;
-        if (rank == 0) node.colour = std::min(plan.colour[n], glue_colour - 1);
       }
     return node;
   }
@@ -174,6 +182,8 @@ class Builder {
       const std::uint32_t centre = centre_[out_.nodes[group.new_publish].rank];
       join(group.new_publish, centre);
       join(group.new_glue, centre);
+      const std::uint32_t collect = collect_[out_.nodes[group.new_publish].rank];
+      if (collect != none) join(group.new_publish, collect);
     }
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {
@@ -238,16 +248,26 @@ class Builder {
         }
       }
     out_.to_centre.resize(ranks);
-    for (std::uint32_t r = 1; r < ranks; ++r) {
-      if (up[r] == 0 || centre_[r] == none || centre_[0] == none) continue;
+    // A message of the tree holds those of the whole branch. Children have higher numbers than their parents.
+    for (std::size_t r = ranks; r-- > 1;) {
+      const auto parent = static_cast<std::size_t>(graph::tree::parent(static_cast<int>(r)));
+      up[parent] += up[r];
+      down[parent] += down[r];
+      if (up[r] == 0 || centre_[r] == none || centre_[parent] == none) continue;
       const auto first =
           static_cast<std::uint32_t>(std::find(rank_of_.begin(), rank_of_.end(), r) - rank_of_.begin());
       const auto named = [](std::uint64_t bytes) {
         return static_cast<std::uint32_t>(std::min<std::uint64_t>(bytes, none));
       };
-      out_.to_centre[r] = {centre_[0], named(up[r]), message_name(groups_[first], centre_group)};
-      ++out_.incoming[centre_[0]];
-      sends[centre_[0]].push_back({centre_[r], named(down[r]), message_name(centre_group, groups_[first])});
+      const SimMessage message{parent == 0 ? centre_[0] : collect_[parent], named(up[r]),
+                               message_name(groups_[first], centre_group)};
+      if (collect_[r] == none)
+        out_.to_centre[r] = message;
+      else
+        sends[collect_[r]].push_back(message);
+      ++out_.incoming[message.to];
+      sends[centre_[parent]].push_back(
+          {centre_[r], named(down[r]), message_name(centre_group, groups_[first])});
       ++out_.incoming[centre_[r]];
     }
     for (const auto& of_node : sends) {
@@ -303,8 +323,9 @@ class Builder {
   const std::vector<std::uint32_t>& rank_of_;
   const Machine& machine_;
   const double faces_;
-  std::vector<Group> group_;           ///< like groups_
-  std::vector<std::uint32_t> centre_;  ///< per rank
+  std::vector<Group> group_;            ///< like groups_
+  std::vector<std::uint32_t> centre_;   ///< per rank
+  std::vector<std::uint32_t> collect_;  ///< per rank; none unless it is between rank 0 and the leaves
   LoopLayout out_;
 };
 

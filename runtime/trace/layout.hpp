@@ -35,8 +35,8 @@ struct LoopLayout {
   std::vector<std::uint32_t> offset, neighbour;  ///< n + 1; conflicting nodes, of the same rank
   std::vector<std::uint32_t> walk_begin, walk;   ///< per worker: its nodes by (colour, index)
   std::vector<std::uint32_t> send_begin;         ///< n + 1, into sends
-  std::vector<SimMessage> sends;                 ///< of publishes; of the centre of rank 0
-  std::vector<SimMessage> to_centre;             ///< per rank: sent by its last publish; rank 0 none
+  std::vector<SimMessage> sends;                 ///< of publishes and centres
+  std::vector<SimMessage> to_centre;             ///< per rank: sent by the last publish of a leaf of the tree
   std::vector<std::uint32_t> publishes;          ///< per rank
   std::vector<std::uint32_t> handed;    ///< n: bytes that a node newly shares with other threads of its rank
   std::vector<std::uint32_t> incoming;  ///< n: messages that a node takes per exchange

@@ -16,7 +16,8 @@ class Network {
   explicit Network(const Machine& machine);
   /// `now` must not decrease from call to call. [ns]
   double arrival(std::uint32_t from_rank, std::uint32_t to_rank, std::uint32_t bytes, double now);
-  /// What all ranks need from when the last has come to know the sum: a tree of messages. [ns]
+  /// What all ranks need from when the last has come to know what each brought: log2(ranks) messages, one
+  /// behind the other (Communicator::start_gather). [ns]
   double collective() const { return collective_; }
   /// Of a thread, per message. [ns]
   double overhead() const { return overhead_; }

@@ -75,7 +75,7 @@ inline std::uint32_t pack(std::uint32_t step, Kind kind) {
 enum class Role : std::uint8_t {
   compute,  ///< nothing
   publish,  ///< sends what its group shows to others
-  centre,   ///< once a rank: what goes through one rank
+  centre,   ///< of a rank: what goes through rank 0; before it, on ranks between, what goes up to it
   glue,     ///< takes what others have published
 };
 

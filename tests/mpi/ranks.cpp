@@ -65,6 +65,21 @@ TEST_F(Ranks, ChangeNoBitOfAnyResult) {
   }
 }
 
+// With more than seven ranks some hand on what others tell rank 0 (runtime/graph/tree.hpp).
+TEST_F(Ranks, HandOnWhatOthersSayToTheBit) {
+  for (const std::string exchange : {"dcs", "ccs"}) {
+    const std::string nine =
+        "run scene.toml --force --steps 4 --threads 1 --set decomposition.subdomains=9 --set "
+        "decomposition.exchange=" +
+        exchange;
+    const Outcome one = run(1, nine + " --out one"), other = run(9, nine + " --out other");
+    ASSERT_EQ(one.code, 3) << exchange << ": " << one.messages;
+    ASSERT_EQ(other.code, 3) << exchange << ": " << other.messages;
+    EXPECT_EQ(digest_of("other"), digest_of("one")) << exchange;
+    EXPECT_EQ(file("other", "walls.csv"), file("one", "walls.csv")) << exchange;
+  }
+}
+
 // One rank ends a step at the check that certifies it; several learn of it a sweep later, and go back.
 TEST_F(Ranks, EndStepsOnTheStateThatWasCertified) {
   for (const std::string method : {"auto", "nlgs", "nncg"}) {

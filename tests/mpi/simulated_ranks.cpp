@@ -14,7 +14,8 @@ class SimulatedRanks : public OnRanks {
   void SetUp() override {
     if (!fs::exists(TALUS_SMPI_COMMAND)) GTEST_SKIP() << "there is no " << TALUS_SMPI_COMMAND;
     write(at("scene.toml"), six_subdomains);
-    const Outcome one = run(1, "run scene.toml --out one --threads 1 --trace");
+    const Outcome one =
+        run(1, "run scene.toml --set decomposition.subdomains=9 --out one --threads 1 --trace");
     ASSERT_EQ(one.code, 3) << one.messages;
   }
 
@@ -29,9 +30,10 @@ class SimulatedRanks : public OnRanks {
 
   /// The code that smpirun ends with; what it says goes to OUT.txt.
   int simulate(int ranks, const std::string& machine, const std::string& out) const {
-    const std::string line = fmt::format("cd '{}' && smpirun -np {} {} '" TALUS_SMPI_COMMAND
-                                         "' run scene.toml --out {} >{}.txt 2>&1",
-                                         folder_.path().string(), ranks, machine, out, out);
+    const std::string line =
+        fmt::format("cd '{}' && smpirun -np {} {} '" TALUS_SMPI_COMMAND
+                    "' run scene.toml --set decomposition.subdomains=9 --out {} >{}.txt 2>&1",
+                    folder_.path().string(), ranks, machine, out, out);
     const int status = std::system(line.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
@@ -41,7 +43,7 @@ class SimulatedRanks : public OnRanks {
 };
 
 TEST_F(SimulatedRanks, ChangeNoBitOfTheResults) {
-  for (int ranks : {1, 2, 6}) {
+  for (int ranks : {1, 2, 9}) {
     const std::string out = fmt::format("r{}", ranks);
     EXPECT_EQ(simulate(ranks, machine(ranks), out), 3) << file(".", out + ".txt");
     EXPECT_EQ(digest_of(out), digest_of("one")) << ranks;
@@ -52,7 +54,7 @@ TEST_F(SimulatedRanks, ChangeNoBitOfTheResults) {
 // Clocks are those of the simulated machine: a network a thousand times slower takes so much longer, on the
 // same host, in the same run.
 TEST_F(SimulatedRanks, TakeTheTimeOfTheirNetwork) {
-  ASSERT_EQ(simulate(6, machine(6, "--latency 1e-3"), "slow"), 3) << file(".", "slow.txt");
+  ASSERT_EQ(simulate(9, machine(9, "--latency 1e-3"), "slow"), 3) << file(".", "slow.txt");
   EXPECT_EQ(digest_of("slow"), digest_of("one"));
   const long iterations = summary(at("slow")).at("iterations");
   // Each iteration has an exchange; its messages need a latency at least.

@@ -155,6 +155,65 @@ TEST(Stiffness, IsThatOfTheForcesThatCarryTheLoad) {
   }
 }
 
+// ---- the error of all velocities
+
+/// All of a long column sinks alike: of its contacts only the lowest shows it.
+TEST(VelocityError, SeesAColumnSinkThroughItsLowestContact) {
+  for (const double mu : {0.35, 0.0})
+    for (const double top : {1.0, 1e6}) {
+      BodyProblem column = column_problem(300, mu, top);
+      double due = 0;
+      for (std::size_t k = column.contacts.size(); k-- > 0;) {
+        due -= column.bodies[k].mass * column.bodies[k].free.u[2];
+        column.impulse[k] = Vec3(0, 0, 0.9 * due);
+      }
+      EXPECT_NEAR(velocity_error(column, 1e-3).relative, 0.1 / 0.9, 0.02) << "mu " << mu << ", top " << top;
+    }
+}
+
+TEST(VelocityError, IsSmallWhereTheLawHolds) {
+  BodyProblem rests = column_problem(30, 0.35), slides = column_problem(1, 0.3);
+  slides.bodies[0].free.u = Vec3(1, 0, -0.1);
+  for (BodyProblem* problem : {&rests, &slides}) {
+    EXPECT_TRUE(solve_admm(*problem, {.tolerance = 1e-9, .balance_tolerance = 0}).converged);
+    EXPECT_LT(velocity_error(*problem, 1e-6).relative, 1e-5);
+  }
+}
+
+/// Two grains sink at 1 m/s under one that follows at 1/2 m/s and a hundred times their mass: stopped, they
+/// stop it too, though its contact is open. So far contacts changed the first two by 1 m/s each.
+TEST(VelocityError, CountsWhatAnOpenContactMeetsOnTheWay) {
+  BodyProblem column = column_problem(3, 0, 100);
+  column.bodies[0].free.u[2] = column.bodies[1].free.u[2] = -2;
+  column.bodies[2].free.u[2] = -0.5;
+  column.impulse[0] = Vec3(0, 0, 2);
+  column.impulse[1] = Vec3(0, 0, 1);
+  EXPECT_NEAR(velocity_error(column, 1e-3).relative, (1 + 1 + 100 * 0.5) / (1 + 1), 1);
+}
+
+TEST(VelocityError, ScalesWithTheUnits) {
+  const Units units{.mass = 1e6, .length = 1e-6, .time = 1e3};
+  BodyProblem plain = column_problem(30, 0.35), scaled = column_problem(30, 0.35, 1, units);
+  for (BodyProblem* problem : {&plain, &scaled})
+    solve_admm(*problem, {.tolerance = 1e-2, .balance_tolerance = 0});
+  const double error = velocity_error(plain, 1e-4).relative;
+  EXPECT_GT(error, 0);
+  EXPECT_NEAR(velocity_error(scaled, 1e-4).relative, error, 1e-6 * error);
+}
+
+/// A driven wall pushes a grain into the floor: whatever the impulses, no velocity will do.
+TEST(VelocityError, StaysLargeWhereThereIsNoAnswer) {
+  BodyProblem crushed = column_problem(1, 0.35);
+  ContactEquation lid = crushed.contacts[0];
+  lid.normal = -Vec3::UnitZ();
+  lid.offset = Vec3(0, 0, 0.1);  // v_n = -u_z - 0.1: it comes down at 0.1 m/s
+  crushed.contacts.push_back(lid);
+  for (const double pressed : {1.0, 1e3, 1e6}) {
+    crushed.impulse = {Vec3(0, 0, pressed), Vec3(0, 0, -pressed)};
+    EXPECT_GT(velocity_error(crushed, 1e-3).relative, 0.3) << pressed;
+  }
+}
+
 // ---- whole steps
 
 /// A block of touching spheres, `edge` x `edge` x `layers`, on a floor, under a plate of `plate` grain

@@ -64,6 +64,27 @@ TEST_F(CsvBodies, MistakesAreFoundWithLineAndColumn) {
   expect_refused("id,x,y,z,radius\n", 1, "", "no bodies");
 }
 
+TEST_F(CsvBodies, WrittenGrainsAreReadBackBitForBit) {
+  Sample sample;
+  sample.density = 1;
+  sample.id = {BodyId{7}, BodyId{3}};
+  sample.x = {Vec3(0.1, 1.0 / 3, -2e-17), Vec3(1e5, 0, 0.7)};
+  sample.radius = {0.011780518345951422, 0.5};
+  const std::string path = write("");
+  write_bodies(path, sample);
+  const Sample resting = read_bodies(path, 1);
+  EXPECT_EQ(resting.id, sample.id);
+  EXPECT_EQ(resting.x, sample.x);
+  EXPECT_EQ(resting.radius, sample.radius);
+  EXPECT_TRUE(resting.velocity.empty());
+  sample.velocity = {{1.0 / 7, 0, -3, 0, 0.25, 1e-9}, {0, 0, 0, 0, 0, 2}};
+  write_bodies(path, sample);
+  const Sample moving = read_bodies(path, 1);
+  for (std::size_t k = 0; k < 2; ++k)
+    for (std::size_t i = 0; i < 6; ++i)
+      EXPECT_DOUBLE_EQ(moving.velocity[k][i], sample.velocity[k][i]) << k << i;  // spins are divided by radii
+}
+
 TEST(Csv, MissingFileIsNamed) {
   EXPECT_THROW(read_bodies("no/such/file.csv", 1), SceneError);
 }

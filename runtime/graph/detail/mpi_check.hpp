@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "runtime/graph/detail/mpi_call.hpp"
+
 namespace talus::graph::detail {
 
 /// Throws std::runtime_error with MPI's own words unless `code` is MPI_SUCCESS.

@@ -1,28 +1,57 @@
 #pragma once
 
-/// What gluing.cpp exchanges and gluing_plan.cpp lays out.
+/// What the parts of Gluing share: links to other ranks, what a subdomain and a rank hold.
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "runtime/step/gluing.hpp"
+#include "runtime/trace/recorder.hpp"
 
-namespace talus {
+namespace talus::detail {
+
+using Channel = graph::Communicator::Channel;
+
+inline std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// Adds the time it took to `waited`.
+inline void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
+  if (channel.done()) return;
+  const trace::Span span(trace, trace::kind_receive, message);
+  waited += channel.wait();
+}
+
+inline void start(Channel& channel, trace::Recorder* trace, std::uint32_t message) {
+  const trace::Span span(trace, trace::kind_send, message);
+  channel.start();
+}
 
 /// A message from and to another rank; buffers have one room more than payload, for the time stamp of a
 /// delay.
-struct Gluing::Link {
+struct Link {
   std::vector<double> out, in;
-  std::unique_ptr<graph::Communicator::Channel> sender, receiver;
+  std::unique_ptr<Channel> sender, receiver;
   std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
 };
+
+inline constexpr int centre_tag = graph::Communicator::first_tag;
+inline int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
+  return centre_tag + 1 + from * subdomains + to;
+}
+
+}  // namespace talus::detail
+
+namespace talus {
 
 /// Towards one neighbour.
 struct Gluing::Side {
   std::vector<std::size_t> slots;  ///< of the bodies in the message, in its order
-  Link link;                       ///< `in` and the channels: of neighbours on other ranks only
+  detail::Link link;               ///< `in` and the channels: of neighbours on other ranks only
   const double* source = nullptr;  ///< the neighbour's message to this subdomain
   std::int32_t local = -1;         ///< the neighbour's place here, -1 on another rank
 };
@@ -39,18 +68,20 @@ struct Gluing::Subdomain {
   double waited = 0;
 };
 
-/// The one rank through which some velocities go is rank 0.
+/// The one rank through which some velocities go is rank 0; messages to and from it go over a tree of ranks
+/// (runtime/graph/tree.hpp). A message up holds the parts of a rank's own subdomains, then its children's
+/// messages: nothing is added up on the way, so that the sums on rank 0 are the same on any ranks.
 struct Gluing::Centre {
   struct Contribution {
     const double* partial = nullptr;
     std::vector<std::size_t> item;  ///< per hub of the subdomain
   };
   std::vector<Contribution> contributions;  ///< rank 0: of every subdomain, in order
-  std::vector<double> sums;  ///< 3 per wall, then width per item: all on rank 0, else those asked for
-  std::vector<std::unique_ptr<Link>> links;             ///< rank 0: per other rank
-  std::vector<std::vector<std::size_t>> items_of_rank;  ///< rank 0: per other rank
-  std::atomic<std::size_t> published{0};                ///< other ranks: subdomains whose part is ready
-  std::unique_ptr<Link> to_centre;                      ///< other ranks
+  std::vector<double> sums;  ///< 3 per wall, then width per item that this rank or one below it asks for
+  std::vector<std::unique_ptr<detail::Link>> links;      ///< per child
+  std::vector<std::vector<std::size_t>> items_of_child;  ///< per child: what its branch asks for
+  std::atomic<std::size_t> published{0};                 ///< leaves: subdomains whose part is ready
+  std::unique_ptr<detail::Link> up;                      ///< to the parent; null on rank 0
   double waited = 0;
 };
 

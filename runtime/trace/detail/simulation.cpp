@@ -94,8 +94,10 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
 }
 
 double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
-  const std::uint32_t messages =
-      layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  const SimNode& of = layout.nodes[node];
+  double messages = layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  if (of.role == Role::publish && layout.to_centre[of.rank].bytes > 0)
+    messages += 1.0 / layout.publishes[of.rank];
   return messages * stage.network.overhead() + 0.5e9 * stage.machine.line / 64 * layout.handed[node];
 }
 
@@ -103,6 +105,16 @@ double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& ep
   double work = 0;
   for (const StepIndex::Rank& rank : index.ranks)
     work = std::max(work, stage.timeline.self(rank.check[epoch.source]));
+  if (stage.machine.typical || stage.machine.quantile > 0) {
+    std::vector<float> all;  // of the step: there are few
+    for (const StepIndex::Rank& rank : index.ranks)
+      for (const Place check : rank.check)
+        if (check.exists()) all.push_back(static_cast<float>(stage.timeline.self(check)));
+    if (!all.empty() && stage.machine.quantile > 0)
+      work = static_cast<double>(quantile_of(all, stage.machine.quantile));
+    else if (!all.empty())
+      work = std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
+  }
   return work / stage.machine.speed;
 }
 

@@ -1,0 +1,46 @@
+#pragma once
+
+/// Momentum on W = 4 or 8 numbers at a time (kernels/momentum.hpp): what stands at s goes on to
+/// s + beta (s - last), and s is remembered.
+
+#include "kernels/detail/lanes.hpp"
+
+namespace talus {
+namespace {
+
+template <class V>
+[[gnu::always_inline]] inline void advance_one(double* value, double* last, double beta) {
+  const V s = load<V>(value);
+  store(value, s + beta * (s - load<V>(last)));
+  store(last, s);
+}
+
+template <int W>
+void advance(double* values, double* last, std::size_t count, double beta) {
+  std::size_t k = 0;
+  for (; k + W <= count; k += W) advance_one<Lanes<W>>(values + k, last + k, beta);
+  for (; k < count; ++k) {
+    const double s = values[k];
+    values[k] = s + beta * (s - last[k]);
+    last[k] = s;
+  }
+}
+
+/// Whole records: masses, equal in both, stay to the bit.
+template <int W>
+void advance_bodies(double* bodies, double* last, const std::int32_t* slots, std::size_t count, double beta) {
+  constexpr std::size_t record = 8, ahead = 8;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (k + ahead < count) {
+      __builtin_prefetch(bodies + record * static_cast<std::uint32_t>(slots[k + ahead]), 1);
+      __builtin_prefetch(last + record * static_cast<std::uint32_t>(slots[k + ahead]), 1);
+    }
+    const std::size_t at = record * static_cast<std::uint32_t>(slots[k]);
+#pragma GCC unroll 2
+    for (std::size_t part = 0; part < record; part += W)
+      advance_one<Lanes<W>>(bodies + at + part, last + at + part, beta);
+  }
+}
+
+}  // namespace
+}  // namespace talus

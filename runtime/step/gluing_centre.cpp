@@ -1,0 +1,187 @@
+/// The centre of the gluing, and the tree of ranks that leads to it and back.
+
+#include <algorithm>
+#include <utility>
+
+#include "runtime/graph/tree.hpp"
+#include "runtime/step/detail/gluing_parts.hpp"
+
+namespace talus {
+
+using detail::at;
+using detail::await;
+using detail::centre_tag;
+using detail::Link;
+using detail::start;
+
+void Gluing::plan_centre() {
+  const Decomposition& all = state_.decomposition;
+  /// A body that goes through the centre, as a subdomain names it.
+  struct HubRecord {
+    std::int64_t subdomain;
+    std::int64_t id;
+  };
+  std::vector<HubRecord> mine;
+  for (std::size_t e = 0; e < all.here.size() && all.several(); ++e) {
+    const SubdomainInterface& interface = all.interfaces[e];
+    for (std::int32_t hub : interface.hubs) {
+      const std::size_t slot = subdomains_[e].shared[at(hub)];
+      mine.push_back({all.here[e], static_cast<std::int64_t>(state_.bodies.id[slot])});
+    }
+  }
+  // Every rank learns all names: a few words per hub, none in most scenes.
+  std::vector<HubRecord> everywhere = ranks_.gather_records(std::span<const HubRecord>(mine));
+  std::stable_sort(everywhere.begin(), everywhere.end(),
+                   [](const HubRecord& a, const HubRecord& b) { return a.subdomain < b.subdomain; });
+  const auto items_of = [&](auto wanted) {
+    std::vector<std::int64_t> ids;
+    for (const HubRecord& record : everywhere)
+      if (wanted(all.rank_of[static_cast<std::size_t>(record.subdomain)])) ids.push_back(record.id);
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
+  };
+  const auto place = [](const std::vector<std::int64_t>& ids, std::int64_t id) {
+    return static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
+  };
+  const int me = ranks_.rank(), ranks = ranks_.ranks();
+  const std::vector<std::int64_t> items =
+      items_of([&](std::int32_t rank) { return rank == me || graph::tree::branch(rank, me) >= 0; });
+  const std::size_t at_walls = 3 * walls_.size();
+  centre_ = std::make_unique<Centre>();
+  Centre& centre = *centre_;
+  centre.sums.resize(at_walls + items.size() * width_);
+  std::vector<std::size_t> length(at(all.partition.subdomains), at_walls);
+  for (const HubRecord& record : everywhere) length[static_cast<std::size_t>(record.subdomain)] += width_;
+  for (std::size_t e = 0; e < all.here.size(); ++e) {
+    Subdomain& subdomain = subdomains_[e];
+    subdomain.partial.resize(length[at(all.here[e])]);
+    for (const HubRecord& record : everywhere)
+      if (record.subdomain == all.here[e]) subdomain.hub_item.push_back(place(items, record.id));
+  }
+  std::vector<std::size_t> length_of_rank(static_cast<std::size_t>(ranks), 0);
+  for (std::size_t e = 0; e < length.size(); ++e) length_of_rank[at(all.rank_of[e])] += length[e];
+  if (ranks > 1 && (at_walls > 0 || !everywhere.empty())) {
+    const auto length_of_branch = [&](int top) {
+      std::size_t sum = 0;
+      for (int rank = top; rank < ranks; ++rank)
+        if (rank == top || graph::tree::branch(rank, top) >= 0) sum += length_of_rank[at(rank)];
+      return sum;
+    };
+    // A message is named after the first subdomain of the lower rank; the upper one speaks for the centre.
+    const auto open = [&](int other, std::size_t out, std::size_t in) {
+      auto link = std::make_unique<Link>();
+      link->out.resize(out + 1);
+      link->in.resize(in + 1);
+      link->sender = ranks_.open_send(other, centre_tag, link->out);
+      link->receiver = ranks_.open_receive(other, centre_tag, link->in);
+      const auto first = static_cast<std::uint32_t>(
+          std::find(all.rank_of.begin(), all.rank_of.end(), std::max(me, other)) - all.rank_of.begin());
+      link->out_name = trace::message_name(first, trace::centre_group);
+      link->in_name = trace::message_name(trace::centre_group, first);
+      if (other > me) std::swap(link->out_name, link->in_name);
+      link->receiver->start();
+      return link;
+    };
+    for (int child = graph::tree::first_child(me); child < graph::tree::end_of_children(me, ranks); ++child) {
+      std::vector<std::size_t>& wanted = centre.items_of_child.emplace_back();
+      for (std::int64_t id : items_of(
+               [&](std::int32_t rank) { return rank == child || graph::tree::branch(rank, child) >= 0; }))
+        wanted.push_back(place(items, id));
+      centre.links.push_back(open(child, at_walls + wanted.size() * width_, length_of_branch(child)));
+    }
+    if (me > 0) centre.up = open(graph::tree::parent(me), length_of_branch(me), centre.sums.size());
+  }
+  if (me > 0) return;
+  // Where the parts of each rank begin in the message of its branch.
+  std::vector<std::size_t> begin(static_cast<std::size_t>(ranks), 0);
+  const auto lay_out = [&](const auto& self, int rank, std::size_t from) -> std::size_t {
+    begin[at(rank)] = from;
+    from += length_of_rank[at(rank)];
+    for (int child = graph::tree::first_child(rank); child < graph::tree::end_of_children(rank, ranks);
+         ++child)
+      from = self(self, child, from);
+    return from;
+  };
+  for (int child = 1; child < graph::tree::end_of_children(0, ranks); ++child) lay_out(lay_out, child, 0);
+  for (std::size_t e = 0; e < length.size(); ++e) {
+    Centre::Contribution contribution;
+    const std::int32_t rank = all.rank_of[e];
+    if (rank == 0) {
+      const auto local = std::lower_bound(all.here.begin(), all.here.end(), static_cast<std::int32_t>(e));
+      contribution.partial = subdomains_[static_cast<std::size_t>(local - all.here.begin())].partial.data();
+    } else if (!centre.links.empty()) {
+      contribution.partial = centre.links[at(graph::tree::branch(rank, 0) - 1)]->in.data() + begin[at(rank)];
+      begin[at(rank)] += length[e];
+    }
+    for (const HubRecord& record : everywhere)
+      if (record.subdomain == static_cast<std::int64_t>(e))
+        contribution.item.push_back(place(items, record.id));
+    centre.contributions.push_back(std::move(contribution));
+  }
+}
+
+std::size_t Gluing::tasks_of_rank() const {
+  return centre_ && centre_->up && !centre_->links.empty() ? 2 : 1;
+}
+
+/// The parts of this rank's subdomains, then the messages of its children as they came.
+void Gluing::send_up() {
+  Link& link = *centre_->up;
+  await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
+  auto out = link.out.begin();
+  for (const Subdomain& subdomain : subdomains_)
+    out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
+  for (const auto& child : centre_->links) out = std::copy(child->in.begin(), child->in.end() - 1, out);
+  start(*link.sender, ranks_.trace(), link.out_name);
+}
+
+void Gluing::collect(Mode mode) {
+  if (mode == Mode::local) return;
+  for (const auto& link : centre_->links)
+    await(*link->receiver, centre_->waited, ranks_.trace(), link->in_name);
+  send_up();
+  for (const auto& link : centre_->links) link->receiver->start();
+}
+
+void Gluing::centre(Mode mode) {
+  if (mode == Mode::local || centre_->sums.empty()) return;
+  Centre& centre = *centre_;
+  if (centre.up) {
+    Link& link = *centre.up;
+    await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);
+    std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
+    link.receiver->start();
+    answer();
+    return;
+  }
+  for (const auto& link : centre.links) await(*link->receiver, centre.waited, ranks_.trace(), link->in_name);
+  std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
+  const std::size_t at_walls = 3 * walls_.size();
+  for (const Centre::Contribution& contribution : centre.contributions) {
+    for (std::size_t k = 0; k < at_walls; ++k) centre.sums[k] += contribution.partial[k];
+    for (std::size_t h = 0; h < contribution.item.size(); ++h)
+      for (std::size_t k = 0; k < width_; ++k)
+        centre.sums[at_walls + contribution.item[h] * width_ + k] +=
+            contribution.partial[at_walls + h * width_ + k];
+  }
+  for (const auto& link : centre.links) link->receiver->start();
+  answer();
+}
+
+/// To each child what its branch asks for.
+void Gluing::answer() {
+  const Centre& centre = *centre_;
+  const std::size_t at_walls = 3 * walls_.size();
+  for (std::size_t child = 0; child < centre.links.size(); ++child) {
+    Link& link = *centre.links[child];
+    await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
+    auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
+    for (std::size_t item : centre.items_of_child[child])
+      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
+                        out);
+    start(*link.sender, ranks_.trace(), link.out_name);
+  }
+}
+
+}  // namespace talus
