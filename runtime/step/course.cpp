@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/balance.hpp"
 #include "runtime/step/iteration.hpp"
@@ -94,6 +95,22 @@ const Iteration::Check* Iteration::check_before() const {
     if (history_[k].iterations + settings_.check_every <= history_.back().iterations) return &history_[k];
   }
   return nullptr;
+}
+
+/// The second half of the sweeps has found no error a twentieth smaller than the quarter before it. Plain
+/// sweeps, the slowest, take a third off in as many; what comes before is the start's, or ADMM's.
+bool Iteration::stagnant() const {
+  constexpr int patience = 1000;
+  const int from = history_[history_from_].iterations, done = history_.back().iterations - from;
+  if (done < patience) return false;
+  double quarter = std::numeric_limits<double>::infinity(), half = quarter;
+  for (std::size_t k = history_from_; k < history_.size(); ++k) {
+    const int at = history_[k].iterations - from;
+    if (4 * at < done) continue;
+    double& best = 2 * at < done ? quarter : half;
+    best = std::min(best, history_[k].error_rms);
+  }
+  return half > settings_.tolerance && half > 0.95 * quarter;
 }
 
 /// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,

@@ -168,6 +168,18 @@ TEST(Wedge, WallsCarryTheWeightOfAJammedSphere) {
   }
 }
 
+TEST(Wedge, ToleranceBelowRoundingEndsTheStepEarlyAndSaysSo) {
+  Scene scene = wedge(0.1, 0.4);
+  scene.setup.solver.tolerance = 1e-16;
+  scene.setup.solver.max_iterations = 100000;
+  Experiment run(std::move(scene));
+  const StepReport& report = run.step();
+  EXPECT_FALSE(report.converged);
+  EXPECT_TRUE(run.simulation().iterations().stagnated);
+  EXPECT_LT(report.iterations, 5000);
+  EXPECT_LT(report.error_rms, 1e-11);
+}
+
 TEST(Wedge, WithFrictionTheForcesAreNotUniqueButTheirSumIs) {
   for (double half_angle : {0.8, 0.3, 0.1}) {
     Scene scene = wedge(half_angle, 0.4);
