@@ -131,7 +131,9 @@ class RecorderFeed {
 
 struct Tally {
   std::int64_t unconverged = 0;
-  std::int64_t passed = 0;  ///< pairs that went through one another
+  std::int64_t passed = 0;     ///< pairs that went through one another
+  std::int64_t stagnated = 0;  ///< steps
+  double floor = 0;            ///< worst error at which a step stood still
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;
@@ -144,6 +146,10 @@ struct Tally {
     iterations += report.iterations;
     if (!report.converged) ++unconverged;
     passed += report.passed;
+    if (simulation.iterations().stagnated) {
+      ++stagnated;
+      floor = std::max(floor, report.error_rms);
+    }
     worst_error = std::max(worst_error, report.error_rms);
     worst_balance = std::max(worst_balance, report.balance);
   }
@@ -274,6 +280,12 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
                "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
                "these steps count as unconverged. Reduce time_step\n",
                tally.passed);
+  if (ranks.rank() == 0 && tally.stagnated > 0)
+    fmt::print(stderr,
+               "talus: warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
+               "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
+               "time_step, or try another solver.method\n",
+               tally.stagnated, tally.floor);
   if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
     summary.exit_code = exit_tolerance_missed;
   summary.steps = simulation.report().step;

@@ -145,7 +145,8 @@ BodyAdmmResult Admm::improve(double tolerance, int calls) {
   // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped,
   // and the step is not balanced by it. The defect is near 1 where light bodies have yet to follow a heavy
   // one. Comparisons are false for NaN.
-  if (result.momentum_defect <= 2 && fastest_of(parts) <= sound * fastest)
+  const bool better = result.converged || calls == 0;  // unfinished is better than sweeps, not than ADMM
+  if (better && result.momentum_defect <= 2 && fastest_of(parts) <= sound * fastest)
     for (const BodyProblem& problem : problems) scatter_impulses(problem, state_.contacts);
   else
     result.balance_defect = 1;

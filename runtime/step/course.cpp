@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/balance.hpp"
 #include "runtime/step/iteration.hpp"
@@ -18,6 +19,8 @@ double most_momentum(bool friction, double tolerance) {
   return std::clamp(1 - 0.08 * std::pow(tolerance / 1e-3, 0.15), 0.9, 0.97);
 }
 
+/// With less than this conjugate gradients are faster.
+constexpr double least_momentum = 0.85;
 /// Between two checks; what makes it so much worse is no method for this problem.
 constexpr double hopeless_growth = 4;
 /// What a few sweeps solve, a grain on the ground, is left to them: they add no force that nothing asks for.
@@ -94,6 +97,22 @@ const Iteration::Check* Iteration::check_before() const {
   return nullptr;
 }
 
+/// The second half of the sweeps has found no error a twentieth smaller than the quarter before it. Plain
+/// sweeps, the slowest, take a third off in as many; what comes before is the start's, or ADMM's.
+bool Iteration::stagnant() const {
+  constexpr int patience = 1000;
+  const int from = history_[history_from_].iterations, done = history_.back().iterations - from;
+  if (done < patience) return false;
+  double quarter = std::numeric_limits<double>::infinity(), half = quarter;
+  for (std::size_t k = history_from_; k < history_.size(); ++k) {
+    const int at = history_[k].iterations - from;
+    if (4 * at < done) continue;
+    double& best = 2 * at < done ? quarter : half;
+    best = std::min(best, history_[k].error_rms);
+  }
+  return half > settings_.tolerance && half > 0.95 * quarter;
+}
+
 /// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,
 /// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
 /// by little; at most half of what was done, so that a wrong guess costs no more.
@@ -126,14 +145,17 @@ void Iteration::plan_sweeps(int epoch, int sweeps) {
 }
 
 /// After a check: momentum that has made it worse begins anew with less, which also ends what it swings by;
-/// what fails altogether gives way to plain sweeps.
+/// when little is left, `automatic` takes conjugate gradients. What fails altogether gives way to plain
+/// sweeps.
 void Iteration::choose_course() {
   const Check* const before = check_before();
   if (!before) return;
   const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
-    if (less > 0 && growth < hopeless_growth)
+    if (growth < hopeless_growth && less < least_momentum && settings_.method == SolverMethod::automatic)
+      begin_course(SolverMethod::nncg, 0);
+    else if (less > 0 && growth < hopeless_growth)
       begin_course(SolverMethod::momentum, less);
     else
       begin_course(SolverMethod::nlgs, 0);

@@ -406,7 +406,8 @@ bool Iteration::judge() {
       course_.method == SolverMethod::nlgs && total.residual2 > hopeless * hopeless * first_residual2_;
   if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
-  if (result_.converged || std::isnan(result_.error_rms) || last) return false;
+  result_.stagnated = !result_.converged && stagnant();
+  if (result_.converged || std::isnan(result_.error_rms) || last || result_.stagnated) return false;
   choose_course();
   return true;
 }

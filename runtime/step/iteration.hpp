@@ -26,7 +26,8 @@ struct IterationResult {
   int stiff_calls = 0;
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
-  bool diverged = false;  ///< the error grows without bound
+  bool diverged = false;   ///< the error grows without bound
+  bool stagnated = false;  ///< more sweeps would not have made the error smaller
 };
 
 /// The iteration part of a step as a program on the chunk graph: every epoch, each chunk does one thing, in
@@ -116,6 +117,7 @@ class Iteration {
   const Course& course(int epoch) const { return number(epoch) >= course_.from ? course_ : course_before_; }
   int number(int epoch) const { return before_segment_ + epoch - sweeps_from_; }
   double beta(int epoch) const;
+  bool stagnant() const;
   void first_course();
   void begin_course(SolverMethod method, double most);
   bool measured(int epoch);

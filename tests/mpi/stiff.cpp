@@ -36,7 +36,7 @@ position = 0
 name = "rest"
 end = { steps = 2 }
 [solver]
-max_iterations = 400
+max_iterations = 2000
 [decomposition]
 subdomains = 12
 [output]

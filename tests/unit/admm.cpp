@@ -157,15 +157,6 @@ TEST(Stiffness, IsThatOfTheForcesThatCarryTheLoad) {
 
 // ---- the error of all velocities
 
-/// |V - V_free|_M, the scale of what contacts do.
-double done(const BodyProblem& problem) {
-  const std::vector<Twist> V = velocities_of(problem, problem.impulse);
-  double sum = 0;
-  for (std::size_t b = 0; b < V.size(); ++b)
-    sum += kinetic2(problem.bodies[b], V[b].u - problem.bodies[b].free.u, V[b].w - problem.bodies[b].free.w);
-  return std::sqrt(sum);
-}
-
 /// All of a long column sinks alike: of its contacts only the lowest shows it.
 TEST(VelocityError, SeesAColumnSinkThroughItsLowestContact) {
   for (const double mu : {0.35, 0.0})
@@ -190,14 +181,14 @@ TEST(VelocityError, IsSmallWhereTheLawHolds) {
 }
 
 /// Two grains sink at 1 m/s under one that follows at 1/2 m/s and a hundred times their mass: stopped, they
-/// stop it too, though its contact is open.
+/// stop it too, though its contact is open. So far contacts changed the first two by 1 m/s each.
 TEST(VelocityError, CountsWhatAnOpenContactMeetsOnTheWay) {
   BodyProblem column = column_problem(3, 0, 100);
   column.bodies[0].free.u[2] = column.bodies[1].free.u[2] = -2;
   column.bodies[2].free.u[2] = -0.5;
   column.impulse[0] = Vec3(0, 0, 2);
   column.impulse[1] = Vec3(0, 0, 1);
-  EXPECT_NEAR(velocity_error(column, 1e-3).relative, std::sqrt(2 + 100 * 0.25) / done(column), 0.2);
+  EXPECT_NEAR(velocity_error(column, 1e-3).relative, (1 + 1 + 100 * 0.5) / (1 + 1), 1);
 }
 
 TEST(VelocityError, ScalesWithTheUnits) {
@@ -262,7 +253,7 @@ PlateOutcome plate_on_block(SolverMethod method, double plate, int subdomains = 
   stage.end.steps = 1;
   setup.stages = {stage};
   setup.solver.method = method;
-  setup.solver.max_iterations = 400;
+  setup.solver.max_iterations = 2000;
   setup.solver.balance_tolerance = 0.01;
   setup.decomposition.subdomains = subdomains;
   setup.decomposition.coupling = coupling;

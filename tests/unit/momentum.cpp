@@ -164,9 +164,8 @@ TEST(Methods, ReachTheToleranceWithFrictionOnSubdomains) {
 
 // The choice is made when the step begins; then it is the method itself.
 TEST(Methods, AutoTakesMomentum) {
-  for (const double tolerance : {1e-4, 1e-6})
-    EXPECT_EQ(solve(SolverMethod::automatic, 0.3, tolerance).digest,
-              solve(SolverMethod::momentum, 0.3, tolerance).digest);
+  EXPECT_EQ(solve(SolverMethod::automatic, 0.3, 1e-4).digest,
+            solve(SolverMethod::momentum, 0.3, 1e-4).digest);
 }
 
 TEST(Methods, GiveTheSameBitsOnAnyNumberOfThreads) {
