@@ -51,9 +51,8 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
         if (rank == 0) continue;
         const Colours above = colours(parent(rank), ranks, publish, glue);
         EXPECT_LE(above.down, own.down) << rank << " of " << ranks;
-        if (relays(rank, ranks)) {
-          EXPECT_LE(own.up, parent(rank) == 0 ? above.down : above.up);
-        }
+        if (!relays(rank, ranks)) continue;
+        EXPECT_LE(own.up, parent(rank) == 0 ? above.down : above.up) << rank << " of " << ranks;
       }
     }
 }
