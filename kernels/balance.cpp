@@ -29,6 +29,7 @@ struct Wishes {
   std::vector<ContactEquation> open;
   std::vector<double> gap;  ///< of those: v_n, > 0 [m/s]
   double drive = 0;         ///< fastest drive among those that carry [m/s]
+  double fastest = 0;       ///< drive, gap to close or rebound [m/s]
   double pressed = 0;       ///< sum of the impulses at walls [N s]
 };
 
@@ -41,6 +42,7 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
     const Vec3 r = problem.impulse[k], v = constrained(c, relative_velocity(c, V) + c.offset);
     if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
       wishes.pressed += std::abs(c.normal.dot(r));
+    wishes.fastest = std::max(wishes.fastest, c.offset.norm());
     const double m = effective_mass(problem, c);
     const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
     const Vec3 carried = project_on_cone(c, r - m * shifted);
@@ -100,17 +102,23 @@ double momentum(const BodyParts& parts, const PartField& V, bool gained) {
   })[0];
 }
 
-/// What the motion is to make small: |d|_M^2 + sum rho |H^T d - change|^2 [J].
-double cost(const BodyParts& parts, const PartField& motion, std::span<const Wishes> wishes, double kappa) {
-  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+/// Of the motion: |d|_M^2 + sum rho |H^T d - change|^2, which it is to make small [J]; and the wishes that it
+/// does not grant, sum |H^T d - change|/W_nn [N s].
+struct Fit {
+  double cost, missed;
+};
+Fit fit_of(const BodyParts& parts, const PartField& motion, std::span<const Wishes> wishes, double kappa) {
+  const std::vector<double> sums = parts.total(2, [&](std::size_t p, std::span<double> row) {
     for (std::size_t b = 0; b < motion[p].size(); ++b)
       if (parts[p].counted(b)) row[0] += kinetic2(parts[p].bodies[b], motion[p][b].u, motion[p][b].w);
     for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
       const ContactEquation& c = parts[p].contacts[k];
       const Vec3 missed = constrained(c, relative_velocity(c, motion[p])) - wishes[p].change[k];
       row[0] += kappa * effective_mass(parts[p], c) * missed.squaredNorm();
+      row[1] += effective_mass(parts[p], c) * missed.norm();
     }
-  })[0];
+  });
+  return {sums[0], sums[1]};
 }
 
 }  // namespace
@@ -122,20 +130,29 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   std::vector<Wishes> wishes(parts.size());
   parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p]); });
 
-  enum { contacts, mass, pressed, drive, width };
+  enum { contacts, mass, pressed, incoming, drive, fastest, width };
   const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
     row[contacts] = static_cast<double>(wishes[p].change.size());
-    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
-      if (parts[p].counted(b)) row[mass] += parts[p].bodies[b].mass;
+    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
+      if (!parts[p].counted(b)) continue;
+      const BodyUnknown& body = parts[p].bodies[b];
+      row[mass] += body.mass;
+      row[incoming] += kinetic2(body, body.free.u, body.free.w);
+    }
     row[pressed] = wishes[p].pressed;
     row[drive] = wishes[p].drive;
+    row[fastest] = wishes[p].fastest;
   });
   std::array<double, width> all{};
   for (std::size_t k = 0; k < rows.size(); ++k)
-    all[k % width] = k % width == drive ? std::max(all[drive], rows[k]) : all[k % width] + rows[k];
+    all[k % width] = k % width >= drive ? std::max(all[k % width], rows[k]) : all[k % width] + rows[k];
   if (all[contacts] == 0) return {};
-  const double scale =
-      std::max(momentum(parts, V, true), all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed]);
+  // By Cauchy and Schwarz: the most momentum in so much energy.
+  const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
+  // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
+  const double sound = most(all[incoming]) + all[mass] * all[fastest];
+  const double scale = std::max(std::min(momentum(parts, V, true), sound),
+                                all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed]);
 
   VelocityError error;
   // Two motions to begin from: none; and the stop of everything, which is the answer of a sample at rest.
@@ -143,9 +160,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   parts.each([&](std::size_t p) {
     for (Twist& v : stop[p]) v = {-v.u, -v.w};
   });
-  double left = 0, found = 0;
-  // By Cauchy and Schwarz: the most momentum in so much energy.
-  const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
+  double left = 0, found = 0, missed = 0;
   for (int round = 0; round < max_rounds; ++round) {
     std::vector<std::vector<double>> rho(parts.size());
     PartField force = parts.field();
@@ -160,7 +175,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     parts.each([&](std::size_t p) {
       for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
     });
-    if (cost(parts, stop, wishes, kappa) < cost(parts, motion, wishes, kappa)) motion = stop;
+    if (fit_of(parts, stop, wishes, kappa).cost < fit_of(parts, motion, wishes, kappa).cost) motion = stop;
     BodySolver solver(parts, rho, 0);
     left = solver.begin(force, motion);
     found = momentum(parts, motion, false);
@@ -169,12 +184,13 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
       found = momentum(parts, motion, false);
       ++error.linear_iterations;
     }
+    missed = fit_of(parts, motion, wishes, kappa).missed;
     const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
       row[0] = close_open(problems[p], motion[p], wishes[p]);
     })[0];
     if (most(kappa * pushed2) <= linear_tolerance * std::max(found, enough * scale)) break;
   }
-  error.relative = (found + caution * most(left)) / scale;
+  error.relative = (found + missed + caution * most(left)) / scale;
   return error;
 }
 

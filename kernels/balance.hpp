@@ -55,12 +55,15 @@ struct VelocityError {
 /// since (r - r*).(y - v*) = -r.v* - r*.y <= 0. The smallest one is sought: min |d|_M^2 + sum rho |H^T d - (y
 /// - v)|^2 over the contacts that carry, along the normal where they slide, rho far above what the problem
 /// needs: a linear solve (body_solver.hpp), which sees through chains where sweeps do not. Open contacts that
-/// d would push in are added and it is solved again. What is heuristic: friction, that rho and the rounds are
-/// finite, and that the momentum of d, whose kinetic norm is bounded, is taken for that of the error.
+/// d would push in are added and it is solved again. Wishes that no motion
+/// grants, as of a grain between driven walls that close, count as they are. What is heuristic: friction,
+/// that rho and the rounds are finite, and that the momentum of d, whose kinetic norm is bounded, is taken
+/// for that of the error.
 ///
-/// The scale is sum m |V(r) - V_free|, what the contacts do; or the speed of driven walls times the whole
-/// mass, if that is more; where no wall is driven, at least a hundredth of the impulses between walls, as
-/// grains pressed at rest gain nothing. Takes about as long as a hundred sweeps.
+/// The scale is sum m |V(r) - V_free|, what the contacts do, as far as what comes in explains it; or the
+/// speed of driven walls times the whole mass, if that is more; where no wall is driven, at least a hundredth
+/// of the impulses between walls, as grains pressed at rest gain nothing. Takes about as long as a hundred
+/// sweeps.
 VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough);
 /// The whole problem in one part.
 VelocityError velocity_error(BodyProblem problem, double enough);

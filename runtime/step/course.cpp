@@ -205,7 +205,8 @@ bool Iteration::balanced() {
 }
 
 /// `automatic` asks for ADMM when sweeps, having had their chance, left the forces out of balance, and would
-/// take longer than ADMM to balance them. Whatever it leaves undone it is asked for again, ever later.
+/// take longer than ADMM to balance them, or have, where all velocities are looked at. Whatever it leaves
+/// undone it is asked for again, ever later.
 bool Iteration::ask_admm() {
   constexpr int chance = 50, calls = 3;
   if (settings_.method == SolverMethod::admm && result_.stiff_calls == 0) return true;
@@ -214,7 +215,9 @@ bool Iteration::ask_admm() {
   if (result_.stiff_calls == calls) return false;
   const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
   return since >= chance << (2 * result_.stiff_calls) &&
-         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff) && !balanced();
+         (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff ||
+          (since >= stiff && looks_at_all())) &&
+         !balanced();
 }
 
 /// With several ranks behind the sweep that hid the sums: what it did is dropped.
