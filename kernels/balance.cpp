@@ -1,6 +1,8 @@
 #include "kernels/balance.hpp"
 
 #include <array>
+#include <bit>
+#include <limits>
 #include <vector>
 
 #include "kernels/body_solver.hpp"
@@ -14,8 +16,10 @@ namespace {
 /// load excites an eigenvalue smaller by sin^2 a.
 constexpr double firmness = 1e4;
 /// Of the conjugate gradients' error over what they found.
-constexpr double linear_tolerance = 0.1;
-constexpr int max_linear = 100;
+constexpr double linear_tolerance = 0.25;
+constexpr int max_linear = 128;
+/// How far they have still to go shows in how they went.
+constexpr int few_linear = 16;
 /// Of open contacts that join those that carry.
 constexpr int max_rounds = 6;
 /// The gradients see a preconditioned residual, which is smaller than the error.
@@ -90,16 +94,27 @@ double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& w
   return pushed2;
 }
 
-/// Sum m |u| + (I/R^2) |w| of V, or of V - V_free [N s].
-double momentum(const BodyParts& parts, const PartField& V, bool gained) {
+/// Sum m |u| + (I/R^2) |w| of the motion [N s].
+double momentum(const BodyParts& parts, const PartField& motion) {
   return parts.total(1, [&](std::size_t p, std::span<double> row) {
-    for (std::size_t b = 0; b < V[p].size(); ++b) {
+    for (std::size_t b = 0; b < motion[p].size(); ++b) {
       if (!parts[p].counted(b)) continue;
       const BodyUnknown& body = parts[p].bodies[b];
-      const Twist from = gained ? body.free : Twist{};
-      row[0] += body.mass * (V[p][b].u - from.u).norm() + body.spin_mass * (V[p][b].w - from.w).norm();
+      row[0] += body.mass * motion[p][b].u.norm() + body.spin_mass * motion[p][b].w.norm();
     }
   })[0];
+}
+
+/// The same of their difference.
+double distance(const BodyParts& parts, const PartField& motion, const PartField& from) {
+  PartField difference = motion;
+  parts.each([&](std::size_t p) {
+    for (std::size_t b = 0; b < motion[p].size(); ++b) {
+      difference[p][b].u -= from[p][b].u;
+      difference[p][b].w -= from[p][b].w;
+    }
+  });
+  return momentum(parts, difference);
 }
 
 /// Of the motion: |d|_M^2 + sum rho |H^T d - change|^2, which it is to make small [J]; and the wishes that it
@@ -147,11 +162,15 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   for (std::size_t k = 0; k < rows.size(); ++k)
     all[k % width] = k % width >= drive ? std::max(all[k % width], rows[k]) : all[k % width] + rows[k];
   if (all[contacts] == 0) return {};
+  PartField free = parts.field();
+  parts.each([&](std::size_t p) {
+    for (std::size_t b = 0; b < free[p].size(); ++b) free[p][b] = parts[p].bodies[b].free;
+  });
   // By Cauchy and Schwarz: the most momentum in so much energy.
   const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
   // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
   const double sound = most(all[incoming]) + all[mass] * all[fastest];
-  const double scale = std::max(std::min(momentum(parts, V, true), sound),
+  const double scale = std::max(std::min(distance(parts, V, free), sound),
                                 all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed]);
 
   VelocityError error;
@@ -161,6 +180,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     for (Twist& v : stop[p]) v = {-v.u, -v.w};
   });
   double left = 0, found = 0, missed = 0;
+  const auto small = [&](double part) { return part <= linear_tolerance * std::max(found, enough * scale); };
   for (int round = 0; round < max_rounds; ++round) {
     std::vector<std::vector<double>> rho(parts.size());
     PartField force = parts.field();
@@ -175,22 +195,32 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     parts.each([&](std::size_t p) {
       for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
     });
+    const PartField began = motion;
     if (fit_of(parts, stop, wishes, kappa).cost < fit_of(parts, motion, wishes, kappa).cost) motion = stop;
     BodySolver solver(parts, rho, 0);
-    left = solver.begin(force, motion);
-    found = momentum(parts, motion, false);
-    for (int k = 0; k < max_linear && most(left) > linear_tolerance * std::max(found, enough * scale); ++k) {
-      left = solver.iterate(motion);
-      found = momentum(parts, motion, false);
+    PartField then = motion;
+    left = caution * most(solver.begin(force, motion));
+    found = momentum(parts, motion);
+    // The bound gives light bodies the mass of all: beside a heavy one what is left shows in how far the last
+    // half of the iterations went, and the quarter before it.
+    double before = std::numeric_limits<double>::infinity();
+    for (int k = 1; k <= max_linear && !small(left); ++k) {
+      const double bound = caution * most(solver.iterate(motion));
       ++error.linear_iterations;
+      if (!std::has_single_bit(static_cast<unsigned>(k)) && !small(bound)) continue;
+      found = momentum(parts, motion);
+      const double change = distance(parts, motion, then);
+      left = k < few_linear ? bound : std::min(bound, left_over(change, before));
+      before = change;
+      then = motion;
     }
     missed = fit_of(parts, motion, wishes, kappa).missed;
     const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
       row[0] = close_open(problems[p], motion[p], wishes[p]);
     })[0];
-    if (most(kappa * pushed2) <= linear_tolerance * std::max(found, enough * scale)) break;
+    if (small(most(kappa * pushed2)) || (round > 0 && small(distance(parts, motion, began)))) break;
   }
-  error.relative = (found + missed + caution * most(left)) / scale;
+  error.relative = (found + missed + left) / scale;
   return error;
 }
 

@@ -45,7 +45,9 @@ void Iteration::first_course() {
                  : SolverMethod::momentum;
   }
   if (method == SolverMethod::admm) method = SolverMethod::nlgs;
-  begin_course(method, most_momentum(parameters_.friction, settings_.tolerance));
+  begin_course(method, method == SolverMethod::momentum
+                           ? most_momentum(parameters_.friction, settings_.tolerance)
+                           : 0);
   result_.iterations = 0;
 }
 
@@ -144,12 +146,16 @@ void Iteration::plan_sweeps(int epoch, int sweeps) {
   segment_ = epoch + 1 + sweeps;
 }
 
-/// After a check: momentum that has made it worse begins anew with less, which also ends what it swings by;
-/// when little is left, `automatic` takes conjugate gradients. What fails altogether gives way to plain
-/// sweeps.
+/// After a check: momentum that ADMM has interrupted is taken up again; what has made it worse begins anew
+/// with less, which also ends what it swings by; when little is left, `automatic` takes conjugate gradients.
+/// What fails altogether gives way to plain sweeps.
 void Iteration::choose_course() {
   const Check* const before = check_before();
   if (!before) return;
+  if (course_.method == SolverMethod::nlgs && course_.most > 0) {
+    begin_course(SolverMethod::momentum, course_.most);
+    return;
+  }
   const double growth = history_.back().error_rms / before->error_rms;
   if (course_.method == SolverMethod::momentum && growth > 1) {
     const double less = 1 - 2 * (1 - course_.most);
@@ -230,8 +236,9 @@ void Iteration::call_admm(int epoch) {
   result_.stiff = admm_.improve(settings_.balance_tolerance, result_.stiff_calls++);
   history_from_ = history_.size();
   looked_ = {};
-  // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone.
-  begin_course(course_.method, course_.most);
+  // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone. Plain ones
+  // first: ADMM leaves light bodies behind, and momentum throws them at the heavy ones that it has settled.
+  begin_course(course_.method == SolverMethod::momentum ? SolverMethod::nlgs : course_.method, course_.most);
   course_.from = result_.iterations;
   before_segment_ = sweeps_;
   segment_ = epoch + 1;

@@ -110,7 +110,7 @@ class Iteration {
   struct Course {
     SolverMethod method = SolverMethod::nlgs;  ///< never automatic
     int from = 0;
-    double most = 0;  ///< of beta, with momentum
+    double most = 0;  ///< of beta, with momentum, or when it is taken up again
   };
   /// Of the sweep in this epoch. A course that a check calls for begins behind the sweep that may have been
   /// made since.

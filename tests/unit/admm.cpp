@@ -180,6 +180,29 @@ TEST(VelocityError, IsSmallWhereTheLawHolds) {
   }
 }
 
+/// What light grains lack counts with their mass, however heavy the body at rest beside them.
+TEST(VelocityError, OfLightGrainsCountsWithTheirMass) {
+  constexpr int grains = 1000;
+  constexpr double heavy = 1e7;
+  BodyProblem problem = column_problem(grains, 0.35);
+  double due = 0;
+  for (std::size_t k = problem.contacts.size(); k-- > 0;) {
+    due -= problem.bodies[k].mass * problem.bodies[k].free.u[2];
+    problem.impulse[k] = Vec3(0, 0, 0.9 * due);
+  }
+  BodyUnknown rock = problem.bodies[0];
+  rock.mass *= heavy;
+  rock.spin_mass *= heavy;
+  ContactEquation floor = problem.contacts[0];
+  floor.first = static_cast<std::int32_t>(problem.bodies.size());
+  problem.bodies.push_back(rock);
+  problem.grains = problem.bodies.size();
+  problem.contacts.push_back(floor);
+  problem.impulse.push_back(-rock.mass * rock.free.u);
+  const double relative = 0.1 * grains / heavy;
+  EXPECT_NEAR(velocity_error(problem, 0.1 * relative).relative, relative, 0.5 * relative);
+}
+
 /// Two grains sink at 1 m/s under one that follows at 1/2 m/s and a hundred times their mass: stopped, they
 /// stop it too, though its contact is open. So far contacts changed the first two by 1 m/s each.
 TEST(VelocityError, CountsWhatAnOpenContactMeetsOnTheWay) {
