@@ -61,9 +61,10 @@ double Iteration::beta(int epoch) const {
   return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
 }
 
-/// Of the normal impulses. As long as beta is 0 sweeps are plain: they solve exactly what few sweeps solve.
+/// Of the normal impulses, with momentum. As long as beta is 0 sweeps are plain: they solve exactly what few
+/// sweeps solve.
 double Iteration::omega(int epoch) const {
-  return course(epoch).method == SolverMethod::momentum && beta(epoch) > 0 ? over_relaxation : 1;
+  return beta(epoch) > 0 ? over_relaxation : 1;
 }
 
 void Iteration::begin_course(SolverMethod method, double most) {
@@ -81,13 +82,16 @@ std::span<const Slot> Iteration::owned(std::size_t c) const {
   return std::span(state_.chunks.owned).subspan(from, to - from);
 }
 
-/// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
-/// write, and its wall copy.
+/// The start of a sweep moves on along the trail: the chunk's impulses, with momentum within the sweep
+/// itself, the bodies that it is the first to write, and its wall copy.
 void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Chunks& chunks = state_.chunks;
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
-  carry_impulses(kernels_, carry, beta, range, state_.contacts, trail_);
+  if (carry == Carry::conjugate)
+    carry_impulses(beta, range, state_.contacts, trail_);
+  else if (number(epoch) == course(epoch).from)
+    begin_steps(range, trail_.steps);
   const bool at_wall = chunks.wall[c] >= 0;
   if (epoch == sweeps_from_) {
     fasten(owned(c), state_.bodies.velocity, trail_);

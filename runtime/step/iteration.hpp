@@ -103,7 +103,7 @@ class Iteration {
   template <bool Friction>
   void chunk(std::size_t c, int epoch);
   template <bool Friction>
-  void sweep(std::size_t c, ContactRange range, double mu, double omega);
+  void sweep(std::size_t c, ContactRange range, double mu, int epoch);
   std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
   /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
