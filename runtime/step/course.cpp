@@ -31,6 +31,11 @@ constexpr int plain_sweeps = 3;
 /// What momentum makes worse shows within as many sweeps.
 constexpr int trusted_sweeps = 25;
 
+/// Plain sweeps that are many for a problem of so many contacts.
+double stiff_for(std::int64_t contacts) {
+  return 0.1 * static_cast<double>(contacts);
+}
+
 Carry carry_of(SolverMethod method) {
   return method == SolverMethod::nncg ? Carry::conjugate : Carry::momentum;
 }
@@ -182,9 +187,23 @@ void Iteration::choose_course() {
   }
 }
 
+std::vector<bool> Iteration::carrying_walls() const {
+  std::vector<bool> carrying;
+  for (const Vec3& impulse : impulses_.back()) carrying.push_back(impulse != Vec3::Zero());
+  return carrying;
+}
+
 /// About the sweeps of the present course that this step's problem takes. Collective.
 double Iteration::sweeps_needed() {
-  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
+  if (sweeps_needed_ < 0) {
+    // To find out takes as long as ten sweeps, and two messages for each layer of grains.
+    const std::int64_t then = stiffness_.contacts, now = result_.contacts;
+    const bool holds = alike_ && stiffness_.sweeps_needed >= 0 &&
+                       2 * stiffness_.sweeps_needed < stiff_for(now) && 20 * std::abs(now - then) <= then &&
+                       stiffness_.carrying == carrying_walls();
+    if (!holds) stiffness_ = {admm_.sweeps_needed(), now, carrying_walls()};
+    sweeps_needed_ = stiffness_.sweeps_needed;
+  }
   // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
   const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
                        : course_.method == SolverMethod::nncg   ? 40
@@ -199,7 +218,7 @@ bool Iteration::looks_at_all() {
   constexpr std::int64_t tiny = 64;
   if (result_.stiff_calls > 0) return true;
   if (result_.contacts <= tiny) return result_.contacts > 0;
-  return sweeps_needed() >= cost && 10 * sweeps_needed_ >= static_cast<double>(result_.contacts);
+  return sweeps_needed() >= cost && sweeps_needed_ >= stiff_for(result_.contacts);
 }
 
 /// Judges the forces that walls and heavy bodies get. By the drift of wall forces, which sweeps show; or by

@@ -3,7 +3,9 @@
 #include "runtime/step/task_kinds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "kernels/balance.hpp"
@@ -32,6 +34,15 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
+  stiffness_ = {};
+  std::array<double, 2> extremes = {std::numeric_limits<double>::infinity(), 0};
+  for (const Velocity& v : state_.bodies.velocity)
+    extremes = {std::min(extremes[0], v.inv_mass), std::max(extremes[1], v.inv_mass)};
+  const std::vector<double> everywhere = ranks_.gather_records(std::span<const double>(extremes));
+  for (std::size_t k = 0; k < everywhere.size(); k += 2)
+    extremes = {std::min(extremes[0], everywhere[k]), std::max(extremes[1], everywhere[k + 1])};
+  constexpr double much_heavier = 1000;
+  alike_ = extremes[1] < much_heavier * extremes[0];
   busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);
 }
 
