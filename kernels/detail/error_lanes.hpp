@@ -4,6 +4,7 @@
 /// stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever W is.
 
 #include "kernels/detail/advance_lanes.hpp"
+#include "kernels/detail/gap_lanes.hpp"
 #include "kernels/detail/sweep_lanes.hpp"
 
 namespace talus {
@@ -154,7 +155,8 @@ constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
                                           error_grains<Friction, W>,
                                           error_wall<Friction, W>,
                                           advance<W>,
-                                          advance_bodies<W>};
+                                          advance_bodies<W>,
+                                          find_gaps<W>};
 
 }  // namespace
 }  // namespace talus

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/narrow_phase.hpp"
 #include "kernels/release.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/tree.hpp"
@@ -251,7 +252,7 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
                        settings_.overlap_correction};
   const SlotRange range = share(state_.chunks.size(), lane);
   for (std::size_t c = range.begin; c < range.end; ++c)
-    narrow_chunk(in, state_.candidates, state_.chunks, c, state_.contacts);
+    narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels(), state_.contacts);
 }
 
 void StepGraph::plan_iteration() {
