@@ -23,7 +23,7 @@ std::size_t index(std::int32_t k) {
 /// beginning of the step, `v_n_free` the one at its end without contacts.
 bool constrain(const GapRule& in, double gap, double v_n, double v_n_free, double& bias) {
   bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
-  if (gap >= in.alert && gap >= -in.time_step * v_n_free) return false;
+  if (!may_touch(gap, v_n_free, in.time_step, in.alert)) return false;
   // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
   // between both would gain energy.
   if (in.restitution > 0 && std::abs(v_n) > in.slow) {

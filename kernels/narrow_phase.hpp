@@ -21,6 +21,12 @@ struct NarrowPhase {
   double overlap_correction = 0;       ///< in [0, 1]
 };
 
+/// Whether a pair may be a contact of this step: nearer than the alert distance, or to be closed within the
+/// step. `v_n` [m/s] is that at its end without contacts.
+inline bool may_touch(double gap, double v_n, double time_step, double alert) {
+  return !(gap >= alert && gap >= -time_step * v_n);
+}
+
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.
 /// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
 /// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
