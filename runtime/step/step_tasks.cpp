@@ -153,11 +153,13 @@ void StepGraph::make_cells() {
   Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
-  // Grains that fly between others use up any skin in a few steps: theirs is as wide as their way.
-  constexpr double steps_ahead = 4;
-  for (std::size_t s = 0; s < bodies.size(); ++s)
-    reach[s] = bodies.radius[s] + half_skin +
-               contact_margin(steps_ahead * speed(bodies.velocity[s]), h, parameters_.alert);
+  // Grains that fly between others use up half a skin at once: they get one more, or their way of three
+  // steps.
+  for (std::size_t s = 0; s < bodies.size(); ++s) {
+    const double v = speed(bodies.velocity[s]);
+    reach[s] = bodies.radius[s] + half_skin + contact_margin(v, h, parameters_.alert) +
+               std::min(3 * h * v, parameters_.skin);
+  }
   state_.wall_then.clear();
   wall_margin_.clear();
   for (const Wall& wall : state_.walls) {
