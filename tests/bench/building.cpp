@@ -3,8 +3,8 @@
 ///
 ///   bench_building SCENE.toml [STEPS, default 200] [EVERY, default 50]
 ///
-/// One thread. Behind every step ten plain sweeps run on copies of its contacts, so that both are measured at the
-/// same time of a busy machine; each line is over EVERY steps: the median of the steps that kept their
+/// One thread. Behind every step ten plain sweeps run on copies of its contacts, so that both are measured at
+/// the same time of a busy machine; each line is over EVERY steps: the median of the steps that kept their
 /// candidates, of those that found them anew, and the mean of all by how many there were of each.
 
 #include <fmt/format.h>
@@ -67,25 +67,26 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "bench_building SCENE.toml [STEPS] [EVERY]\n");
     return 2;
   }
-  const int steps = argc > 2 ? std::atoi(argv[2]) : 200, every = argc > 3 ? std::max(1, std::atoi(argv[3])) : 50;
-  const io::Scene scene = io::load_scene(argv[1]);
-  const graph::Communicator alone;
+  const int steps = argc > 2 ? std::atoi(argv[2]) : 200,
+            every = argc > 3 ? std::max(1, std::atoi(argv[3])) : 50;
+  io::Scene scene = io::load_scene(argv[1]);
+  Sample sample = build_sample(scene);
+  io::place_walls(scene, sample);
   graph::Executor executor({.threads = 1});
-  Simulation simulation(scene.setup, deal_out(build_sample(scene, alone), scene.setup.decomposition, alone), executor,
-                        alone);
-  fmt::print("{:>12} {:>6} {:>10} {:>14} {:>14} {:>12}\n", "stage", "step", "anew", "kept, sweeps", "anew, sweeps",
-             "mean, sweeps");
+  Simulation simulation(scene.setup, deal_out(sample, scene.setup.decomposition, graph::Communicator()),
+                        executor);
+  fmt::print("{:>12} {:>6} {:>10} {:>14} {:>14} {:>12}\n", "stage", "step", "anew", "kept, sweeps",
+             "anew, sweeps", "mean, sweeps");
   std::vector<double> kept, anew;
   for (int k = 1; k <= steps && !simulation.finished(); ++k) {
-    const bool friction = !simulation.state().contacts.rx.empty() || simulation.stage().law.mu_grains > 0;
     simulation.step();
     const StepState& state = simulation.state();
-    const double sweep = friction ? plain_sweep<true>(state) : plain_sweep<false>(state);
+    const double sweep = !state.contacts.rx.empty() ? plain_sweep<true>(state) : plain_sweep<false>(state);
     (simulation.sums().broad_phase ? anew : kept).push_back(simulation.sums().times.detection / sweep);
     if (k % every == 0) {
       const auto share = static_cast<double>(anew.size()) / static_cast<double>(anew.size() + kept.size());
-      fmt::print("{:>12} {:>6} {:>9.0f}% {:>14.1f} {:>14.1f} {:>12.1f}\n", simulation.stage().name, k, 100 * share,
-                 median(kept), median(anew), share * median(anew) + (1 - share) * median(kept));
+      fmt::print("{:>12} {:>6} {:>9.0f}% {:>14.1f} {:>14.1f} {:>12.1f}\n", simulation.stage().name, k,
+                 100 * share, median(kept), median(anew), share * median(anew) + (1 - share) * median(kept));
       kept.clear();
       anew.clear();
     }
