@@ -12,7 +12,8 @@ namespace talus {
 
 /// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
 /// chunks.begin[c] + count[c]), in groups of 16 and, towards the end, fewer. No grain stands twice in a
-/// group, so that a group can be swept at once.
+/// group, so that a group can be swept at once. Behind them, between grains, stand the candidates that are
+/// no contacts, so that the next step finds all of them where they were (kernels/narrow_phase.hpp).
 struct Contacts {
   std::vector<double> nx, ny, nz;   ///< normal, unit, from the second body (or the wall) to the first
   std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
@@ -26,31 +27,8 @@ struct Contacts {
   std::vector<std::uint8_t> group;   ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
 };
 
-/// Room for the contacts of `chunks`; `friction` decides which impulses exist.
+/// Room for the contacts of `chunks`, of which there are none yet; `friction` decides which impulses exist.
 void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
-
-/// What the narrow phase looks at; x at the middle of the step (theta = 1/2), velocities those of its
-/// beginning.
-struct NarrowPhase {
-  std::span<const Vec3> x;             ///< [m]
-  std::span<const double> radius;      ///< [m]
-  std::span<const Velocity> velocity;  ///< V-
-  std::span<const Wall> walls;         ///< points at the middle of the step
-  double time_step;                    ///< h [s]
-  double alert;                        ///< [m]
-  double restitution;                  ///< e in [0, 1]
-  Vec3 gravity;                        ///< [m/s^2]
-  double overlap_correction = 0;       ///< in [0, 1]
-};
-
-/// Finds the contacts of one chunk and starts them from the candidates' impulses.
-/// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
-/// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
-/// approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once g <= 0, and no constraint before.
-/// A resting overlap is undone at the rate of b = overlap_correction x g/h. Coincident centres get the normal
-/// +z.
-void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
-                  std::size_t chunk, Contacts& contacts);
 
 /// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.
 void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,

@@ -101,15 +101,4 @@ double contact_margin(double speed, double time_step, double alert) {
   return std::max(0.5 * alert, time_step * speed);
 }
 
-bool left_margin(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
-                 std::span<const double> radius, std::span<const Vec3> x_then,
-                 std::span<const double> reach_then, double time_step, double alert) {
-  for (std::size_t s = range.begin; s < range.end; ++s) {
-    const double need = radius[s] + contact_margin(std::sqrt(square(velocity[s].u)), time_step, alert) +
-                        (x[s] - x_then[s]).norm();
-    if (!(need <= reach_then[s])) return true;
-  }
-  return false;
-}
-
 }  // namespace talus

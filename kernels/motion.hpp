@@ -56,10 +56,4 @@ void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::sp
 /// or closes within a step at its speed, and either grain may then have used up half the skin.
 double contact_margin(double speed, double time_step, double alert);
 
-/// True when a grain of the range, now at x, has used up its margin of the last broad phase (x_then,
-/// reach_then).
-bool left_margin(SlotRange range, std::span<const Vec3> x, std::span<const Velocity> velocity,
-                 std::span<const double> radius, std::span<const Vec3> x_then,
-                 std::span<const double> reach_then, double time_step, double alert);
-
 }  // namespace talus

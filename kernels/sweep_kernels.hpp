@@ -39,6 +39,8 @@ class SweepKernels {
 
   /// What was chosen, never `automatic`.
   InstructionSet set() const { return set_; }
+  /// For the narrow phase; null: the scalar one.
+  const LaneKernels* lanes() const { return lanes_[1]; }
 
   template <bool Friction>
   void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) const;

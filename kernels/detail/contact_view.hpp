@@ -24,6 +24,27 @@ struct ImpulseView {
   double* n;          ///< without
 };
 
+/// Pairs of grains of one chunk, whose gaps are asked for.
+struct PairView {
+  const double* first;         ///< 8 per grain of the chunk: centre, radius, velocity, 0
+  const double* second;        ///< likewise -centre, 0, -velocity, radius: so a pair is the sum of two rows
+  const std::uint16_t* local;  ///< 2 per candidate: its grains in the chunk
+  const std::int32_t* candidate;  ///< per pair
+  std::size_t count;              ///< of pairs
+};
+
+/// When a pair is a contact, and its bias: `NarrowPhase`.
+struct GapRule {
+  double time_step, alert, restitution, overlap_correction;
+  double slow;  ///< [m/s] no restitution up to here
+};
+
+/// What is found, per pair.
+struct GapTarget {
+  double *nx, *ny, *nz, *bias;
+  std::int64_t* contact;  ///< -1 for contacts, 0 for others
+};
+
 /// SweepMomentum, its steps in the layout of `ImpulseView`.
 struct MomentumView {
   float *x, *y, *z;  ///< with friction
@@ -39,7 +60,8 @@ struct ErrorTotals {
 };
 
 /// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
-/// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be null.
+/// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be
+/// null.
 struct LaneKernels {
   void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu);
   void (*momentum_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu,
@@ -57,6 +79,8 @@ struct LaneKernels {
   /// Momentum of whole records at `slots`.
   void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
                          double beta);
+  /// Narrow phase: true when a pair came half the smaller radius nearer on its way here, or further.
+  bool (*find_gaps)(const PairView&, const GapRule&, const GapTarget&);
 };
 
 /// Kernels of one instruction set, with and without friction.

@@ -4,6 +4,7 @@
 /// stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever W is.
 
 #include "kernels/detail/advance_lanes.hpp"
+#include "kernels/detail/gap_lanes.hpp"
 #include "kernels/detail/sweep_lanes.hpp"
 
 namespace talus {
@@ -147,10 +148,16 @@ ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, co
 }
 
 template <bool Friction, int W>
-constexpr LaneKernels kernels_of_lanes = {
-    sweep_grains<Friction, W>,  momentum_grains<Friction, W>,   sweep_wall<Friction, W>,
-    momentum_wall<Friction, W>, accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,
-    error_grains<Friction, W>,  error_wall<Friction, W>,        advance_bodies<W>};
+constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
+                                          momentum_grains<Friction, W>,
+                                          sweep_wall<Friction, W>,
+                                          momentum_wall<Friction, W>,
+                                          accumulate_grains<Friction, W>,
+                                          accumulate_wall<Friction, W>,
+                                          error_grains<Friction, W>,
+                                          error_wall<Friction, W>,
+                                          advance_bodies<W>,
+                                          find_gaps<W>};
 
 }  // namespace
 }  // namespace talus

@@ -74,6 +74,7 @@ class Iteration {
   void plan();
 
   const Gluing& gluing() const { return gluing_; }
+  const SweepKernels& kernels() const { return kernels_; }
   const IterationResult& result() const { return result_; }
   /// Contacts of the fullest subdomain over the mean one, less 1, at the last check.
   double imbalance() const { return imbalance_; }

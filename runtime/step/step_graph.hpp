@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/leavers.hpp"
 #include "runtime/graph/epoch_loop.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/graph/graph.hpp"
@@ -42,9 +43,9 @@ struct StepSums {
 /// A lane is a fixed share of the bodies of a subdomain, or of this rank's cells or chunks; the number of
 /// lanes of a subdomain depends on the number of all bodies and subdomains only, so that sums are the same
 /// for any number of threads and ranks. cells, pairs and chunks return at once while every grain and wall is
-/// within its margin of the last broad phase; otherwise, with several subdomains, cells collects the bodies
-/// around them and chunks deals them out anew. Each task declares what it reads and writes; the order above
-/// follows from that.
+/// within its margin of the last broad phase, or the few that are not meet none but their candidates;
+/// otherwise, with several subdomains, cells collects the bodies around them and chunks deals them out anew.
+/// Each task declares what it reads and writes; the order above follows from that.
 class StepGraph {
  public:
   /// Keeps references. `bodies`: of all ranks.
@@ -71,6 +72,7 @@ class StepGraph {
   void build();
   void predict_lane(std::uint32_t lane);
   bool needs_broad_phase();
+  bool candidates_hold() const;
   void make_cells();
   void find_lane_pairs(std::uint32_t lane);
   void make_chunks();
@@ -113,8 +115,8 @@ class StepGraph {
   std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
   double imbalance_then_ = 0;                 ///< what it was made against
   CellGrid cells_;
-  std::vector<double> wall_margin_;  ///< at the last broad phase [m]
-  std::vector<char> left_;           ///< per lane: a grain left its margin
+  std::vector<double> wall_margin_;        ///< at the last broad phase [m]
+  std::vector<std::vector<Leaver>> left_;  ///< per lane: grains that have used up their margins
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
   std::vector<ContactSums> contact_sums_;  ///< per chunk

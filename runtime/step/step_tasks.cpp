@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/narrow_phase.hpp"
 #include "kernels/release.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/tree.hpp"
@@ -92,9 +93,9 @@ void StepGraph::predict_lane(std::uint32_t lane) {
   predict(range, bodies.x, bodies.velocity, h);
   free_velocities(range, bodies.velocity, h, parameters_.gravity, state_.free);
   if (!bodies.orientation.empty()) turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
-  left_[lane] =
-      state_.candidates_valid && left_margin(range, bodies.x, bodies.velocity, bodies.radius, state_.x_then,
-                                             state_.reach_then, h, parameters_.alert);
+  left_[lane].clear();
+  if (state_.candidates_valid)
+    find_leavers(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[lane]);
 }
 
 /// How near a grain can come to a wall for what the grain's own margin does not count: the wall's way, and
@@ -114,12 +115,34 @@ bool StepGraph::walls_left_margin() const {
 }
 
 bool StepGraph::needs_broad_phase() {
-  double needed[1] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ||
-                              std::any_of(left_.begin(), left_.end(), [](char left) { return left != 0; })
-                          ? 1.0
-                          : 0.0};
+  const bool left = std::any_of(left_.begin(), left_.end(), [](const auto& lane) { return !lane.empty(); });
+  double needed[2] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ? 1.0 : 0.0,
+                      left ? 1.0 : 0.0};
   ranks_.max(needed);
-  return needed[0] > 0;
+  return needed[0] > 0 || (needed[1] > 0 && !candidates_hold());
+}
+
+/// Whether the grains that left their margins, few of them, meet none but their candidates. Collective; the
+/// same for any ranks, since the grains and their candidates are put together from all of them.
+bool StepGraph::candidates_hold() const {
+  constexpr std::size_t few = 32;  // comparing them with all grains costs less than a tenth of a broad phase
+  std::vector<Leaver> leavers;
+  for (const auto& lane : left_) leavers.insert(leavers.end(), lane.begin(), lane.end());
+  leavers = ranks_.gather_records(std::span<const Leaver>(leavers));
+  std::sort(leavers.begin(), leavers.end());  // copies side by side, whichever rank comes first
+  leavers.erase(std::unique(leavers.begin(), leavers.end(),
+                            [](const Leaver& a, const Leaver& b) { return a.id == b.id; }),
+                leavers.end());
+  if (leavers.size() > few) return false;
+  for (const Leaver& leaver : leavers)
+    if (!std::isfinite(leaver.need + leaver.x[0] + leaver.x[1] + leaver.x[2])) return false;  // a runaway
+  std::vector<Encounter> needed, known;
+  compare_leavers(leavers, state_.bodies, state_.candidates,
+                  {state_.x_then, state_.reach_then, parameters_.time_step, parameters_.alert,
+                   parameters_.gravity, state_.walls},
+                  needed, known);
+  return all_known(ranks_.gather_records(std::span<const Encounter>(needed)),
+                   ranks_.gather_records(std::span<const Encounter>(known)));
 }
 
 void StepGraph::make_cells() {
@@ -130,8 +153,13 @@ void StepGraph::make_cells() {
   Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
-  for (std::size_t s = 0; s < bodies.size(); ++s)
-    reach[s] = bodies.radius[s] + half_skin + contact_margin(speed(bodies.velocity[s]), h, parameters_.alert);
+  // Grains that fly between others use up half a skin at once: they get one more, or their way of three
+  // steps.
+  for (std::size_t s = 0; s < bodies.size(); ++s) {
+    const double v = speed(bodies.velocity[s]);
+    reach[s] = bodies.radius[s] + half_skin + contact_margin(v, h, parameters_.alert) +
+               std::min(3 * h * v, parameters_.skin);
+  }
   state_.wall_then.clear();
   wall_margin_.clear();
   for (const Wall& wall : state_.walls) {
@@ -251,7 +279,7 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
                        settings_.overlap_correction};
   const SlotRange range = share(state_.chunks.size(), lane);
   for (std::size_t c = range.begin; c < range.end; ++c)
-    narrow_chunk(in, state_.candidates, state_.chunks, c, state_.contacts);
+    narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels(), state_.contacts);
 }
 
 void StepGraph::plan_iteration() {

@@ -14,7 +14,7 @@
 #include <functional>
 
 #include "kernels/broad_phase.hpp"
-#include "kernels/sweep_kernels.hpp"
+#include "kernels/narrow_phase.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "tests/bench/packing.hpp"
 
@@ -73,8 +73,9 @@ Sample make_sample(const bench::Packing& packing, std::size_t grains, bool frict
   sample.chunks = cut_chunks(candidates, bodies.size(), chunk_target(candidates.size()));
   allocate(sample.contacts, candidates, sample.chunks, friction);
   const NarrowPhase in{bodies.x, bodies.radius, bodies.velocity, {}, 0.01, 0.02, 0, Vec3::Zero()};
+  const SweepKernels kernels(best_instruction_set());
   for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
-    narrow_chunk(in, candidates, sample.chunks, c, sample.contacts);
+    narrow_chunk(in, candidates, sample.chunks, c, kernels, sample.contacts);
     const std::size_t begin = at(sample.chunks.begin[c]), count = at(sample.contacts.count[c]);
     sample.count += count;
     for (std::size_t k = 0, g = begin; k < count; k += sample.contacts.group[g++])
@@ -247,14 +248,16 @@ void report(const bench::Packing& packing, std::size_t grains, int repeats) {
     row("  V afresh from r", time_of(sample.count, repeats, [&] {
           over_chunks([&](ContactRange range) { kernels.accumulate_grains<Friction>(contacts, range, own); });
         }));
+    const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, {}, 0.01, 0.02, 0,
+                         Vec3::Zero()};
+    for (const bool anew : {false, true})
+      row(anew ? "  narrow phase, all groups anew" : "  narrow phase, groups kept",
+          time_of(sample.count, repeats, [&] {
+            if (anew) contacts.count.assign(contacts.count.size(), 0);
+            for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+              narrow_chunk(in, sample.candidates, sample.chunks, c, kernels, contacts);
+          }));
   }
-  const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, {}, 0.01, 0.02, 0,
-                       Vec3::Zero()};
-  Contacts found = sample.contacts;
-  row("narrow phase, groups", time_of(sample.count, repeats, [&] {
-        for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-          narrow_chunk(in, sample.candidates, sample.chunks, c, found);
-      }));
 }
 
 }  // namespace

@@ -56,7 +56,8 @@ struct Scene {
         sample.bodies.x,     sample.bodies.radius, sample.bodies.velocity, sample.walls, time_step, alert, 0,
         Vec3(0, 0, -gravity)};
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-      narrow_chunk(in, sample.candidates, sample.chunks, c, sample.contacts);
+      narrow_chunk(in, sample.candidates, sample.chunks, c, SweepKernels(best_instruction_set()),
+                   sample.contacts);
     if (closed) std::fill(sample.contacts.bias.begin(), sample.contacts.bias.end(), 0.0);
     free.u.resize(sample.bodies.size());
     free.w.resize(sample.bodies.size());

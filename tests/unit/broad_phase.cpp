@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/leavers.hpp"
 #include "kernels/motion.hpp"
 #include "tests/unit/dense_sample.hpp"
 
@@ -134,7 +135,7 @@ TEST(BroadPhase, NoPairMeansMoreThanCellsCanCount) {
 
 /// Grains that jostle at random: what the step does, in small. At each step every pair that the narrow phase
 /// would take for a contact must stand among the candidates.
-TEST(Candidates, HoldEveryContactUntilTheMarginIsUsedUp) {
+TEST(Candidates, HoldEveryContactUntilAGrainThatLeftItsMarginMeetsOneMore) {
   constexpr double h = 1e-2, alert = 0.03, skin = 0.12;
   for (std::uint64_t seed : {1, 2}) {
     Random random(seed);
@@ -142,24 +143,49 @@ TEST(Candidates, HoldEveryContactUntilTheMarginIsUsedUp) {
     const std::size_t n = bodies.size();
     std::vector<Vec3> x_then;
     std::vector<double> reach_then(n);
-    std::vector<GrainPair> candidates;
+    Candidates candidates;
+    const std::vector<Wall> walls = test::box_of_walls(-1, 6);
     const auto velocity = [&](std::size_t s) { return Eigen::Map<Vec3>(bodies.velocity[s].u); };
     const auto move = [&] {
       for (std::size_t s = 0; s < n; ++s) bodies.x[s] += 0.5 * h * velocity(s);
     };
-    int searches = 0, steps = 400;
+    int searches = 0, held = 0, steps = 400;
     for (int step = 0; step < steps; ++step) {
       for (std::size_t s = 0; s < n; ++s) velocity(s) = 0.9 * velocity(s) + uniform_vector(random, -0.1, 0.1);
       if (step % 90 == 89) velocity(static_cast<std::size_t>(step) % n) *= 40;  // one shoots off
       move();
-      if (step == 0 ||
-          left_margin({0, n}, bodies.x, bodies.velocity, bodies.radius, x_then, reach_then, h, alert)) {
+      const Margins margins{x_then, reach_then, h, alert, Vec3::Zero(), walls};
+      bool holds = step > 0;
+      if (holds) {
+        std::vector<Leaver> leavers;
+        std::vector<Encounter> needed, known;
+        find_leavers({0, n}, bodies, margins, leavers);
+        std::sort(leavers.begin(), leavers.end());
+        compare_leavers(leavers, bodies, candidates, margins, needed, known);
+        holds = all_known(needed, known);
+        held += holds && !leavers.empty();
+      }
+      if (!holds) {
         ++searches;
         x_then = bodies.x;
         for (std::size_t s = 0; s < n; ++s)
           reach_then[s] = bodies.radius[s] + 0.5 * skin + contact_margin(velocity(s).norm(), h, alert);
-        candidates = pairs_from_cells(x_then, reach_then);
+        candidates.grain_pairs = pairs_from_cells(x_then, reach_then);
+        candidates.wall_pairs.clear();
+        for (std::size_t w = 0; w < walls.size(); ++w)
+          for (std::size_t s = 0; s < n; ++s)
+            if (walls[w].normal.dot(x_then[s] - walls[w].point) < reach_then[s] + 0.5 * alert)
+              candidates.wall_pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
       }
+      for (std::size_t w = 0; w < walls.size(); ++w)
+        for (std::size_t s = 0; s < n; ++s) {
+          const double gap = walls[w].normal.dot(bodies.x[s] - walls[w].point) - bodies.radius[s];
+          if (gap >= alert && gap >= -h * walls[w].normal.dot(velocity(s))) continue;
+          const WallPair pair{static_cast<std::int32_t>(w), static_cast<Slot>(s)};
+          ASSERT_NE(std::find(candidates.wall_pairs.begin(), candidates.wall_pairs.end(), pair),
+                    candidates.wall_pairs.end())
+              << "step " << step << ": grain " << s << " at wall " << w << " with gap " << gap;
+        }
       for (std::size_t i = 0; i < n; ++i)
         for (std::size_t j = i + 1; j < n; ++j) {
           const Vec3 d = bodies.x[i] - bodies.x[j];
@@ -167,7 +193,7 @@ TEST(Candidates, HoldEveryContactUntilTheMarginIsUsedUp) {
           const double v_n = d.normalized().dot(velocity(i) - velocity(j));
           if (gap >= alert && gap >= -h * v_n) continue;
           const GrainPair pair{static_cast<Slot>(i), static_cast<Slot>(j)};
-          ASSERT_TRUE(std::binary_search(candidates.begin(), candidates.end(), pair,
+          ASSERT_TRUE(std::binary_search(candidates.grain_pairs.begin(), candidates.grain_pairs.end(), pair,
                                          [](const GrainPair& a, const GrainPair& b) {
                                            return a.first != b.first ? a.first < b.first
                                                                      : a.second < b.second;
@@ -177,6 +203,7 @@ TEST(Candidates, HoldEveryContactUntilTheMarginIsUsedUp) {
       move();
     }
     EXPECT_GT(searches, 5);
+    EXPECT_GT(held, 5) << "grains outside of their margins that meet no one new";
     EXPECT_LT(searches, steps / 3) << "candidates are to be kept for many steps";
   }
 }

@@ -12,7 +12,7 @@
 #include "kernels/bodies.hpp"
 #include "kernels/broad_phase.hpp"
 #include "kernels/chunks.hpp"
-#include "kernels/contacts.hpp"
+#include "kernels/narrow_phase.hpp"
 #include "kernels/sweep.hpp"
 #include "kernels/walls.hpp"
 #include "runtime/step/setup.hpp"
@@ -123,13 +123,14 @@ struct Sample {
 };
 
 /// Narrow phase over all chunks with h = 1 ms and the given alert distance; biases as IQS gives them.
-inline void find_contacts(Sample& sample, double alert) {
+inline void find_contacts(Sample& sample, double alert,
+                          const SweepKernels& kernels = SweepKernels(InstructionSet::portable)) {
   allocate(sample.contacts, sample.candidates, sample.chunks, sample.candidates.components == 3);
   const NarrowPhase in{
       sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, 0,
       Vec3::Zero()};
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-    narrow_chunk(in, sample.candidates, sample.chunks, c, sample.contacts);
+    narrow_chunk(in, sample.candidates, sample.chunks, c, kernels, sample.contacts);
 }
 
 inline Sample dense_sample(int edge, std::uint64_t seed, bool friction, bool with_walls, int chunk_target) {

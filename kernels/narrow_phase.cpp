@@ -1,0 +1,246 @@
+#include "kernels/narrow_phase.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "kernels/detail/contact_view.hpp"
+
+namespace talus {
+
+namespace {
+
+constexpr std::size_t group_size = 16;
+constexpr std::size_t groups_open = 64;
+constexpr std::size_t row = 8;  ///< of PairView
+
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// Bias of a contact, or false when it constrains nothing in this step. `v_n` is the normal velocity at the
+/// beginning of the step, `v_n_free` the one at its end without contacts.
+bool constrain(const GapRule& in, double gap, double v_n, double v_n_free, double& bias) {
+  bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
+  if (!may_touch(gap, v_n_free, in.time_step, in.alert)) return false;
+  // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
+  // between both would gain energy.
+  if (in.restitution > 0 && std::abs(v_n) > in.slow) {
+    bias = in.restitution * v_n;
+    if (gap > 0) return false;
+  }
+  return true;
+}
+
+/// Two grains seen from their rows in a PairView.
+struct Pairing {
+  Vec3 d;  ///< x_i - x_j
+  Vec3 v;  ///< u_i - u_j
+  double radius_i, radius_j;
+};
+Pairing meet(const PairView& pairs, std::size_t k) {
+  const std::uint16_t* local = pairs.local + 2 * index(pairs.candidate[k]);
+  const double *a = pairs.first + row * local[0], *b = pairs.second + row * local[1];
+  using Map = Eigen::Map<const Vec3>;
+  return {Map(a) + Map(b), Map(a + 4) + Map(b + 4), a[3], b[7]};
+}
+
+/// Whether two bodies came so far on their way `way` here that they may have passed.
+bool came_far(const Vec3& way, double small) {
+  return !(way.squaredNorm() < 0.25 * small * small);
+}
+
+/// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
+/// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
+bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
+  if (!came_far(way, small)) return false;
+  const Vec3 start = d - way;
+  const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const double overlap = touching - (start + nearest * way).norm();
+  return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
+}
+
+std::int32_t count_passed(const PairView& pairs, double half_step) {
+  std::int32_t through = 0;
+  for (std::size_t k = 0; k < pairs.count; ++k) {
+    const Pairing pair = meet(pairs, k);
+    through += passed(pair.d, half_step * pair.v, pair.radius_i + pair.radius_j,
+                      std::min(pair.radius_i, pair.radius_j));
+  }
+  return through;
+}
+
+/// The kernel find_gaps without lanes.
+bool find_gaps(const PairView& pairs, const GapRule& rule, const GapTarget& out) {
+  bool far = false;
+  for (std::size_t k = 0; k < pairs.count; ++k) {
+    const Pairing pair = meet(pairs, k);
+    const double distance = pair.d.norm();
+    const Vec3 normal = distance > 0 ? Vec3(pair.d / distance) : Vec3::UnitZ();
+    const double v_n = normal.dot(pair.v);  // gravity moves both alike
+    out.nx[k] = normal[0];
+    out.ny[k] = normal[1];
+    out.nz[k] = normal[2];
+    out.contact[k] =
+        constrain(rule, distance - pair.radius_i - pair.radius_j, v_n, v_n, out.bias[k]) ? -1 : 0;
+    far |= came_far(0.5 * rule.time_step * pair.v, std::min(pair.radius_i, pair.radius_j));
+  }
+  return far;
+}
+
+/// Rows of the grains of a chunk: side by side they stay in the first cache, and each is looked at by about
+/// five pairs.
+struct Rows {
+  std::vector<double> first, second;
+};
+Rows rows_of(const NarrowPhase& in, const Chunks& chunks, std::size_t chunk) {
+  const std::size_t begin = index(chunks.body_begin[chunk]), end = index(chunks.body_begin[chunk + 1]);
+  Rows rows{std::vector<double>(row * (end - begin)), std::vector<double>(row * (end - begin))};
+  double *a = rows.first.data(), *b = rows.second.data();
+  for (std::size_t k = begin; k < end; ++k, a += row, b += row) {
+    const std::size_t s = index(chunks.bodies[k]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      a[c] = in.x[s][static_cast<Eigen::Index>(c)];
+      a[4 + c] = in.velocity[s].u[c];
+      b[c] = -a[c];
+      b[4 + c] = -a[4 + c];
+    }
+    a[3] = b[7] = in.radius[s];
+  }
+  return rows;
+}
+
+/// Deals the pairs of a chunk that are contacts to groups of 16 without a common grain, first fit, with one
+/// bit per group and grain; what fits in none of 64 open groups (a large grain among small ones) follows,
+/// each a group of its own, and behind them the pairs that are no contacts. `from` gets the place where each
+/// of them stands now, `sizes` those of the groups; returns the number of contacts. The order of the
+/// candidates (cut_chunks), made once per broad phase, is what makes the groups full.
+std::size_t deal_to_groups(const Chunks& chunks, std::size_t chunk, std::span<const std::int32_t> candidate,
+                           std::span<const std::int64_t> contact, std::vector<std::uint16_t>& from,
+                           std::uint8_t* sizes) {
+  const std::size_t begin = index(chunks.begin[chunk]), count = candidate.size();
+  const std::size_t bodies = index(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
+  std::vector<std::uint16_t> place(count);  // of the candidates
+  for (std::size_t k = 0; k < count; ++k) place[index(candidate[k]) - begin] = static_cast<std::uint16_t>(k);
+  std::vector<std::uint64_t> in_group(bodies, 0);
+  std::array<std::array<std::uint16_t, group_size>, groups_open> group;
+  std::array<std::size_t, groups_open> filled{};
+  std::uint64_t open = ~std::uint64_t{0};
+  std::vector<std::uint16_t> late, others;
+  others.reserve(count);
+  for (std::size_t at = begin; at < begin + count; ++at) {
+    const std::size_t k = chunks.order[at];
+    const std::uint16_t p = place[k];
+    if (contact[p] == 0) {
+      others.push_back(p);
+      continue;
+    }
+    std::uint64_t& mask_i = in_group[chunks.local[2 * (begin + k)]];
+    std::uint64_t& mask_j = in_group[chunks.local[2 * (begin + k) + 1]];
+    const std::uint64_t room = open & ~(mask_i | mask_j);
+    if (room == 0) {
+      late.push_back(p);
+      continue;
+    }
+    const auto g = static_cast<std::size_t>(std::countr_zero(room));
+    const std::uint64_t bit = std::uint64_t{1} << g;
+    mask_i |= bit;
+    mask_j |= bit;
+    group[g][filled[g]++] = p;
+    if (filled[g] == group_size) open &= ~bit;
+  }
+  from.clear();
+  for (std::size_t g = 0; g < groups_open && filled[g] > 0; ++g) {
+    from.insert(from.end(), group[g].begin(), group[g].begin() + static_cast<std::ptrdiff_t>(filled[g]));
+    *sizes++ = static_cast<std::uint8_t>(filled[g]);
+  }
+  from.insert(from.end(), late.begin(), late.end());
+  std::fill_n(sizes, late.size(), std::uint8_t{1});
+  from.insert(from.end(), others.begin(), others.end());
+  return count - others.size();
+}
+
+/// values[k] becomes what stood at values[from[k]].
+template <class T>
+void rearrange(std::span<const std::uint16_t> from, T* values, std::vector<T>& room) {
+  room.assign(values, values + from.size());
+  for (std::size_t k = 0; k < from.size(); ++k) values[k] = room[from[k]];
+}
+
+void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
+                   const Chunks& chunks, std::size_t chunk, const SweepKernels& kernels, Contacts& contacts) {
+  const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
+  const std::span candidate(contacts.candidate.data() + begin, count);
+  const Rows rows = rows_of(in, chunks, chunk);
+  std::vector<std::int64_t> contact(count);
+  const PairView pairs{rows.first.data(), rows.second.data(), chunks.local.data(), candidate.data(), count};
+  const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
+                         contacts.bias.data() + begin, contact.data()};
+  const bool far =
+      kernels.lanes() ? kernels.lanes()->find_gaps(pairs, rule, target) : find_gaps(pairs, rule, target);
+  contacts.passed[chunk] = far ? count_passed(pairs, 0.5 * in.time_step) : 0;
+
+  const auto last = contact.begin() + contacts.count[chunk];
+  const auto is = [](std::int64_t c) { return c != 0; };
+  if (!std::all_of(contact.begin(), last, is) || std::any_of(last, contact.end(), is)) {
+    std::vector<std::uint16_t> from;
+    from.reserve(count);
+    contacts.count[chunk] = static_cast<std::int32_t>(
+        deal_to_groups(chunks, chunk, candidate, contact, from, contacts.group.data() + begin));
+    std::vector<double> room;
+    for (double* values : {target.nx, target.ny, target.nz, target.bias})
+      rearrange<double>(from, values, room);
+    std::vector<std::int32_t> indices;
+    rearrange<std::int32_t>(from, candidate.data(), indices);
+    for (std::size_t at = begin; at < begin + count; ++at) {
+      const GrainPair& pair = candidates.grain_pairs[index(contacts.candidate[at])];
+      contacts.first[at] = pair.first;
+      contacts.second[at] = pair.second;
+    }
+  }
+}
+
+/// At a wall: a grain meets it once, so that any contacts may share a group.
+void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
+                 const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
+  const Wall& wall = in.walls[index(chunks.wall[chunk])];
+  const double fall = in.time_step * wall.normal.dot(in.gravity), half_step = 0.5 * in.time_step;
+  std::int32_t through = 0;
+  std::size_t at = begin;
+  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+    const Slot body = candidates.wall_pairs[k - grains].body;
+    const std::size_t i = index(body);
+    const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
+    const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
+    through += std::min(0.0, gap - half_step * v_n) - gap > 0.5 * in.radius[i];
+    if (!constrain(rule, gap, v_n, v_n + fall, contacts.bias[at])) continue;
+    contacts.nx[at] = wall.normal[0];
+    contacts.ny[at] = wall.normal[1];
+    contacts.nz[at] = wall.normal[2];
+    contacts.first[at] = body;
+    contacts.second[at] = -1;
+    contacts.candidate[at++] = static_cast<std::int32_t>(k);
+  }
+  contacts.passed[chunk] = through;
+  contacts.count[chunk] = static_cast<std::int32_t>(at - begin);
+  std::uint8_t* size = contacts.group.data() + begin;
+  for (std::size_t k = begin; k < at; k += group_size)
+    *size++ = static_cast<std::uint8_t>(std::min(group_size, at - k));
+}
+
+}  // namespace
+
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                  std::size_t chunk, const SweepKernels& kernels, Contacts& contacts) {
+  const GapRule rule{in.time_step, in.alert, in.restitution, in.overlap_correction,
+                     2 * in.time_step * in.gravity.norm()};
+  if (chunks.wall[chunk] < 0)
+    narrow_grains(in, rule, candidates, chunks, chunk, kernels, contacts);
+  else
+    narrow_wall(in, rule, candidates, chunks, chunk, contacts);
+  restore_impulses(candidates, chunks, chunk, contacts);
+}
+
+}  // namespace talus
