@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "runtime/trace/replay.hpp"
@@ -17,7 +18,8 @@ constexpr double absent = -1;
 Machine without_network(int ranks) {
   Machine machine;
   machine.ranks = ranks;
-  machine.latency = machine.overhead = machine.line = machine.node_latency = 0;
+  machine.latency = machine.overhead = machine.line = 0;
+  machine.bandwidth = std::numeric_limits<double>::max();
   machine.quantile = 0.5;
   return machine;
 }

@@ -8,8 +8,10 @@ namespace talus::trace::detail {
 void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
                Kind kind) {
   if (!trace_) return;
+  // Ends in whole nanoseconds too: one that lay behind the next beginning would take it for a part of itself.
+  const std::int64_t from = std::llround(begin);
   trace_->lanes[worker].records.push_back(
-      {std::llround(begin), static_cast<float>(end - begin), node, epoch, pack(step_, kind)});
+      {from, static_cast<float>(std::llround(end) - from), node, epoch, pack(step_, kind)});
 }
 
 double Stage::stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const {
