@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "runtime/trace/replay.hpp"
@@ -52,6 +53,7 @@ TaskTimes::TaskTimes(const Trace& recorded, int ranks, int rank) {
 bool TaskTimes::begin_step(std::uint32_t step) {
   const auto found = steps_.find(step);
   current_ = found == steps_.end() ? nullptr : &found->second;
+  if (current_) match();
   return active();
 }
 
@@ -62,10 +64,29 @@ void TaskTimes::check(const std::vector<Task>& tasks) const {
         "the steps of the trace have other tasks than those of the run: the scene or the subdomains differ");
 }
 
-void TaskTimes::check(const Plan& plan) const {
-  if (!current_ || (plan.role == current_->plan.role && plan.group == current_->plan.group)) return;
-  throw TraceError(fmt::format(
-      "step {} has another loop than the recorded one: the scene or the subdomains differ", plan.step));
+void TaskTimes::plan(const Plan& plan) {
+  plan_ = plan;
+  if (current_) match();
+}
+
+/// The nodes of one subdomain have the same order in both.
+void TaskTimes::match() {
+  const auto order_of = [](const Plan& plan) {
+    std::vector<std::uint32_t> order(plan.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, {},
+                             [&](std::uint32_t n) { return std::pair(plan.role[n], plan.group[n]); });
+    return order;
+  };
+  const Plan& recorded = current_->plan;
+  const std::vector<std::uint32_t> here = order_of(plan_), there = order_of(recorded);
+  place_.clear();
+  if (here.size() != there.size()) return;
+  for (std::size_t k = 0; k < here.size(); ++k)
+    if (plan_.role[here[k]] != recorded.role[there[k]] || plan_.group[here[k]] != recorded.group[there[k]])
+      return;
+  place_.resize(here.size());
+  for (std::size_t k = 0; k < here.size(); ++k) place_[here[k]] = there[k];
 }
 
 double TaskTimes::task(std::uint32_t id) const {
@@ -73,10 +94,12 @@ double TaskTimes::task(std::uint32_t id) const {
 }
 
 double TaskTimes::node(std::uint32_t node, int epoch) const {
+  if (node >= place_.size())
+    throw TraceError("the loop is another one than the recorded: the scene or the subdomains differ");
   const auto e = static_cast<std::size_t>(epoch);
-  if (e >= current_->node.size() || node >= current_->node[e].size() || current_->node[e][node] < 0)
+  if (e >= current_->node.size() || current_->node[e][place_[node]] < 0)
     throw TraceError(fmt::format("the trace has no time for node {} in epoch {}", node, epoch));
-  return current_->node[e][node];
+  return current_->node[e][place_[node]];
 }
 
 double TaskTimes::decision(int epoch) const {

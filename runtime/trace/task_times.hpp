@@ -27,13 +27,15 @@ class TaskTimes {
   bool begin_step(std::uint32_t step);
   void end_step() { current_ = nullptr; }
   bool active() const { return current_ != nullptr; }
-  /// Throws TraceError unless the run has these tasks, or this loop, too: another scene or other subdomains.
+  /// Throws TraceError unless the run has the recorded tasks: another scene or other subdomains.
   void check(const std::vector<Task>& tasks) const;
-  void check(const Plan& plan) const;
+  /// The run's loop from now on, whose nodes may stand in another order.
+  void plan(const Plan& plan);
 
   // Of the present step [s], without waits for other ranks.
   double task(std::uint32_t id) const;
-  /// Throw TraceError when the recorded loop had no such node in this epoch, or no decision.
+  /// Throw TraceError when the recorded loop was another one, or had no such node in this epoch, or no
+  /// decision.
   double node(std::uint32_t node, int epoch) const;
   double decision(int epoch) const;
 
@@ -45,9 +47,13 @@ class TaskTimes {
     std::vector<double> decision;           ///< per epoch; < 0: none
   };
 
+  void match();
+
   std::vector<Task> tasks_;
   std::map<std::uint32_t, Step> steps_;
   const Step* current_ = nullptr;
+  Plan plan_;                         ///< the run's
+  std::vector<std::uint32_t> place_;  ///< per node of the run: the recorded one; empty: loops differ
 };
 
 /// A program of the epoch loop whose nodes and decisions take their given times.

@@ -259,17 +259,19 @@ TEST(TaskTimes, AreThoseOfTheReplay) {
   TaskTimes times(trace, 2, 1);
   EXPECT_FALSE(times.begin_step(2));
   ASSERT_TRUE(times.begin_step(1));
+  EXPECT_THROW(times.node(0, 0), TraceError) << "whose loop is not known yet";
+  times.plan(test::two_subdomains(2).plans[1]);
   EXPECT_DOUBLE_EQ(times.task(0), 0);
   // Of one subdomain: sweep, inner sweep, publish, centre, glue.
   const double nodes[] = {100e-9, 50e-9, 10e-9, 0, 20e-9};
-  for (std::uint32_t n = 0; n < 5; ++n)
-    EXPECT_NEAR(times.node(n, 0), nodes[n], 1e-15) << n;
+  for (std::uint32_t n = 0; n < 5; ++n) EXPECT_NEAR(times.node(n, 0), nodes[n], 1e-15) << n;
   EXPECT_NEAR(times.decision(1), 50e-9, 1e-15);
   EXPECT_THROW(times.decision(0), TraceError);
   EXPECT_THROW(times.node(0, 9), TraceError);
   EXPECT_NO_THROW(times.check(test::three_tasks()));
   EXPECT_THROW(times.check(std::vector<Task>{}), TraceError);
-  EXPECT_THROW(times.check(trace.plans[0]), TraceError);  // of both subdomains
+  times.plan(trace.plans[0]);  // of both subdomains
+  EXPECT_THROW(times.node(0, 0), TraceError);
 }
 
 TEST(Replay, NoiseIsTheSameForTheSameSeed) {
