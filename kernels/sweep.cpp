@@ -107,12 +107,13 @@ inline void store_impulse(Contacts& c, std::size_t k, V3 r, V3 n) {
 
 /// Closed form of Signorini-Coulomb with a diagonal W: stores the new impulse and returns what it adds.
 template <bool Friction>
-inline V3 solve_law(Contacts& c, std::size_t k, V3 n, V3 v, double w_nn, double w_tt, double mu) {
+inline V3 solve_law(Contacts& c, std::size_t k, V3 n, V3 v, double w_nn, double w_tt, double mu,
+                    double omega) {
   const double v_n = dot(v, n);
   if constexpr (Friction) {
     const V3 r{c.rx[k], c.ry[k], c.rz[k]};
     const double r_n = dot(r, n);
-    const double r_n_new = positive_part(r_n - (v_n + c.bias[k]) / w_nn);
+    const double r_n_new = positive_part(r_n - omega * (v_n + c.bias[k]) / w_nn);
     const double limit = mu * r_n_new;
     const V3 t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
     const double t2 = dot(t, t);
@@ -121,7 +122,7 @@ inline V3 solve_law(Contacts& c, std::size_t k, V3 n, V3 v, double w_nn, double 
     store_impulse<true>(c, k, r_new, n);
     return r_new - r;
   } else {
-    const double r_n = c.rn[k], r_n_new = positive_part(r_n - (v_n + c.bias[k]) / w_nn);
+    const double r_n = c.rn[k], r_n_new = positive_part(r_n - omega * (v_n + c.bias[k]) / w_nn);
     c.rn[k] = r_n_new;
     return (r_n_new - r_n) * n;
   }
@@ -212,7 +213,8 @@ inline void add_error(ErrorSums& sums, const Contacts& c, std::size_t k, V3 n, V
 }  // namespace
 
 template <bool Friction>
-void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) {
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                  double omega) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
     prefetch_bodies(contacts, k, range.end, velocity);
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
@@ -220,13 +222,14 @@ void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> ve
     const V3 n = normal_of(contacts, k);
     const double w_nn = a.inv_mass + b.inv_mass;
     const double w_tt = w_nn + (a.spin_mobility + b.spin_mobility);
-    push<Friction>(a, b, n, solve_law<Friction>(contacts, k, n, relative<Friction>(a, b, n), w_nn, w_tt, mu));
+    push<Friction>(a, b, n,
+                   solve_law<Friction>(contacts, k, n, relative<Friction>(a, b, n), w_nn, w_tt, mu, omega));
   }
 }
 
 template <bool Friction>
 void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                WallCopy& wall) {
+                WallCopy& wall, double omega) {
   SplitWall split(wall, range);
   for (std::size_t k = range.begin; k < range.end; ++k) {
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
@@ -234,7 +237,7 @@ void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velo
     const V3 n = normal_of(contacts, k);
     push<Friction>(a, own, n,
                    solve_law<Friction>(contacts, k, n, relative<Friction>(a, own, n),
-                                       a.inv_mass + own.inv_mass, a.inv_mass + a.spin_mobility, mu));
+                                       a.inv_mass + own.inv_mass, a.inv_mass + a.spin_mobility, mu, omega));
   }
   split.glue(wall);
 }
@@ -352,10 +355,10 @@ void relax(Contacts& contacts, ContactRange range, std::span<const double> befor
   }
 }
 
-template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double);
-template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double);
-template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
-template void sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
+template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double, double);
+template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double, double);
+template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&, double);
+template void sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&, double);
 template void accumulate_grains<true>(const Contacts&, ContactRange, std::span<Velocity>);
 template void accumulate_grains<false>(const Contacts&, ContactRange, std::span<Velocity>);
 template void accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);

@@ -99,16 +99,16 @@ SweepKernels::SweepKernels(InstructionSet set)
 
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
-                                double mu) const {
-  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
-  lanes_[Friction]->sweep_grains(view(contacts, range), impulses(contacts), records(velocity), mu);
+                                double mu, double omega) const {
+  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu, omega);
+  lanes_[Friction]->sweep_grains(view(contacts, range), impulses(contacts), records(velocity), mu, omega);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                              WallCopy& wall) const {
-  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
-  lanes_[Friction]->sweep_wall(view(contacts, range), impulses(contacts), records(velocity), mu,
+                              WallCopy& wall, double omega) const {
+  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall, omega);
+  lanes_[Friction]->sweep_wall(view(contacts, range), impulses(contacts), records(velocity), mu, omega,
                                wall.velocity, wall.inv_mass);
 }
 
@@ -171,9 +171,10 @@ void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velo
   }
 }
 
-template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;
-template void SweepKernels::sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double,
-                                             WallCopy&) const;
+template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                               double) const;
+template void SweepKernels::sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
+                                             double) const;
 template void SweepKernels::accumulate_grains<true>(const Contacts&, ContactRange, std::span<Velocity>) const;
 template void SweepKernels::accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>,
                                                   WallCopy&) const;
@@ -181,9 +182,10 @@ template ErrorSums SweepKernels::error_grains<true>(const Contacts&, ContactRang
                                                     double, Multiplicities) const;
 template ErrorSums SweepKernels::error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>,
                                                   double, const WallCopy&, double, Multiplicities) const;
-template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double) const;
-template void SweepKernels::sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double,
-                                              WallCopy&) const;
+template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                                double) const;
+template void SweepKernels::sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
+                                              double) const;
 template void SweepKernels::accumulate_grains<false>(const Contacts&, ContactRange,
                                                      std::span<Velocity>) const;
 template void SweepKernels::accumulate_wall<false>(const Contacts&, ContactRange, std::span<Velocity>,

@@ -41,10 +41,11 @@ class SweepKernels {
   InstructionSet set() const { return set_; }
 
   template <bool Friction>
-  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) const;
+  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                    double omega = 1) const;
   template <bool Friction>
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  WallCopy& wall) const;
+                  WallCopy& wall, double omega = 1) const;
   template <bool Friction>
   void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) const;
   template <bool Friction>

@@ -34,9 +34,9 @@ struct ErrorTotals {
 /// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
 /// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be null.
 struct LaneKernels {
-  void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu);
-  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
-                     double wall_inv_mass);
+  void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu, double omega);
+  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double omega,
+                     double* wall, double wall_inv_mass);
   void (*accumulate_grains)(const ContactView&, double* bodies);
   void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,

@@ -119,11 +119,11 @@ template <bool Friction, class V>
 template <bool Friction, class V>
 [[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, const Target& out, std::size_t at,
                                                  const Space<V>& n, const Space<V>& v, V w_nn, V w_tt,
-                                                 double mu) {
+                                                 double mu, double omega) {
   const V bias = load<V>(c.bias + at), v_n = dot(v, n);
   if constexpr (Friction) {
     const Space<V> r = load_impulse<true, V>(c, at, n);
-    const V r_n = dot(r, n), next = r_n - (v_n + bias) / w_nn;
+    const V r_n = dot(r, n), next = r_n - omega * (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next)), limit = mu * r_n_new;
     const Space<V> t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
     const V t2 = dot(t, t);
@@ -134,7 +134,7 @@ template <bool Friction, class V>
     store(out.z + at, r_new.z);
     return r_new - r;
   } else {
-    const V r_n = load<V>(c.rn + at), next = r_n - (v_n + bias) / w_nn;
+    const V r_n = load<V>(c.rn + at), next = r_n - omega * (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next));
     store(out.n + at, r_n_new);
     return (r_n_new - r_n) * n;
@@ -199,7 +199,7 @@ template <class V>
 /// Blocks x W contacts in three phases.
 template <bool Friction, int W, int Blocks>
 [[gnu::always_inline]] inline void sweep_block(const Slice& c, const Target& out, double* const* a,
-                                               double* const* b, double mu) {
+                                               double* const* b, double mu, double omega) {
   using V = Lanes<W>;
   Meeting<V> m[Blocks];
   Space<V> dr[Blocks];
@@ -211,7 +211,8 @@ template <bool Friction, int W, int Blocks>
     const Space<V> n = load_normal<V>(c, at);
     V w_tt{};
     if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
-    dr[k] = solve_law<Friction>(c, out, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu);
+    dr[k] =
+        solve_law<Friction>(c, out, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu, omega);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)
@@ -298,7 +299,8 @@ struct Part {
 };
 
 template <bool Friction, int W>
-void sweep_grains(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu) {
+void sweep_grains(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu,
+                  double omega) {
   constexpr std::size_t at_once = W * blocks_at_once;
   const ContactView c = view;  // local ones, so that no store can change them
   const ImpulseView r = impulses;
@@ -310,17 +312,17 @@ void sweep_grains(const ContactView& view, const ImpulseView& impulses, double* 
       double *a[at_once], *b[at_once];
       find_bodies<at_once>(bodies, c.first + k, a);
       find_bodies<at_once>(bodies, c.second + k, b);
-      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu);
+      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, omega);
     }
     for (; k + W <= end; k += W) {
       double *a[W], *b[W];
       find_bodies<W>(bodies, c.first + k, a);
       find_bodies<W>(bodies, c.second + k, b);
-      sweep_block<Friction, W, 1>(slice(c, k), target(r, k), a, b, mu);
+      sweep_block<Friction, W, 1>(slice(c, k), target(r, k), a, b, mu, omega);
     }
     if (k == end) continue;
     Part<Friction, W> part(c, k, end - k, bodies, true);
-    sweep_block<Friction, W, 1>(part.slice(), part.target(), part.a, part.b, mu);
+    sweep_block<Friction, W, 1>(part.slice(), part.target(), part.a, part.b, mu, omega);
     part.copy_out(r, k, end - k);
     k = end;
   }
@@ -388,22 +390,23 @@ struct SplitWall {
 /// A block of W grains against as many copies of a wall.
 template <bool Friction, int W>
 [[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, const Target& out, double* const* a,
-                                                    double mu, std::size_t lanes, SplitWall<W>& wall) {
+                                                    double mu, double omega, std::size_t lanes,
+                                                    SplitWall<W>& wall) {
   using V = Lanes<W>;
   Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
   m.du = m.du - wall.velocity[lanes];
   const Space<V> n = load_normal<V>(c, 0);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
-  const Space<V> dr =
-      solve_law<Friction>(c, out, 0, n, relative_velocity<Friction>(m, n), m.w_nn + wall.inv_mass, w_tt, mu);
+  const Space<V> dr = solve_law<Friction>(c, out, 0, n, relative_velocity<Friction>(m, n),
+                                          m.w_nn + wall.inv_mass, w_tt, mu, omega);
   scatter<Friction, false>(a, nullptr, n, dr);
   wall.push(lanes, n, dr);
 }
 
 template <bool Friction, int W>
-void sweep_wall(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu, double* wall,
-                double wall_inv_mass) {
+void sweep_wall(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu, double omega,
+                double* wall, double wall_inv_mass) {
   const ContactView c = view;
   const ImpulseView r = impulses;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
@@ -411,11 +414,11 @@ void sweep_wall(const ContactView& view, const ImpulseView& impulses, double* bo
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
     double* a[W];
     find_bodies<W>(bodies, c.first + k, a);
-    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, lanes, split);
+    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, omega, lanes, split);
   }
   if (k < c.end) {
     Part<Friction, W> part(c, k, c.end - k, bodies, false);
-    sweep_wall_block<Friction, W>(part.slice(), part.target(), part.a, mu, lanes, split);
+    sweep_wall_block<Friction, W>(part.slice(), part.target(), part.a, mu, omega, lanes, split);
     part.copy_out(r, k, c.end - k);
   }
   split.glue(wall);

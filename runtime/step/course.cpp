@@ -19,6 +19,9 @@ double most_momentum(bool friction, double tolerance) {
   return std::clamp(1 - 0.08 * std::pow(tolerance / 1e-3, 0.15), 0.9, 0.97);
 }
 
+/// With momentum: 4-16 % fewer sweeps than 1, and 1.3 saves no more; at 1.4 packings begin to swing
+/// (docs/decisions/0009-methods.md).
+constexpr double over_relaxation = 1.2;
 /// With less than this conjugate gradients are faster.
 constexpr double least_momentum = 0.85;
 /// Between two checks; what makes it so much worse is no method for this problem.
@@ -56,6 +59,11 @@ double Iteration::beta(int epoch) const {
   if (now.method == SolverMethod::nncg) return conjugate_beta_;
   const int sweep = number(epoch) - now.from - plain_sweeps;
   return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
+}
+
+/// Of the normal impulses. As long as beta is 0 sweeps are plain: they solve exactly what few sweeps solve.
+double Iteration::omega(int epoch) const {
+  return course(epoch).method == SolverMethod::momentum && beta(epoch) > 0 ? over_relaxation : 1;
 }
 
 void Iteration::begin_course(SolverMethod method, double most) {

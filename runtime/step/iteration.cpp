@@ -73,16 +73,16 @@ void Iteration::begin() {
 }
 
 template <bool Friction>
-void Iteration::sweep(std::size_t c, ContactRange range, double mu) {
+void Iteration::sweep(std::size_t c, ContactRange range, double mu, double omega) {
   const Chunks& chunks = state_.chunks;
   std::span<Velocity> velocity = state_.bodies.velocity;
   const bool at_wall = chunks.wall[c] >= 0;
   const bool damped = !before_.empty() && chunks.boundary[c] != 0;
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
   if (at_wall)
-    kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
+    kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c], omega);
   else
-    kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu);
+    kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu, omega);
   if (damped)
     relax<Friction>(state_.contacts, range, before_[c], state_.decomposition.multiplicity, velocity,
                     at_wall ? &state_.copies[c] : nullptr);
@@ -131,7 +131,7 @@ void Iteration::chunk(std::size_t c, int epoch) {
       break;
     case Work::sweep:
       if (course(epoch).method != SolverMethod::nlgs) carry_on(c, range, epoch);
-      sweep<Friction>(c, range, mu);
+      sweep<Friction>(c, range, mu, omega(epoch));
       if (course(epoch).method == SolverMethod::nncg)
         changes_[c] = change_squared(range, contacts, velocity, copy.inv_mass, trail_);
       break;

@@ -107,7 +107,7 @@ class Iteration {
   template <bool Friction>
   void chunk(std::size_t c, int epoch);
   template <bool Friction>
-  void sweep(std::size_t c, ContactRange range, double mu);
+  void sweep(std::size_t c, ContactRange range, double mu, double omega);
   std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
   /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
@@ -121,6 +121,7 @@ class Iteration {
   const Course& course(int epoch) const { return number(epoch) >= course_.from ? course_ : course_before_; }
   int number(int epoch) const { return before_segment_ + epoch - sweeps_from_; }
   double beta(int epoch) const;
+  double omega(int epoch) const;
   bool stagnant() const;
   void first_course();
   void begin_course(SolverMethod method, double most);

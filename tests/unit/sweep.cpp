@@ -148,6 +148,23 @@ TEST(Sweep, AgainstAWallOfFiniteMassSolvesOneContactAndMovesItAlongItsNormal) {
     }
 }
 
+TEST(Sweep, OverRelaxedGoesBeyondTheSolutionOfAContactAndSettlesThereWithTheNext) {
+  Random random(4);
+  for (int trial = 0; trial < 300; ++trial) {
+    OneContact plain(random, true);
+    plain.contacts.bias[0] = -20;  // pressed together: it stays closed
+    OneContact over = plain;
+    const double before = contact_impulse(over.contacts, 0).dot(over.n);
+    sweep_grains<true>(plain.contacts, {0, 1}, plain.velocity, 0.4);
+    sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4, 1.2);
+    const double exact = contact_impulse(plain.contacts, 0).dot(plain.n),
+                 beyond = contact_impulse(over.contacts, 0).dot(over.n);
+    EXPECT_NEAR(beyond - before, 1.2 * (exact - before), 1e-12 * (std::abs(exact) + std::abs(before)));
+    sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4);
+    EXPECT_NEAR(contact_impulse(over.contacts, 0).dot(over.n), exact, 1e-12 * (std::abs(exact) + before));
+  }
+}
+
 /// Sums of m u and of x cross m u + I omega over the grains.
 struct Momentum {
   Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();

@@ -103,11 +103,12 @@ Outcome run(const Kernels& kernels, const Sample& sample, const Plan& plan) {
   measure();
   for (int s = 0; s < plan.sweeps; ++s)
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+      const double omega = s % 2 == 0 ? 1 : 1.2;
       if (sample.chunks.wall[c] < 0)
-        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu);
+        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu, omega);
       else
         kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
-                                              out.walls[c]);
+                                              out.walls[c], omega);
     }
   measure();
   for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
