@@ -69,6 +69,10 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
   StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(lane.rank)];
   const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(lane.rank)];
   Place last_task, last_check;
+  // By its beginning: ends of long ones are rounded.
+  const auto in_check = [&](const Record& span) {
+    return last_check.exists() && static_cast<double>(span.begin) < record(last_check).end();
+  };
   for (auto it = first; it != lane.records.end() && it->step() == index.step; ++it) {
     const Place place{number, static_cast<std::uint32_t>(it - lane.records.begin())};
     const Kind kind = it->kind();
@@ -76,7 +80,7 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
     if (kind == kind_outside) {
       rank.outside = place;
     } else if (kind == kind_collective) {
-      if (last_check.exists() && it->end() <= record(last_check).end())
+      if (in_check(*it))
         rank.awaited[static_cast<std::size_t>(record(last_check).epoch)] = 1;
       else if (last_task.exists() && it->end() <= record(last_task).end())
         ++rank.calls[record(last_task).node];
@@ -99,7 +103,7 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
       rank.task[it->node] = last_task = place;
     } else if (last_task.exists() && it->end() <= record(last_task).end()) {
       rank.part[record(last_task).node] = place;
-    } else if (last_check.exists() && it->end() <= record(last_check).end()) {
+    } else if (in_check(*it)) {
       rank.whole[static_cast<std::size_t>(record(last_check).epoch)].push_back(place);
     }
   }

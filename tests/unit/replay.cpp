@@ -222,16 +222,17 @@ TEST(Replay, ACheckThatSettlesIsReadAtOnce) {
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180) << "no sweep more, nothing to undo";
 }
 
-/// A task that all ranks share, of 80 ns, in the last check of two subdomains: two gathers and three
-/// exchanges.
-Trace with_a_look() {
+/// A task that all ranks share in the last check of two subdomains, which takes 10 ns more: two gathers and
+/// three exchanges.
+Trace with_a_look(std::int64_t length = 80) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.lanes[0].records;
   const auto check = std::ranges::find(records, kind_check, &Record::kind);
-  check->duration = 90;
+  check->duration = static_cast<float>(length + 10);
   check->node = check_settles;
-  std::prev(records.end())->begin += 90;
-  records.insert(std::next(check), {check->begin + 10, 80, Meetings{2, 3}.packed(), -1, pack(1, test::task)});
+  std::prev(records.end())->begin += length + 10;
+  records.insert(std::next(check), {check->begin + 10, static_cast<float>(length), Meetings{2, 3}.packed(),
+                                    -1, pack(1, test::task)});
   return trace;
 }
 
@@ -272,6 +273,13 @@ TEST(TaskTimes, AreThoseOfTheReplay) {
   EXPECT_THROW(times.check(std::vector<Task>{}), TraceError);
   times.plan(trace.plans[0]);  // of both subdomains
   EXPECT_THROW(times.node(0, 0), TraceError);
+}
+
+TEST(TaskTimes, HoldWhatTakesLongerThanTheDigitsOfARecord) {
+  const std::int64_t length = 782263171;  // known to 64 ns
+  TaskTimes times(with_a_look(length), 1, 0);
+  ASSERT_TRUE(times.begin_step(1));
+  EXPECT_NEAR(times.decision(1), 1e-9 * static_cast<double>(length), 1e-6);
 }
 
 TEST(Replay, NoiseIsTheSameForTheSameSeed) {
