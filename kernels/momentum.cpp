@@ -1,5 +1,6 @@
 #include "kernels/momentum.hpp"
 
+#include <algorithm>
 #include <bit>
 
 namespace talus {
@@ -21,18 +22,6 @@ inline void carry_one(Carry carry, double beta, double& value, double& last, dou
     *step = 0;
   }
   last = value;
-}
-
-void carry_values(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
-                  std::vector<double>& values, std::vector<double>& last, std::vector<double>& step) {
-  if (carry == Carry::momentum && beta != 0) {
-    const std::size_t count = range.end - range.begin;
-    kernels.advance(std::span(values).subspan(range.begin, count),
-                    std::span(last).subspan(range.begin, count), beta);
-    return;
-  }
-  for (std::size_t k = range.begin; k < range.end; ++k)
-    carry_one(carry, beta, values[k], last[k], step.empty() ? nullptr : &step[k]);
 }
 
 template <std::size_t N>
@@ -57,38 +46,45 @@ void add_records(std::span<const Slot> slots, std::span<const Velocity> from, st
   }
 }
 
-std::size_t bytes(const Trail::Impulses& impulses) {
-  return sizeof(double) *
+template <class Impulses>
+std::size_t bytes(const Impulses& impulses) {
+  return sizeof(impulses.x[0]) *
          (impulses.x.capacity() + impulses.y.capacity() + impulses.z.capacity() + impulses.n.capacity());
 }
 
 }  // namespace
 
 void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks) {
-  const auto like = [&](Trail::Impulses& impulses, bool wanted) {
-    impulses.x.resize(wanted ? contacts.rx.size() : 0);
-    impulses.y.resize(wanted ? contacts.ry.size() : 0);
-    impulses.z.resize(wanted ? contacts.rz.size() : 0);
-    impulses.n.resize(wanted ? contacts.rn.size() : 0);
+  const auto like = [&](auto& impulses) {
+    impulses.x.resize(contacts.rx.size());
+    impulses.y.resize(contacts.ry.size());
+    impulses.z.resize(contacts.rz.size());
+    impulses.n.resize(contacts.rn.size());
   };
-  const bool conjugate = carry == Carry::conjugate;
-  like(trail.last, true);
-  like(trail.step, conjugate);
   trail.last_v.resize(bodies);
-  trail.step_v.resize(conjugate ? bodies : 0);
   trail.last_wall_v.resize(chunks);
-  trail.step_wall_v.resize(conjugate ? chunks : 0);
+  if (carry == Carry::momentum) return like(trail.steps);
+  like(trail.last);
+  like(trail.step);
+  trail.step_v.resize(bodies);
+  trail.step_wall_v.resize(chunks);
 }
 
-void carry_impulses(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
-                    Contacts& contacts, Trail& trail) {
-  if (contacts.rx.empty()) {
-    carry_values(kernels, carry, beta, range, contacts.rn, trail.last.n, trail.step.n);
-    return;
-  }
-  carry_values(kernels, carry, beta, range, contacts.rx, trail.last.x, trail.step.x);
-  carry_values(kernels, carry, beta, range, contacts.ry, trail.last.y, trail.step.y);
-  carry_values(kernels, carry, beta, range, contacts.rz, trail.last.z, trail.step.z);
+void begin_steps(ContactRange range, SweepSteps& steps) {
+  const std::size_t count = range.end - range.begin;
+  for (std::vector<float>* part : {&steps.x, &steps.y, &steps.z, &steps.n})
+    if (!part->empty()) std::fill_n(part->begin() + static_cast<std::ptrdiff_t>(range.begin), count, 0.0F);
+}
+
+void carry_impulses(double beta, ContactRange range, Contacts& contacts, Trail& trail) {
+  const auto carry = [&](std::vector<double>& values, std::vector<double>& last, std::vector<double>& step) {
+    for (std::size_t k = range.begin; k < range.end; ++k)
+      carry_one(Carry::conjugate, beta, values[k], last[k], &step[k]);
+  };
+  if (contacts.rx.empty()) return carry(contacts.rn, trail.last.n, trail.step.n);
+  carry(contacts.rx, trail.last.x, trail.step.x);
+  carry(contacts.ry, trail.last.y, trail.step.y);
+  carry(contacts.rz, trail.last.z, trail.step.z);
 }
 
 void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
@@ -152,7 +148,7 @@ double change_squared(ContactRange range, const Contacts& contacts, std::span<co
 }
 
 std::size_t memory_used(const Trail& trail) {
-  return bytes(trail.last) + bytes(trail.step) +
+  return bytes(trail.steps) + bytes(trail.last) + bytes(trail.step) +
          sizeof(Velocity) * (trail.last_v.capacity() + trail.step_v.capacity()) +
          sizeof(std::array<double, 3>) * (trail.last_wall_v.capacity() + trail.step_wall_v.capacity());
 }

@@ -19,26 +19,30 @@ namespace talus {
 enum class Carry { momentum, conjugate };
 
 /// What the rule remembers, in the layout of Contacts and Bodies. Empty vectors where a scene has no such
-/// quantity, and `step` empty with momentum.
+/// quantity, or the rule has never been needed.
 struct Trail {
   struct Impulses {
     std::vector<double> x, y, z;  ///< with friction [N s]
     std::vector<double> n;        ///< without [N s]
   };
-  Impulses last;                 ///< s_before, or y
-  Impulses step;                 ///< p
+  SweepSteps steps;              ///< momentum: s - s_before, read and made within the sweep
+  Impulses last;                 ///< conjugate: y
+  Impulses step;                 ///< conjugate: p
   std::vector<Velocity> last_v;  ///< per slot; whole records, so that eight numbers are carried at once
   std::vector<Velocity> step_v;
   std::vector<std::array<double, 3>> last_wall_v;  ///< per chunk: of its wall copy [m/s]
   std::vector<std::array<double, 3>> step_wall_v;
 };
 
-/// Room for the contacts, bodies and chunks of `contacts`; what stood there is void.
+/// Room for the contacts, bodies and chunks of `contacts`; what stands there is void. What only the other
+/// rule remembers stays: a sweep under it may still be on its way.
 void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
 
-/// Applies the rule to the impulses of a range; beta = 0 begins a new trail.
-void carry_impulses(const SweepKernels& kernels, Carry carry, double beta, ContactRange range,
-                    Contacts& contacts, Trail& trail);
+/// Momentum of the impulses of a range begins: no step yet.
+void begin_steps(ContactRange range, SweepSteps& steps);
+
+/// Applies the conjugate rule to the impulses of a range; beta = 0 begins a new trail.
+void carry_impulses(double beta, ContactRange range, Contacts& contacts, Trail& trail);
 
 /// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
 void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,

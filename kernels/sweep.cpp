@@ -105,25 +105,52 @@ inline void store_impulse(Contacts& c, std::size_t k, V3 r, V3 n) {
   }
 }
 
-/// Closed form of Signorini-Coulomb with a diagonal W: stores the new impulse and returns what it adds.
-template <bool Friction>
+/// A plain sweep begins where the last one ended.
+struct Plain {
+  double omega = 1;
+  V3 begin(V3 s, std::size_t) const { return s; }
+  double begin(double s, std::size_t) const { return s; }
+  void end(V3, V3, std::size_t) const {}
+  void end(double, double, std::size_t) const {}
+};
+
+struct WithMomentum {
+  double beta, omega;
+  SweepSteps& steps;
+  V3 begin(V3 s, std::size_t k) const { return s + beta * V3{steps.x[k], steps.y[k], steps.z[k]}; }
+  double begin(double s, std::size_t k) const { return s + beta * static_cast<double>(steps.n[k]); }
+  void end(V3 s, V3 s_new, std::size_t k) const {
+    const V3 step = s_new - s;
+    steps.x[k] = static_cast<float>(step.x);
+    steps.y[k] = static_cast<float>(step.y);
+    steps.z[k] = static_cast<float>(step.z);
+  }
+  void end(double s, double s_new, std::size_t k) const { steps.n[k] = static_cast<float>(s_new - s); }
+};
+
+/// Closed form of Signorini-Coulomb with a diagonal W: stores the new impulse and returns what it adds to the
+/// one that the velocities know.
+template <bool Friction, class Start>
 inline V3 solve_law(Contacts& c, std::size_t k, V3 n, V3 v, double w_nn, double w_tt, double mu,
-                    double omega) {
+                    const Start& start) {
   const double v_n = dot(v, n);
   if constexpr (Friction) {
-    const V3 r{c.rx[k], c.ry[k], c.rz[k]};
+    const V3 s{c.rx[k], c.ry[k], c.rz[k]}, r = start.begin(s, k);
     const double r_n = dot(r, n);
-    const double r_n_new = positive_part(r_n - omega * (v_n + c.bias[k]) / w_nn);
+    const double r_n_new = positive_part(r_n - start.omega * (v_n + c.bias[k]) / w_nn);
     const double limit = mu * r_n_new;
     const V3 t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
     const double t2 = dot(t, t);
     const double scale = t2 > limit * limit ? limit / std::sqrt(t2) : 1.0;
     const V3 r_new = r_n_new * n + scale * t;
     store_impulse<true>(c, k, r_new, n);
+    start.end(s, r_new, k);
     return r_new - r;
   } else {
-    const double r_n = c.rn[k], r_n_new = positive_part(r_n - omega * (v_n + c.bias[k]) / w_nn);
+    const double s = c.rn[k], r_n = start.begin(s, k);
+    const double r_n_new = positive_part(r_n - start.omega * (v_n + c.bias[k]) / w_nn);
     c.rn[k] = r_n_new;
+    start.end(s, r_n_new, k);
     return (r_n_new - r_n) * n;
   }
 }
@@ -210,11 +237,9 @@ inline void add_error(ErrorSums& sums, const Contacts& c, std::size_t k, V3 n, V
   if (r_n > 0) ++sums.active;
 }
 
-}  // namespace
-
-template <bool Friction>
-void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  double omega) {
+template <bool Friction, class Start>
+void sweep_grains_from(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                       const Start& start) {
   for (std::size_t k = range.begin; k < range.end; ++k) {
     prefetch_bodies(contacts, k, range.end, velocity);
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
@@ -223,13 +248,13 @@ void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> ve
     const double w_nn = a.inv_mass + b.inv_mass;
     const double w_tt = w_nn + (a.spin_mobility + b.spin_mobility);
     push<Friction>(a, b, n,
-                   solve_law<Friction>(contacts, k, n, relative<Friction>(a, b, n), w_nn, w_tt, mu, omega));
+                   solve_law<Friction>(contacts, k, n, relative<Friction>(a, b, n), w_nn, w_tt, mu, start));
   }
 }
 
-template <bool Friction>
-void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                WallCopy& wall, double omega) {
+template <bool Friction, class Start>
+void sweep_wall_from(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                     WallCopy& wall, const Start& start) {
   SplitWall split(wall, range);
   for (std::size_t k = range.begin; k < range.end; ++k) {
     Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
@@ -237,9 +262,36 @@ void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velo
     const V3 n = normal_of(contacts, k);
     push<Friction>(a, own, n,
                    solve_law<Friction>(contacts, k, n, relative<Friction>(a, own, n),
-                                       a.inv_mass + own.inv_mass, a.inv_mass + a.spin_mobility, mu, omega));
+                                       a.inv_mass + own.inv_mass, a.inv_mass + a.spin_mobility, mu, start));
   }
   split.glue(wall);
+}
+
+}  // namespace
+
+template <bool Friction>
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) {
+  sweep_grains_from<Friction>(contacts, range, velocity, mu, Plain{});
+}
+
+template <bool Friction>
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                  const SweepMomentum& momentum) {
+  sweep_grains_from<Friction>(contacts, range, velocity, mu,
+                              WithMomentum{momentum.beta, momentum.omega, momentum.steps});
+}
+
+template <bool Friction>
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall) {
+  sweep_wall_from<Friction>(contacts, range, velocity, mu, wall, Plain{});
+}
+
+template <bool Friction>
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall, const SweepMomentum& momentum) {
+  sweep_wall_from<Friction>(contacts, range, velocity, mu, wall,
+                            WithMomentum{momentum.beta, momentum.omega, momentum.steps});
 }
 
 template <bool Friction>
@@ -355,10 +407,16 @@ void relax(Contacts& contacts, ContactRange range, std::span<const double> befor
   }
 }
 
-template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double, double);
-template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double, double);
-template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&, double);
-template void sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&, double);
+template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double);
+template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double, const SweepMomentum&);
+template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
+template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
+                               const SweepMomentum&);
+template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double);
+template void sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double, const SweepMomentum&);
+template void sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);
+template void sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
+                                const SweepMomentum&);
 template void accumulate_grains<true>(const Contacts&, ContactRange, std::span<Velocity>);
 template void accumulate_grains<false>(const Contacts&, ContactRange, std::span<Velocity>);
 template void accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>, WallCopy&);

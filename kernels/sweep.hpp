@@ -23,24 +23,43 @@ struct ContactRange {
   std::size_t end;
 };
 
+/// What sweeps with momentum changed last, in the layout of Contacts: s - s_before [N s], s the impulses
+/// after a sweep. Rounded to float: of a step, not of an impulse, so that nothing is lost as steps become
+/// small.
+struct SweepSteps {
+  std::vector<float> x, y, z;  ///< with friction
+  std::vector<float> n;        ///< without
+};
+
+/// A sweep that begins from s + beta (s - s_before) instead of s (momentum.hpp), and over-relaxes the normal
+/// impulses by omega, in (0, 2): friction gains nothing by it. The velocities have gone on already.
+struct SweepMomentum {
+  double beta = 0, omega = 1;
+  SweepSteps& steps;  ///< read, and made anew
+};
+
 /// One pass of nonlinear Gauss-Seidel over grain-grain contacts (design.md §4; Jean 1999, closed form for
 /// spheres):
-///   r_n <- max(0, r_n - omega (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
+///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
 ///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
-/// omega: over-relaxation, in (0, 2); of the normal part alone, as friction gains nothing by it.
 /// `Friction` false: only r_n exists and only u is read and written. Per contact: reads 2 body records (128
 /// bytes) and 56 bytes of contact, writes 128 + 24; about 117 flop, 2 divisions and, when sliding, 1 square
-/// root.
+/// root. Momentum reads and writes 12 more.
+template <bool Friction>
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu);
 template <bool Friction>
 void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  double omega = 1);
+                  const SweepMomentum& momentum);
 
 /// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i. A copy of finite
 /// mass is split once more, contact k of the range against part k mod 8, and glued at the end: 8 contacts
 /// that do not wait for one another.
 template <bool Friction>
 void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                WallCopy& wall, double omega = 1);
+                WallCopy& wall);
+template <bool Friction>
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall, const SweepMomentum& momentum);
 
 /// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
 /// r.

@@ -44,6 +44,10 @@ ContactView view(const Contacts& c, ContactRange range) {
           range.end};
 }
 
+MomentumView view(const SweepMomentum& m) {
+  return {m.steps.x.data(), m.steps.y.data(), m.steps.z.data(), m.steps.n.data(), m.beta, m.omega};
+}
+
 ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
   ErrorSums sums;
   sums.residual2 = totals.residual2;
@@ -99,17 +103,33 @@ SweepKernels::SweepKernels(InstructionSet set)
 
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
-                                double mu, double omega) const {
-  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu, omega);
-  lanes_[Friction]->sweep_grains(view(contacts, range), impulses(contacts), records(velocity), mu, omega);
+                                double mu) const {
+  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
+  lanes_[Friction]->sweep_grains(view(contacts, range), impulses(contacts), records(velocity), mu);
+}
+
+template <bool Friction>
+void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                                double mu, const SweepMomentum& momentum) const {
+  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu, momentum);
+  lanes_[Friction]->momentum_grains(view(contacts, range), impulses(contacts), records(velocity), mu,
+                                    view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                              WallCopy& wall, double omega) const {
-  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall, omega);
-  lanes_[Friction]->sweep_wall(view(contacts, range), impulses(contacts), records(velocity), mu, omega,
+                              WallCopy& wall) const {
+  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
+  lanes_[Friction]->sweep_wall(view(contacts, range), impulses(contacts), records(velocity), mu,
                                wall.velocity, wall.inv_mass);
+}
+
+template <bool Friction>
+void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                              WallCopy& wall, const SweepMomentum& momentum) const {
+  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall, momentum);
+  lanes_[Friction]->momentum_wall(view(contacts, range), impulses(contacts), records(velocity), mu,
+                                  wall.velocity, wall.inv_mass, view(momentum));
 }
 
 template <bool Friction>
@@ -147,15 +167,6 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
                  range);
 }
 
-void SweepKernels::advance(std::span<double> values, std::span<double> last, double beta) const {
-  if (lanes_[1]) return lanes_[1]->advance(values.data(), last.data(), values.size(), beta);
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    const double s = values[k];
-    values[k] = s + beta * (s - last[k]);
-    last[k] = s;
-  }
-}
-
 void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velocity,
                            std::span<Velocity> last, double beta) const {
   if (lanes_[1])
@@ -171,10 +182,20 @@ void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velo
   }
 }
 
+template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double,
-                                               double) const;
+                                               const SweepMomentum&) const;
+template void SweepKernels::sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                             WallCopy&) const;
 template void SweepKernels::sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
-                                             double) const;
+                                             const SweepMomentum&) const;
+template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double) const;
+template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                                const SweepMomentum&) const;
+template void SweepKernels::sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double,
+                                              WallCopy&) const;
+template void SweepKernels::sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
+                                              const SweepMomentum&) const;
 template void SweepKernels::accumulate_grains<true>(const Contacts&, ContactRange, std::span<Velocity>) const;
 template void SweepKernels::accumulate_wall<true>(const Contacts&, ContactRange, std::span<Velocity>,
                                                   WallCopy&) const;
@@ -182,10 +203,6 @@ template ErrorSums SweepKernels::error_grains<true>(const Contacts&, ContactRang
                                                     double, Multiplicities) const;
 template ErrorSums SweepKernels::error_wall<true>(const Contacts&, ContactRange, std::span<const Velocity>,
                                                   double, const WallCopy&, double, Multiplicities) const;
-template void SweepKernels::sweep_grains<false>(Contacts&, ContactRange, std::span<Velocity>, double,
-                                                double) const;
-template void SweepKernels::sweep_wall<false>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&,
-                                              double) const;
 template void SweepKernels::accumulate_grains<false>(const Contacts&, ContactRange,
                                                      std::span<Velocity>) const;
 template void SweepKernels::accumulate_wall<false>(const Contacts&, ContactRange, std::span<Velocity>,

@@ -41,11 +41,16 @@ class SweepKernels {
   InstructionSet set() const { return set_; }
 
   template <bool Friction>
+  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) const;
+  template <bool Friction>
   void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                    double omega = 1) const;
+                    const SweepMomentum& momentum) const;
   template <bool Friction>
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  WallCopy& wall, double omega = 1) const;
+                  WallCopy& wall) const;
+  template <bool Friction>
+  void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                  WallCopy& wall, const SweepMomentum& momentum) const;
   template <bool Friction>
   void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) const;
   template <bool Friction>
@@ -59,9 +64,8 @@ class SweepKernels {
                        double mu, const WallCopy& wall, double wall_inv_mass,
                        Multiplicities multiplicity = {}) const;
 
-  /// Momentum: s goes on to s + beta (s - last), and `last` becomes s. Of numbers, and of whole records at
-  /// `slots`, whose masses, equal in both, stay to the bit.
-  void advance(std::span<double> values, std::span<double> last, double beta) const;
+  /// Momentum of bodies: s goes on to s + beta (s - last), and `last` becomes s. Of whole records at `slots`,
+  /// whose masses, equal in both, stay to the bit.
   void advance(std::span<const Slot> slots, std::span<Velocity> velocity, std::span<Velocity> last,
                double beta) const;
 

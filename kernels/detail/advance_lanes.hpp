@@ -1,6 +1,6 @@
 #pragma once
 
-/// Momentum on W = 4 or 8 numbers at a time (kernels/momentum.hpp): what stands at s goes on to
+/// Momentum of bodies, W = 4 or 8 numbers at a time (kernels/momentum.hpp): what stands at s goes on to
 /// s + beta (s - last), and s is remembered.
 
 #include "kernels/detail/lanes.hpp"
@@ -13,17 +13,6 @@ template <class V>
   const V s = load<V>(value);
   store(value, s + beta * (s - load<V>(last)));
   store(last, s);
-}
-
-template <int W>
-void advance(double* values, double* last, std::size_t count, double beta) {
-  std::size_t k = 0;
-  for (; k + W <= count; k += W) advance_one<Lanes<W>>(values + k, last + k, beta);
-  for (; k < count; ++k) {
-    const double s = values[k];
-    values[k] = s + beta * (s - last[k]);
-    last[k] = s;
-  }
 }
 
 /// Whole records: masses, equal in both, stay to the bit.

@@ -24,6 +24,13 @@ struct ImpulseView {
   double* n;          ///< without
 };
 
+/// SweepMomentum, its steps in the layout of `ImpulseView`.
+struct MomentumView {
+  float *x, *y, *z;  ///< with friction
+  float* n;          ///< without
+  double beta, omega;
+};
+
 /// Sums of the error as in `ErrorSums`.
 struct ErrorTotals {
   double residual2, residual_max, impulse2, velocity2;
@@ -34,17 +41,20 @@ struct ErrorTotals {
 /// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
 /// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be null.
 struct LaneKernels {
-  void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu, double omega);
-  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double omega,
-                     double* wall, double wall_inv_mass);
+  void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu);
+  void (*momentum_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu,
+                          const MomentumView&);
+  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
+                     double wall_inv_mass);
+  void (*momentum_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
+                        double wall_inv_mass, const MomentumView&);
   void (*accumulate_grains)(const ContactView&, double* bodies);
   void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,
                               const std::uint16_t* multiplicity);
   ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const double* wall,
                             double wall_inv_mass, const std::uint16_t* multiplicity);
-  /// Momentum: of `count` numbers, and of whole records at `slots`.
-  void (*advance)(double* values, double* last, std::size_t count, double beta);
+  /// Momentum of whole records at `slots`.
   void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
                          double beta);
 };

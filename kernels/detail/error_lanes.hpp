@@ -147,14 +147,10 @@ ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, co
 }
 
 template <bool Friction, int W>
-constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
-                                          sweep_wall<Friction, W>,
-                                          accumulate_grains<Friction, W>,
-                                          accumulate_wall<Friction, W>,
-                                          error_grains<Friction, W>,
-                                          error_wall<Friction, W>,
-                                          advance<W>,
-                                          advance_bodies<W>};
+constexpr LaneKernels kernels_of_lanes = {
+    sweep_grains<Friction, W>,  momentum_grains<Friction, W>,   sweep_wall<Friction, W>,
+    momentum_wall<Friction, W>, accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,
+    error_grains<Friction, W>,  error_wall<Friction, W>,        advance_bodies<W>};
 
 }  // namespace
 }  // namespace talus

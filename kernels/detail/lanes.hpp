@@ -50,6 +50,29 @@ template <class V>
   __builtin_memcpy(to, &v, sizeof(V));
 }
 
+/// Floats, widened when they are read and rounded when they are written.
+typedef float NarrowQuad __attribute__((vector_size(16)));
+typedef float NarrowOctet __attribute__((vector_size(32)));
+template <class V>
+struct NarrowOf {
+  using Type = NarrowQuad;
+};
+template <>
+struct NarrowOf<Octet> {
+  using Type = NarrowOctet;
+};
+template <class V>
+[[gnu::always_inline]] inline V load(const float* from) {
+  typename NarrowOf<V>::Type v;
+  __builtin_memcpy(&v, from, sizeof(v));
+  return __builtin_convertvector(v, V);
+}
+template <class V>
+[[gnu::always_inline]] inline void store(float* to, V v) {
+  const auto narrow = __builtin_convertvector(v, typename NarrowOf<V>::Type);
+  __builtin_memcpy(to, &narrow, sizeof(narrow));
+}
+
 [[gnu::always_inline]] inline Quad root(Quad v) {
 #ifdef __AVX__
   return reinterpret_cast<Quad>(_mm256_sqrt_pd(reinterpret_cast<__m256d>(v)));

@@ -114,16 +114,59 @@ template <bool Friction, class V>
   return m.du;
 }
 
-/// The impulse that solves the law, less the old one; stores the new one. Without friction only the first
-/// component is meant, along the normal.
-template <bool Friction, class V>
+/// A plain sweep begins where the last one ended.
+struct PlainStart {
+  static constexpr double omega = 1;
+  PlainStart from(std::size_t) const { return {}; }
+  template <class V>
+  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t) const {
+    return s;
+  }
+  template <class V>
+  [[gnu::always_inline]] V begin(V s, std::size_t) const {
+    return s;
+  }
+  template <class V>
+  [[gnu::always_inline]] void end(const V&, const V&, std::size_t) const {}
+};
+
+/// Steps of the contacts from some place on.
+struct MomentumStart {
+  float *x, *y, *z, *n;
+  double beta, omega;
+  [[gnu::always_inline]] MomentumStart from(std::size_t k) const {
+    return {x + k, y + k, z + k, n + k, beta, omega};
+  }
+  template <class V>
+  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at) const {
+    return {s.x + beta * load<V>(x + at), s.y + beta * load<V>(y + at), s.z + beta * load<V>(z + at)};
+  }
+  template <class V>
+  [[gnu::always_inline]] V begin(V s, std::size_t at) const {
+    return s + beta * load<V>(n + at);
+  }
+  template <class V>
+  [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at) const {
+    store(x + at, s_new.x - s.x);
+    store(y + at, s_new.y - s.y);
+    store(z + at, s_new.z - s.z);
+  }
+  template <class V>
+  [[gnu::always_inline]] void end(V s, V s_new, std::size_t at) const {
+    store(n + at, s_new - s);
+  }
+};
+
+/// The impulse that solves the law, less the one that the velocities know; stores the new one. Without
+/// friction only the first component is meant, along the normal.
+template <bool Friction, class V, class Start>
 [[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, const Target& out, std::size_t at,
                                                  const Space<V>& n, const Space<V>& v, V w_nn, V w_tt,
-                                                 double mu, double omega) {
+                                                 double mu, const Start& start) {
   const V bias = load<V>(c.bias + at), v_n = dot(v, n);
   if constexpr (Friction) {
-    const Space<V> r = load_impulse<true, V>(c, at, n);
-    const V r_n = dot(r, n), next = r_n - omega * (v_n + bias) / w_nn;
+    const Space<V> s = load_impulse<true, V>(c, at, n), r = start.begin(s, at);
+    const V r_n = dot(r, n), next = r_n - start.omega * (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next)), limit = mu * r_n_new;
     const Space<V> t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
     const V t2 = dot(t, t);
@@ -132,11 +175,14 @@ template <bool Friction, class V>
     store(out.x + at, r_new.x);
     store(out.y + at, r_new.y);
     store(out.z + at, r_new.z);
+    start.end(s, r_new, at);
     return r_new - r;
   } else {
-    const V r_n = load<V>(c.rn + at), next = r_n - omega * (v_n + bias) / w_nn;
+    const V s = load<V>(c.rn + at), r_n = start.begin(s, at);
+    const V next = r_n - start.omega * (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next));
     store(out.n + at, r_n_new);
+    start.end(s, r_n_new, at);
     return (r_n_new - r_n) * n;
   }
 }
@@ -197,9 +243,9 @@ template <class V>
 }
 
 /// Blocks x W contacts in three phases.
-template <bool Friction, int W, int Blocks>
+template <bool Friction, int W, int Blocks, class Start>
 [[gnu::always_inline]] inline void sweep_block(const Slice& c, const Target& out, double* const* a,
-                                               double* const* b, double mu, double omega) {
+                                               double* const* b, double mu, const Start& start) {
   using V = Lanes<W>;
   Meeting<V> m[Blocks];
   Space<V> dr[Blocks];
@@ -212,7 +258,7 @@ template <bool Friction, int W, int Blocks>
     V w_tt{};
     if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
     dr[k] =
-        solve_law<Friction>(c, out, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu, omega);
+        solve_law<Friction>(c, out, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu, start);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)
@@ -298,12 +344,49 @@ struct Part {
   }
 };
 
+/// Of the contacts of a `Part`, their steps.
+template <bool Friction, int W, class Start>
+struct StepsOfPart {
+  [[gnu::always_inline]] StepsOfPart(const Start&, std::size_t) {}
+  [[gnu::always_inline]] Start start() { return {}; }
+  [[gnu::always_inline]] void copy_out(const Start&, std::size_t) const {}
+};
 template <bool Friction, int W>
-void sweep_grains(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu,
-                  double omega) {
+struct StepsOfPart<Friction, W, MomentumStart> {
+  float x[W]{}, y[W]{}, z[W]{}, n[W]{};
+  double beta, omega;
+
+  [[gnu::always_inline]] StepsOfPart(const MomentumStart& own, std::size_t count)
+      : beta(own.beta), omega(own.omega) {
+    copy(own, start(), count);
+  }
+  [[gnu::always_inline]] MomentumStart start() { return {x, y, z, n, beta, omega}; }
+  [[gnu::always_inline]] void copy_out(const MomentumStart& own, std::size_t count) {
+    copy(start(), own, count);
+  }
+
+ private:
+  [[gnu::always_inline]] static void copy(const MomentumStart& from, const MomentumStart& to,
+                                          std::size_t count) {
+    for (std::size_t l = 0; l < count; ++l) {
+      if constexpr (Friction) {
+        to.x[l] = from.x[l];
+        to.y[l] = from.y[l];
+        to.z[l] = from.z[l];
+      } else {
+        to.n[l] = from.n[l];
+      }
+    }
+  }
+};
+
+template <bool Friction, int W, class Start>
+[[gnu::always_inline]] inline void sweep_grains_from(const ContactView& view, const ImpulseView& impulses,
+                                                     double* bodies, double mu, const Start& start) {
   constexpr std::size_t at_once = W * blocks_at_once;
   const ContactView c = view;  // local ones, so that no store can change them
   const ImpulseView r = impulses;
+  const Start all = start;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
@@ -312,20 +395,38 @@ void sweep_grains(const ContactView& view, const ImpulseView& impulses, double* 
       double *a[at_once], *b[at_once];
       find_bodies<at_once>(bodies, c.first + k, a);
       find_bodies<at_once>(bodies, c.second + k, b);
-      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, omega);
+      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, all.from(k));
     }
     for (; k + W <= end; k += W) {
       double *a[W], *b[W];
       find_bodies<W>(bodies, c.first + k, a);
       find_bodies<W>(bodies, c.second + k, b);
-      sweep_block<Friction, W, 1>(slice(c, k), target(r, k), a, b, mu, omega);
+      sweep_block<Friction, W, 1>(slice(c, k), target(r, k), a, b, mu, all.from(k));
     }
     if (k == end) continue;
+    const Start own = all.from(k);
     Part<Friction, W> part(c, k, end - k, bodies, true);
-    sweep_block<Friction, W, 1>(part.slice(), part.target(), part.a, part.b, mu, omega);
+    StepsOfPart<Friction, W, Start> steps(own, end - k);
+    sweep_block<Friction, W, 1>(part.slice(), part.target(), part.a, part.b, mu, steps.start());
     part.copy_out(r, k, end - k);
+    steps.copy_out(own, end - k);
     k = end;
   }
+}
+
+[[gnu::always_inline]] inline MomentumStart start_of(const MomentumView& m) {
+  return {m.x, m.y, m.z, m.n, m.beta, m.omega};
+}
+
+template <bool Friction, int W>
+void sweep_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu) {
+  sweep_grains_from<Friction, W>(c, r, bodies, mu, PlainStart{});
+}
+
+template <bool Friction, int W>
+void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
+                     const MomentumView& momentum) {
+  sweep_grains_from<Friction, W>(c, r, bodies, mu, start_of(momentum));
 }
 
 /// V += M^-1 H r for W contacts.
@@ -388,9 +489,9 @@ struct SplitWall {
 };
 
 /// A block of W grains against as many copies of a wall.
-template <bool Friction, int W>
+template <bool Friction, int W, class Start>
 [[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, const Target& out, double* const* a,
-                                                    double mu, double omega, std::size_t lanes,
+                                                    double mu, const Start& start, std::size_t lanes,
                                                     SplitWall<W>& wall) {
   using V = Lanes<W>;
   Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
@@ -399,29 +500,46 @@ template <bool Friction, int W>
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
   const Space<V> dr = solve_law<Friction>(c, out, 0, n, relative_velocity<Friction>(m, n),
-                                          m.w_nn + wall.inv_mass, w_tt, mu, omega);
+                                          m.w_nn + wall.inv_mass, w_tt, mu, start);
   scatter<Friction, false>(a, nullptr, n, dr);
   wall.push(lanes, n, dr);
 }
 
-template <bool Friction, int W>
-void sweep_wall(const ContactView& view, const ImpulseView& impulses, double* bodies, double mu, double omega,
-                double* wall, double wall_inv_mass) {
+template <bool Friction, int W, class Start>
+[[gnu::always_inline]] inline void sweep_wall_from(const ContactView& view, const ImpulseView& impulses,
+                                                   double* bodies, double mu, double* wall,
+                                                   double wall_inv_mass, const Start& start) {
   const ContactView c = view;
   const ImpulseView r = impulses;
+  const Start all = start;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
   std::size_t k = c.begin, lanes = 0;
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
     double* a[W];
     find_bodies<W>(bodies, c.first + k, a);
-    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, omega, lanes, split);
+    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, all.from(k), lanes, split);
   }
   if (k < c.end) {
+    const Start own = all.from(k);
     Part<Friction, W> part(c, k, c.end - k, bodies, false);
-    sweep_wall_block<Friction, W>(part.slice(), part.target(), part.a, mu, omega, lanes, split);
+    StepsOfPart<Friction, W, Start> steps(own, c.end - k);
+    sweep_wall_block<Friction, W>(part.slice(), part.target(), part.a, mu, steps.start(), lanes, split);
     part.copy_out(r, k, c.end - k);
+    steps.copy_out(own, c.end - k);
   }
   split.glue(wall);
+}
+
+template <bool Friction, int W>
+void sweep_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
+                double wall_inv_mass) {
+  sweep_wall_from<Friction, W>(c, r, bodies, mu, wall, wall_inv_mass, PlainStart{});
+}
+
+template <bool Friction, int W>
+void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
+                   double wall_inv_mass, const MomentumView& momentum) {
+  sweep_wall_from<Friction, W>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
 }
 
 template <bool Friction, int W>

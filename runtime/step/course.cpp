@@ -31,6 +31,11 @@ constexpr int plain_sweeps = 3;
 /// What momentum makes worse shows within as many sweeps.
 constexpr int trusted_sweeps = 25;
 
+/// Plain sweeps that are many for a problem of so many contacts.
+double stiff_for(std::int64_t contacts) {
+  return 0.1 * static_cast<double>(contacts);
+}
+
 Carry carry_of(SolverMethod method) {
   return method == SolverMethod::nncg ? Carry::conjugate : Carry::momentum;
 }
@@ -61,9 +66,10 @@ double Iteration::beta(int epoch) const {
   return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
 }
 
-/// Of the normal impulses. As long as beta is 0 sweeps are plain: they solve exactly what few sweeps solve.
+/// Of the normal impulses, with momentum. As long as beta is 0 sweeps are plain: they solve exactly what few
+/// sweeps solve.
 double Iteration::omega(int epoch) const {
-  return course(epoch).method == SolverMethod::momentum && beta(epoch) > 0 ? over_relaxation : 1;
+  return beta(epoch) > 0 ? over_relaxation : 1;
 }
 
 void Iteration::begin_course(SolverMethod method, double most) {
@@ -81,13 +87,16 @@ std::span<const Slot> Iteration::owned(std::size_t c) const {
   return std::span(state_.chunks.owned).subspan(from, to - from);
 }
 
-/// The start of a sweep moves on along the trail: the chunk's impulses, the bodies that it is the first to
-/// write, and its wall copy.
+/// The start of a sweep moves on along the trail: the chunk's impulses, with momentum within the sweep
+/// itself, the bodies that it is the first to write, and its wall copy.
 void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Chunks& chunks = state_.chunks;
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
-  carry_impulses(kernels_, carry, beta, range, state_.contacts, trail_);
+  if (carry == Carry::conjugate)
+    carry_impulses(beta, range, state_.contacts, trail_);
+  else if (number(epoch) == course(epoch).from)
+    begin_steps(range, trail_.steps);
   const bool at_wall = chunks.wall[c] >= 0;
   if (epoch == sweeps_from_) {
     fasten(owned(c), state_.bodies.velocity, trail_);
@@ -178,9 +187,23 @@ void Iteration::choose_course() {
   }
 }
 
+std::vector<bool> Iteration::carrying_walls() const {
+  std::vector<bool> carrying;
+  for (const Vec3& impulse : impulses_.back()) carrying.push_back(impulse != Vec3::Zero());
+  return carrying;
+}
+
 /// About the sweeps of the present course that this step's problem takes. Collective.
 double Iteration::sweeps_needed() {
-  if (sweeps_needed_ < 0) sweeps_needed_ = admm_.sweeps_needed();
+  if (sweeps_needed_ < 0) {
+    // To find out takes as long as ten sweeps, and two messages for each layer of grains.
+    const std::int64_t then = stiffness_.contacts, now = result_.contacts;
+    const bool holds = alike_ && stiffness_.sweeps_needed >= 0 &&
+                       2 * stiffness_.sweeps_needed < stiff_for(now) && 20 * std::abs(now - then) <= then &&
+                       stiffness_.carrying == carrying_walls();
+    if (!holds) stiffness_ = {admm_.sweeps_needed(), now, carrying_walls()};
+    sweeps_needed_ = stiffness_.sweeps_needed;
+  }
   // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.
   const double speed = course_.method == SolverMethod::momentum ? (1 + course_.most) / (1 - course_.most)
                        : course_.method == SolverMethod::nncg   ? 40
@@ -195,7 +218,7 @@ bool Iteration::looks_at_all() {
   constexpr std::int64_t tiny = 64;
   if (result_.stiff_calls > 0) return true;
   if (result_.contacts <= tiny) return result_.contacts > 0;
-  return sweeps_needed() >= cost && 10 * sweeps_needed_ >= static_cast<double>(result_.contacts);
+  return sweeps_needed() >= cost && sweeps_needed_ >= stiff_for(result_.contacts);
 }
 
 /// Judges the forces that walls and heavy bodies get. By the drift of wall forces, which sweeps show; or by

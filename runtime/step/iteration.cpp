@@ -3,7 +3,9 @@
 #include "runtime/step/task_kinds.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "kernels/balance.hpp"
@@ -32,6 +34,15 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
+  stiffness_ = {};
+  std::array<double, 2> extremes = {std::numeric_limits<double>::infinity(), 0};
+  for (const Velocity& v : state_.bodies.velocity)
+    extremes = {std::min(extremes[0], v.inv_mass), std::max(extremes[1], v.inv_mass)};
+  const std::vector<double> everywhere = ranks_.gather_records(std::span<const double>(extremes));
+  for (std::size_t k = 0; k < everywhere.size(); k += 2)
+    extremes = {std::min(extremes[0], everywhere[k]), std::max(extremes[1], everywhere[k + 1])};
+  constexpr double much_heavier = 1000;
+  alike_ = extremes[1] < much_heavier * extremes[0];
   busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);
 }
 
@@ -73,16 +84,23 @@ void Iteration::begin() {
 }
 
 template <bool Friction>
-void Iteration::sweep(std::size_t c, ContactRange range, double mu, double omega) {
+void Iteration::sweep(std::size_t c, ContactRange range, double mu, int epoch) {
   const Chunks& chunks = state_.chunks;
   std::span<Velocity> velocity = state_.bodies.velocity;
   const bool at_wall = chunks.wall[c] >= 0;
   const bool damped = !before_.empty() && chunks.boundary[c] != 0;
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
-  if (at_wall)
-    kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c], omega);
-  else
-    kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu, omega);
+  if (course(epoch).method == SolverMethod::momentum) {
+    const SweepMomentum momentum{beta(epoch), omega(epoch), trail_.steps};
+    if (at_wall)
+      kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c], momentum);
+    else
+      kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu, momentum);
+  } else if (at_wall) {
+    kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c]);
+  } else {
+    kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu);
+  }
   if (damped)
     relax<Friction>(state_.contacts, range, before_[c], state_.decomposition.multiplicity, velocity,
                     at_wall ? &state_.copies[c] : nullptr);
@@ -131,7 +149,7 @@ void Iteration::chunk(std::size_t c, int epoch) {
       break;
     case Work::sweep:
       if (course(epoch).method != SolverMethod::nlgs) carry_on(c, range, epoch);
-      sweep<Friction>(c, range, mu, omega(epoch));
+      sweep<Friction>(c, range, mu, epoch);
       if (course(epoch).method == SolverMethod::nncg)
         changes_[c] = change_squared(range, contacts, velocity, copy.inv_mass, trail_);
       break;

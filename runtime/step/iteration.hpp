@@ -107,7 +107,7 @@ class Iteration {
   template <bool Friction>
   void chunk(std::size_t c, int epoch);
   template <bool Friction>
-  void sweep(std::size_t c, ContactRange range, double mu, double omega);
+  void sweep(std::size_t c, ContactRange range, double mu, int epoch);
   std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
   /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
@@ -138,6 +138,7 @@ class Iteration {
   double impulse_scale() const;
   double drift() const;
   double sweeps_needed();
+  std::vector<bool> carrying_walls() const;
   bool looks_at_all();
   bool balanced();
   bool ask_admm();
@@ -168,6 +169,15 @@ class Iteration {
   double first_residual2_ = 0;       ///< at the first check of the step, or the first since ADMM [m^2/s^2]
   std::size_t history_from_ = 0;     ///< that check
   double sweeps_needed_ = -1;        ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  /// The last answer to that, and the problem it was given for. It holds for later steps on the same
+  /// candidates where the problem was far from stiff and is still much the same.
+  struct Stiffness {
+    double sweeps_needed = -1;
+    std::int64_t contacts = 0;
+    std::vector<bool> carrying;  ///< per wall
+  };
+  Stiffness stiffness_;
+  bool alike_ = false;  ///< no grain is much heavier than another, whose landing would change the answer
   /// The last look at the error of all velocities.
   struct Look {
     int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM

@@ -15,16 +15,39 @@ namespace {
 
 const SweepKernels kernels(InstructionSet::automatic);
 
-TEST(Momentum, GoesOnBeyondTheLastSweepByBeta) {
-  Contacts contacts;
-  contacts.rn = {1.0, 2.0};
+/// A sweep with momentum is a plain sweep of what has gone on by beta times the last step, to the bit; with
+/// beta = 0 it is the plain sweep.
+template <bool Friction>
+void expect_plain_sweeps_of_what_went_on() {
+  const test::Sample sample = test::dense_sample(5, 3, Friction, false, 60);
+  Contacts with = sample.contacts, plain = with;
+  std::vector<Velocity> velocity = sample.bodies.velocity, same = velocity;
   Trail trail;
-  allocate(trail, Carry::momentum, contacts, 0, 0);
-  carry_impulses(kernels, Carry::momentum, 0, {0, 2}, contacts, trail);
-  EXPECT_EQ(contacts.rn, (std::vector{1.0, 2.0}));  // the first sweep begins where it is
-  contacts.rn = {1.5, 1.0};                         // what the sweep made of it
-  carry_impulses(kernels, Carry::momentum, 0.5, {0, 2}, contacts, trail);
-  EXPECT_EQ(contacts.rn, (std::vector{1.75, 0.5}));
+  allocate(trail, Carry::momentum, with, velocity.size(), sample.chunks.size());
+  begin_steps({0, with.rx.size() + with.rn.size()}, trail.steps);
+  for (const double beta : {0.0, 0.0, 0.5, 0.9}) {
+    const auto go_on = [&](std::vector<double>& r, const std::vector<float>& step) {
+      for (std::size_t k = 0; k < r.size(); ++k) r[k] += beta * static_cast<double>(step[k]);
+    };
+    go_on(plain.rx, trail.steps.x);
+    go_on(plain.ry, trail.steps.y);
+    go_on(plain.rz, trail.steps.z);
+    go_on(plain.rn, trail.steps.n);
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+      if (sample.chunks.wall[c] >= 0) continue;
+      kernels.sweep_grains<Friction>(with, sample.range(c), velocity, 0.3,
+                                     SweepMomentum{beta, 1, trail.steps});
+      kernels.sweep_grains<Friction>(plain, sample.range(c), same, 0.3);
+    }
+    EXPECT_EQ(with.rx, plain.rx) << beta;
+    EXPECT_EQ(with.rz, plain.rz) << beta;
+    EXPECT_EQ(with.rn, plain.rn) << beta;
+  }
+}
+
+TEST(Momentum, SweepsWhatGoesOnBeyondTheLastSweepByBeta) {
+  expect_plain_sweeps_of_what_went_on<true>();
+  expect_plain_sweeps_of_what_went_on<false>();
 }
 
 TEST(Momentum, ConjugateDirectionIsTheWayOfTheSweepBefore) {
@@ -32,12 +55,12 @@ TEST(Momentum, ConjugateDirectionIsTheWayOfTheSweepBefore) {
   contacts.rn = {1.0};
   Trail trail;
   allocate(trail, Carry::conjugate, contacts, 0, 0);
-  carry_impulses(kernels, Carry::conjugate, 0, {0, 1}, contacts, trail);  // y0 = 1
-  contacts.rn = {3.0};                                                    // s
-  carry_impulses(kernels, Carry::conjugate, 0.5, {0, 1}, contacts, trail);
+  carry_impulses(0, {0, 1}, contacts, trail);  // y0 = 1
+  contacts.rn = {3.0};                         // s
+  carry_impulses(0.5, {0, 1}, contacts, trail);
   EXPECT_EQ(contacts.rn[0], 3.0);  // no direction before the first sweep: y1 = 3, p = 2
   contacts.rn = {4.0};
-  carry_impulses(kernels, Carry::conjugate, 0.5, {0, 1}, contacts, trail);
+  carry_impulses(0.5, {0, 1}, contacts, trail);
   EXPECT_EQ(contacts.rn[0], 5.0);  // 4 + 0.5 * 2
 }
 
@@ -45,10 +68,14 @@ TEST(Momentum, StaleTrailsAreNeverRead) {
   Contacts contacts;
   contacts.rn = {1.0};
   Trail trail;
-  allocate(trail, Carry::momentum, contacts, 0, 0);
-  trail.last.n = {std::numeric_limits<double>::quiet_NaN()};
-  carry_impulses(kernels, Carry::momentum, 0, {0, 1}, contacts, trail);
+  allocate(trail, Carry::conjugate, contacts, 0, 0);
+  trail.last.n = trail.step.n = {std::numeric_limits<double>::quiet_NaN()};
+  carry_impulses(0, {0, 1}, contacts, trail);
   EXPECT_EQ(contacts.rn[0], 1.0);
+  allocate(trail, Carry::momentum, contacts, 0, 0);
+  trail.steps.n = {std::numeric_limits<float>::quiet_NaN()};
+  begin_steps({0, 1}, trail.steps);
+  EXPECT_EQ(trail.steps.n[0], 0);
 }
 
 // Velocities made afresh lose what rounding had added to them. Momentum must not take that loss for motion:
@@ -76,36 +103,28 @@ TEST(Momentum, TakesARefreshForNoMotion) {
   EXPECT_EQ(velocity[0].inv_mass, 0.3);
 }
 
-TEST(Momentum, IsTheSameToTheBitOnEveryInstructionSet) {
-  constexpr std::size_t count = 19;
+TEST(Momentum, OfBodiesIsTheSameToTheBitOnEveryInstructionSet) {
   for (const InstructionSet set : {InstructionSet::avx2, InstructionSet::avx512}) {
     if (set > best_instruction_set()) continue;
-    std::vector<double> values[2], last[2];
-    std::vector<Velocity> velocity[2], last_v[2];
+    std::vector<Velocity> velocity[2], last[2];
     const std::vector<Slot> slots = {3, 0, 2};
     for (const int k : {0, 1}) {
-      for (std::size_t i = 0; i < count; ++i) {
-        values[k].push_back(1 / (1.0 + static_cast<double>(i)));
-        last[k].push_back(1 / (3.0 + static_cast<double>(i * i)));
-      }
       velocity[k].resize(4);
-      last_v[k].resize(4);
+      last[k].resize(4);
       for (std::size_t s = 0; s < 4; ++s)
         for (std::size_t c = 0; c < 3; ++c) {
-          velocity[k][s].u[c] = values[k][4 * s + c];
-          last_v[k][s].w[c] = last[k][4 * s + c];
-          velocity[k][s].inv_mass = last_v[k][s].inv_mass = 0.7;
+          velocity[k][s].u[c] = 1 / (1.0 + static_cast<double>(4 * s + c));
+          last[k][s].w[c] = 1 / (3.0 + static_cast<double>((4 * s + c) * (4 * s + c)));
+          velocity[k][s].inv_mass = last[k][s].inv_mass = 0.7;
         }
       const SweepKernels those(k == 0 ? InstructionSet::portable : set);
-      those.advance(values[k], last[k], 0.9);
-      those.advance(slots, velocity[k], last_v[k], 0.9);
+      those.advance(slots, velocity[k], last[k], 0.9);
     }
-    EXPECT_EQ(values[0], values[1]);
-    EXPECT_EQ(last[0], last[1]);
     for (std::size_t s = 0; s < 4; ++s)
       for (std::size_t c = 0; c < 3; ++c) {
         EXPECT_EQ(velocity[0][s].u[c], velocity[1][s].u[c]);
         EXPECT_EQ(velocity[0][s].w[c], velocity[1][s].w[c]);
+        EXPECT_EQ(last[0][s].u[c], last[1][s].u[c]);
         EXPECT_EQ(velocity[1][s].inv_mass, 0.7);
       }
   }

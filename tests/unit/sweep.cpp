@@ -154,9 +154,10 @@ TEST(Sweep, OverRelaxedGoesBeyondTheSolutionOfAContactAndSettlesThereWithTheNext
     OneContact plain(random, true);
     plain.contacts.bias[0] = -20;  // pressed together: it stays closed
     OneContact over = plain;
+    SweepSteps steps{{0}, {0}, {0}, {}};
     const double before = contact_impulse(over.contacts, 0).dot(over.n);
     sweep_grains<true>(plain.contacts, {0, 1}, plain.velocity, 0.4);
-    sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4, 1.2);
+    sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4, SweepMomentum{0, 1.2, steps});
     const double exact = contact_impulse(plain.contacts, 0).dot(plain.n),
                  beyond = contact_impulse(over.contacts, 0).dot(over.n);
     EXPECT_NEAR(beyond - before, 1.2 * (exact - before), 1e-12 * (std::abs(exact) + std::abs(before)));

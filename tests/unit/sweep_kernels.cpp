@@ -89,6 +89,10 @@ Outcome run(const Kernels& kernels, const Sample& sample, const Plan& plan) {
   Outcome out{sample.bodies.velocity, sample.contacts, {}, {}};
   out.walls.resize(sample.chunks.size());
   const Multiplicities multiplicity(plan.multiplicity);
+  SweepSteps steps;
+  steps.x.resize(out.contacts.rx.size());
+  steps.y = steps.z = steps.x;
+  steps.n.resize(out.contacts.rn.size());
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     out.walls[c] = {{0.1, -0.2, 0.05}, plan.wall_inv_mass};
   const auto measure = [&] {
@@ -103,12 +107,19 @@ Outcome run(const Kernels& kernels, const Sample& sample, const Plan& plan) {
   measure();
   for (int s = 0; s < plan.sweeps; ++s)
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
-      const double omega = s % 2 == 0 ? 1 : 1.2;
-      if (sample.chunks.wall[c] < 0)
-        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu, omega);
+      // Plain and with momentum by turns.
+      const SweepMomentum momentum{0.9, 1.2, steps};
+      if (sample.chunks.wall[c] < 0 && s % 2 == 0)
+        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu);
+      else if (sample.chunks.wall[c] < 0)
+        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
+                                                momentum);
+      else if (s % 2 == 0)
+        kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
+                                              out.walls[c]);
       else
         kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
-                                              out.walls[c], omega);
+                                              out.walls[c], momentum);
     }
   measure();
   for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
