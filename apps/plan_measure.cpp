@@ -144,11 +144,13 @@ class Forms {
 };
 
 /// The fastest of each, in turns, so that a busy moment of the machine meets both.
-std::pair<Cost, Cost> compare(const Setup& with, const Setup& without, const Bodies& bodies,
-                              graph::Executor& executor, int repeats) {
+std::pair<Cost, Cost> compare(const std::pair<Setup, graph::Executor&>& with,
+                              const std::pair<Setup, graph::Executor&>& without, const Bodies& bodies,
+                              int repeats) {
   std::pair<Cost, Cost> best;
   for (int k = 0; k < repeats; ++k) {
-    const Cost a = sweep_first_step(with, bodies, executor), b = sweep_first_step(without, bodies, executor);
+    const Cost a = sweep_first_step(with.first, bodies, with.second),
+               b = sweep_first_step(without.first, bodies, without.second);
     if (k == 0 || a.ns < best.first.ns) best.first = a;
     if (k == 0 || b.ns < best.second.ns) best.second = b;
   }
@@ -168,7 +170,7 @@ std::vector<MeasuredSaving> measure_savings(const io::Scene& scene, int threads,
   std::vector<MeasuredSaving> savings;
   const auto add = [&](const char* part, bool in_scene, Setup (Forms::*form)(bool) const) {
     const auto [with, without] =
-        compare((forms.*form)(true), (forms.*form)(false), bodies, executor, repeats);
+        compare({(forms.*form)(true), executor}, {(forms.*form)(false), executor}, bodies, repeats);
     savings.push_back({part, in_scene, with.ns, without.ns, with.bytes, without.bytes});
     return with;
   };
@@ -187,6 +189,16 @@ std::vector<MeasuredSaving> measure_savings(const io::Scene& scene, int threads,
                        savings.back().with_ns + 1e9 * each * count / cut.contacts, savings.back().with_ns,
                        savings.back().with_bytes + bytes, savings.back().with_bytes});
   }
+
+  // Recorded, and thrown away instead of written.
+  trace::RecorderOptions recording{.threads = threads, .sink = [](trace::Block&&) {}};
+  const std::size_t buffers = recording.block * sizeof(trace::Record) * static_cast<std::size_t>(threads);
+  trace::Recorder recorder(std::move(recording));
+  graph::Executor traced({.threads = threads, .trace = &recorder});
+  const Setup base = forms.subdomains(forms.has_subdomains());
+  const auto [with, without] = compare({base, traced}, {base, executor}, bodies, repeats);
+  savings.push_back({"trace", false, with.ns, without.ns,
+                     without.bytes + static_cast<double>(buffers) / without.contacts, without.bytes});
   return savings;
 }
 

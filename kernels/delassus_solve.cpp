@@ -37,7 +37,9 @@ class NewtonTrials {
     }
     // Sweeps that have not made the error a third while they doubled have stalled.
     const bool stalled = last_error_ > 0 && answer.least() > 0.3 * last_error_;
-    const bool helped = newton(answer, stalled ? 6 : 2, static_cast<std::int64_t>(0.5 * sweeps / step_cost_));
+    const bool helped =
+        newton(answer, stalled ? patience_ : 2, static_cast<std::int64_t>(0.5 * sweeps / step_cost_));
+    if (stalled && !helped) patience_ *= 4;
     last_error_ = answer.least();
     next_trial_ = 2 * sweeps;
     return helped;
@@ -61,6 +63,7 @@ class NewtonTrials {
   double next_trial_ = 40;  ///< [sweeps]
   double step_cost_ = 0;    ///< of a step of Newton [sweeps]
   double last_error_ = 0;   ///< after the last trial
+  int patience_ = 6;        ///< with Newton, where sweeps have stalled: its way down may lead up first
 };
 
 }  // namespace

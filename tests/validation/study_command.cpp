@@ -200,8 +200,8 @@ TEST_F(StudyError, PlanMeasuresWhatOmissionsSave) {
   EXPECT_EQ(plain.output.find("measured here"), std::string::npos);
   const std::size_t table = measured.output.find("measured here");
   ASSERT_NE(table, std::string::npos);
-  for (const std::string part :
-       {"friction", "rotation, with friction", "pushed walls", "several subdomains", "a rank per subdomain"})
+  for (const std::string part : {"friction", "rotation, with friction", "pushed walls", "several subdomains",
+                                 "a rank per subdomain", "trace"})
     EXPECT_NE(measured.output.find("\n  " + part, table), std::string::npos) << measured.output;
   // Tangential impulses and spins are bytes that a frictionless scene does not hold.
   std::istringstream row(measured.output.substr(measured.output.find("\n  friction", table) + 28));
