@@ -16,6 +16,7 @@
 #include "apps/trace_command.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
+#include "runtime/graph/clock.hpp"
 
 #include <cstdio>
 #include <cstdlib>
@@ -116,6 +117,12 @@ int main(int argc, char** argv) {
       ->needs(trace_flag);
   run_app->add_option("--replay-order", run.replay_order, "begin the loop's tasks in the order of this trace")
       ->type_name("FILE");
+  if (graph::simulated_ranks)
+    run_app
+        ->add_option(
+            "--task-times", run.task_times,
+            "in the steps of this trace, tasks take their medians in it instead of what this host needs")
+        ->type_name("FILE");
   run_app->add_flag("--dry-run", run.dry_run, "check everything, print the resolved scene, write nothing");
 
   PlanOptions plan;

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdio>
 #include <functional>
+#include <memory>
 
 #include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
@@ -25,6 +26,7 @@
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "runtime/trace/order.hpp"
+#include "runtime/trace/task_times.hpp"
 
 namespace talus {
 
@@ -221,9 +223,15 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
   return 0;
 }
 
+/// Of earlier runs, that this one goes by; null: not asked for.
+struct Recordings {
+  std::unique_ptr<trace::Order> order;
+  std::unique_ptr<trace::TaskTimes> times;
+};
+
 /// Takes the run to its end, or to what breaks it off; the summary says which.
 io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     const std::string& directory, trace::Order* order, io::Recorder& recorder,
+                     const std::string& directory, const Recordings& recordings, io::Recorder& recorder,
                      const graph::Communicator& ranks) {
   Stopwatch watch;
   io::Summary summary;
@@ -237,11 +245,12 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   };
   std::optional<TraceFeed> trace;
   if (options.trace) trace.emplace(directory, parse_steps(options.trace_steps), threads, ranks);
-  graph::Executor executor({.threads = threads, .trace = trace ? &trace->recorder() : nullptr});
+  graph::Executor executor(
+      {.threads = threads, .trace = trace ? &trace->recorder() : nullptr, .times = recordings.times.get()});
   if (trace) trace->start(executor);
   Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
                         ranks);
-  if (order) simulation.follow(order);
+  if (recordings.order) simulation.follow(recordings.order.get());
   RecorderFeed feed(executor, recorder, ranks,
                     options.error_history.empty() ? StepList() : StepList(options.error_history));
   try {
@@ -356,7 +365,7 @@ trace::Trace order_of(const RunOptions& options, const graph::Communicator& rank
   return recorded;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, trace::Order* order,
+int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, const Recordings& recordings,
               const graph::Communicator& ranks) {
   const int threads = threads_of(options);
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
@@ -386,7 +395,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
   if (any_failed(refused, ranks)) return exit_bad_input;
   io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
   const io::Summary summary =
-      simulate(options, scene, std::move(sample), threads, directory, order, recorder, ranks);
+      simulate(options, scene, std::move(sample), threads, directory, recordings, recorder, ranks);
   recorder.finish(summary);
   if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
@@ -405,14 +414,18 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Sample sample;
-  std::optional<trace::Order> order;
+  Recordings recordings;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
     if (graph::simulated_ranks && options.threads > 1)
       throw std::invalid_argument(
           fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
-    if (!options.replay_order.empty()) order.emplace(order_of(options, ranks), ranks.rank());
+    if (!options.replay_order.empty())
+      recordings.order = std::make_unique<trace::Order>(order_of(options, ranks), ranks.rank());
+    if (!options.task_times.empty())
+      recordings.times =
+          std::make_unique<trace::TaskTimes>(io::read_trace(options.task_times), ranks.ranks(), ranks.rank());
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
@@ -440,7 +453,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   try {
-    return run_scene(options, scene, std::move(sample), order ? &*order : nullptr, ranks);
+    return run_scene(options, scene, std::move(sample), recordings, ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) ranks.abort(exit_failure);

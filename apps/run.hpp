@@ -21,6 +21,7 @@ struct RunOptions {
   bool trace = false;                     ///< record the tasks into trace.h5
   std::string trace_steps;                ///< "first:last", recorded alone; empty: all
   std::string replay_order;               ///< a trace whose order of tasks is to be followed; empty: none
+  std::string task_times;                 ///< a trace by which tasks take their time; simulated ranks only
   bool dry_run = false;                   ///< read, build, place and check; write nothing
   std::vector<std::string> command_line;  ///< for run.json
 };

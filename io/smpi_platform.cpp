@@ -10,11 +10,9 @@ namespace talus::io {
 
 std::string smpi_platform(const trace::Machine& machine) {
   const trace::Machine plain;
-  if (machine.noise != plain.noise || machine.contacts != plain.contacts || machine.typical ||
-      machine.quantile != 0)
+  if (machine.noise != plain.noise || machine.contacts != plain.contacts)
     throw std::invalid_argument(
-        "a platform for SMPI has no noise, no scale of contacts and no typical times: SMPI measures the real "
-        "program");
+        "a platform for SMPI has no noise and no scale of contacts: SMPI runs the real program");
   if (machine.threads != 1)
     throw std::invalid_argument(
         fmt::format("simulated ranks have one thread each, and the machine has {}", machine.threads));

@@ -44,7 +44,7 @@ bool Communicator::Channel::done() {
 double Communicator::Channel::wait() {
   const Request& r = *request_;
   if (!r.open) return 0;
-  const detail::MpiCall call;
+  const detail::MpiCall call(true);
   const double start = simgrid_get_clock();
   check(MPI_Recv(r.buffer.data(), static_cast<int>(r.buffer.size()), MPI_DOUBLE, r.other, r.tag,
                  MPI_COMM_WORLD, MPI_STATUS_IGNORE),

@@ -8,13 +8,14 @@
 
 #include <algorithm>
 #include <ctime>
+#include <utility>
 
 #include "runtime/graph/detail/mpi_call.hpp"
 
 namespace talus::graph {
 
 Clock::time_point Clock::now() noexcept {
-  const detail::MpiCall call;
+  const detail::MpiCall call(true);
   return time_point(std::chrono::duration_cast<duration>(std::chrono::duration<double>(MPI_Wtime())));
 }
 
@@ -38,6 +39,19 @@ HostTime host_time() {
 struct RankTime {
   HostTime left = host_time();  ///< MPI
   int inside = 0;
+  double owed = 0;   ///< has passed on the host or was given, not yet on the simulated machine [s]
+  double given = 0;  ///< of the innermost GivenTime, not yet in `owed` [s]
+  int givers = 0;
+
+  /// What lies between two looks at the host's clock counts, unless a time is given.
+  void look() {
+    if (givers > 0) return;
+    // The clock is read first here and last behind the call: nothing but work lies between.
+    const double clock =
+        std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count() -
+        left.clock;
+    owed += std::min(clock, host_time().processor - left.processor);
+  }
 };
 
 RankTime& rank_time() {
@@ -47,14 +61,12 @@ RankTime& rank_time() {
 
 }  // namespace
 
-MpiCall::MpiCall() {
+MpiCall::MpiCall(bool takes) {
   RankTime& time = rank_time();
   if (time.inside++ > 0) return;
-  // The clock is read first here and last behind the call: nothing but work lies between.
-  const double clock =
-      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count() -
-      time.left.clock;
-  smpi_execute_flops_benched(host_flops * std::min(clock, host_time().processor - time.left.processor));
+  time.look();
+  if (!takes) time.owed += std::exchange(time.given, 0);
+  if (time.owed > 0) smpi_execute_flops_benched(host_flops * std::exchange(time.owed, 0));
 }
 
 MpiCall::~MpiCall() {
@@ -67,6 +79,20 @@ void MpiCall::begin_rank() {
 }
 
 }  // namespace detail
+
+GivenTime::GivenTime(double seconds) {
+  detail::RankTime& time = detail::rank_time();
+  time.look();
+  ++time.givers;
+  around_ = std::exchange(time.given, seconds);
+}
+
+GivenTime::~GivenTime() {
+  detail::RankTime& time = detail::rank_time();
+  time.owed += std::exchange(time.given, around_);
+  if (--time.givers == 0) time.left = detail::host_time();
+}
+
 }  // namespace talus::graph
 
 #endif

@@ -21,9 +21,28 @@ struct Clock {
   static constexpr bool is_steady = true;
   static time_point now() noexcept;
 };
+
+/// As long as it lives, what the rank does takes `seconds` on the simulated machine, whatever the host needs
+/// for it: at the first message that the rank sends meanwhile, or at the end; what is taken comes before. One
+/// within another counts apart.
+class GivenTime {
+ public:
+  explicit GivenTime(double seconds);
+  ~GivenTime();
+  GivenTime(const GivenTime&) = delete;
+  GivenTime& operator=(const GivenTime&) = delete;
+
+ private:
+  double around_ = 0;  ///< still to come of the one around this one [s]
+};
 #else
 inline constexpr bool simulated_ranks = false;
 using Clock = std::chrono::steady_clock;
+
+/// Real ranks take the time they take.
+struct GivenTime {
+  explicit GivenTime(double /*seconds*/) {}
+};
 #endif
 
 /// [s] since some moment that is the same for the whole run.

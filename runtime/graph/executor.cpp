@@ -3,8 +3,11 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <optional>
 #include <stdexcept>
 #include <utility>
+
+#include "runtime/trace/task_times.hpp"
 
 namespace talus::graph {
 namespace {
@@ -92,10 +95,14 @@ void Executor::run_inline(const Graph& graph) {
 void Executor::run_task(const Graph& graph, TaskId task, Worker& worker) {
   trace::Recorder* const trace = options_.trace && options_.trace->active() ? options_.trace : nullptr;
   const std::int64_t begin = trace ? trace->now() : 0;
+  std::optional<GivenTime> given;
+  if (options_.times && options_.times->active())
+    given.emplace(options_.times->task(static_cast<std::uint32_t>(task)));
   if (graph.is_team(task))
     graph.run(task, worker);
   else
     graph.run(task);
+  given.reset();
   if (trace) trace->task(worker.thread(), static_cast<std::uint32_t>(task), begin);
 }
 

@@ -25,6 +25,10 @@
 #include "runtime/graph/worker.hpp"
 #include "runtime/trace/recorder.hpp"
 
+namespace talus::trace {
+class TaskTimes;
+}
+
 namespace talus::graph {
 
 struct ExecutorOptions {
@@ -35,6 +39,7 @@ struct ExecutorOptions {
       4;  ///< >= 1: background tasks that may be outstanding before submit_background blocks
   trace::Recorder* trace =
       nullptr;  ///< takes down each task, if given; of as many threads, outlives the executor
+  trace::TaskTimes* times = nullptr;  ///< what tasks take, on simulated ranks; outlives the executor
 };
 
 class Executor {
@@ -44,6 +49,7 @@ class Executor {
 
   int threads() const noexcept { return options_.threads; }
   trace::Recorder* trace() const noexcept { return options_.trace; }
+  trace::TaskTimes* times() const noexcept { return options_.times; }
 
   /// Runs all tasks of the graph in an order that its edges allow; returns when all have ended. With one
   /// thread they run inline, in the order of submission, without locks or atomics. When a task throws, no

@@ -44,7 +44,7 @@ struct Communicator::PendingGather::Request {
           "MPI_Isend");
   }
   void end_round() {
-    const detail::MpiCall call;
+    const detail::MpiCall call(true);
     check(MPI_Waitall(2, handles, MPI_STATUSES_IGNORE), "MPI_Waitall");
     const std::size_t from = back(rank, have);
     auto part = in.begin();

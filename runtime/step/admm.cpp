@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "kernels/balance.hpp"
+#include "runtime/step/task_kinds.hpp"
+#include "runtime/trace/recorder.hpp"
 
 namespace talus {
 
@@ -13,18 +16,22 @@ namespace {
 /// The copies agree by the messages of the gluing; rows travel to all ranks; threads share the subdomains.
 class StepLink final : public PartLink {
  public:
-  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew)
-      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew) {}
+  StepLink(const StepState& state, Gluing& gluing, const graph::Communicator& ranks, graph::Crew& crew,
+           trace::Meetings& rounds)
+      : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew), rounds_(rounds) {}
 
   void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
     crew_.share(parts, work);
   }
 
   void sum_copies(PartField& field) const override {
-    if (state_.decomposition.several()) gluing_.sum_copies(field);
+    if (!state_.decomposition.several()) return;
+    count(rounds_.exchanges);
+    gluing_.sum_copies(field);
   }
 
   std::vector<double> gather(std::vector<std::vector<double>> rows) const override {
+    count(rounds_.gathers);
     const Decomposition& all = state_.decomposition;
     const std::size_t width = rows.front().size();
     std::vector<double> here;
@@ -49,10 +56,15 @@ class StepLink final : public PartLink {
   }
 
  private:
+  static void count(std::uint16_t& calls) {
+    if (calls < std::numeric_limits<std::uint16_t>::max()) ++calls;
+  }
+
   const StepState& state_;
   Gluing& gluing_;
   const graph::Communicator& ranks_;
   graph::Crew& crew_;
+  trace::Meetings& rounds_;
 };
 
 /// The fastest that impulses make a body.
@@ -81,7 +93,30 @@ Admm::Admm(StepState& state, const StepParameters& parameters, const Decompositi
       parameters_(parameters),
       decomposition_(decomposition),
       ranks_(ranks),
-      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_)) {}
+      link_(std::make_unique<StepLink>(state, gluing, ranks, crew_, rounds_)) {}
+
+/// Outside of the loop's epochs, as parts of the step's tasks are: it is no node's.
+class Admm::Whole {
+ public:
+  explicit Whole(const Admm& admm) : admm_(admm) {
+    trace::Recorder* const trace = admm.ranks_.trace();
+    if (!trace || !trace->active()) return;
+    trace_ = trace;
+    admm.rounds_ = {};
+    begin_ = trace->now();
+  }
+  ~Whole() {
+    if (trace_)
+      trace_->lane().add(begin_, trace_->now(), admm_.rounds_.packed(), -1, kind_of(TaskKind::whole));
+  }
+  Whole(const Whole&) = delete;
+  Whole& operator=(const Whole&) = delete;
+
+ private:
+  const Admm& admm_;
+  trace::Recorder* trace_ = nullptr;
+  std::int64_t begin_ = 0;
+};
 
 std::vector<BodyProblem> Admm::gather() const {
   std::vector<WallMotion> walls;
@@ -112,11 +147,13 @@ std::vector<BodyProblem> Admm::gather() const {
 }
 
 double Admm::sweeps_needed() const {
+  const Whole span(*this);
   const std::vector<BodyProblem> parts = gather();
   return estimate_stiffness(BodyParts(parts, *link_));
 }
 
 double Admm::velocity_error(double enough) const {
+  const Whole span(*this);
   std::vector<BodyProblem> problems = gather();
   if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
     for (BodyProblem& problem : problems)
@@ -132,6 +169,7 @@ double Admm::velocity_error(double enough) const {
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {
+  const Whole span(*this);
   std::vector<BodyProblem> problems = gather();
   const BodyParts parts(problems, *link_);
   BodyAdmmSettings settings;

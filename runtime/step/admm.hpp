@@ -8,6 +8,7 @@
 #include "runtime/graph/crew.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/trace/trace.hpp"
 
 namespace talus {
 
@@ -41,6 +42,7 @@ class Admm {
   BodyAdmmResult improve(double tolerance, int calls);
 
  private:
+  class Whole;  ///< a span of it in a trace
   std::vector<BodyProblem> gather() const;
 
   StepState& state_;
@@ -48,6 +50,7 @@ class Admm {
   const DecompositionSettings& decomposition_;
   const graph::Communicator& ranks_;
   graph::Crew crew_;
+  mutable trace::Meetings rounds_;  ///< since the last span began
   std::unique_ptr<PartLink> link_;
 };
 

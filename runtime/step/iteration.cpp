@@ -350,7 +350,7 @@ bool Iteration::measured(int epoch) {
   for (std::int32_t rank : all.rank_of)
     lengths[static_cast<std::size_t>(rank)] += row_head + 3 * state_.walls.size();
   pending_ = ranks_.start_gather(std::move(rows), lengths);
-  if (ranks_.ranks() == 1 || sweeps_ >= settings_.max_iterations) {
+  if (ranks_.ranks() == 1 || settles(epoch)) {
     add_up(pending_->wait());
     if (!judge()) return false;
     if (ask_admm())

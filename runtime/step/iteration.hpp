@@ -62,6 +62,10 @@ class Iteration {
            (work(epoch) == Work::sweep && course(epoch).method == SolverMethod::nncg);
   }
   bool decide(int epoch);
+  /// The decision behind this epoch waits for the sums of all ranks, however many there are.
+  bool settles(int epoch) const {
+    return work(epoch) == Work::measure && sweeps_ >= settings_.max_iterations;
+  }
   /// Of threads that wait for decide(): ADMM's subdomains are shared out.
   void assist() { admm_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.

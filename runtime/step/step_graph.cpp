@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "runtime/graph/clock.hpp"
+#include "runtime/trace/task_times.hpp"
 
 namespace talus {
 
@@ -68,17 +70,23 @@ void StepGraph::build() {
     graph_.task(fmt::format("measure[{}]", lane), {read(bodies), read(walls), write(contacts[lane])},
                 [this, lane] { measure_lane(lane); });
   graph_.task("sum", {read(bodies), read(contacts)}, [this] { sum_up(); });
-  if (executor_.trace()) declare_tasks(*executor_.trace());
+  if (executor_.trace()) executor_.trace()->declare(declared_tasks());
+  if (executor_.times()) executor_.times()->check(declared_tasks());
 }
 
 void StepGraph::run() {
   sums_ = {};
   ++steps_;
+  // Nothing else counts in a step whose times are given.
+  std::optional<graph::GivenTime> none;
+  trace::TaskTimes* const times = executor_.times();
+  if (times && times->begin_step(static_cast<std::uint32_t>(steps_))) none.emplace(0);
   started_ = graph::seconds_now();
   trace::Recorder* const trace = executor_.trace();
   if (trace) trace->begin_step(static_cast<std::uint32_t>(steps_));
   executor_.run(graph_);
   if (trace) trace->end_step();
+  if (times) times->end_step();
 }
 
 }  // namespace talus

@@ -81,7 +81,7 @@ class StepGraph {
   void plan_iteration();
   void plan_epochs();
   void iterate(graph::Worker& worker);
-  void declare_tasks(trace::Recorder& recorder) const;
+  std::vector<trace::Task> declared_tasks() const;
   void note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner);
   trace::Plan describe_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) const;
   void finish_lane(std::uint32_t lane);

@@ -376,7 +376,7 @@ void StepGraph::plan_epochs() {
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
-  if (executor_.trace() || order_) note_plan({colour, offset, neighbour}, owner);
+  if (executor_.trace() || executor_.times() || order_) note_plan({colour, offset, neighbour}, owner);
   planned_ = true;
 }
 

@@ -8,6 +8,7 @@
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/order.hpp"
+#include "runtime/trace/task_times.hpp"
 
 namespace talus {
 
@@ -27,7 +28,7 @@ trace::Kind kind_of_task(std::string_view name, bool team) {
 
 }  // namespace
 
-void StepGraph::declare_tasks(trace::Recorder& recorder) const {
+std::vector<trace::Task> StepGraph::declared_tasks() const {
   std::vector<trace::Task> tasks;
   for (std::uint32_t i = 0; i < graph_.size(); ++i) {
     const graph::TaskId id{i};
@@ -44,7 +45,7 @@ void StepGraph::declare_tasks(trace::Recorder& recorder) const {
     for (graph::TaskId before : graph_.predecessors(id))
       task.predecessors.push_back(static_cast<std::uint32_t>(before));
   }
-  recorder.declare(std::move(tasks));
+  return tasks;
 }
 
 trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
@@ -87,6 +88,7 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
 void StepGraph::note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) {
   trace::Plan plan = describe_plan(conflicts, owner);
   if (order_) order_->check(plan, static_cast<std::uint32_t>(steps_));
+  if (executor_.times()) executor_.times()->plan(plan);
   if (executor_.trace()) executor_.trace()->plan(std::move(plan));
 }
 
@@ -102,6 +104,10 @@ void StepGraph::iterate(graph::Worker& worker) {
     trace::Traced traced(program, *trace, worker.thread());
     graph::run_epochs(epochs_, worker, traced);
   };
+  if (const trace::TaskTimes* const times = executor_.times(); times && times->active()) {
+    trace::Timed timed(iteration_, *times);
+    return run(timed);
+  }
   if (!followed_) return run(iteration_);
   trace::Ordered ordered(iteration_, *order_, worker);
   run(ordered);

@@ -25,7 +25,8 @@ enum class TaskKind : std::uint8_t {
   restore,
   publish,
   centre,
-  glue
+  glue,
+  whole  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
 };
 
 inline trace::Kind kind_of(TaskKind kind) {

@@ -243,7 +243,7 @@ class Builder {
             out_.handed[to] += bytes;
             continue;
           }
-          sends[from].push_back({to, bytes, message_name(m.from, m.to)});
+          sends[from].push_back({from, to, bytes, message_name(m.from, m.to)});
           ++out_.incoming[to];
         }
       }
@@ -259,7 +259,8 @@ class Builder {
       const auto named = [](std::uint64_t bytes) {
         return static_cast<std::uint32_t>(std::min<std::uint64_t>(bytes, none));
       };
-      const SimMessage message{parent == 0 ? centre_[0] : collect_[parent], named(up[r]),
+      const SimMessage message{collect_[r] == none ? centre_[r] : collect_[r],
+                               parent == 0 ? centre_[0] : collect_[parent], named(up[r]),
                                message_name(groups_[first], centre_group)};
       if (collect_[r] == none)
         out_.to_centre[r] = message;
@@ -267,7 +268,7 @@ class Builder {
         sends[collect_[r]].push_back(message);
       ++out_.incoming[message.to];
       sends[centre_[parent]].push_back(
-          {centre_[r], named(down[r]), message_name(centre_group, groups_[first])});
+          {centre_[parent], centre_[r], named(down[r]), message_name(centre_group, groups_[first])});
       ++out_.incoming[centre_[r]];
     }
     for (const auto& of_node : sends) {

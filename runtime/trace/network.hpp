@@ -19,13 +19,18 @@ class Network {
   /// What all ranks need from when the last has come to know what each brought: log2(ranks) messages, one
   /// behind the other (Communicator::start_gather). [ns]
   double collective() const { return collective_; }
+  /// Of it, what comes when all ranks wait: the first message of each leaves before
+  /// (Communicator::start_gather).
+  double collective_rest() const { return collective_ - first_; }
+  /// Between ranks that are farthest from each other.
+  double latency() const { return out_free_.size() > 1 ? latency_ : node_latency_; }
   /// Of a thread, per message. [ns]
   double overhead() const { return overhead_; }
 
  private:
   std::size_t node_of(std::uint32_t rank) const { return rank / ranks_per_node_; }
   std::uint32_t ranks_per_node_;
-  double latency_, per_byte_, node_latency_, node_per_byte_, overhead_, collective_;
+  double latency_, per_byte_, node_latency_, node_per_byte_, overhead_, collective_, first_;
   std::vector<double> out_free_, in_free_;  ///< per node: when its link is free again
 };
 

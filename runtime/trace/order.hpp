@@ -72,6 +72,10 @@ class Ordered {
     if constexpr (requires { program_.assist(); }) program_.assist();
   }
   bool decide(int epoch) { return program_.decide(epoch); }
+  bool settles(int epoch) const {
+    if constexpr (requires { program_.settles(epoch); }) return program_.settles(epoch);
+    return false;
+  }
   std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
 
  private:

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 
+#include "runtime/graph/tree.hpp"
 #include "runtime/trace/detail/simulation.hpp"
 
 namespace talus::trace {
@@ -76,6 +77,7 @@ class Player {
     out_.makespan = *std::max_element(now.begin(), now.end());
     out_.work = stage_.log.work();
     out_.tasks = stage_.log.tasks();
+    out_.dispatch = stage_.dispatch;
     if (!out_.trace.lanes.empty()) {
       for (const auto& rank : tasks_) {
         std::vector<Task>& tasks = out_.trace.tasks.emplace_back();
@@ -234,11 +236,19 @@ class Player {
     const bool late = machine_.ranks > 1 && trace_.ranks == 1 && machine_.late_check;
     std::vector<SimEpoch> epochs;
     bool read_next = false;
+    // What follows from the sums of recorded epoch e is done where they are read.
+    const auto read_here = [&](std::size_t e, SimEpoch& epoch) {
+      epoch.gate = epoch.reads = true;
+      do_together(index, e, epoch);
+    };
     std::size_t unread = 0;  // posted, not read: of a recording of several ranks
     for (std::size_t e = 0; e < recorded.epochs; ++e) {
       SimEpoch epoch;
       epoch.source = e;
       epoch.gate = recorded.check[e].exists();
+      epoch.settles = recorded.settled[e] != 0;
+      const bool later = late && epoch.gate && !epoch.settles;
+      if (!later) do_together(index, e, epoch);
       epoch.exchange = exchanges(index, e);
       if (machine_.ranks > 1 && epoch.gate) {
         if (trace_.ranks > 1) {
@@ -252,21 +262,21 @@ class Player {
           }
         } else {
           epoch.posts = true;
-          epoch.reads = !late;
+          epoch.reads = !later;
         }
       }
-      if (read_next) {
-        epoch.gate = epoch.reads = true;
-        read_next = false;
-      }
-      read_next = late && recorded.check[e].exists();
+      if (read_next) read_here(e - 1, epoch);
+      read_next = later;
       epochs.push_back(epoch);
     }
-    if (late && !epochs.empty()) {
+    if (read_next) {
       const std::size_t last = epochs.size() - 1;
       SimEpoch sweep = epochs[last >= 2 ? last - 2 : 0], undo = epochs[last >= 1 ? last - 1 : 0];
-      sweep.posts = undo.posts = undo.reads = false;
-      sweep.gate = sweep.reads = undo.gate = true;
+      for (SimEpoch* added : {&sweep, &undo}) {
+        added->posts = added->reads = false;
+        added->gate = true;
+      }
+      read_here(last, sweep);
       epochs.push_back(sweep);
       epochs.push_back(undo);
     }
@@ -280,6 +290,46 @@ class Player {
       read += epoch.reads ? 1 : 0;
     }
     return epochs;
+  }
+
+  /// Adds what all ranks did together within the check of recorded epoch e. As long as the rank with the
+  /// largest share needs; threads that wait help.
+  void do_together(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
+    const double part = machine_.contacts / machine_.speed * trace_.threads / machine_.threads;
+    for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
+      double most = 0;
+      for (std::size_t r = 0; r < static_cast<std::size_t>(machine_.ranks); ++r) {
+        double work = 0;
+        for (std::size_t s = 0; s < index.ranks.size(); ++s)
+          if (k < index.ranks[s].whole[e].size())
+            work += share(r, s) * stage_.timeline.self(index.ranks[s].whole[e][k]);
+        most = std::max(most, work * part);
+      }
+      const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
+      epoch.spans.push_back({epoch.whole, epoch.whole + most, record.node, record.kind()});
+      epoch.whole += most;
+      if (machine_.ranks == 1) continue;
+      const Meetings meetings = Meetings::of(record.node);
+      epoch.meetings += meetings.gathers * stage_.network.collective() + meetings.exchanges * exchange_time();
+    }
+  }
+
+  /// One exchange of copies with no sweeps to hide it: to neighbours, and up and down the tree of ranks.
+  double exchange_time() const {
+    const auto ranks = static_cast<std::size_t>(machine_.ranks);
+    std::vector<double> messages(ranks, 0);
+    bool tree = false;
+    for (std::uint32_t n = 0; n < layout_.nodes.size(); ++n) {
+      const SimNode& node = layout_.nodes[n];
+      const double count = layout_.incoming[n] + layout_.send_begin[n + 1] - layout_.send_begin[n];
+      if (node.role != Role::centre) messages[node.rank] += count;
+      tree = tree || (node.role == Role::centre && count > 0);
+    }
+    const double overhead = stage_.network.overhead(), most = *std::ranges::max_element(messages);
+    const int children = std::min(graph::tree::children_of_a_rank, machine_.ranks - 1),
+              levels = tree ? 2 * graph::tree::depth(machine_.ranks - 1) : 0;
+    return most * overhead + std::max(1, levels) * stage_.network.latency() +
+           levels * (children + 1) * overhead;
   }
 
   static bool next_reads(const StepIndex::Rank& recorded, std::size_t epoch) {

@@ -68,6 +68,7 @@ struct Replay {
   double makespan = 0;  ///< [ns]
   double work = 0;      ///< of all tasks, without waiting [ns]
   std::size_t tasks = 0;
+  double dispatch = 0;  ///< between two nodes of a thread that need not wait, not within them [ns]
 };
 
 /// Plays all steps of a trace. `keep`: the records of what would have been, for pictures and shares. Throws

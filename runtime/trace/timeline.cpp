@@ -15,6 +15,13 @@ bool names_task(const Trace& trace, Kind kind) {
   return false;
 }
 
+void resize_checks(StepIndex::Rank& rank, std::size_t epochs) {
+  rank.check.resize(epochs);
+  rank.awaited.resize(epochs, 0);
+  rank.settled.resize(epochs, 0);
+  rank.whole.resize(epochs);
+}
+
 }  // namespace
 
 std::vector<std::vector<float>> self_times(const Trace& trace) {
@@ -62,6 +69,10 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
   StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(lane.rank)];
   const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(lane.rank)];
   Place last_task, last_check;
+  // By its beginning: ends of long ones are rounded.
+  const auto in_check = [&](const Record& span) {
+    return last_check.exists() && static_cast<double>(span.begin) < record(last_check).end();
+  };
   for (auto it = first; it != lane.records.end() && it->step() == index.step; ++it) {
     const Place place{number, static_cast<std::uint32_t>(it - lane.records.begin())};
     const Kind kind = it->kind();
@@ -69,14 +80,15 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
     if (kind == kind_outside) {
       rank.outside = place;
     } else if (kind == kind_collective) {
-      if (last_check.exists() && it->end() <= record(last_check).end())
+      if (in_check(*it))
         rank.awaited[static_cast<std::size_t>(record(last_check).epoch)] = 1;
       else if (last_task.exists() && it->end() <= record(last_task).end())
         ++rank.calls[record(last_task).node];
     } else if (kind == kind_check) {
       const auto epoch = static_cast<std::size_t>(it->epoch);
-      if (rank.check.size() <= epoch) rank.check.resize(epoch + 1), rank.awaited.resize(epoch + 1, 0);
+      if (rank.check.size() <= epoch) resize_checks(rank, epoch + 1);
       rank.check[epoch] = last_check = place;
+      rank.settled[epoch] = it->node == check_settles ? 1 : 0;
     } else if (it->epoch >= 0) {
       if (it->node >= rank.nodes)
         throw TraceError(fmt::format("step {}: node {} of a plan of {} on rank {}", index.step, it->node,
@@ -91,6 +103,8 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
       rank.task[it->node] = last_task = place;
     } else if (last_task.exists() && it->end() <= record(last_task).end()) {
       rank.part[record(last_task).node] = place;
+    } else if (in_check(*it)) {
+      rank.whole[static_cast<std::size_t>(record(last_check).epoch)].push_back(place);
     }
   }
 }
@@ -110,8 +124,7 @@ StepIndex Timeline::index(std::uint32_t step) const {
   for (std::uint32_t k = 0; k < trace_.lanes.size(); ++k) add(trace_.lanes[k], k, index);
   for (int r = 0; r < trace_.ranks; ++r) {
     StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(r)];
-    rank.check.resize(rank.epochs);
-    rank.awaited.resize(rank.epochs, 0);
+    resize_checks(rank, rank.epochs);
     const auto incomplete = [&](const std::string& what) {
       throw TraceError(fmt::format(
           "step {} was recorded in part: {} of rank {} is missing. Choose whole steps, or record anew", step,

@@ -35,8 +35,10 @@ struct StepIndex {
     std::vector<Place> task;    ///< per task of the step, absent for teams
     std::vector<int> calls;     ///< per task: collective calls within
     std::vector<char> awaited;  ///< per epoch: its check waited for other ranks
-    Place outside;              ///< before the step; absent for the first of a trace
-    std::vector<Place> part;    ///< per task: a span within that is no wait, or absent
+    std::vector<char> settled;  ///< per epoch: its check reads its own sums on any number of ranks
+    std::vector<std::vector<Place>> whole;  ///< per epoch: what all ranks did together within its check
+    Place outside;                          ///< before the step; absent for the first of a trace
+    std::vector<Place> part;                ///< per task: a span within that is no wait, or absent
 
     Place at(std::size_t epoch, std::size_t n) const { return node[epoch * nodes + n]; }
   };

@@ -49,8 +49,20 @@ inline constexpr Kind kind_outside{1};     ///< from the end of one step to the 
 inline constexpr Kind kind_collective{2};  ///< inside a call of all ranks; node = bytes
 inline constexpr Kind kind_receive{3};     ///< waits for a message; node = message_name
 inline constexpr Kind kind_send{4};        ///< starts a message; node = message_name
-inline constexpr Kind kind_check{5};       ///< decides after an epoch; node = 0
+inline constexpr Kind kind_check{5};       ///< decides after an epoch; node = 0 or check_settles
+/// A check that reads its own sums at once on any number of ranks; others are read a sweep later by several.
+inline constexpr std::uint32_t check_settles = 1;
 std::vector<KindInfo> runtime_kinds();
+
+/// How often all ranks meet in a task that they share: numbers that everybody learns, and copies that all
+/// subdomains exchange. Within a check it is Record::node of its span.
+struct Meetings {
+  std::uint16_t gathers = 0, exchanges = 0;
+  std::uint32_t packed() const { return std::uint32_t{gathers} << 16 | exchanges; }
+  static Meetings of(std::uint32_t packed) {
+    return {static_cast<std::uint16_t>(packed >> 16), static_cast<std::uint16_t>(packed)};
+  }
+};
 
 /// One task, or one span within a task (then it lies within the task's time, on the same lane).
 struct Record {

@@ -44,8 +44,10 @@ class Traced {
   }
   bool decide(int epoch) {
     const std::int64_t begin = recorder_.now();
+    std::uint32_t how = 0;
+    if constexpr (requires { program_.settles(epoch); }) how = program_.settles(epoch) ? check_settles : 0;
     const bool goes_on = program_.decide(epoch);
-    lane_.add(begin, recorder_.now(), 0, epoch, kind_check);
+    lane_.add(begin, recorder_.now(), how, epoch, kind_check);
     return goes_on;
   }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "io/trace_file.hpp"
+#include "runtime/trace/analysis.hpp"
 #include "tests/mpi/launcher.hpp"
 
 namespace talus::test {
@@ -29,11 +31,12 @@ class SimulatedRanks : public OnRanks {
   }
 
   /// The code that smpirun ends with; what it says goes to OUT.txt.
-  int simulate(int ranks, const std::string& machine, const std::string& out) const {
+  int simulate(int ranks, const std::string& machine, const std::string& out,
+               const std::string& options = "") const {
     const std::string line =
         fmt::format("cd '{}' && smpirun -np {} {} '" TALUS_SMPI_COMMAND
-                    "' run scene.toml --set decomposition.subdomains=9 --out {} >{}.txt 2>&1",
-                    folder_.path().string(), ranks, machine, out, out);
+                    "' run scene.toml --set decomposition.subdomains=9 --out {} {} >{}.txt 2>&1",
+                    folder_.path().string(), ranks, machine, out, options, out);
     const int status = std::system(line.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
@@ -59,6 +62,28 @@ TEST_F(SimulatedRanks, TakeTheTimeOfTheirNetwork) {
   const long iterations = summary(at("slow")).at("iterations");
   // Each iteration has an exchange; its messages need a latency at least.
   EXPECT_GT(seconds("slow"), 1e-3 * static_cast<double>(iterations));
+}
+
+// With the same times of tasks and the same network nothing is left but the two models: no clock is in it.
+TEST_F(SimulatedRanks, AgreeWithTheReplayOnGivenTimes) {
+  const Outcome one = run(1,
+                          "run scene.toml --set decomposition.subdomains=9 --out step --threads 1 --trace "
+                          "--trace-steps 2:2");
+  ASSERT_EQ(one.code, 3) << one.messages;
+  for (int ranks : {1, 2, 9}) {
+    const Outcome replay =
+        run(1, fmt::format("replay step/trace.h5 --ranks {} --quantile 0.5 --smpi-platform machine{}.xml "
+                           "--out played{}.h5",
+                           ranks, ranks, ranks));
+    ASSERT_EQ(replay.code, 0) << replay.messages;
+    const std::string out = fmt::format("given{}", ranks);
+    const std::string machine = fmt::format("-platform machine{}.xml", ranks);
+    ASSERT_EQ(simulate(ranks, machine, out, "--task-times step/trace.h5"), 3) << file(".", out + ".txt");
+    EXPECT_EQ(digest_of(out), digest_of("one")) << ranks;
+    const double played =
+        1e-9 * trace::analyse(io::read_trace(at(fmt::format("played{}.h5", ranks)))).makespan;
+    EXPECT_NEAR(read_table(at(out) / "steps.csv").number(1, "wall_s"), played, 0.15 * played) << ranks;
+  }
 }
 
 TEST_F(SimulatedRanks, ShareNodesAsTheReplayDoes) {

@@ -7,6 +7,7 @@
 
 #include "runtime/trace/analysis.hpp"
 #include "runtime/trace/network.hpp"
+#include "runtime/trace/task_times.hpp"
 #include "tests/unit/small_trace.hpp"
 
 namespace talus::trace {
@@ -89,6 +90,18 @@ TEST(Replay, OverheadIsPaidBySenderAndTaker) {
   machine.overhead = 5e-9;
   // Publish and glue take 5 ns more; so do both ends of the decision's message.
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (180 + 10) + 10);
+}
+
+TEST(Replay, AMessageLeavesWhenThoseBeforeItHave) {
+  // Three ranks, two messages each way, 20 ns of a core a message: what is sent first leaves 20 ns earlier,
+  // and is taken while the other is under way. Were both sent at the end of publish, and taken when the last
+  // has come, every rank would need 100 + 10 + 40 + latency + 40 + 20 in each epoch: 620 ns.
+  const Trace trace = test::all_neighbours(3, 1);
+  Machine machine = bare(3, 1);
+  machine.latency = 100e-9;
+  machine.overhead = 20e-9;
+  const double sums = 2 * (100 + 2 * 20);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 600 + sums);
 }
 
 TEST(Replay, OfTwoRecordedRanksOnOneAddsThemUp) {
@@ -184,6 +197,89 @@ TEST(Replay, ChecksAfterEverySweepAreReadASweepLater) {
     machine.late_check = false;
     EXPECT_DOUBLE_EQ(late, 2 * makespan(trace, machine)) << "a sweep more, and one to undo it";
   }
+}
+
+// The last way of sums among four ranks begins when all have done the sweep behind the check; the first is
+// hidden by it.
+TEST(Replay, SumsGoTheRestOfTheirWayWhenAllWait) {
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.late_check = true;
+    machine.latency = 40e-9;  // hidden where copies are glued
+    const double two = makespan(test::all_neighbours(2, 1), machine);
+    machine.ranks = 4;
+    EXPECT_DOUBLE_EQ(makespan(test::all_neighbours(4, 1), machine), two + 40);
+  }
+}
+
+TEST(Replay, ACheckThatSettlesIsReadAtOnce) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  std::ranges::find(records, kind_check, &Record::kind)->node = check_settles;
+  Machine machine = bare(2, 1);
+  machine.late_check = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180) << "no sweep more, nothing to undo";
+}
+
+/// A task that all ranks share in the last check of two subdomains, which takes 10 ns more: two gathers and
+/// three exchanges.
+Trace with_a_look(std::int64_t length = 80) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  const auto check = std::ranges::find(records, kind_check, &Record::kind);
+  check->duration = static_cast<float>(length + 10);
+  check->node = check_settles;
+  std::prev(records.end())->begin += length + 10;
+  records.insert(std::next(check), {check->begin + 10, static_cast<float>(length), Meetings{2, 3}.packed(),
+                                    -1, pack(1, test::task)});
+  return trace;
+}
+
+TEST(Replay, WhatAllRanksDoInACheckIsShared) {
+  const Trace trace = with_a_look();
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90);
+  Machine machine = bare(2, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40);
+  machine.latency = 30e-9;  // of the check's own sums, two gathers and three exchanges
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40 + 6 * 30);
+  const Replay played = replay(Timeline(trace), machine, true);
+  EXPECT_NO_THROW(validate(played.trace));
+  EXPECT_NEAR(analyse(played.trace).exposed, 2 * 6 * 30, 1e-3);
+}
+
+TEST(Replay, KeepsNodesApartThatMeetBetweenNanoseconds) {
+  Machine machine = bare(2, 1);
+  machine.bandwidth = 12e9;  // 83 1/3 ns a message: every second glue ends within a nanosecond
+  const Replay played = replay(Timeline(test::two_subdomains(1)), machine, true);
+  EXPECT_NEAR(analyse(played.trace).work, played.work, 2);
+}
+
+TEST(TaskTimes, AreThoseOfTheReplay) {
+  const Trace trace = with_a_look();
+  TaskTimes times(trace, 2, 1);
+  EXPECT_FALSE(times.begin_step(2));
+  ASSERT_TRUE(times.begin_step(1));
+  EXPECT_THROW(times.node(0, 0), TraceError) << "whose loop is not known yet";
+  times.plan(test::two_subdomains(2).plans[1]);
+  EXPECT_DOUBLE_EQ(times.task(0), 0);
+  // Of one subdomain: sweep, inner sweep, publish, centre, glue.
+  const double nodes[] = {100e-9, 50e-9, 10e-9, 0, 20e-9};
+  for (std::uint32_t n = 0; n < 5; ++n) EXPECT_NEAR(times.node(n, 0), nodes[n], 1e-15) << n;
+  EXPECT_NEAR(times.decision(1), 50e-9, 1e-15);
+  EXPECT_THROW(times.decision(0), TraceError);
+  EXPECT_THROW(times.node(0, 9), TraceError);
+  EXPECT_NO_THROW(times.check(test::three_tasks()));
+  EXPECT_THROW(times.check(std::vector<Task>{}), TraceError);
+  times.plan(trace.plans[0]);  // of both subdomains
+  EXPECT_THROW(times.node(0, 0), TraceError);
+}
+
+TEST(TaskTimes, HoldWhatTakesLongerThanTheDigitsOfARecord) {
+  const std::int64_t length = 782263171;  // known to 64 ns
+  TaskTimes times(with_a_look(length), 1, 0);
+  ASSERT_TRUE(times.begin_step(1));
+  EXPECT_NEAR(times.decision(1), 1e-9 * static_cast<double>(length), 1e-6);
 }
 
 TEST(Replay, NoiseIsTheSameForTheSameSeed) {

@@ -86,9 +86,9 @@ inline Lane run_once(const Plan& plan, const std::vector<float>& duration, const
   return lane;
 }
 
-/// Two subdomains that share copies: in each epoch a sweep of 100 ns, publish of 10 ns, an inner sweep of 50
-/// ns, glue of 20 ns, on one rank or one on each of two; two epochs, messages of 1000 bytes.
-inline Trace two_subdomains(int ranks) {
+/// Subdomains that all share copies: in each epoch a sweep of 100 ns, publish of 10 ns, an inner sweep of 50
+/// ns, glue of 20 ns, on one rank or one on each; two epochs, messages of 1000 bytes.
+inline Trace all_neighbours(int subdomains, int ranks) {
   Trace trace;
   trace.ranks = ranks;
   trace.kinds = kinds();
@@ -103,7 +103,7 @@ inline Trace two_subdomains(int ranks) {
       kind.push_back(of);
       return builder.add(role, group, colour);
     };
-    const int first = ranks == 1 ? 0 : rank, end = ranks == 1 ? 2 : rank + 1;
+    const int first = ranks == 1 ? 0 : rank, end = ranks == 1 ? subdomains : rank + 1;
     std::vector<std::uint32_t> outer;
     for (int e = first; e < end; ++e) {
       outer.push_back(add(Role::compute, static_cast<std::uint32_t>(e), 0, 100, sweep));
@@ -114,7 +114,9 @@ inline Trace two_subdomains(int ranks) {
     const std::uint32_t hub = add(Role::centre, centre_group, 7, 0, centre);
     for (int e = first; e < end; ++e) {
       glues.push_back(add(Role::glue, static_cast<std::uint32_t>(e), 8, 20, glue));
-      messages.push_back({static_cast<std::uint16_t>(e), static_cast<std::uint16_t>(1 - e), 1000});
+      for (int other = 0; other < subdomains; ++other)
+        if (other != e)
+          messages.push_back({static_cast<std::uint16_t>(e), static_cast<std::uint16_t>(other), 1000});
     }
     for (std::size_t k = 0; k < publishes.size(); ++k) {
       builder.join(publishes[k], outer[k]);
@@ -128,6 +130,10 @@ inline Trace two_subdomains(int ranks) {
     trace.lanes.push_back(run_once(trace.plans.back(), duration, kind, 2));
   }
   return trace;
+}
+
+inline Trace two_subdomains(int ranks) {
+  return all_neighbours(2, ranks);
 }
 
 /// One subdomain without gluing: `colour` and conflicts as given, one epoch.

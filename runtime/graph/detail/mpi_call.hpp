@@ -13,7 +13,9 @@ inline constexpr double host_flops = 1e9;
 /// nested; the outermost counts.
 class MpiCall {
  public:
-  MpiCall();
+  /// `takes`: takes a message and sends none, so that a time that is given (graph::GivenTime) is still to
+  /// come.
+  explicit MpiCall(bool takes = false);
   ~MpiCall();
   MpiCall(const MpiCall&) = delete;
   MpiCall& operator=(const MpiCall&) = delete;
@@ -23,7 +25,7 @@ class MpiCall {
 #else
 /// Real ranks need nothing around calls of MPI.
 struct MpiCall {
-  MpiCall() {}  // not trivial: an unused one is no oversight
+  explicit MpiCall(bool /*takes*/ = false) {}  // not trivial: an unused one is no oversight
   static void begin_rank() {}
 };
 #endif

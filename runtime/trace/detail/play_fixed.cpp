@@ -22,7 +22,7 @@ class FixedLoop {
         layout_(layout),
         epochs_(epochs),
         threads_(static_cast<std::uint32_t>(stage.machine.threads)),
-        rounds_(stage.machine.ranks, epochs, stage.network.collective()),
+        rounds_(stage.machine.ranks, epochs, stage.network),
         workers_(layout.walk_begin.size() - 1),
         ranks_(start.size()),
         finished_(layout.nodes.size(), 0),
@@ -45,6 +45,9 @@ class FixedLoop {
         case node_ends:
           node_ended(event.a, event.time);
           break;
+        case message_leaves:
+          message_left(event.a, event.b, event.time);
+          break;
         case message_comes:
           message_came(message(event.a), event.b, event.time);
           break;
@@ -65,7 +68,7 @@ class FixedLoop {
   }
 
  private:
-  enum : std::uint32_t { node_ends, message_comes, gate_reached, gate_opens };
+  enum : std::uint32_t { node_ends, message_leaves, message_comes, gate_reached, gate_opens };
 
   struct Worker {
     std::uint32_t rank = 0;
@@ -73,13 +76,16 @@ class FixedLoop {
     std::uint32_t epoch = 0;
     std::uint32_t next_waiter = none;
     double time = 0;
+    double taken = 0;             ///< when it has taken the messages that have come
+    double waited_to = 0;         ///< end of its last wait for one,
+    std::uint32_t last_name = 0;  ///< and which that was
   };
   struct Rank {
     std::uint32_t at_gate = 0;    ///< threads
     std::uint32_t published = 0;  ///< in this exchange
     double time = 0;
     double ready = 0;  ///< decided, but for the sums of others
-    bool waits = false, left = false;
+    bool left = false;
   };
 
   /// Only what other threads of the rank own must be looked at; a walk knows its own nodes done.
@@ -128,35 +134,44 @@ class FixedLoop {
         first_waiter_[before] = w;
         return;
       }
-      if (epochs_[me.epoch].exchange && arrived_[inbox(node, me.epoch)] < layout_.incoming[node]) {
-        pending_[node] = w;
-        return;
+      me.taken = me.waited_to = me.time;
+      if (epochs_[me.epoch].exchange) {
+        const std::uint32_t came = arrived_[inbox(node, me.epoch)];
+        me.taken += came * stage_.network.overhead();
+        if (came < layout_.incoming[node]) {
+          pending_[node] = w;
+          return;
+        }
       }
-      if (!start(w, node, me.time)) return;
+      if (!start(w, node)) return;
     }
   }
 
-  /// The node has all it needs at `ready`. True when nobody has to see its end.
-  bool start(std::uint32_t w, std::uint32_t node, double ready) {
+  /// The node has taken all it needs. True when nobody has to see its end.
+  bool start(std::uint32_t w, std::uint32_t node) {
     Worker& me = workers_[w];
     const SimEpoch& epoch = epochs_[me.epoch];
     const NodeWork recorded = work_of(stage_, index_, layout_.nodes[node], node, epoch, me.epoch);
-    double exchanged = 0;
+    ExchangeWork exchange;
     if (epoch.exchange) {
-      exchanged = exchange_work(stage_, layout_, node);
+      exchange = exchange_work(stage_, layout_, node);
       arrived_[inbox(node, me.epoch)] = 0;
     }
-    const double end = ready + recorded.work + exchanged;
+    const double waited = std::max(0.0, me.taken - me.time - exchange.takes),
+                 worked = me.taken + recorded.work + exchange.shares, end = worked + exchange.sends;
     if (recorded.recorded) {
       const auto number = static_cast<std::int32_t>(me.epoch);
-      stage_.log.task(w, me.time, end, ready - me.time, node - layout_.rank_begin[me.rank], number,
-                      recorded.kind);
-      if (ready > me.time) stage_.log.span(w, me.time, ready, last_name_, number, kind_receive);
+      stage_.log.task(w, me.time, end, waited, node - layout_.rank_begin[me.rank], number, recorded.kind);
+      if (waited > 0)
+        stage_.log.span(w, me.waited_to - waited, me.waited_to, me.last_name, number, kind_receive);
     }
     me.time = end + (recorded.recorded ? stage_.dispatch : 0);
     const bool sends = epoch.exchange &&
                        (layout_.send_begin[node + 1] > layout_.send_begin[node] ||
                         (layout_.nodes[node].role == Role::publish && layout_.to_centre[me.rank].bytes > 0));
+    for (std::uint32_t k = layout_.send_begin[node]; epoch.exchange && k < layout_.send_begin[node + 1]; ++k)
+      agenda_.add(worked + (k - layout_.send_begin[node] + 1) * stage_.network.overhead(), message_leaves, k,
+                  me.epoch);
     if (watched_[node] || sends) {
       agenda_.add(end, node_ends, w);
       return false;
@@ -169,7 +184,7 @@ class FixedLoop {
   void node_ended(std::uint32_t w, double now) {
     Worker& me = workers_[w];
     const std::uint32_t node = layout_.walk[me.at];
-    if (epochs_[me.epoch].exchange) send(node, me.rank, me.epoch, now);
+    if (epochs_[me.epoch].exchange) send_up(node, me.rank, me.epoch, now);
     ++finished_[node];
     ++me.at;
     std::uint32_t waiter = std::exchange(first_waiter_[node], none);
@@ -181,20 +196,21 @@ class FixedLoop {
     advance(w, now);
   }
 
-  void send(std::uint32_t node, std::uint32_t rank, std::uint32_t epoch, double now) {
-    const auto post = [&](std::size_t number) {
-      const SimMessage& posted = message(number);
-      const std::uint32_t to = layout_.nodes[posted.to].rank;
-      agenda_.add(stage_.network.arrival(rank, to, posted.bytes, now), message_comes,
-                  static_cast<std::uint32_t>(number), epoch);
-      stage_.log.span(layout_.nodes[node].worker, now, now, posted.name, static_cast<std::int32_t>(epoch),
-                      kind_send);
-    };
-    for (std::uint32_t k = layout_.send_begin[node]; k < layout_.send_begin[node + 1]; ++k) post(k);
+  /// The last publish of a leaf of the tree sends for all.
+  void send_up(std::uint32_t node, std::uint32_t rank, std::uint32_t epoch, double now) {
     if (layout_.nodes[node].role != Role::publish || ++ranks_[rank].published < layout_.publishes[rank])
       return;
     ranks_[rank].published = 0;
-    if (layout_.to_centre[rank].bytes > 0) post(layout_.sends.size() + rank);
+    if (layout_.to_centre[rank].bytes > 0)
+      message_left(static_cast<std::uint32_t>(layout_.sends.size() + rank), epoch, now);
+  }
+
+  void message_left(std::uint32_t number, std::uint32_t epoch, double now) {
+    const SimMessage& left = message(number);
+    const SimNode& from = layout_.nodes[left.from];
+    agenda_.add(stage_.network.arrival(from.rank, layout_.nodes[left.to].rank, left.bytes, now),
+                message_comes, number, epoch);
+    stage_.log.span(from.worker, now, now, left.name, static_cast<std::int32_t>(epoch), kind_send);
   }
 
   /// Those of `sends`, then those to the centre.
@@ -207,10 +223,16 @@ class FixedLoop {
     const std::uint32_t node = came_now.to;
     const std::uint32_t came = ++arrived_[inbox(node, epoch)];
     const std::uint32_t w = pending_[node];
-    if (came < layout_.incoming[node] || w == none || workers_[w].epoch != epoch) return;
+    if (w == none || workers_[w].epoch != epoch) return;
+    Worker& me = workers_[w];
+    if (now > me.taken) {
+      me.taken = me.waited_to = now;
+      me.last_name = came_now.name;
+    }
+    me.taken += stage_.network.overhead();
+    if (came < layout_.incoming[node]) return;
     pending_[node] = none;
-    last_name_ = came_now.name;
-    if (start(w, node, std::max(now, workers_[w].time))) advance(w, now);
+    if (start(w, node)) advance(w, now);
   }
 
   void decide(std::uint32_t r, double now) {
@@ -218,30 +240,25 @@ class FixedLoop {
     const std::uint32_t e = workers_[r * threads_].epoch;
     const SimEpoch& epoch = epochs_[e];
     rank.ready = now + check_work(stage_, index_, epoch);
-    const std::size_t round = epoch.reads_before;
-    rank.waits = epoch.reads;
     rank.time = now;
-    // With a check after every sweep, this one may post a round and read the one before.
-    const bool last = epoch.posts && rounds_.post(epoch.posts_before, rank.ready);
+    if (epoch.posts) {
+      rounds_.post(epoch.posts_before, rank.ready);
+      rank.ready += stage_.network.overhead();
+    }
+    const double behind = epoch.meetings + epoch.whole;
     if (!epoch.reads)
-      agenda_.add(rank.ready, gate_opens, r);
-    else if (rounds_.complete(round) && !(last && epoch.posts_before == round))
-      agenda_.add(std::max(rank.ready, rounds_.known(round)), gate_opens, r);
-    if (last)
+      agenda_.add(rank.ready + behind, gate_opens, r);
+    else if (rounds_.read(epoch.reads_before, rank.ready))
       for (std::uint32_t other = 0; other < ranks_.size(); ++other)
-        if (ranks_[other].waits &&
-            epochs_[workers_[other * threads_].epoch].reads_before == epoch.posts_before)
-          agenda_.add(std::max(ranks_[other].ready, rounds_.known(epoch.posts_before)), gate_opens, other);
+        agenda_.add(std::max(ranks_[other].ready, rounds_.known(epoch.reads_before)) + behind, gate_opens,
+                    other);
   }
 
   void open_gate(std::uint32_t r, double now) {
     Rank& rank = ranks_[r];
     const std::uint32_t first = r * threads_, e = workers_[first].epoch;
-    stage_.log.task(first, rank.time, now, now - rank.ready, 0, static_cast<std::int32_t>(e), kind_check);
-    if (now > rank.ready)
-      stage_.log.span(first, rank.ready, now, 0, static_cast<std::int32_t>(e), kind_collective);
+    log_check(stage_, first, static_cast<std::int32_t>(e), epochs_[e], rank.time, rank.ready, now);
     rank.at_gate = 0;
-    rank.waits = false;
     rank.time = now;
     if (e + 1 == epochs_.size()) {
       rank.left = true;
@@ -276,7 +293,6 @@ class FixedLoop {
   std::vector<std::uint32_t> foreign_begin_;
   std::vector<Foreign> foreign_;
   std::vector<char> watched_;
-  std::uint32_t last_name_ = 0;  ///< of the message that a node waited for last
 };
 
 }  // namespace

@@ -18,7 +18,7 @@ class ListLoop {
         layout_(layout),
         epochs_(epochs),
         threads_(static_cast<std::uint32_t>(stage.machine.threads)),
-        rounds_(stage.machine.ranks, epochs, stage.network.collective()),
+        rounds_(stage.machine.ranks, epochs, stage.network),
         ranks_(start.size()),
         missing_(layout.nodes.size(), 0),
         epoch_(layout.nodes.size(), 0),
@@ -40,6 +40,9 @@ class ListLoop {
       switch (event.what) {
         case node_ends:
           node_ended(event.a, event.b, event.time);
+          break;
+        case message_leaves:
+          message_left(event.a, event.b, event.time);
           break;
         case message_comes: {
           const SimMessage& came = message(event.a);
@@ -65,7 +68,7 @@ class ListLoop {
   }
 
  private:
-  enum : std::uint32_t { node_ends, message_comes, gate_reached, gate_opens };
+  enum : std::uint32_t { node_ends, message_leaves, message_comes, gate_reached, gate_opens };
   using Ready = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  ///< epoch, colour, node
 
   struct Rank {
@@ -75,7 +78,7 @@ class ListLoop {
     std::size_t ended = 0;            ///< nodes that have ended that epoch
     std::uint32_t published = 0;
     double time = 0, decided = 0;
-    bool waits = false, left = false;
+    bool left = false;
   };
 
   std::uint32_t last_before_gate(std::uint32_t epoch) const {
@@ -112,12 +115,20 @@ class ListLoop {
       }
       const SimEpoch& epoch = epochs_[epoch_[n]];
       const NodeWork recorded = work_of(stage_, index_, layout_.nodes[n], n, epoch, epoch_[n]);
-      double exchanged = 0;
+      ExchangeWork exchange;
       if (epoch.exchange) {
-        exchanged = exchange_work(stage_, layout_, n);
+        exchange = exchange_work(stage_, layout_, n);
+        // A thread that has nothing else to do takes each message as it comes; the last one is left.
+        if (stage_.machine.unbounded) exchange.takes = std::min(exchange.takes, stage_.network.overhead());
         arrived_[inbox(n, epoch_[n])] = 0;
       }
-      const double end = now + recorded.work + exchanged;
+      const double worked = now + exchange.takes + recorded.work + exchange.shares,
+                   end = worked + exchange.sends;
+      if (epoch.exchange) {
+        const std::uint32_t first = layout_.send_begin[n];
+        for (std::uint32_t k = first; k < layout_.send_begin[n + 1]; ++k)
+          agenda_.add(worked + (k - first + 1) * stage_.network.overhead(), message_leaves, k, epoch_[n]);
+      }
       if (recorded.recorded)
         stage_.log.task(stage_.log.worker(r, thread), now, end, 0, n - layout_.rank_begin[r],
                         static_cast<std::int32_t>(epoch_[n]), recorded.kind);
@@ -129,7 +140,7 @@ class ListLoop {
     const SimNode& node = layout_.nodes[n];
     Rank& rank = ranks_[node.rank];
     const std::uint32_t e = epoch_[n];
-    if (epochs_[e].exchange) send(n, e, now);
+    if (epochs_[e].exchange) send_up(n, e, now);
     if (!stage_.machine.unbounded) rank.idle.push_back(thread);
     // From now on everything that conflicts must end once more before this node runs again.
     ++epoch_[n];
@@ -142,18 +153,21 @@ class ListLoop {
     dispatch(node.rank, now);
   }
 
-  void send(std::uint32_t n, std::uint32_t e, double now) {
+  /// The last publish of a leaf of the tree sends for all.
+  void send_up(std::uint32_t n, std::uint32_t e, double now) {
     const SimNode& node = layout_.nodes[n];
-    const auto post = [&](std::size_t number) {
-      const SimMessage& posted = message(number);
-      agenda_.add(stage_.network.arrival(node.rank, layout_.nodes[posted.to].rank, posted.bytes, now),
-                  message_comes, static_cast<std::uint32_t>(number), e);
-    };
-    for (std::uint32_t k = layout_.send_begin[n]; k < layout_.send_begin[n + 1]; ++k) post(k);
     Rank& rank = ranks_[node.rank];
     if (node.role != Role::publish || ++rank.published < layout_.publishes[node.rank]) return;
     rank.published = 0;
-    if (layout_.to_centre[node.rank].bytes > 0) post(layout_.sends.size() + node.rank);
+    if (layout_.to_centre[node.rank].bytes > 0)
+      message_left(static_cast<std::uint32_t>(layout_.sends.size() + node.rank), e, now);
+  }
+
+  void message_left(std::uint32_t number, std::uint32_t e, double now) {
+    const SimMessage& left = message(number);
+    agenda_.add(
+        stage_.network.arrival(layout_.nodes[left.from].rank, layout_.nodes[left.to].rank, left.bytes, now),
+        message_comes, number, e);
   }
 
   void decide(std::uint32_t r, double now) {
@@ -161,28 +175,25 @@ class ListLoop {
     const SimEpoch& epoch = epochs_[rank.allowed];
     rank.time = now;
     rank.decided = now + check_work(stage_, index_, epoch);
-    rank.waits = epoch.reads;
-    // With a check after every sweep, this one may post a round and read the one before.
-    const bool last = epoch.posts && rounds_.post(epoch.posts_before, rank.decided);
+    if (epoch.posts) {
+      rounds_.post(epoch.posts_before, rank.decided);
+      rank.decided += stage_.network.overhead();
+    }
+    const double behind = epoch.meetings + epoch.whole;
     if (!epoch.reads)
-      agenda_.add(rank.decided, gate_opens, r);
-    else if (rounds_.complete(epoch.reads_before) && !(last && epoch.posts_before == epoch.reads_before))
-      agenda_.add(std::max(rank.decided, rounds_.known(epoch.reads_before)), gate_opens, r);
-    if (last)
+      agenda_.add(rank.decided + behind, gate_opens, r);
+    else if (rounds_.read(epoch.reads_before, rank.decided))
       for (std::uint32_t other = 0; other < ranks_.size(); ++other)
-        if (ranks_[other].waits && epochs_[ranks_[other].allowed].reads_before == epoch.posts_before)
-          agenda_.add(std::max(ranks_[other].decided, rounds_.known(epoch.posts_before)), gate_opens, other);
+        agenda_.add(std::max(ranks_[other].decided, rounds_.known(epoch.reads_before)) + behind, gate_opens,
+                    other);
   }
 
   void open_gate(std::uint32_t r, double now, bool first) {
     Rank& rank = ranks_[r];
     if (!first) {
-      const auto epoch = static_cast<std::int32_t>(rank.allowed);
-      const std::uint32_t worker = stage_.log.worker(r, 0);
-      stage_.log.task(worker, rank.time, now, now - rank.decided, 0, epoch, kind_check);
-      if (now > rank.decided) stage_.log.span(worker, rank.decided, now, 0, epoch, kind_collective);
+      log_check(stage_, stage_.log.worker(r, 0), static_cast<std::int32_t>(rank.allowed),
+                epochs_[rank.allowed], rank.time, rank.decided, now);
       rank.time = now;
-      rank.waits = false;
       rank.ended = 0;
       if (rank.allowed + 1 == epochs_.size()) {
         rank.left = true;

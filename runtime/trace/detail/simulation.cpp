@@ -8,8 +8,10 @@ namespace talus::trace::detail {
 void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
                Kind kind) {
   if (!trace_) return;
+  // Ends in whole nanoseconds too: one that lay behind the next beginning would take it for a part of itself.
+  const std::int64_t from = std::llround(begin);
   trace_->lanes[worker].records.push_back(
-      {std::llround(begin), static_cast<float>(end - begin), node, epoch, pack(step_, kind)});
+      {from, static_cast<float>(std::llround(end) - from), node, epoch, pack(step_, kind)});
 }
 
 double Stage::stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const {
@@ -93,12 +95,14 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
   return typical;
 }
 
-double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
+ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
   const SimNode& of = layout.nodes[node];
-  double messages = layout.incoming[node] + layout.send_begin[node + 1] - layout.send_begin[node];
+  double sent = layout.send_begin[node + 1] - layout.send_begin[node];
   if (of.role == Role::publish && layout.to_centre[of.rank].bytes > 0)
-    messages += 1.0 / layout.publishes[of.rank];
-  return messages * stage.network.overhead() + 0.5e9 * stage.machine.line / 64 * layout.handed[node];
+    sent += 1.0 / layout.publishes[of.rank];
+  const double overhead = stage.network.overhead();
+  return {layout.incoming[node] * overhead, 0.5e9 * stage.machine.line / 64 * layout.handed[node],
+          sent * overhead};
 }
 
 double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch) {
@@ -116,6 +120,15 @@ double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& ep
       work = std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
   }
   return work / stage.machine.speed;
+}
+
+void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double begin,
+               double decided, double end) {
+  const double waited = end - decided - epoch.whole, from = end - epoch.whole;
+  stage.log.task(worker, begin, end, waited, epoch.settles ? check_settles : 0, number, kind_check);
+  if (waited > 0) stage.log.span(worker, decided, from, 0, number, kind_collective);
+  for (const SimEpoch::Span& span : epoch.spans)
+    stage.log.span(worker, from + span.begin, from + span.end, span.meetings, -1, span.kind);
 }
 
 }  // namespace talus::trace::detail

@@ -2,6 +2,7 @@
 
 /// What the parts of a replay share: the machine, what was recorded, and what is written down.
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <queue>
@@ -72,7 +73,16 @@ struct SimEpoch {
   bool gate = false;       ///< a decision behind it
   bool posts = false;      ///< the sums of the rank leave at that decision
   bool reads = false;      ///< and it waits for those that all ranks have posted
-  bool exchange = false;   ///< copies are glued
+  bool settles = false;    ///< those it posts itself (check_settles)
+  /// What all ranks do together then: work, and waits where they meet [ns]; its parts, one after the other.
+  struct Span {
+    double begin = 0, end = 0;  ///< in `whole`
+    std::uint32_t meetings = 0;
+    Kind kind{};
+  };
+  double whole = 0, meetings = 0;
+  std::vector<Span> spans{};
+  bool exchange = false;  ///< copies are glued
   std::size_t exchanges_before = 0;
   std::size_t reads_before = 0, posts_before = 0;
 };
@@ -107,10 +117,18 @@ struct NodeWork {
 };
 NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node, std::uint32_t number,
                  const SimEpoch& epoch, std::size_t number_of_epoch);
-/// What messages and shared data add to the work of a node in an epoch that exchanges. [ns]
-double exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node);
+/// What a node adds to its work in an epoch that exchanges. [ns]
+struct ExchangeWork {
+  double takes = 0;   ///< each message that it takes
+  double shares = 0;  ///< what goes between threads
+  double sends = 0;   ///< all messages that it sends
+};
+ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node);
 /// Work of the decision behind an epoch. [ns]
 double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch);
+/// The decision of a worker's rank: it began, had done its own part, and was known, with all that follows.
+void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double begin,
+               double decided, double end);
 
 /// Things that happen, in order of time, then of their making.
 struct Event {
@@ -138,23 +156,28 @@ class Agenda {
   std::uint64_t order_ = 0;
 };
 
-/// Sums that all ranks post and read, one round per check.
+/// Sums that all ranks post and read, one round per check. What a rank posts is on its way to one other rank;
+/// the rest of the way is gone when all ranks wait for it.
 class Rounds {
  public:
-  Rounds(int ranks, const std::vector<SimEpoch>& epochs, double cost)
-      : ranks_(ranks), cost_(cost), posted_(epochs.back().posts_before + 1), at_(posted_.size(), 0) {}
-  /// True when this was the last rank.
-  bool post(std::size_t round, double time) {
-    at_[round] = std::max(at_[round], time);
-    return ++posted_[round] == ranks_;
+  Rounds(int ranks, const std::vector<SimEpoch>& epochs, const Network& network)
+      : ranks_(ranks),
+        whole_way_(network.collective()),
+        rest_(network.collective_rest()),
+        read_(epochs.size() + 1, 0),
+        at_(epochs.size() + 1, 0) {}
+  void post(std::size_t round, double time) { at_[round] = std::max(at_[round], time + whole_way_); }
+  /// True when this was the last rank: then all know the sums at known().
+  bool read(std::size_t round, double time) {
+    at_[round] = std::max(at_[round], time + rest_);
+    return ++read_[round] == ranks_;
   }
-  bool complete(std::size_t round) const { return posted_[round] == ranks_; }
-  double known(std::size_t round) const { return at_[round] + cost_; }
+  double known(std::size_t round) const { return at_[round]; }
 
  private:
   int ranks_;
-  double cost_;
-  std::vector<int> posted_;
+  double whole_way_, rest_;
+  std::vector<int> read_;
   std::vector<double> at_;
 };
 
