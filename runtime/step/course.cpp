@@ -120,10 +120,11 @@ const Iteration::Check* Iteration::check_before() const {
 /// sweeps, the slowest, take a third off in as many; what comes before is the start's, or ADMM's.
 bool Iteration::stagnant() const {
   constexpr int patience = 1000;
-  const int from = history_[history_from_].iterations, done = history_.back().iterations - from;
+  const std::size_t first = std::max(history_from_, patience_from_);
+  const int from = history_[first].iterations, done = history_.back().iterations - from;
   if (done < patience) return false;
   double quarter = std::numeric_limits<double>::infinity(), half = quarter;
-  for (std::size_t k = history_from_; k < history_.size(); ++k) {
+  for (std::size_t k = first; k < history_.size(); ++k) {
     const int at = history_[k].iterations - from;
     if (4 * at < done) continue;
     double& best = 2 * at < done ? quarter : half;

@@ -77,7 +77,7 @@ void Iteration::begin() {
   sweeps_from_ = segment_ = 0;
   read_at_ = restore_at_ = -1;
   sweeps_ = before_segment_ = 0;
-  history_from_ = 0;
+  history_from_ = patience_from_ = 0;
   sweeps_needed_ = -1;
   looked_ = {};
   first_course();
@@ -425,6 +425,13 @@ bool Iteration::judge() {
   if (result_.diverged) return false;
   // A NaN fails every comparison: sweeping on cannot mend it, and the step's end reports it.
   result_.stagnated = !result_.converged && stagnant();
+  if (result_.stagnated && settings_.method == SolverMethod::automatic &&
+      course_.method != SolverMethod::nlgs) {
+    // Momentum can go in circles about what plain sweeps reach.
+    result_.stagnated = false;
+    patience_from_ = history_.size() - 1;
+    begin_course(SolverMethod::nlgs, 0);
+  }
   if (result_.converged || std::isnan(result_.error_rms) || last || result_.stagnated) return false;
   choose_course();
   return true;
