@@ -58,28 +58,18 @@ class Order {
 
 /// One thread's view of a program of the epoch loop whose nodes wait for their turn.
 template <NamedProgram Program>
-class Ordered {
+class Ordered : public View<Program> {
  public:
   Ordered(Program& program, Order& order, const graph::Worker& me)
-      : program_(program), order_(order), me_(me) {}
+      : View<Program>(program), order_(order), me_(me) {}
   void node(std::uint32_t node, int epoch) {
     // What leaves no record has no turn. A run that was stopped elsewhere ends by itself.
     if (program_.kind(node, epoch) && !me_.wait([&] { return order_.take(node, epoch); })) return;
     program_.node(node, epoch);
   }
-  bool gate(int epoch) { return program_.gate(epoch); }
-  void assist() {
-    if constexpr (requires { program_.assist(); }) program_.assist();
-  }
-  bool decide(int epoch) { return program_.decide(epoch); }
-  bool settles(int epoch) const {
-    if constexpr (requires { program_.settles(epoch); }) return program_.settles(epoch);
-    return false;
-  }
-  std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
 
  private:
-  Program& program_;
+  using View<Program>::program_;
   Order& order_;
   const graph::Worker& me_;
 };

@@ -58,29 +58,20 @@ class TaskTimes {
 
 /// A program of the epoch loop whose nodes and decisions take their given times.
 template <NamedProgram Program>
-class Timed {
+class Timed : public View<Program> {
  public:
-  Timed(Program& program, const TaskTimes& times) : program_(program), times_(times) {}
+  Timed(Program& program, const TaskTimes& times) : View<Program>(program), times_(times) {}
   void node(std::uint32_t node, int epoch) {
     const graph::GivenTime given(program_.kind(node, epoch) ? times_.node(node, epoch) : 0);
     program_.node(node, epoch);
-  }
-  bool gate(int epoch) { return program_.gate(epoch); }
-  void assist() {
-    if constexpr (requires { program_.assist(); }) program_.assist();
   }
   bool decide(int epoch) {
     const graph::GivenTime given(times_.decision(epoch));
     return program_.decide(epoch);
   }
-  bool settles(int epoch) const {
-    if constexpr (requires { program_.settles(epoch); }) return program_.settles(epoch);
-    return false;
-  }
-  std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
 
  private:
-  Program& program_;
+  using View<Program>::program_;
   const TaskTimes& times_;
 };
 

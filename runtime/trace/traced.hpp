@@ -17,13 +17,34 @@ concept NamedProgram = graph::EpochProgram<Program> &&
   { program.kind(node, epoch) } -> std::convertible_to<std::optional<Kind>>;
 };
 
+/// A program of the epoch loop as it is: what a view of it has that changes one thing only, and says so by a
+/// member of its own that hides the one here.
+template <NamedProgram Program>
+class View {
+ public:
+  explicit View(Program& program) : program_(program) {}
+  bool gate(int epoch) { return program_.gate(epoch); }
+  void assist() {
+    if constexpr (requires { program_.assist(); }) program_.assist();
+  }
+  bool decide(int epoch) { return program_.decide(epoch); }
+  bool settles(int epoch) const {
+    if constexpr (requires { program_.settles(epoch); }) return program_.settles(epoch);
+    return false;
+  }
+  std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
+
+ protected:
+  Program& program_;
+};
+
 /// One thread's view of a program of the epoch loop that records each node: the loop itself stays as it is,
 /// so a run without a trace has not one instruction more per node.
 template <NamedProgram Program>
-class Traced {
+class Traced : public View<Program> {
  public:
   Traced(Program& program, Recorder& recorder, int thread)
-      : program_(program), recorder_(recorder), lane_(recorder.lane(thread)) {}
+      : View<Program>(program), recorder_(recorder), lane_(recorder.lane(thread)) {}
   ~Traced() { lane_.at_epoch(-1); }
   Traced(const Traced&) = delete;
   Traced& operator=(const Traced&) = delete;
@@ -39,20 +60,16 @@ class Traced {
     lane_.at_epoch(epoch);
     return program_.gate(epoch);
   }
-  void assist() {
-    if constexpr (requires { program_.assist(); }) program_.assist();
-  }
   bool decide(int epoch) {
     const std::int64_t begin = recorder_.now();
-    std::uint32_t how = 0;
-    if constexpr (requires { program_.settles(epoch); }) how = program_.settles(epoch) ? check_settles : 0;
+    const std::uint32_t how = this->settles(epoch) ? check_settles : 0;
     const bool goes_on = program_.decide(epoch);
     lane_.add(begin, recorder_.now(), how, epoch, kind_check);
     return goes_on;
   }
 
  private:
-  Program& program_;
+  using View<Program>::program_;
   Recorder& recorder_;
   Recorder::Lane& lane_;
 };

@@ -8,7 +8,6 @@
 /// candidates, of those that found them anew, and the mean of all by how many there were of each.
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -19,16 +18,12 @@
 #include "kernels/sweep_kernels.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
+#include "tests/bench/cpu_time.hpp"
 
 namespace {
 
 using namespace talus;
-
-double cpu_now() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
+using bench::cpu_now;
 
 template <bool Friction>
 double plain_sweep(const StepState& state) {

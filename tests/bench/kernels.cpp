@@ -8,25 +8,19 @@
 /// contact and sweep, best and median over the repeats (default 15) of one to a few sweeps, one thread, chunk
 /// after chunk. The sample contracts and its grains turn, so that contacts open, stick and slide.
 
-#include <time.h>
-
 #include <cstdlib>
 #include <functional>
 
 #include "kernels/broad_phase.hpp"
 #include "kernels/narrow_phase.hpp"
 #include "runtime/step/decomposition.hpp"
+#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/packing.hpp"
 
 namespace {
 
 using namespace talus;
-
-double cpu_now() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
+using bench::cpu_now;
 
 std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);

@@ -10,7 +10,6 @@
 /// columns and 1000 on the pile.
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,21 +22,17 @@
 #include "kernels/sample.hpp"
 #include "kernels/sweep.hpp"
 #include "runtime/step/simulation.hpp"
+#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/packing.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace {
 
 using namespace talus;
+using bench::cpu_now;
 using bench::Packing;
 
 constexpr double gravity = 9.81, mu = 0.35;
-
-double cpu_now() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 /// One step's problem and plain Gauss-Seidel on it.
 struct Scene {
