@@ -30,13 +30,13 @@ template <class V>
   return {choose(edge.x, z.x), choose(edge.y, z.y), choose(edge.z, z.z)};
 }
 
-template <bool Friction, class V>
-[[gnu::always_inline]] inline void add_error(const Slice& c, const Space<V>& n, const Space<V>& v, V w_nn,
-                                             double mu, ErrorLanes<V>& sums) {
-  const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias);
+template <bool Friction, class V, class Only>
+[[gnu::always_inline]] inline void add_error(const Slice& c, Only only, const Space<V>& n, const Space<V>& v,
+                                             V w_nn, double mu, ErrorLanes<V>& sums) {
+  const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias, 0, only);
   V e, r_n, carried;
   if constexpr (Friction) {
-    const Space<V> r = load_impulse<true, V>(c, 0, n);
+    const Space<V> r = load_impulse<true, V>(c, 0, only, n);
     const Space<V> v_t = v - v_0 * n;
     const V v_t2 = dot(v_t, v_t);
     const Space<V> v_hat = v_t + (v_n + mu * root(v_t2)) * n;
@@ -46,7 +46,7 @@ template <bool Friction, class V>
     sums.impulse2 += dot(r, r) * (w_nn * w_nn);
     carried = v_t2 + v_n * v_n;
   } else {
-    r_n = load<V>(c.rn);
+    r_n = load<V>(c.rn, 0, only);
     const V next = r_n - v_n / w_nn;
     e = w_nn * absolute(r_n - 0.5 * (next + absolute(next)));
     sums.impulse2 += r_n * r_n * (w_nn * w_nn);
@@ -88,15 +88,16 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
   return total;
 }
 
-/// Adds up the error of `count` <= W contacts from k on, whose arrays are `own` and whose bodies are a, b.
-template <bool Friction, bool AtWall, int W>
+/// Adds up the error of `count` <= W contacts from k on, whose bodies are a, b.
+template <bool Friction, bool AtWall, int W, class Only>
 [[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
-                                               const Slice& own, const double* const* a,
-                                               const double* const* b, double mu, const double* wall,
-                                               double wall_inv_mass, const std::uint16_t* multiplicity,
+                                               Only only, const double* const* a, const double* const* b,
+                                               double mu, const double* wall, double wall_inv_mass,
+                                               const std::uint16_t* multiplicity,
                                                ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
-  const Space<V> n = load_normal<V>(own, 0);
+  const Slice own = slice(c, k);
+  const Space<V> n = load_normal<V>(own, 0, only);
   Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
   if (multiplicity) {
     m.w_nn = whole<V>(a, c.first + k, count, multiplicity);
@@ -105,9 +106,9 @@ template <bool Friction, bool AtWall, int W>
   if constexpr (AtWall) {
     m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
     m.w_nn = m.w_nn + wall_inv_mass;
-    sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(own, 0, n);
+    sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(own, 0, only, n);
   }
-  add_error<Friction>(own, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums);
+  add_error<Friction>(own, only, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums);
 }
 
 /// `wall` is null between grains.
@@ -118,19 +119,20 @@ template <bool Friction, bool AtWall, int W>
   const ContactView c = view;
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
+  const double *a[W], *b[W];
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
     if (!AtWall && (k - c.begin) % group_size == 0) prefetch_group(c, k, bodies);
-    const double *a[W], *b[W];
     find_bodies<W>(bodies, c.first + k, a);
     if constexpr (!AtWall) find_bodies<W>(bodies, c.second + k, b);
-    error_block<Friction, AtWall, W>(c, k, W, slice(c, k), a, b, mu, wall, wall_inv_mass, multiplicity,
+    error_block<Friction, AtWall, W>(c, k, W, AllLanes{}, a, b, mu, wall, wall_inv_mass, multiplicity,
                                      sums[lanes]);
   }
-  if (k < c.end) {
-    Part<Friction, W, const double> part(c, k, c.end - k, bodies, !AtWall);
+  if (const std::size_t rest = c.end - k; rest > 0) {
     // A lane without a contact sees no motion, and so no error.
-    if constexpr (AtWall) __builtin_memcpy(part.grain, wall, 3 * sizeof(double));
-    error_block<Friction, AtWall, W>(c, k, c.end - k, part.slice(), part.a, part.b, mu, wall, wall_inv_mass,
+    SpareGrains<W> spare(wall);
+    find_bodies<W>(bodies, c.first + k, rest, spare, a);
+    if constexpr (!AtWall) find_bodies<W>(bodies, c.second + k, rest, spare, b);
+    error_block<Friction, AtWall, W>(c, k, rest, FirstLanes{rest}, a, b, mu, wall, wall_inv_mass,
                                      multiplicity, sums[lanes]);
   }
   return add_lanes<W>(sums);

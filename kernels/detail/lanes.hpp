@@ -10,6 +10,7 @@
 /// No operation here is fused or reordered (-ffp-contract=off): a lane computes to the bit what the scalar
 /// kernel computes for the same contact (docs/decisions/0008-lanes.md).
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 // Vectors pass between inlined functions only, so that it does not matter how a call would pass them.
@@ -72,6 +73,74 @@ template <class V>
   const auto narrow = __builtin_convertvector(v, typename NarrowOf<V>::Type);
   __builtin_memcpy(to, &narrow, sizeof(narrow));
 }
+
+/// Which lanes a load or store means: all of them ...
+struct AllLanes {};
+/// ... or those of the first `count` elements of an array: behind them zeros are read and nothing is written.
+struct FirstLanes {
+  std::size_t count;
+};
+
+template <class V>
+[[gnu::always_inline]] inline V load(const double* from, std::size_t at, AllLanes) {
+  return load<V>(from + at);
+}
+template <class V>
+[[gnu::always_inline]] inline V load(const float* from, std::size_t at, AllLanes) {
+  return load<V>(from + at);
+}
+template <class Number, class V>
+[[gnu::always_inline]] inline void store(Number* to, std::size_t at, V v, AllLanes) {
+  store(to + at, v);
+}
+
+#ifdef __AVX2__
+/// All bits of the lanes at, at + 1, ... that are meant.
+[[gnu::always_inline]] inline __m256i mask_of(std::size_t at, FirstLanes lanes) {
+  const auto left = static_cast<long long>(lanes.count) - static_cast<long long>(at);
+  return _mm256_cmpgt_epi64(_mm256_set1_epi64x(left), _mm256_setr_epi64x(0, 1, 2, 3));
+}
+[[gnu::always_inline]] inline __m128i narrow_mask_of(std::size_t at, FirstLanes lanes) {
+  const auto left = static_cast<int>(lanes.count) - static_cast<int>(at);
+  return _mm_cmpgt_epi32(_mm_set1_epi32(left), _mm_setr_epi32(0, 1, 2, 3));
+}
+template <std::same_as<Quad> V>
+[[gnu::always_inline]] inline V load(const double* from, std::size_t at, FirstLanes lanes) {
+  return reinterpret_cast<V>(_mm256_maskload_pd(from + at, mask_of(at, lanes)));
+}
+template <std::same_as<Quad> V>
+[[gnu::always_inline]] inline V load(const float* from, std::size_t at, FirstLanes lanes) {
+  return reinterpret_cast<V>(_mm256_cvtps_pd(_mm_maskload_ps(from + at, narrow_mask_of(at, lanes))));
+}
+[[gnu::always_inline]] inline void store(double* to, std::size_t at, Quad v, FirstLanes lanes) {
+  _mm256_maskstore_pd(to + at, mask_of(at, lanes), reinterpret_cast<__m256d>(v));
+}
+[[gnu::always_inline]] inline void store(float* to, std::size_t at, Quad v, FirstLanes lanes) {
+  _mm_maskstore_ps(to + at, narrow_mask_of(at, lanes), _mm256_cvtpd_ps(reinterpret_cast<__m256d>(v)));
+}
+#endif
+#ifdef __AVX512VL__
+[[gnu::always_inline]] inline __mmask8 bits_of(std::size_t at, FirstLanes lanes) {
+  const std::size_t left = lanes.count - at;
+  return static_cast<__mmask8>(left >= 8 ? 0xffU : (1U << left) - 1U);
+}
+template <std::same_as<Octet> V>
+[[gnu::always_inline]] inline V load(const double* from, std::size_t at, FirstLanes lanes) {
+  return reinterpret_cast<V>(_mm512_maskz_loadu_pd(bits_of(at, lanes), from + at));
+}
+template <std::same_as<Octet> V>
+[[gnu::always_inline]] inline V load(const float* from, std::size_t at, FirstLanes lanes) {
+  return reinterpret_cast<V>(
+      _mm512_maskz_cvtps_pd(0xff, _mm256_maskz_loadu_ps(bits_of(at, lanes), from + at)));
+}
+[[gnu::always_inline]] inline void store(double* to, std::size_t at, Octet v, FirstLanes lanes) {
+  _mm512_mask_storeu_pd(to + at, bits_of(at, lanes), reinterpret_cast<__m512d>(v));
+}
+[[gnu::always_inline]] inline void store(float* to, std::size_t at, Octet v, FirstLanes lanes) {
+  _mm256_mask_storeu_ps(to + at, bits_of(at, lanes),
+                        _mm512_maskz_cvtpd_ps(0xff, reinterpret_cast<__m512d>(v)));
+}
+#endif
 
 [[gnu::always_inline]] inline Quad root(Quad v) {
 #ifdef __AVX__

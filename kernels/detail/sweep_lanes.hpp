@@ -11,8 +11,8 @@
 ///   scatter  one transposition of (dr, dr x n) back to rows, then record += mobility * row: no record is
 ///            transposed for its mobility.
 /// Per contact: 2 records of 64 bytes read and written, 56 bytes of contact read and 24 written, about 117
-/// flop, 1.5 shuffles of 8 lanes. A group that is not full runs on a copy, its free lanes on a grain of its
-/// own.
+/// flop, 1.5 shuffles of 8 lanes. In a group that is not full the free lanes read n = r = bias = 0 and meet a
+/// grain of their own of mass 1 at rest, so that nothing happens there.
 
 #include "kernels/detail/contact_view.hpp"
 #include "kernels/detail/lanes.hpp"
@@ -42,12 +42,13 @@ struct Target {
   return {r.x + k, r.y + k, r.z + k, r.n + k};
 }
 
-template <bool Friction, class V>
-[[gnu::always_inline]] inline Space<V> load_impulse(const Slice& c, std::size_t at, const Space<V>& n) {
+template <bool Friction, class V, class Only>
+[[gnu::always_inline]] inline Space<V> load_impulse(const Slice& c, std::size_t at, Only only,
+                                                    const Space<V>& n) {
   if constexpr (Friction)
-    return {load<V>(c.rx + at), load<V>(c.ry + at), load<V>(c.rz + at)};
+    return {load<V>(c.rx, at, only), load<V>(c.ry, at, only), load<V>(c.rz, at, only)};
   else
-    return load<V>(c.rn + at) * n;
+    return load<V>(c.rn, at, only) * n;
 }
 
 /// Two grains, or a grain and a wall, seen from their contact.
@@ -118,16 +119,16 @@ template <bool Friction, class V>
 struct PlainStart {
   static constexpr double omega = 1;
   PlainStart from(std::size_t) const { return {}; }
-  template <class V>
-  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t) const {
+  template <class V, class Only>
+  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t, Only) const {
     return s;
   }
-  template <class V>
-  [[gnu::always_inline]] V begin(V s, std::size_t) const {
+  template <class V, class Only>
+  [[gnu::always_inline]] V begin(V s, std::size_t, Only) const {
     return s;
   }
-  template <class V>
-  [[gnu::always_inline]] void end(const V&, const V&, std::size_t) const {}
+  template <class V, class Only>
+  [[gnu::always_inline]] void end(const V&, const V&, std::size_t, Only) const {}
 };
 
 /// Steps of the contacts from some place on.
@@ -137,52 +138,53 @@ struct MomentumStart {
   [[gnu::always_inline]] MomentumStart from(std::size_t k) const {
     return {x + k, y + k, z + k, n + k, beta, omega};
   }
-  template <class V>
-  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at) const {
-    return {s.x + beta * load<V>(x + at), s.y + beta * load<V>(y + at), s.z + beta * load<V>(z + at)};
+  template <class V, class Only>
+  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at, Only only) const {
+    return {s.x + beta * load<V>(x, at, only), s.y + beta * load<V>(y, at, only),
+            s.z + beta * load<V>(z, at, only)};
   }
-  template <class V>
-  [[gnu::always_inline]] V begin(V s, std::size_t at) const {
-    return s + beta * load<V>(n + at);
+  template <class V, class Only>
+  [[gnu::always_inline]] V begin(V s, std::size_t at, Only only) const {
+    return s + beta * load<V>(n, at, only);
   }
-  template <class V>
-  [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at) const {
-    store(x + at, s_new.x - s.x);
-    store(y + at, s_new.y - s.y);
-    store(z + at, s_new.z - s.z);
+  template <class V, class Only>
+  [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at, Only only) const {
+    store(x, at, s_new.x - s.x, only);
+    store(y, at, s_new.y - s.y, only);
+    store(z, at, s_new.z - s.z, only);
   }
-  template <class V>
-  [[gnu::always_inline]] void end(V s, V s_new, std::size_t at) const {
-    store(n + at, s_new - s);
+  template <class V, class Only>
+  [[gnu::always_inline]] void end(V s, V s_new, std::size_t at, Only only) const {
+    store(n, at, s_new - s, only);
   }
 };
 
 /// The impulse that solves the law, less the one that the velocities know; stores the new one. Without
 /// friction only the first component is meant, along the normal.
-template <bool Friction, class V, class Start>
-[[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, const Target& out, std::size_t at,
+template <bool Friction, class V, class Start, class Only>
+[[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, const Target& out, std::size_t at, Only only,
                                                  const Space<V>& n, const Space<V>& v, V w_nn, V w_tt,
                                                  double mu, const Start& start) {
-  const V bias = load<V>(c.bias + at), v_n = dot(v, n);
+  const V bias = load<V>(c.bias, at, only), v_n = dot(v, n);
   if constexpr (Friction) {
-    const Space<V> s = load_impulse<true, V>(c, at, n), r = start.begin(s, at);
+    const Space<V> s = load_impulse<true, V>(c, at, only, n), r = start.begin(s, at, only);
     const V r_n = dot(r, n), next = r_n - start.omega * (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next)), limit = mu * r_n_new;
     const Space<V> t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
     const V t2 = dot(t, t);
     const V scale = t2 > limit * limit ? limit / root(t2) : V{} + 1.0;
     const Space<V> r_new = r_n_new * n + scale * t;
-    store(out.x + at, r_new.x);
-    store(out.y + at, r_new.y);
-    store(out.z + at, r_new.z);
-    start.end(s, r_new, at);
+    store(out.x, at, r_new.x, only);
+    store(out.y, at, r_new.y, only);
+    store(out.z, at, r_new.z, only);
+    start.end(s, r_new, at, only);
     return r_new - r;
   } else {
-    const V s = load<V>(c.rn + at), r_n = start.begin(s, at);
+    const V s = load<V>(c.rn, at, only), r_n = start.begin(s, at, only);
     const V next = r_n - start.omega * (v_n + bias) / w_nn;
     const V r_n_new = 0.5 * (next + absolute(next));
-    store(out.n + at, r_n_new);
-    start.end(s, r_n_new, at);
+    store(out.n, at, r_n_new, only);
+    start.end(s, r_n_new, at, only);
     return (r_n_new - r_n) * n;
   }
 }
@@ -237,15 +239,15 @@ template <bool Friction, bool Pair>
   }
 }
 
-template <class V>
-[[gnu::always_inline]] inline Space<V> load_normal(const Slice& c, std::size_t at) {
-  return {load<V>(c.nx + at), load<V>(c.ny + at), load<V>(c.nz + at)};
+template <class V, class Only>
+[[gnu::always_inline]] inline Space<V> load_normal(const Slice& c, std::size_t at, Only only) {
+  return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
 }
 
 /// Blocks x W contacts in three phases.
-template <bool Friction, int W, int Blocks, class Start>
+template <bool Friction, int W, int Blocks, class Start, class Only>
 [[gnu::always_inline]] inline void sweep_block(const Slice& c, const Target& out, double* const* a,
-                                               double* const* b, double mu, const Start& start) {
+                                               double* const* b, double mu, const Start& start, Only only) {
   using V = Lanes<W>;
   Meeting<V> m[Blocks];
   Space<V> dr[Blocks];
@@ -254,15 +256,16 @@ template <bool Friction, int W, int Blocks, class Start>
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k) {
     const auto at = static_cast<std::size_t>(W * k);
-    const Space<V> n = load_normal<V>(c, at);
+    const Space<V> n = load_normal<V>(c, at, only);
     V w_tt{};
     if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
-    dr[k] =
-        solve_law<Friction>(c, out, at, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt, mu, start);
+    dr[k] = solve_law<Friction>(c, out, at, only, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt,
+                                mu, start);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)
-    scatter<Friction, true>(a + W * k, b + W * k, load_normal<V>(c, static_cast<std::size_t>(W * k)), dr[k]);
+    scatter<Friction, true>(a + W * k, b + W * k, load_normal<V>(c, static_cast<std::size_t>(W * k), only),
+                            dr[k]);
 }
 
 /// Blocks of W contacts that go through the phases together: more would not stay in registers.
@@ -286,6 +289,32 @@ template <std::size_t Count, class Number>
     address[l] = bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]));
 }
 
+/// Grains of mass 1 that no contact knows, for the lanes that hold none. In a sweep they rest.
+template <int W>
+struct SpareGrains {
+  alignas(64) double record_of[W][record];
+
+  [[gnu::always_inline]] explicit SpareGrains(const double* velocity = nullptr) {
+#pragma GCC unroll 8
+    for (auto& grain : record_of) {
+      const Lanes<4> first = {velocity ? velocity[0] : 0, velocity ? velocity[1] : 0,
+                              velocity ? velocity[2] : 0, 1};
+      store(grain, first);
+      store(grain + 4, Lanes<4>{});
+    }
+  }
+};
+
+/// Addresses of the first `count` <= Count bodies; the lanes behind them get spare grains, each its own.
+template <std::size_t Count, int W, class Number>
+[[gnu::always_inline]] inline void find_bodies(Number* bodies, const std::int32_t* slot, std::size_t count,
+                                               SpareGrains<W>& spare, Number** address) {
+#pragma GCC unroll 16
+  for (std::size_t l = 0; l < Count; ++l)
+    address[l] = l < count ? bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]))
+                           : spare.record_of[l % W];
+}
+
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
 /// them coming, and with 200,000 grains they stand beyond its second cache.
 template <class Number>
@@ -299,86 +328,16 @@ template <class Number>
   }
 }
 
-/// A copy of contacts [k, k + count), count < W. The lanes behind them have n = r = bias = 0 and a grain of
-/// mass 1 at rest, so that nothing happens there.
-template <bool Friction, int W, class Number = double>
-struct Part {
-  double nx[W], ny[W], nz[W], bias[W], rx[W], ry[W], rz[W], rn[W];
-  double grain[record] = {0, 0, 0, 1, 0, 0, 0, 0};
-  Number *a[W], *b[W];
-
-  [[gnu::always_inline]] Part(const ContactView& c, std::size_t k, std::size_t count, Number* bodies,
-                              bool pairs) {
-    for (std::size_t l = 0; l < W; ++l) {
-      const bool real = l < count;
-      const std::size_t from = real ? k + l : k;
-      nx[l] = real ? c.nx[from] : 0;
-      ny[l] = real ? c.ny[from] : 0;
-      nz[l] = real ? c.nz[from] : 0;
-      bias[l] = real ? c.bias[from] : 0;
-      if constexpr (Friction) {
-        rx[l] = real ? c.rx[from] : 0;
-        ry[l] = real ? c.ry[from] : 0;
-        rz[l] = real ? c.rz[from] : 0;
-      } else {
-        rn[l] = real ? c.rn[from] : 0;
-      }
-      a[l] = real ? body(bodies, c.first[from]) : grain;
-      if (pairs) b[l] = real ? body(bodies, c.second[from]) : grain;
-    }
-  }
-
-  [[gnu::always_inline]] Slice slice() const { return {nx, ny, nz, bias, rx, ry, rz, rn}; }
-  [[gnu::always_inline]] Target target() { return {rx, ry, rz, rn}; }
-
-  [[gnu::always_inline]] void copy_out(const ImpulseView& r, std::size_t k, std::size_t count) const {
-    for (std::size_t l = 0; l < count; ++l) {
-      if constexpr (Friction) {
-        r.x[k + l] = rx[l];
-        r.y[k + l] = ry[l];
-        r.z[k + l] = rz[l];
-      } else {
-        r.n[k + l] = rn[l];
-      }
-    }
-  }
-};
-
-/// Of the contacts of a `Part`, their steps.
-template <bool Friction, int W, class Start>
-struct StepsOfPart {
-  [[gnu::always_inline]] StepsOfPart(const Start&, std::size_t) {}
-  [[gnu::always_inline]] Start start() { return {}; }
-  [[gnu::always_inline]] void copy_out(const Start&, std::size_t) const {}
-};
-template <bool Friction, int W>
-struct StepsOfPart<Friction, W, MomentumStart> {
-  float x[W]{}, y[W]{}, z[W]{}, n[W]{};
-  double beta, omega;
-
-  [[gnu::always_inline]] StepsOfPart(const MomentumStart& own, std::size_t count)
-      : beta(own.beta), omega(own.omega) {
-    copy(own, start(), count);
-  }
-  [[gnu::always_inline]] MomentumStart start() { return {x, y, z, n, beta, omega}; }
-  [[gnu::always_inline]] void copy_out(const MomentumStart& own, std::size_t count) {
-    copy(start(), own, count);
-  }
-
- private:
-  [[gnu::always_inline]] static void copy(const MomentumStart& from, const MomentumStart& to,
-                                          std::size_t count) {
-    for (std::size_t l = 0; l < count; ++l) {
-      if constexpr (Friction) {
-        to.x[l] = from.x[l];
-        to.y[l] = from.y[l];
-        to.z[l] = from.z[l];
-      } else {
-        to.n[l] = from.n[l];
-      }
-    }
-  }
-};
+/// The last contacts of a group, fewer than fill its blocks.
+template <bool Friction, int W, int Blocks, class Start>
+[[gnu::always_inline]] inline void sweep_rest(const ContactView& c, const ImpulseView& r, std::size_t k,
+                                              std::size_t count, double* bodies, SpareGrains<W>& spare,
+                                              double mu, const Start& start) {
+  double *a[W * Blocks], *b[W * Blocks];
+  find_bodies<W * Blocks>(bodies, c.first + k, count, spare, a);
+  find_bodies<W * Blocks>(bodies, c.second + k, count, spare, b);
+  sweep_block<Friction, W, Blocks>(slice(c, k), target(r, k), a, b, mu, start.from(k), FirstLanes{count});
+}
 
 template <bool Friction, int W, class Start>
 [[gnu::always_inline]] inline void sweep_grains_from(const ContactView& view, const ImpulseView& impulses,
@@ -387,6 +346,7 @@ template <bool Friction, int W, class Start>
   const ContactView c = view;  // local ones, so that no store can change them
   const ImpulseView r = impulses;
   const Start all = start;
+  SpareGrains<W> spare;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
@@ -395,21 +355,12 @@ template <bool Friction, int W, class Start>
       double *a[at_once], *b[at_once];
       find_bodies<at_once>(bodies, c.first + k, a);
       find_bodies<at_once>(bodies, c.second + k, b);
-      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, all.from(k));
+      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, all.from(k), AllLanes{});
     }
-    for (; k + W <= end; k += W) {
-      double *a[W], *b[W];
-      find_bodies<W>(bodies, c.first + k, a);
-      find_bodies<W>(bodies, c.second + k, b);
-      sweep_block<Friction, W, 1>(slice(c, k), target(r, k), a, b, mu, all.from(k));
-    }
-    if (k == end) continue;
-    const Start own = all.from(k);
-    Part<Friction, W> part(c, k, end - k, bodies, true);
-    StepsOfPart<Friction, W, Start> steps(own, end - k);
-    sweep_block<Friction, W, 1>(part.slice(), part.target(), part.a, part.b, mu, steps.start());
-    part.copy_out(r, k, end - k);
-    steps.copy_out(own, end - k);
+    if (k + W < end)
+      sweep_rest<Friction, W, blocks_at_once>(c, r, k, end - k, bodies, spare, mu, all);
+    else if (k < end)
+      sweep_rest<Friction, W, 1>(c, r, k, end - k, bodies, spare, mu, all);
     k = end;
   }
 }
@@ -430,28 +381,31 @@ void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies,
 }
 
 /// V += M^-1 H r for W contacts.
-template <bool Friction, bool Pair, int W>
-[[gnu::always_inline]] inline void accumulate_block(const Slice& c, double* const* a, double* const* b) {
-  const auto n = load_normal<Lanes<W>>(c, 0);
-  scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, n));
+template <bool Friction, bool Pair, int W, class Only>
+[[gnu::always_inline]] inline void accumulate_block(const Slice& c, double* const* a, double* const* b,
+                                                    Only only) {
+  const auto n = load_normal<Lanes<W>>(c, 0, only);
+  scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, only, n));
 }
 
 template <bool Friction, int W>
 void accumulate_grains(const ContactView& view, double* bodies) {
   const ContactView c = view;
+  SpareGrains<W> spare;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
+    double *a[W], *b[W];
     for (; k + W <= end; k += W) {
-      double *a[W], *b[W];
       find_bodies<W>(bodies, c.first + k, a);
       find_bodies<W>(bodies, c.second + k, b);
-      accumulate_block<Friction, true, W>(slice(c, k), a, b);
+      accumulate_block<Friction, true, W>(slice(c, k), a, b, AllLanes{});
     }
     if (k == end) continue;
-    Part<Friction, W> part(c, k, end - k, bodies, true);
-    accumulate_block<Friction, true, W>(part.slice(), part.a, part.b);
+    find_bodies<W>(bodies, c.first + k, end - k, spare, a);
+    find_bodies<W>(bodies, c.second + k, end - k, spare, b);
+    accumulate_block<Friction, true, W>(slice(c, k), a, b, FirstLanes{end - k});
     k = end;
   }
 }
@@ -489,17 +443,17 @@ struct SplitWall {
 };
 
 /// A block of W grains against as many copies of a wall.
-template <bool Friction, int W, class Start>
+template <bool Friction, int W, class Start, class Only>
 [[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, const Target& out, double* const* a,
-                                                    double mu, const Start& start, std::size_t lanes,
-                                                    SplitWall<W>& wall) {
+                                                    double mu, const Start& start, Only only,
+                                                    std::size_t lanes, SplitWall<W>& wall) {
   using V = Lanes<W>;
   Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
   m.du = m.du - wall.velocity[lanes];
-  const Space<V> n = load_normal<V>(c, 0);
+  const Space<V> n = load_normal<V>(c, 0, only);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
-  const Space<V> dr = solve_law<Friction>(c, out, 0, n, relative_velocity<Friction>(m, n),
+  const Space<V> dr = solve_law<Friction>(c, out, 0, only, n, relative_velocity<Friction>(m, n),
                                           m.w_nn + wall.inv_mass, w_tt, mu, start);
   scatter<Friction, false>(a, nullptr, n, dr);
   wall.push(lanes, n, dr);
@@ -514,18 +468,16 @@ template <bool Friction, int W, class Start>
   const Start all = start;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
   std::size_t k = c.begin, lanes = 0;
+  double* a[W];
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
-    double* a[W];
     find_bodies<W>(bodies, c.first + k, a);
-    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, all.from(k), lanes, split);
+    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, all.from(k), AllLanes{}, lanes, split);
   }
   if (k < c.end) {
-    const Start own = all.from(k);
-    Part<Friction, W> part(c, k, c.end - k, bodies, false);
-    StepsOfPart<Friction, W, Start> steps(own, c.end - k);
-    sweep_wall_block<Friction, W>(part.slice(), part.target(), part.a, mu, steps.start(), lanes, split);
-    part.copy_out(r, k, c.end - k);
-    steps.copy_out(own, c.end - k);
+    SpareGrains<W> spare;
+    find_bodies<W>(bodies, c.first + k, c.end - k, spare, a);
+    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, all.from(k), FirstLanes{c.end - k}, lanes,
+                                  split);
   }
   split.glue(wall);
 }
@@ -547,20 +499,21 @@ void accumulate_wall(const ContactView& view, double* bodies, double* wall, doub
   using V = Lanes<W>;
   const ContactView c = view;
   SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
-  const auto add = [&](const Slice& own, double* const* a, std::size_t lanes) {
-    const Space<V> n = load_normal<V>(own, 0);
-    accumulate_block<Friction, false, W>(own, a, nullptr);
-    split.push(lanes, n, load_impulse<Friction, V>(own, 0, n));
+  const auto add = [&](const Slice& own, double* const* a, std::size_t lanes, auto only) {
+    const Space<V> n = load_normal<V>(own, 0, only);
+    accumulate_block<Friction, false, W>(own, a, nullptr, only);
+    split.push(lanes, n, load_impulse<Friction, V>(own, 0, only, n));
   };
   std::size_t k = c.begin, lanes = 0;
+  double* a[W];
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
-    double* a[W];
     find_bodies<W>(bodies, c.first + k, a);
-    add(slice(c, k), a, lanes);
+    add(slice(c, k), a, lanes, AllLanes{});
   }
   if (k < c.end) {
-    Part<Friction, W> part(c, k, c.end - k, bodies, false);
-    add(part.slice(), part.a, lanes);
+    SpareGrains<W> spare;
+    find_bodies<W>(bodies, c.first + k, c.end - k, spare, a);
+    add(slice(c, k), a, lanes, FirstLanes{c.end - k});
   }
   split.glue(wall);
 }
