@@ -28,14 +28,15 @@ PartField BodyParts::field() const {
   return field;
 }
 
-std::vector<double> BodyParts::rows(std::size_t width, const Fill& fill) const {
-  std::vector<std::vector<double>> rows(size(), std::vector<double>(width, 0.0));
-  each([&](std::size_t p) { fill(p, rows[p]); });
-  return link_->gather(std::move(rows));
+std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill) {
+  std::vector<std::vector<double>> rows(parts, std::vector<double>(width, 0.0));
+  link.each(parts, [&](std::size_t p) { fill(p, rows[p]); });
+  return link.gather(std::move(rows));
 }
 
-std::vector<double> BodyParts::total(std::size_t width, const Fill& fill) const {
-  const std::vector<double> all = rows(width, fill);
+std::vector<double> total_of(const PartLink& link, std::size_t parts, std::size_t width,
+                             const PartRow& fill) {
+  const std::vector<double> all = rows_of(link, parts, width, fill);
   std::vector<double> sum(width, 0.0);
   for (std::size_t k = 0; k < all.size(); ++k) sum[k % width] += all[k];
   return sum;

@@ -35,6 +35,13 @@ class PartLink {
   virtual std::vector<double> gather(std::vector<std::vector<double>> rows) const;
 };
 
+/// Of each of `parts` parts here `fill(part, row)` fills a row of `width` numbers: all rows, as
+/// PartLink::gather.
+using PartRow = std::function<void(std::size_t, std::span<double>)>;
+std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill);
+/// The same, added up in order of subdomain.
+std::vector<double> total_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill);
+
 /// The parts here, ascending by subdomain, and their link. What it refers to must outlive it.
 class BodyParts {
  public:
@@ -48,11 +55,12 @@ class BodyParts {
   /// A zero for every unknown.
   PartField field() const;
 
-  /// `fill(part, row)` of `width` numbers each: all rows, as PartLink::gather.
-  using Fill = std::function<void(std::size_t, std::span<double>)>;
-  std::vector<double> rows(std::size_t width, const Fill& fill) const;
-  /// The same, added up in order of subdomain.
-  std::vector<double> total(std::size_t width, const Fill& fill) const;
+  std::vector<double> rows(std::size_t width, const PartRow& fill) const {
+    return rows_of(*link_, size(), width, fill);
+  }
+  std::vector<double> total(std::size_t width, const PartRow& fill) const {
+    return total_of(*link_, size(), width, fill);
+  }
 
   /// Sum of a.b over all bodies, each once.
   double dot(const PartField& a, const PartField& b) const;

@@ -1,6 +1,7 @@
 #include "kernels/body_problem.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "kernels/measures.hpp"
 
@@ -12,12 +13,16 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
+double mass_of_slot(const BodyProblemSource& source, std::size_t slot) {
+  return (source.multiplicity.empty() ? 1 : source.multiplicity[slot]) / source.velocity[slot].inv_mass;
+}
+
 BodyUnknown unknown_of_slot(const BodyProblemSource& source, std::size_t slot) {
   const Velocity& v = source.velocity[slot];
-  const double m = source.multiplicity.empty() ? 1 : source.multiplicity[slot];
   BodyUnknown body;
-  body.mass = m / v.inv_mass;
-  body.spin_mass = v.spin_mobility > 0 && !source.free.w.empty() ? m / v.spin_mobility : 0;
+  body.mass = mass_of_slot(source, slot);
+  if (v.spin_mobility > 0 && !source.free.w.empty())
+    body.spin_mass = (source.multiplicity.empty() ? 1 : source.multiplicity[slot]) / v.spin_mobility;
   body.x = source.x[slot];
   body.radius = source.radius[slot];
   body.free.u = Eigen::Map<const Vec3>(source.free.u[slot].data());
@@ -25,75 +30,125 @@ BodyUnknown unknown_of_slot(const BodyProblemSource& source, std::size_t slot) {
   return body;
 }
 
+BodyUnknown unknown_of_wall(const WallMotion& wall) {
+  BodyUnknown body;
+  body.mass = 1 / wall.inv_mass;
+  body.wall = true;
+  body.axis = wall.normal;
+  body.free.u = wall.normal.dot(wall.free_velocity) * wall.normal;
+  return body;
+}
+
 /// `part` null: all of it.
-BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part) {
-  BodyProblem problem;
-  const std::size_t begin_slot = part ? part->begin : 0;
-  const std::size_t end_slot = part ? part->end : source.velocity.size();
-  problem.grains = end_slot - begin_slot;
-  problem.subdomain = part ? part->subdomain : 0;
-  problem.bodies.reserve(problem.grains + source.walls.size());
-  for (std::size_t slot = begin_slot; slot < end_slot; ++slot) {
+std::array<std::size_t, 2> slots_of(const BodyProblemSource& source, const BodyProblemPart* part) {
+  return part ? std::array{part->begin, part->end} : std::array{std::size_t{0}, source.velocity.size()};
+}
+
+template <class Visit>
+void each_chunk(const BodyProblemSource& source, const BodyProblemPart* part, const Visit& visit) {
+  for (std::size_t c = 0; c < source.chunks.size(); ++c)
+    if (!part || source.chunks.subdomain[c] == part->local) visit(c);
+}
+
+/// Calls visit(chunk, contact) in order.
+template <class Visit>
+void each_contact(const BodyProblemSource& source, const BodyProblemPart* part, const Visit& visit) {
+  each_chunk(source, part, [&](std::size_t c) {
+    const std::size_t begin = at(source.chunks.begin[c]);
+    for (std::size_t k = begin; k < begin + at(source.contacts.count[c]); ++k) visit(c, k);
+  });
+}
+
+ContactGraph graph_of(const BodyProblemSource& source, const BodyProblemPart* part) {
+  ContactGraph graph;
+  const auto [begin, end] = slots_of(source, part);
+  graph.subdomain = part ? part->subdomain : 0;
+  graph.mass.reserve(end - begin + source.walls.size());
+  for (std::size_t slot = begin; slot < end; ++slot) {
     if (part) {
-      problem.counts.push_back(part->counts[slot]);
-      if (part->multiplicity[slot] > 1)
-        problem.shared.push_back(static_cast<std::int32_t>(problem.bodies.size()));
+      graph.counts.push_back(part->counts[slot]);
+      if (part->multiplicity[slot] > 1) graph.shared.push_back(static_cast<std::int32_t>(graph.mass.size()));
     }
-    problem.bodies.push_back(unknown_of_slot(source, slot));
+    graph.mass.push_back(mass_of_slot(source, slot));
   }
-  const auto unknown = [&](Slot slot) { return slot - static_cast<Slot>(begin_slot); };
   std::vector<std::int32_t> wall_unknown(source.walls.size(), -1);
   for (std::size_t w = 0; w < source.walls.size(); ++w) {
-    const WallMotion& wall = source.walls[w];
-    if (wall.inv_mass == 0) continue;
-    wall_unknown[w] = static_cast<std::int32_t>(problem.bodies.size());
-    BodyUnknown body;
-    body.mass = 1 / wall.inv_mass;
-    body.wall = true;
-    body.axis = wall.normal;
-    body.free.u = wall.normal.dot(wall.free_velocity) * wall.normal;
+    if (source.walls[w].inv_mass == 0) continue;
+    wall_unknown[w] = static_cast<std::int32_t>(graph.mass.size());
     if (part) {
-      problem.counts.push_back(part->subdomain == 0 ? 1 : 0);
-      problem.shared.push_back(wall_unknown[w]);
+      graph.counts.push_back(part->subdomain == 0 ? 1 : 0);
+      graph.shared.push_back(wall_unknown[w]);
     }
-    problem.bodies.push_back(body);
+    graph.mass.push_back(1 / source.walls[w].inv_mass);
   }
+  const auto first_slot = static_cast<Slot>(begin);
+  std::size_t count = 0;
+  each_chunk(source, part, [&](std::size_t c) { count += at(source.contacts.count[c]); });
+  graph.pairs.reserve(count);
+  each_contact(source, part, [&](std::size_t c, std::size_t k) {
+    const std::int32_t w = source.chunks.wall[c];
+    graph.pairs.push_back({source.contacts.first[k] - first_slot,
+                           w < 0 ? source.contacts.second[k] - first_slot : wall_unknown[at(w)]});
+  });
+  return graph;
+}
+
+BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part) {
+  ContactGraph graph = graph_of(source, part);
+  BodyProblem problem;
+  problem.subdomain = graph.subdomain;
+  problem.counts = std::move(graph.counts);
+  problem.shared = std::move(graph.shared);
+  const auto [begin, end] = slots_of(source, part);
+  problem.grains = end - begin;
+  problem.bodies.reserve(graph.mass.size());
+  for (std::size_t slot = begin; slot < end; ++slot) problem.bodies.push_back(unknown_of_slot(source, slot));
+  for (const WallMotion& wall : source.walls)
+    if (wall.inv_mass != 0) problem.bodies.push_back(unknown_of_wall(wall));
 
   const Contacts& contacts = source.contacts;
-  const auto here = [&](std::size_t c) { return !part || source.chunks.subdomain[c] == part->local; };
-  std::size_t count = 0;
-  for (std::size_t c = 0; c < source.chunks.size(); ++c)
-    if (here(c)) count += at(contacts.count[c]);
-  problem.contacts.reserve(count);
-  problem.impulse.reserve(count);
-  for (std::size_t c = 0; c < source.chunks.size(); ++c) {
-    if (!here(c)) continue;
+  problem.contacts.reserve(graph.pairs.size());
+  problem.impulse.reserve(graph.pairs.size());
+  each_contact(source, part, [&](std::size_t c, std::size_t k) {
     const std::int32_t w = source.chunks.wall[c];
-    const std::size_t begin = at(source.chunks.begin[c]);
-    for (std::size_t k = begin; k < begin + at(contacts.count[c]); ++k) {
-      ContactEquation contact;
-      contact.normal = contact_normal(contacts, k);
-      contact.offset = contacts.bias[k] * contact.normal;
-      contact.mu = contacts.rn.empty() ? (w < 0 ? source.mu_grains : source.mu_walls) : 0;
-      contact.first = unknown(contacts.first[k]);
-      if (w < 0) {
-        contact.second = unknown(contacts.second[k]);
-      } else {
-        contact.second = wall_unknown[at(w)];
-        const Vec3& drive = source.walls[at(w)].free_velocity;
-        // Of a wall of finite mass only the normal velocity is an unknown.
-        contact.offset -=
-            contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
-      }
-      contact.place = static_cast<std::int32_t>(k);
-      problem.contacts.push_back(contact);
-      problem.impulse.push_back(contact_impulse(contacts, k));
+    const std::array<std::int32_t, 2>& pair = graph.pairs[problem.contacts.size()];
+    ContactEquation contact;
+    contact.normal = contact_normal(contacts, k);
+    contact.offset = contacts.bias[k] * contact.normal;
+    contact.mu = contacts.rn.empty() ? (w < 0 ? source.mu_grains : source.mu_walls) : 0;
+    contact.first = pair[0];
+    contact.second = pair[1];
+    if (w >= 0) {
+      const Vec3& drive = source.walls[at(w)].free_velocity;
+      // Of a wall of finite mass only the normal velocity is an unknown.
+      contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
     }
-  }
+    contact.place = static_cast<std::int32_t>(k);
+    problem.contacts.push_back(contact);
+    problem.impulse.push_back(contact_impulse(contacts, k));
+  });
   return problem;
 }
 
 }  // namespace
+
+ContactGraph graph_of(const BodyProblem& problem) {
+  ContactGraph graph;
+  for (const BodyUnknown& body : problem.bodies) graph.mass.push_back(body.mass);
+  for (const ContactEquation& c : problem.contacts) graph.pairs.push_back({c.first, c.second});
+  graph.subdomain = problem.subdomain;
+  graph.counts = problem.counts;
+  graph.shared = problem.shared;
+  return graph;
+}
+
+ContactGraph gather_graph(const BodyProblemSource& source) {
+  return graph_of(source, nullptr);
+}
+
+ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart& part) {
+  return graph_of(source, &part);
+}
 
 BodyProblem gather_problem(const BodyProblemSource& source) {
   return gather(source, nullptr);

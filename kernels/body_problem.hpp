@@ -8,6 +8,7 @@
 /// normal. Driven walls are data. With several subdomains each holds a part of the problem (body_parts.hpp).
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -65,6 +66,18 @@ struct BodyProblem {
   bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
 };
 
+/// Who touches whom in a problem or its part, and how heavy they are; unknowns as there.
+struct ContactGraph {
+  std::vector<double> mass;                        ///< per unknown [kg]
+  std::vector<std::array<std::int32_t, 2>> pairs;  ///< per contact its unknowns; second -1 at a driven wall
+  std::int32_t subdomain = 0;
+  std::vector<char> counts;
+  std::vector<std::int32_t> shared;
+
+  bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
+};
+ContactGraph graph_of(const BodyProblem& problem);
+
 /// A wall as the problem sees it; `inv_mass` [1/kg] is 0 when it is driven.
 struct WallMotion {
   Vec3 normal;
@@ -94,6 +107,10 @@ struct BodyProblemPart {
   std::span<const char> counts;    ///< per slot of the step: of the body's copies this one counts
   std::span<const std::uint16_t> multiplicity;  ///< per slot of the step: in how many subdomains it stands
 };
+
+/// The graph of the problem gathered below, all of it or of one subdomain: spares what only solvers read.
+ContactGraph gather_graph(const BodyProblemSource& source);
+ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart& part);
 
 /// Gathers the problem, contacts in order of chunk, with the impulses that `contacts` hold. Unknowns are the
 /// slots, then the walls.

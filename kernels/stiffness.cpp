@@ -10,6 +10,7 @@ std::size_t at(std::int32_t k) {
 
 /// One part's bodies by their distance over contacts from the driven walls.
 struct Layers {
+  const ContactGraph& graph;
   std::vector<std::size_t> begin;                ///< per unknown + 1, into `other`
   std::vector<std::int32_t> other;               ///< neighbours, in order of contact
   std::vector<std::int32_t> depth;               ///< per unknown; -1: not reached
@@ -17,20 +18,20 @@ struct Layers {
   std::vector<std::int32_t> met;                 ///< unknowns whose mark may have been set
   std::vector<double> parts, load;               ///< contacts with the layer below; what is handed on [kg]
 
-  explicit Layers(const BodyProblem& problem)
-      : begin(problem.bodies.size() + 1, 0), depth(problem.bodies.size(), -1) {
-    for (const ContactEquation& c : problem.contacts)
-      if (c.second >= 0) {
-        ++begin[at(c.first) + 1];
-        ++begin[at(c.second) + 1];
+  explicit Layers(const ContactGraph& of)
+      : graph(of), begin(of.mass.size() + 1, 0), depth(of.mass.size(), -1) {
+    for (const auto& [first, second] : graph.pairs)
+      if (second >= 0) {
+        ++begin[at(first) + 1];
+        ++begin[at(second) + 1];
       }
     for (std::size_t b = 0; b + 1 < begin.size(); ++b) begin[b + 1] += begin[b];
     other.resize(begin.back());
     std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
-    for (const ContactEquation& c : problem.contacts)
-      if (c.second >= 0) {
-        other[next[at(c.first)]++] = c.second;
-        other[next[at(c.second)]++] = c.first;
+    for (const auto& [first, second] : graph.pairs)
+      if (second >= 0) {
+        other[next[at(first)]++] = second;
+        other[next[at(second)]++] = first;
       }
   }
   std::span<const std::int32_t> neighbours(std::int32_t body) const {
@@ -41,67 +42,86 @@ struct Layers {
   }
 };
 
+/// The parts and their link.
+struct Graph {
+  std::vector<Layers> parts;
+  const PartLink& link;
+
+  Graph(std::span<const ContactGraph> graphs, const PartLink& of) : link(of) {
+    for (const ContactGraph& graph : graphs) parts.emplace_back(graph);
+  }
+  PartField field() const {
+    PartField field;
+    for (const Layers& part : parts) field.emplace_back(part.depth.size());
+    return field;
+  }
+  void each(const std::function<void(std::size_t)>& work) const { link.each(parts.size(), work); }
+};
+
 /// Unknowns marked in any part are the layer `depth`, those that have none yet. False when there are none.
-bool take_layer(const BodyParts& parts, std::vector<Layers>& layers, PartField& mark, std::int32_t depth) {
-  parts.link().sum_copies(mark);
-  return parts.total(1, [&](std::size_t p, std::span<double> row) {
-    Layers& here = layers[p];
-    std::vector<std::int32_t>& layer = here.layer.emplace_back();
-    const auto take = [&](std::int32_t b) {
-      if (mark[p][at(b)].u[0] > 0 && here.depth[at(b)] < 0) {
-        here.depth[at(b)] = depth;
-        layer.push_back(b);
-      }
-      mark[p][at(b)].u[0] = 0;
-    };
-    for (std::int32_t b : here.met) take(b);
-    for (std::int32_t b : parts[p].shared) take(b);
-    here.met.clear();
-    row[0] = static_cast<double>(layer.size());
-  })[0] > 0;
+bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
+  graph.link.sum_copies(mark);
+  return total_of(graph.link, graph.parts.size(), 1, [&](std::size_t p, std::span<double> row) {
+           Layers& here = graph.parts[p];
+           std::vector<std::int32_t>& layer = here.layer.emplace_back();
+           const auto take = [&](std::int32_t b) {
+             if (mark[p][at(b)].u[0] > 0 && here.depth[at(b)] < 0) {
+               here.depth[at(b)] = depth;
+               layer.push_back(b);
+             }
+             mark[p][at(b)].u[0] = 0;
+           };
+           for (std::int32_t b : here.met) take(b);
+           for (std::int32_t b : here.graph.shared) take(b);
+           here.met.clear();
+           row[0] = static_cast<double>(layer.size());
+         })[0] > 0;
 }
 
 /// Without a driven wall: what the others come to rest on.
-void mark_heaviest(const BodyParts& parts, std::vector<Layers>& layers, PartField& mark) {
-  std::vector<std::size_t> heaviest(parts.size());
-  const std::vector<double> masses = parts.rows(1, [&](std::size_t p, std::span<double> row) {
-    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b)
-      if (parts[p].counted(b) && parts[p].bodies[b].mass > row[0]) {
-        row[0] = parts[p].bodies[b].mass;
+void mark_heaviest(Graph& graph, PartField& mark) {
+  std::vector<std::size_t> heaviest(graph.parts.size());
+  const auto find = [&](std::size_t p, std::span<double> row) {
+    const ContactGraph& here = graph.parts[p].graph;
+    for (std::size_t b = 0; b < here.mass.size(); ++b)
+      if (here.counted(b) && here.mass[b] > row[0]) {
+        row[0] = here.mass[b];
         heaviest[p] = b;
       }
-  });
+  };
+  const std::vector<double> masses = rows_of(graph.link, graph.parts.size(), 1, find);
   std::size_t most = 0;
   for (std::size_t k = 1; k < masses.size(); ++k)
     if (masses[k] > masses[most]) most = k;
-  for (std::size_t p = 0; p < parts.size(); ++p)
-    if (at(parts[p].subdomain) == most && masses[most] > 0) {
+  for (std::size_t p = 0; p < graph.parts.size(); ++p)
+    if (at(graph.parts[p].graph.subdomain) == most && masses[most] > 0) {
       mark[p][heaviest[p]].u[0] = 1;
-      layers[p].met.push_back(static_cast<std::int32_t>(heaviest[p]));
+      graph.parts[p].met.push_back(static_cast<std::int32_t>(heaviest[p]));
     }
 }
 
 /// Returns the largest depth.
-std::int32_t find_layers(const BodyParts& parts, std::vector<Layers>& layers) {
-  PartField mark = parts.field();
-  parts.each([&](std::size_t p) {
-    layers[p].layer.emplace_back();  // depth 0
-    for (const ContactEquation& c : parts[p].contacts)
-      if (c.second < 0) {
-        mark[p][at(c.first)].u[0] = 1;
-        layers[p].met.push_back(c.first);
+std::int32_t find_layers(Graph& graph) {
+  PartField mark = graph.field();
+  graph.each([&](std::size_t p) {
+    Layers& here = graph.parts[p];
+    here.layer.emplace_back();  // depth 0
+    for (const auto& [first, second] : here.graph.pairs)
+      if (second < 0) {
+        mark[p][at(first)].u[0] = 1;
+        here.met.push_back(first);
       }
   });
   std::int32_t depth = 1;
-  if (!take_layer(parts, layers, mark, depth)) {
-    for (Layers& here : layers) here.layer.clear();
-    mark_heaviest(parts, layers, mark);
+  if (!take_layer(graph, mark, depth)) {
+    for (Layers& here : graph.parts) here.layer.clear();
+    mark_heaviest(graph, mark);
     depth = 0;
-    if (!take_layer(parts, layers, mark, depth)) return 0;
+    if (!take_layer(graph, mark, depth)) return 0;
   }
   for (;;) {
-    parts.each([&](std::size_t p) {
-      Layers& here = layers[p];
+    graph.each([&](std::size_t p) {
+      Layers& here = graph.parts[p];
       for (std::int32_t b : here.layer[at(depth)])
         for (std::int32_t other : here.neighbours(b))
           if (here.depth[at(other)] < 0 && mark[p][at(other)].u[0] == 0) {
@@ -109,33 +129,33 @@ std::int32_t find_layers(const BodyParts& parts, std::vector<Layers>& layers) {
             here.met.push_back(other);
           }
     });
-    if (!take_layer(parts, layers, mark, depth + 1)) return depth;
+    if (!take_layer(graph, mark, depth + 1)) return depth;
     ++depth;
   }
 }
 
 /// Inwards, each body hands what it carries to its contacts of the layer below, in equal parts.
-void hand_on(const BodyParts& parts, std::vector<Layers>& layers, std::int32_t deepest) {
-  PartField gain = parts.field();
-  parts.each([&](std::size_t p) {
-    const Layers& here = layers[p];
-    for (const ContactEquation& c : parts[p].contacts) {
-      if (here.below(c.first, c.second)) ++gain[p][at(c.first)].u[0];
-      if (c.second >= 0 && here.below(c.second, c.first)) ++gain[p][at(c.second)].u[0];
+void hand_on(Graph& graph, std::int32_t deepest) {
+  PartField gain = graph.field();
+  graph.each([&](std::size_t p) {
+    const Layers& here = graph.parts[p];
+    for (const auto& [first, second] : here.graph.pairs) {
+      if (here.below(first, second)) ++gain[p][at(first)].u[0];
+      if (second >= 0 && here.below(second, first)) ++gain[p][at(second)].u[0];
     }
   });
-  parts.link().sum_copies(gain);
-  parts.each([&](std::size_t p) {
-    Layers& here = layers[p];
+  graph.link.sum_copies(gain);
+  graph.each([&](std::size_t p) {
+    Layers& here = graph.parts[p];
     for (std::size_t b = 0; b < here.depth.size(); ++b) {
       here.parts.push_back(gain[p][b].u[0]);
-      here.load.push_back(here.depth[b] >= 1 ? parts[p].bodies[b].mass : 0);
+      here.load.push_back(here.depth[b] >= 1 ? here.graph.mass[b] : 0);
       gain[p][b] = Twist{};
     }
   });
   for (std::int32_t depth = deepest; depth > 1; --depth) {
-    parts.each([&](std::size_t p) {
-      Layers& here = layers[p];
+    graph.each([&](std::size_t p) {
+      Layers& here = graph.parts[p];
       here.met.clear();
       for (std::int32_t b : here.layer[at(depth)])
         for (std::int32_t other : here.neighbours(b))
@@ -144,15 +164,15 @@ void hand_on(const BodyParts& parts, std::vector<Layers>& layers, std::int32_t d
             here.met.push_back(other);
           }
     });
-    parts.link().sum_copies(gain);
-    parts.each([&](std::size_t p) {
-      Layers& here = layers[p];
+    graph.link.sum_copies(gain);
+    graph.each([&](std::size_t p) {
+      Layers& here = graph.parts[p];
       const auto take = [&](std::int32_t b) {
         here.load[at(b)] += gain[p][at(b)].u[0];
         gain[p][at(b)].u[0] = 0;
       };
       for (std::int32_t b : here.met) take(b);
-      for (std::int32_t b : parts[p].shared) take(b);
+      for (std::int32_t b : here.graph.shared) take(b);
     });
   }
 }
@@ -173,24 +193,28 @@ double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse) {
   return kinetic > 0 ? sum / kinetic : 0;
 }
 
-double estimate_stiffness(const BodyParts& parts) {
-  std::vector<Layers> layers;
-  for (std::size_t p = 0; p < parts.size(); ++p) layers.emplace_back(parts[p]);
-  hand_on(parts, layers, find_layers(parts, layers));
-  const std::vector<double> sums = parts.total(2, [&](std::size_t p, std::span<double> row) {
-    const BodyProblem& problem = parts[p];
-    const Layers& here = layers[p];
-    for (const ContactEquation& c : problem.contacts) {
+double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& link) {
+  Graph graph(parts, link);
+  hand_on(graph, find_layers(graph));
+  const std::vector<double> sums = total_of(link, parts.size(), 2, [&](std::size_t p, std::span<double> row) {
+    const Layers& here = graph.parts[p];
+    const std::vector<double>& mass = here.graph.mass;
+    for (const auto& [first, second] : here.graph.pairs) {
       double r = 0;
-      if (here.below(c.first, c.second)) r = here.load[at(c.first)] / here.parts[at(c.first)];
-      if (c.second >= 0 && here.below(c.second, c.first))
-        r = here.load[at(c.second)] / here.parts[at(c.second)];
-      row[0] += r * r / effective_mass(problem, c);
+      if (here.below(first, second)) r = here.load[at(first)] / here.parts[at(first)];
+      if (second >= 0 && here.below(second, first)) r = here.load[at(second)] / here.parts[at(second)];
+      row[0] += r * r * (1 / mass[at(first)] + (second < 0 ? 0 : 1 / mass[at(second)]));
     }
-    for (std::size_t b = 0; b < problem.bodies.size(); ++b)
-      if (problem.counted(b) && here.depth[b] >= 1) row[1] += problem.bodies[b].mass;
+    for (std::size_t b = 0; b < mass.size(); ++b)
+      if (here.graph.counted(b) && here.depth[b] >= 1) row[1] += mass[b];
   });
   return sums[1] > 0 ? sums[0] / sums[1] : 0;
+}
+
+double estimate_stiffness(const BodyParts& parts) {
+  std::vector<ContactGraph> graphs;
+  for (std::size_t p = 0; p < parts.size(); ++p) graphs.push_back(graph_of(parts[p]));
+  return estimate_stiffness(graphs, parts.link());
 }
 
 double estimate_stiffness(const BodyProblem& problem) {

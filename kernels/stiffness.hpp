@@ -17,6 +17,7 @@ double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse);
 /// layer over the contacts, to the driven walls; or from the heaviest body outwards if there is none. Also
 /// about the number of Gauss-Seidel sweeps that the problem needs. 0 without contacts. With several parts, an
 /// exchange for each layer on the way out and one on the way back.
+double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& link);
 double estimate_stiffness(const BodyParts& parts);
 double estimate_stiffness(const BodyProblem& problem);
 

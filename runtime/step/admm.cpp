@@ -118,7 +118,8 @@ class Admm::Whole {
   std::int64_t begin_ = 0;
 };
 
-std::vector<BodyProblem> Admm::gather() const {
+template <class Gathered, class Gather>
+std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
   std::vector<WallMotion> walls;
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     walls.push_back(
@@ -135,21 +136,26 @@ std::vector<BodyProblem> Admm::gather() const {
                                  parameters_.law.mu_grains,
                                  parameters_.law.mu_walls,
                                  split ? Multiplicities(all.multiplicity) : Multiplicities()};
-  std::vector<BodyProblem> parts;
+  std::vector<Gathered> parts;
   if (!all.several()) {
-    parts.push_back(gather_problem(source));
+    parts.push_back(gather(source));
     return parts;
   }
   for (std::size_t e = 0; e < all.here.size(); ++e)
-    parts.push_back(gather_problem(source, {all.here[e], static_cast<std::int32_t>(e), all.slot_begin[e],
-                                            all.slot_begin[e + 1], all.counts, all.multiplicity}));
+    parts.push_back(
+        gather(source, BodyProblemPart{all.here[e], static_cast<std::int32_t>(e), all.slot_begin[e],
+                                       all.slot_begin[e + 1], all.counts, all.multiplicity}));
   return parts;
+}
+
+std::vector<BodyProblem> Admm::gather() const {
+  return gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
 }
 
 double Admm::sweeps_needed() const {
   const Whole span(*this);
-  const std::vector<BodyProblem> parts = gather();
-  return estimate_stiffness(BodyParts(parts, *link_));
+  const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
+  return estimate_stiffness(graphs, *link_);
 }
 
 double Admm::velocity_error(double enough) const {

@@ -43,6 +43,9 @@ class Admm {
 
  private:
   class Whole;  ///< a span of it in a trace
+  /// gather(source), or gather(source, part) of each subdomain.
+  template <class Gathered, class Gather>
+  std::vector<Gathered> gather_parts(const Gather& gather) const;
   std::vector<BodyProblem> gather() const;
 
   StepState& state_;

@@ -236,6 +236,17 @@ void report(const bench::Packing& packing, std::size_t grains, int repeats) {
     if (contacts.rx != scalar.rx || contacts.rn != scalar.rn)
       throw std::logic_error("the kernels of " + std::string(name_of(set)) +
                              " disagree with the scalar ones");
+    SweepSteps steps;
+    const std::vector<float> still(contacts.nx.size(), 0.0F);
+    if constexpr (Friction)
+      steps.x = steps.y = steps.z = still;
+    else
+      steps.n = still;
+    row("  with momentum", time_of(sample.count, repeats, [&] {
+          over_chunks([&](ContactRange range) {
+            kernels.sweep_grains<Friction>(contacts, range, own, mu, {0.5, 1.2, steps});
+          });
+        }));
     row("  natural map", time_of(sample.count, repeats, [&] {
           over_chunks([&](ContactRange range) { kernels.error_grains<Friction>(contacts, range, own, mu); });
         }));
