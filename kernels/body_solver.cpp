@@ -27,12 +27,9 @@ std::vector<BodySystem> systems_of(const BodyParts& parts, std::span<const std::
   return systems;
 }
 
-/// Per part and unknown: it has contacts.
-std::vector<std::vector<char>> touched_bodies(const BodyParts& parts, std::vector<BodySystem>& systems) {
-  std::vector<std::vector<char>> touched(parts.size());
-  parts.each([&](std::size_t p) {
-    for (const auto& block : systems[p].diagonal()) touched[p].push_back(block.trace() > 0 ? 1 : 0);
-  });
+std::vector<std::vector<char>> touched_bodies(std::span<const BodySystem> systems) {
+  std::vector<std::vector<char>> touched;
+  for (const BodySystem& system : systems) touched.push_back(system.touched());
   return touched;
 }
 
@@ -58,7 +55,7 @@ void add(std::vector<Twist>& a, double factor, const std::vector<Twist>& b) {
 BodySolver::BodySolver(const BodyParts& parts, std::span<const std::vector<double>> rho, int aggregate)
     : parts_(parts),
       systems_(systems_of(parts, rho)),
-      coarse_(parts, touched_bodies(parts, systems_), rho, target_of(parts, aggregate)),
+      coarse_(parts, touched_bodies(systems_), rho, target_of(parts, aggregate)),
       residual_(parts.field()),
       z_(residual_),
       direction_(residual_),

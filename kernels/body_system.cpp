@@ -33,22 +33,20 @@ void restrict_all(const BodyProblem& problem, std::span<Twist> f) {
 
 }  // namespace
 
-/// f += or -= the row's part from the other body.
-template <bool Add>
-inline void BodySystem::couple(const Edge& edge, const Twist& x, Twist& f) {
+/// f less the row's part from the other body.
+inline void BodySystem::take(const Edge& edge, const Twist& x, Twist& f) {
   Vec3 v = edge.m.cross(x.w) - x.u;
   if (edge.slick) v = edge.m.dot(v) * edge.m;
-  v *= Add ? edge.rho : -edge.rho;
+  v *= -edge.rho;
   f.u += v;
   f.w -= edge.m.cross(v);
 }
 
-template <bool Add>
-void BodySystem::couple_ties(std::span<const Twist> x, std::span<Twist> f) const {
-  for (const Tie& tie : ties_) {
+void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
+  for (const Whole& tie : ties_) {
     const Edge back{-tie.edge.m, tie.edge.rho, tie.first, tie.edge.slick};
-    couple<Add>(tie.edge, x[at(tie.edge.other)], f[at(tie.first)]);
-    couple<Add>(back, x[at(tie.first)], f[at(tie.edge.other)]);
+    take(tie.edge, x[at(tie.edge.other)], f[at(tie.first)]);
+    take(back, x[at(tie.first)], f[at(tie.edge.other)]);
   }
 }
 
@@ -85,10 +83,11 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     }
     if (lower) middle_ = next;
   }
+  contacts_.reserve(contacts.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactEquation& c = contacts[k];
-    if (c.second >= 0 && !edge(c))
-      ties_.push_back({{c.normal, rho[k], c.second, c.mu == 0 ? 1 : 0}, c.first});
+    contacts_.push_back({{c.normal, rho[k], c.second, c.mu == 0 ? 1 : 0}, c.first});
+    if (c.second >= 0 && !edge(c)) ties_.push_back(contacts_.back());
     diagonal_[at(c.first)] += own_block(c.normal, rho[k], c.mu == 0);
     if (c.second >= 0) diagonal_[at(c.second)] += own_block(-c.normal, rho[k], c.mu == 0);
   }
@@ -96,6 +95,7 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
 
 void BodySystem::close() {
   for (std::size_t b = 0; b < size(); ++b) {
+    touched_.push_back(diagonal_[b].trace() > 0 ? 1 : 0);
     if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];
     Matrix6 inverse = Matrix6::Zero();
@@ -114,6 +114,7 @@ void BodySystem::close() {
     }
     inverse_[b] = 0.5 * (inverse + inverse.transpose());
   }
+  diagonal_ = {};
 }
 
 namespace {
@@ -133,17 +134,23 @@ inline Twist times(const Eigen::Matrix<double, 6, 6>& A, const Twist& x) {
 
 void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
   for (std::size_t b = 0; b < size(); ++b) {
-    y[b] = Twist{};
-    if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];
-    Twist sum = times(diagonal_[b], x[b]);
-    sum.u += body.mass * x[b].u;
-    sum.w += body.spin_mass * x[b].w;
-    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e)
-      couple<true>(edges_[e], x[at(edges_[e].other)], sum);
-    y[b] = sum;
+    y[b] = problem_.counted(b) ? Twist{body.mass * x[b].u, body.spin_mass * x[b].w} : Twist{};
   }
-  couple_ties<true>(x, y);
+  for (const Whole& contact : contacts_) {
+    const Edge& edge = contact.edge;
+    const bool pair = edge.other >= 0;
+    Vec3 v = x[at(contact.first)].u + edge.m.cross(x[at(contact.first)].w);
+    if (pair) v += edge.m.cross(x[at(edge.other)].w) - x[at(edge.other)].u;
+    if (edge.slick) v = edge.m.dot(v) * edge.m;
+    v *= edge.rho;
+    const Vec3 turn = edge.m.cross(v);
+    y[at(contact.first)].u += v;
+    y[at(contact.first)].w -= turn;
+    if (!pair) continue;
+    y[at(edge.other)].u -= v;
+    y[at(edge.other)].w -= turn;
+  }
   restrict_all(problem_, y);
 }
 
@@ -152,8 +159,7 @@ void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) co
     x[b] = Twist{};
     if (!problem_.counted(b)) continue;
     Twist sum = f[b];
-    for (std::size_t e = begin_[b]; e < middle_[b]; ++e)
-      couple<false>(edges_[e], x[at(edges_[e].other)], sum);
+    for (std::size_t e = begin_[b]; e < middle_[b]; ++e) take(edges_[e], x[at(edges_[e].other)], sum);
     x[b] = times(inverse_[b], sum);
   }
 }
@@ -162,17 +168,16 @@ void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) co
 void BodySystem::rest_of_forward(std::span<const Twist> x, std::span<Twist> rest) const {
   for (std::size_t b = 0; b < size(); ++b) {
     Twist sum;
-    for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e)
-      couple<false>(edges_[e], x[at(edges_[e].other)], sum);
+    for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x[at(edges_[e].other)], sum);
     rest[b] = sum;
   }
-  couple_ties<false>(x, rest);
+  take_ties(x, rest);
   restrict_all(problem_, rest);
 }
 
 void BodySystem::take_ties(std::span<const Twist> f, std::span<const Twist> x, std::span<Twist> rest) const {
   for (std::size_t b = 0; b < size(); ++b) rest[b] = problem_.counted(b) ? f[b] : Twist{};
-  couple_ties<false>(x, rest);
+  take_ties(x, rest);
 }
 
 void BodySystem::smooth_backward(std::span<const Twist> rest, std::span<Twist> x) const {
@@ -182,8 +187,7 @@ void BodySystem::smooth_backward(std::span<const Twist> rest, std::span<Twist> x
       continue;
     }
     Twist sum = rest[b];
-    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e)
-      couple<false>(edges_[e], x[at(edges_[e].other)], sum);
+    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x[at(edges_[e].other)], sum);
     x[b] = times(inverse_[b], sum);
   }
 }

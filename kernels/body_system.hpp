@@ -17,8 +17,9 @@ namespace talus {
 /// mass or with a grain that counts elsewhere, is a `tie`: between parts, and between grains and walls, the
 /// passes are block Jacobi. They converge for any such split: with D the blocks on the diagonal, of all
 /// contacts of a body, and T the ties, D - T = M + sum rho |H_i^T x_i - H_j^T x_j|^2 > 0.
-/// Per contact and product: 2 records of 48 bytes and 2 gathered twists, about 80 flop. 600 bytes a body and
-/// 96 a contact.
+/// A product goes over the contacts: per contact a record of 64 bytes, 2 twists read and written, about 70
+/// flop. Passes go over the rows: 2 records of 48 bytes and 2 gathered twists. 310 bytes a body, 160 a
+/// contact.
 ///
 /// With m = +-n pointing to the body of the row, seen from there the relative velocity is
 /// v = (u_i - u_j) + m x (w_i + w_j), and the row gains rho (v, -m x v). Where a contact has no friction only
@@ -32,8 +33,10 @@ class BodySystem {
   BodySystem(const BodyProblem& problem, std::span<const double> rho);
 
   std::vector<Matrix6>& diagonal() { return diagonal_; }
-  /// Once `diagonal` holds what the contacts of all parts give.
+  /// Once `diagonal` holds what the contacts of all parts give; it is void then.
   void close();
+  /// Per unknown: some part has contacts of it.
+  const std::vector<char>& touched() const { return touched_; }
 
   // Twists are restricted to the freedoms of their bodies. Results are parts of a sum over the copies of a
   // body, unless said otherwise.
@@ -50,7 +53,7 @@ class BodySystem {
   /// Second half: one backward pass from x, whose `rest` is summed.
   void smooth_backward(std::span<const Twist> rest, std::span<Twist> x) const;
 
-  std::size_t size() const { return diagonal_.size(); }
+  std::size_t size() const { return inverse_.size(); }
 
  private:
   struct Edge {
@@ -59,20 +62,20 @@ class BodySystem {
     std::int32_t other;  ///< unknown
     std::int32_t slick;  ///< 1: normal part only
   };
-  /// A contact from its first body's side: to the second m is -m.
-  struct Tie {
+  /// A contact from its first body's side: to the second m is -m. At a driven wall there is no other.
+  struct Whole {
     Edge edge;
     std::int32_t first;
   };
-  template <bool Add>
-  static void couple(const Edge& edge, const Twist& x, Twist& f);
-  template <bool Add>
-  void couple_ties(std::span<const Twist> x, std::span<Twist> f) const;
+  static void take(const Edge& edge, const Twist& x, Twist& f);
+  void take_ties(std::span<const Twist> x, std::span<Twist> f) const;
 
   const BodyProblem& problem_;
   std::vector<std::size_t> begin_, middle_;  ///< per body + 1; edges to lower unknowns stand before middle_
   std::vector<Edge> edges_;
-  std::vector<Tie> ties_;
+  std::vector<Whole> contacts_;
+  std::vector<Whole> ties_;
+  std::vector<char> touched_;
   std::vector<Matrix6> diagonal_;  ///< of H rho H^T
   std::vector<Matrix6> inverse_;   ///< of the blocks of A, on the freedoms of each body; 0 where it counts
                                    ///< elsewhere

@@ -137,7 +137,9 @@ bool Iteration::stagnant() const {
 /// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
 /// by little; at most half of what was done, so that a wrong guess costs no more.
 int Iteration::sweeps_ahead() const {
-  const int done = result_.iterations;
+  // ADMM is a new start.
+  const int start = result_.stiff_calls > 0 ? history_[history_from_].iterations : 0;
+  const int done = result_.iterations - start;
   int sweeps = std::max(settings_.check_every, done / 2);
   if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
   const double error = history_.back().error_rms;
@@ -145,15 +147,15 @@ int Iteration::sweeps_ahead() const {
   if (before && error > settings_.tolerance && error < before->error_rms) {
     const double log_error = std::log(before->error_rms / error),
                  log_missing = std::log(error / settings_.tolerance);
-    const double to_go =
-        before->iterations > 0
-            ? done * std::expm1(log_missing / log_error * std::log(double(done) / before->iterations))
-            : done * log_missing / log_error;
+    const int then = before->iterations - start;
+    const double to_go = then > 0
+                             ? done * std::expm1(log_missing / log_error * std::log(double(done) / then))
+                             : done * log_missing / log_error;
     sweeps = std::max(least_sweeps, static_cast<int>(std::ceil(std::min<double>(sweeps, to_go))));
   }
   const int exchange = decomposition_.sweeps_per_exchange;
   sweeps = (sweeps + exchange - 1) / exchange * exchange;
-  return std::min(sweeps, settings_.max_iterations - done);
+  return std::min(sweeps, settings_.max_iterations - result_.iterations);
 }
 
 /// The sweeps behind the check of this epoch: `sweeps_` done.
