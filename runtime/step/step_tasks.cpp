@@ -8,6 +8,7 @@
 #include "kernels/narrow_phase.hpp"
 #include "kernels/release.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/loop_colours.hpp"
 #include "runtime/graph/tree.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
@@ -304,24 +305,18 @@ void StepGraph::plan_epochs() {
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here);
-  // Even colours are those of chunks, a subdomain's after those of the one before, so that a thread stays
-  // with one subdomain while it is in the cache; they share nothing. Inner ones are shifted behind publish.
-  // Rank 0 does its part half-way through the inner chunks, so that the way there and the way back are both
-  // hidden. Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
-  const auto at_border = static_cast<std::uint32_t>(2 * chunks.boundary_colours),
-             inside = static_cast<std::uint32_t>(2 * chunks.colours) - at_border,
-             subdomains = static_cast<std::uint32_t>(here);
-  const std::uint32_t first_inner = subdomains * at_border, end = first_inner + subdomains * inside;
-  const std::uint32_t shift = decomposition_.overlap ? 2 : 4;
-  const std::uint32_t glue_colour = decomposition_.overlap ? end + 2 : first_inner + 2;
-  const auto in_tree = graph::tree::colours(ranks_.rank(), ranks_.ranks(), first_inner, glue_colour);
+  // The tree of ranks has its part half-way through the inner chunks, so that the way there and the way back
+  // are both hidden. Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
+  std::vector<graph::ChunkTurn> turns;
+  for (std::size_t c = 0; c < count; ++c)
+    turns.push_back({chunks.boundary[c] == 0, static_cast<std::uint32_t>(chunks.subdomain[c]),
+                     static_cast<std::uint32_t>(chunks.colour[c])});
+  const graph::LoopColours colours = graph::loop_colours(turns, decomposition_.overlap, executor_.threads());
+  const auto in_tree = graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.publish, colours.glue);
+  std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
     const bool at_interface = gluing.needed() && chunks.boundary[c] != 0;
-    const std::uint32_t own = 2 * static_cast<std::uint32_t>(chunks.colour[c]),
-                        before = static_cast<std::uint32_t>(e);
-    colour[c] = chunks.boundary[c] != 0 ? before * at_border + own
-                                        : first_inner + shift + before * inside + own - at_border;
     neighbour.insert(neighbour.end(), chunks.conflicts.begin() + chunks.conflict_begin[c],
                      chunks.conflicts.begin() + chunks.conflict_begin[c + 1]);
     if (at_interface) {
@@ -333,7 +328,7 @@ void StepGraph::plan_epochs() {
   }
   if (gluing.needed()) {
     for (std::size_t e = 0; e < here; ++e) {
-      colour[publish(e)] = first_inner;
+      colour[publish(e)] = colours.publish;
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
       for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
         neighbour.push_back(task);
@@ -353,7 +348,7 @@ void StepGraph::plan_epochs() {
     }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     for (std::size_t e = 0; e < here; ++e) {
-      colour[glue(e)] = glue_colour;
+      colour[glue(e)] = colours.glue;
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
       neighbour.push_back(centre);
       neighbour.push_back(publish(e));

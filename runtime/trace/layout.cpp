@@ -10,6 +10,7 @@
 #include <set>
 
 #include "runtime/graph/epoch_graph.hpp"
+#include "runtime/graph/loop_colours.hpp"
 #include "runtime/graph/tree.hpp"
 
 namespace talus::trace {
@@ -81,6 +82,25 @@ class Builder {
     return static_cast<std::uint32_t>(out_.nodes.size() - 1);
   }
 
+  /// As the program would have them with these subdomains on one rank; `first`: the rank's first chunk, all
+  /// of which get theirs.
+  graph::LoopColours colours_of(std::uint32_t first, std::span<const std::size_t> mine) {
+    bool overlap = true;
+    std::vector<graph::ChunkTurn> turns;
+    for (std::size_t n = first, at = 0; n < out_.nodes.size(); ++n) {
+      const SimNode& node = out_.nodes[n];
+      while (groups_[mine[at]] != node.group) ++at;
+      const Group& group = group_[mine[at]];
+      const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
+      const bool inside = group.publish == none || plan.colour[group.publish] < node.colour;
+      if (inside && group.glue != none && plan.colour[group.glue] < node.colour) overlap = false;
+      turns.push_back({inside, static_cast<std::uint32_t>(at), node.colour});
+    }
+    graph::LoopColours colours = graph::loop_colours(turns, overlap, machine_.threads);
+    for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
+    return colours;
+  }
+
   /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues; and their owners.
   void add_rank(std::uint32_t rank) {
     const auto first = static_cast<std::uint32_t>(out_.nodes.size());
@@ -116,16 +136,15 @@ class Builder {
       const auto found = first_owner.find(g);
       return worker(found == first_owner.end() ? 0 : found->second);
     };
-    std::uint32_t publish_colour = 0, glue_colour = 0, publishes = 0;
+    const graph::LoopColours colours = colours_of(first, mine);
+    std::uint32_t publishes = 0;
     bool glued = false;
     for (std::size_t g : mine) {
       if (group_[g].publish == none) continue;
       group_[g].new_publish = add_node(rank, group_[g].source, group_[g].publish);
       out_.nodes.back().worker = owner_of(g);
+      out_.nodes.back().colour = colours.publish;
       ++publishes;
-      const Plan& plan = *plans_[static_cast<std::size_t>(group_[g].source)];
-      publish_colour = std::max(publish_colour, plan.colour[group_[g].publish]);
-      glue_colour = std::max(glue_colour, plan.colour[group_[g].glue]);
       glued = true;
     }
     out_.publishes.push_back(publishes);
@@ -133,20 +152,19 @@ class Builder {
     collect_.push_back(none);
     if (!glued) return;
     const int own = static_cast<int>(rank);
-    const auto colours = graph::tree::colours(own, machine_.ranks, publish_colour, glue_colour);
+    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.publish, colours.glue);
     const auto add = [&](std::uint32_t colour) {
       out_.nodes.push_back(centre_node(rank, colour));
       out_.nodes.back().worker = worker(0);
       return static_cast<std::uint32_t>(out_.nodes.size() - 1);
     };
-    if (graph::tree::relays(own, machine_.ranks)) collect_.back() = add(colours.up);
-    centre_.back() = add(colours.down);
+    if (graph::tree::relays(own, machine_.ranks)) collect_.back() = add(in_tree.up);
+    centre_.back() = add(in_tree.down);
     for (std::size_t g : mine) {
       if (group_[g].glue == none) continue;
       group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);
       out_.nodes.back().worker = owner_of(g);
-      // Colours of different recorded ranks mean the same order, but not the same numbers.
-      out_.nodes.back().colour = glue_colour;
+      out_.nodes.back().colour = colours.glue;
     }
   }
 

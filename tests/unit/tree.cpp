@@ -1,6 +1,7 @@
 /// The tree of ranks over which walls are glued.
 
 #include "runtime/graph/tree.hpp"
+#include "runtime/graph/loop_colours.hpp"
 
 #include <gtest/gtest.h>
 
@@ -54,6 +55,48 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
         if (!relays(rank, ranks)) continue;
         EXPECT_LE(own.up, parent(rank) == 0 ? above.down : above.up) << rank << " of " << ranks;
       }
+    }
+}
+
+using graph::ChunkTurn;
+using graph::loop_colours;
+
+TEST(LoopColours, GoThroughTheBordersThenPublishThenTheInsidesSubdomainAfterSubdomain) {
+  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 2}, {true, 0, 2},
+                                        {false, 1, 0}, {true, 1, 2},  {true, 1, 3}};
+  const graph::LoopColours hidden = loop_colours(turns, true, 1), bare = loop_colours(turns, false, 1);
+  EXPECT_EQ(hidden.chunk, (std::vector<std::uint32_t>{0, 2, 8, 8, 4, 10, 12}));
+  EXPECT_EQ(hidden.publish, 6U);
+  EXPECT_EQ(hidden.glue, 14U);
+  EXPECT_EQ(bare.chunk, (std::vector<std::uint32_t>{0, 2, 10, 10, 4, 12, 14}));
+  EXPECT_EQ(bare.glue, 8U);
+}
+
+TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
+  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 7},
+                                        {false, 1, 4}, {true, 1, 9},  {true, 1, 12}};
+  const graph::LoopColours colours = loop_colours(turns, true, 2);
+  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
+  EXPECT_EQ(colours.publish, 4U);
+  EXPECT_EQ(colours.glue, 10U);
+}
+
+TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
+  const std::vector<ChunkTurn> all = {{false, 0, 0}, {true, 0, 3}, {false, 1, 0}, {false, 1, 2},
+                                      {true, 1, 3},  {true, 1, 5}, {true, 2, 3}};
+  for (int threads_then : {1, 4})
+    for (int threads : {1, 4}) {
+      const graph::LoopColours among = loop_colours(all, true, threads_then);
+      std::vector<ChunkTurn> alone, again;
+      for (std::size_t k = 0; k < all.size(); ++k)
+        if (all[k].subdomain == 1) {
+          alone.push_back({all[k].inside, 0, all[k].colour});
+          again.push_back({among.publish < among.chunk[k], 0, among.chunk[k]});
+        }
+      const graph::LoopColours here = loop_colours(alone, true, threads),
+                               replayed = loop_colours(again, true, threads);
+      EXPECT_EQ(here.chunk, replayed.chunk);
+      EXPECT_EQ(here.glue, replayed.glue);
     }
 }
 
