@@ -148,9 +148,8 @@ int Iteration::sweeps_ahead() const {
     const double log_error = std::log(before->error_rms / error),
                  log_missing = std::log(error / settings_.tolerance);
     const int then = before->iterations - start;
-    const double to_go = then > 0
-                             ? done * std::expm1(log_missing / log_error * std::log(double(done) / then))
-                             : done * log_missing / log_error;
+    const double to_go = then > 0 ? done * std::expm1(log_missing / log_error * std::log(double(done) / then))
+                                  : done * log_missing / log_error;
     sweeps = std::max(least_sweeps, static_cast<int>(std::ceil(std::min<double>(sweeps, to_go))));
   }
   const int exchange = decomposition_.sweeps_per_exchange;
