@@ -13,8 +13,13 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
+/// Of a body over that of the copy at a slot.
+double masses_of_slot(const BodyProblemSource& source, std::size_t slot) {
+  return source.multiplicity.empty() ? 1 : source.multiplicity[slot];
+}
+
 double mass_of_slot(const BodyProblemSource& source, std::size_t slot) {
-  return (source.multiplicity.empty() ? 1 : source.multiplicity[slot]) / source.velocity[slot].inv_mass;
+  return masses_of_slot(source, slot) / source.velocity[slot].inv_mass;
 }
 
 BodyUnknown unknown_of_slot(const BodyProblemSource& source, std::size_t slot) {
@@ -22,7 +27,7 @@ BodyUnknown unknown_of_slot(const BodyProblemSource& source, std::size_t slot) {
   BodyUnknown body;
   body.mass = mass_of_slot(source, slot);
   if (v.spin_mobility > 0 && !source.free.w.empty())
-    body.spin_mass = (source.multiplicity.empty() ? 1 : source.multiplicity[slot]) / v.spin_mobility;
+    body.spin_mass = masses_of_slot(source, slot) / v.spin_mobility;
   body.x = source.x[slot];
   body.radius = source.radius[slot];
   body.free.u = Eigen::Map<const Vec3>(source.free.u[slot].data());

@@ -43,7 +43,7 @@ inline void BodySystem::take(const Edge& edge, const Twist& x, Twist& f) {
 }
 
 void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
-  for (const Whole& tie : ties_) {
+  for (const Tie& tie : ties_) {
     const Edge back{-tie.edge.m, tie.edge.rho, tie.first, tie.edge.slick};
     take(tie.edge, x[at(tie.edge.other)], f[at(tie.first)]);
     take(back, x[at(tie.first)], f[at(tie.edge.other)]);
@@ -52,6 +52,7 @@ void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
 
 BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     : problem_(problem),
+      rho_(rho.begin(), rho.end()),
       begin_(problem.bodies.size() + 1, 0),
       middle_(problem.bodies.size(), 0),
       diagonal_(problem.bodies.size(), Matrix6::Zero()),
@@ -83,11 +84,10 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     }
     if (lower) middle_ = next;
   }
-  contacts_.reserve(contacts.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const ContactEquation& c = contacts[k];
-    contacts_.push_back({{c.normal, rho[k], c.second, c.mu == 0 ? 1 : 0}, c.first});
-    if (c.second >= 0 && !edge(c)) ties_.push_back(contacts_.back());
+    if (c.second >= 0 && !edge(c))
+      ties_.push_back({{c.normal, rho[k], c.second, c.mu == 0 ? 1 : 0}, c.first});
     diagonal_[at(c.first)] += own_block(c.normal, rho[k], c.mu == 0);
     if (c.second >= 0) diagonal_[at(c.second)] += own_block(-c.normal, rho[k], c.mu == 0);
   }
@@ -137,19 +137,9 @@ void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
     const BodyUnknown& body = problem_.bodies[b];
     y[b] = problem_.counted(b) ? Twist{body.mass * x[b].u, body.spin_mass * x[b].w} : Twist{};
   }
-  for (const Whole& contact : contacts_) {
-    const Edge& edge = contact.edge;
-    const bool pair = edge.other >= 0;
-    Vec3 v = x[at(contact.first)].u + edge.m.cross(x[at(contact.first)].w);
-    if (pair) v += edge.m.cross(x[at(edge.other)].w) - x[at(edge.other)].u;
-    if (edge.slick) v = edge.m.dot(v) * edge.m;
-    v *= edge.rho;
-    const Vec3 turn = edge.m.cross(v);
-    y[at(contact.first)].u += v;
-    y[at(contact.first)].w -= turn;
-    if (!pair) continue;
-    y[at(edge.other)].u -= v;
-    y[at(edge.other)].w -= turn;
+  for (std::size_t k = 0; k < rho_.size(); ++k) {
+    const ContactEquation& c = problem_.contacts[k];
+    add_force(c, rho_[k] * constrained(c, relative_velocity(c, x)), y);
   }
   restrict_all(problem_, y);
 }

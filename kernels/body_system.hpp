@@ -17,9 +17,8 @@ namespace talus {
 /// mass or with a grain that counts elsewhere, is a `tie`: between parts, and between grains and walls, the
 /// passes are block Jacobi. They converge for any such split: with D the blocks on the diagonal, of all
 /// contacts of a body, and T the ties, D - T = M + sum rho |H_i^T x_i - H_j^T x_j|^2 > 0.
-/// A product goes over the contacts: per contact a record of 64 bytes, 2 twists read and written, about 70
-/// flop. Passes go over the rows: 2 records of 48 bytes and 2 gathered twists. 310 bytes a body, 160 a
-/// contact.
+/// A product goes over the contacts of the problem, 2 twists read and written each, about 70 flop. Passes go
+/// over the rows: 2 records of 48 bytes and 2 gathered twists. 310 bytes a body, 104 a contact.
 ///
 /// With m = +-n pointing to the body of the row, seen from there the relative velocity is
 /// v = (u_i - u_j) + m x (w_i + w_j), and the row gains rho (v, -m x v). Where a contact has no friction only
@@ -62,8 +61,8 @@ class BodySystem {
     std::int32_t other;  ///< unknown
     std::int32_t slick;  ///< 1: normal part only
   };
-  /// A contact from its first body's side: to the second m is -m. At a driven wall there is no other.
-  struct Whole {
+  /// A contact from its first body's side: to the second m is -m.
+  struct Tie {
     Edge edge;
     std::int32_t first;
   };
@@ -71,10 +70,10 @@ class BodySystem {
   void take_ties(std::span<const Twist> x, std::span<Twist> f) const;
 
   const BodyProblem& problem_;
+  std::vector<double> rho_;                  ///< per contact [kg]
   std::vector<std::size_t> begin_, middle_;  ///< per body + 1; edges to lower unknowns stand before middle_
   std::vector<Edge> edges_;
-  std::vector<Whole> contacts_;
-  std::vector<Whole> ties_;
+  std::vector<Tie> ties_;
   std::vector<char> touched_;
   std::vector<Matrix6> diagonal_;  ///< of H rho H^T
   std::vector<Matrix6> inverse_;   ///< of the blocks of A, on the freedoms of each body; 0 where it counts

@@ -133,12 +133,16 @@ bool Iteration::stagnant() const {
   return half > settings_.tolerance && half > 0.95 * quarter;
 }
 
+/// Sweeps done when those that count began: ADMM is a new start.
+int Iteration::started_at() const {
+  return result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations;
+}
+
 /// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,
 /// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
 /// by little; at most half of what was done, so that a wrong guess costs no more.
 int Iteration::sweeps_ahead() const {
-  // ADMM is a new start.
-  const int start = result_.stiff_calls > 0 ? history_[history_from_].iterations : 0;
+  const int start = started_at();
   const int done = result_.iterations - start;
   int sweeps = std::max(settings_.check_every, done / 2);
   if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
@@ -252,7 +256,7 @@ bool Iteration::ask_admm() {
   const bool may = settings_.method == SolverMethod::admm || settings_.method == SolverMethod::automatic;
   if (!may) return false;
   if (result_.stiff_calls == calls) return false;
-  const int since = result_.iterations - (result_.stiff_calls == 0 ? 0 : history_[history_from_].iterations);
+  const int since = result_.iterations - started_at();
   return since >= chance << (2 * result_.stiff_calls) &&
          (settings_.method == SolverMethod::admm || sweeps_needed() >= stiff ||
           (since >= stiff && looks_at_all())) &&

@@ -133,6 +133,7 @@ class Iteration {
   bool judge();
   void choose_course();
   const Check* check_before() const;
+  int started_at() const;
   int sweeps_ahead() const;
   void plan_sweeps(int epoch, int sweeps);
   void turn_conjugate();
