@@ -14,13 +14,16 @@ namespace talus {
 /// A sphere of radius R turns as w = R omega [m/s], so that no radius and no tangent frame is needed at a
 /// contact (docs/theory.md, "Spheres"): with n pointing to it from the other body, the surface at the contact
 /// point moves with u - w x n; the other body's with u + w x n.
-struct alignas(64) Velocity {
-  double u[3]{};           ///< velocity of the centre [m/s]
-  double inv_mass{};       ///< 1/m [1/kg]; 0 for a body that nothing moves
-  double w[3]{};           ///< R omega [m/s]
-  double spin_mobility{};  ///< R^2/I [1/kg]; 0 for a body that does not turn
+template <class Number>
+struct alignas(8 * sizeof(Number)) VelocityOf {
+  Number u[3]{};           ///< velocity of the centre [m/s]
+  Number inv_mass{};       ///< 1/m [1/kg]; 0 for a body that nothing moves
+  Number w[3]{};           ///< R omega [m/s]
+  Number spin_mobility{};  ///< R^2/I [1/kg]; 0 for a body that does not turn
 };
-static_assert(sizeof(Velocity) == 64);
+using Velocity = VelocityOf<double>;
+using SingleVelocity = VelocityOf<float>;  ///< mobilities in other units: single_precision.hpp
+static_assert(sizeof(Velocity) == 64 && sizeof(SingleVelocity) == 32);
 
 /// The spheres of this process, one entry per slot. All arrays have the same length, except `orientation`,
 /// which is empty unless the scene asks for orientations.

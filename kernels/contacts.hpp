@@ -27,6 +27,14 @@ struct Contacts {
   std::vector<std::uint8_t> group;   ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
 };
 
+/// Contacts in the same places, as sweeps in single precision know them (single_precision.hpp).
+struct SingleContacts {
+  double unit = 1;                ///< [kg] of impulses and of bodies' mobilities, a power of two
+  std::vector<float> nx, ny, nz;  ///< normal
+  std::vector<float> bias;        ///< b [m/s]
+  std::vector<float> rx, ry, rz;  ///< impulse on the first body over `unit` [m/s]
+};
+
 /// Room for the contacts of `chunks`, of which there are none yet; `friction` decides which impulses exist.
 void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
 

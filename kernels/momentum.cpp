@@ -35,14 +35,16 @@ constexpr std::size_t record_numbers = sizeof(Velocity) / sizeof(double);
 using Record = std::array<double, record_numbers>;
 
 /// Masses, equal in both, come back to the bit: m - m = 0, 0 + m = m.
-template <int Sign>
-void add_records(std::span<const Slot> slots, std::span<const Velocity> from, std::vector<Velocity>& to) {
+template <int Sign, class Number>
+void add_records(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& from,
+                 std::vector<VelocityOf<Number>>& to) {
+  using Numbers = std::array<Number, record_numbers>;
   for (const Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);
-    auto sum = std::bit_cast<Record>(to[s]);
-    const auto add = std::bit_cast<Record>(from[s]);
+    auto sum = std::bit_cast<Numbers>(to[s]);
+    const auto add = std::bit_cast<Numbers>(from[s]);
     for (std::size_t k = 0; k < record_numbers; ++k) sum[k] += Sign * add[k];
-    to[s] = std::bit_cast<Velocity>(sum);
+    to[s] = std::bit_cast<VelocityOf<Number>>(sum);
   }
 }
 
@@ -107,17 +109,34 @@ void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std
   }
 }
 
+void carry_velocities(const SweepKernels& kernels, double beta, std::span<const Slot> slots,
+                      std::span<SingleVelocity> velocity, std::span<SingleVelocity> last) {
+  if (beta != 0) return kernels.advance(slots, velocity, last, beta);
+  for (const Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    last[s] = velocity[s];
+  }
+}
+
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail) {
   carry_numbers(carry, beta, copy.velocity, trail.last_wall_v[chunk],
                 trail.step_wall_v.empty() ? nullptr : trail.step_wall_v[chunk].data(), 3);
 }
 
-void loosen(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail) {
-  add_records<-1>(slots, velocity, trail.last_v);
+template <class Number>
+void loosen(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
+            std::vector<VelocityOf<Number>>& last) {
+  add_records<-1>(slots, velocity, last);
 }
-void fasten(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail) {
-  add_records<1>(slots, velocity, trail.last_v);
+template <class Number>
+void fasten(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
+            std::vector<VelocityOf<Number>>& last) {
+  add_records<1>(slots, velocity, last);
 }
+template void loosen(std::span<const Slot>, const std::vector<Velocity>&, std::vector<Velocity>&);
+template void loosen(std::span<const Slot>, const std::vector<SingleVelocity>&, std::vector<SingleVelocity>&);
+template void fasten(std::span<const Slot>, const std::vector<Velocity>&, std::vector<Velocity>&);
+template void fasten(std::span<const Slot>, const std::vector<SingleVelocity>&, std::vector<SingleVelocity>&);
 void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail) {
   for (std::size_t k = 0; k < 3; ++k) trail.last_wall_v[chunk][k] -= copy.velocity[k];
 }

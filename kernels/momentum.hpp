@@ -34,8 +34,8 @@ struct Trail {
   std::vector<std::array<double, 3>> step_wall_v;
 };
 
-/// Room for the contacts, bodies and chunks of `contacts`; what stands there is void. What only the other
-/// rule remembers stays: a sweep under it may still be on its way.
+/// Room for the contacts, bodies (none where they are carried in single precision) and chunks; what was not
+/// there is void. What only the other rule remembers stays: a sweep under it may still be on its way.
 void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
 
 /// Momentum of the impulses of a range begins: no step yet.
@@ -47,6 +47,9 @@ void carry_impulses(double beta, ContactRange range, Contacts& contacts, Trail& 
 /// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
 void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
                       std::span<Velocity> velocity, Trail& trail);
+/// Momentum in single precision; with beta = 0 what is in `last` may be void.
+void carry_velocities(const SweepKernels& kernels, double beta, std::span<const Slot> slots,
+                      std::span<SingleVelocity> velocity, std::span<SingleVelocity> last);
 
 /// Applies the rule to the wall copy of a chunk.
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);
@@ -55,8 +58,13 @@ void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Tra
 /// what the trail remembers: the rule would take the difference for motion, and carry it on beta/(1 - beta)
 /// times as large, at every refresh. So the trail goes along: `loosen` before the velocities are reset,
 /// `fasten` when they stand.
-void loosen(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail);
-void fasten(std::span<const Slot> slots, std::span<const Velocity> velocity, Trail& trail);
+/// Of the slots; `last` is that of the trail, in the precision of the velocities.
+template <class Number>
+void loosen(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
+            std::vector<VelocityOf<Number>>& last);
+template <class Number>
+void fasten(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
+            std::vector<VelocityOf<Number>>& last);
 /// The same with the wall copy of a chunk.
 void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail);
 void fasten(std::size_t chunk, const WallCopy& copy, Trail& trail);

@@ -61,6 +61,13 @@ template <bool Friction>
 void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                 WallCopy& wall, const SweepMomentum& momentum);
 
+/// Sweeps with momentum and friction in single precision, on what `narrow` has made of contacts and bodies
+/// (single_precision.hpp); `contacts` lends groups and bodies. The steps are in the units of `single`.
+void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                  std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum);
+void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                std::span<SingleVelocity> velocity, double mu, WallCopy& wall, const SweepMomentum& momentum);
+
 /// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
 /// r.
 template <bool Friction>

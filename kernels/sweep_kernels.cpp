@@ -24,6 +24,10 @@ const double* records(std::span<const Velocity> velocity) {
   return reinterpret_cast<const double*>(velocity.data());
 }
 
+float* records(std::span<SingleVelocity> velocity) {
+  return reinterpret_cast<float*>(velocity.data());
+}
+
 ImpulseView impulses(Contacts& c) {
   return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
 }
@@ -42,6 +46,41 @@ ContactView view(const Contacts& c, ContactRange range) {
           c.group.data() + range.begin,
           range.begin,
           range.end};
+}
+
+SingleImpulseView impulses(SingleContacts& c) {
+  return {c.rx.data(), c.ry.data(), c.rz.data(), nullptr};
+}
+
+SingleContactView view(const Contacts& c, const SingleContacts& single, ContactRange range) {
+  return {single.nx.data(),
+          single.ny.data(),
+          single.nz.data(),
+          single.bias.data(),
+          single.rx.data(),
+          single.ry.data(),
+          single.rz.data(),
+          nullptr,
+          c.first.data(),
+          c.second.data(),
+          c.group.data() + range.begin,
+          range.begin,
+          range.end};
+}
+
+/// Of whole records at `slots`, as LaneKernels::advance_bodies does it.
+template <class Number>
+void advance_records(std::span<const Slot> slots, std::span<VelocityOf<Number>> velocity,
+                     std::span<VelocityOf<Number>> last, Number beta) {
+  for (const Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    const VelocityOf<Number> now = velocity[s];
+    for (std::size_t k = 0; k < 3; ++k) {
+      velocity[s].u[k] = now.u[k] + beta * (now.u[k] - last[s].u[k]);
+      velocity[s].w[k] = now.w[k] + beta * (now.w[k] - last[s].w[k]);
+    }
+    last[s] = now;
+  }
 }
 
 MomentumView view(const SweepMomentum& m) {
@@ -132,6 +171,22 @@ void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<
                                   wall.velocity, wall.inv_mass, view(momentum));
 }
 
+void SweepKernels::sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                                std::span<SingleVelocity> velocity, double mu,
+                                const SweepMomentum& momentum) const {
+  if (!lanes_[1]) return talus::sweep_grains(contacts, single, range, velocity, mu, momentum);
+  lanes_[1]->single_grains(view(contacts, single, range), impulses(single), records(velocity), mu,
+                           view(momentum));
+}
+
+void SweepKernels::sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                              std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
+                              const SweepMomentum& momentum) const {
+  if (!lanes_[1]) return talus::sweep_wall(contacts, single, range, velocity, mu, wall, momentum);
+  lanes_[1]->single_wall(view(contacts, single, range), impulses(single), records(velocity), mu,
+                         wall.velocity, wall.inv_mass * single.unit, view(momentum));
+}
+
 template <bool Friction>
 void SweepKernels::accumulate_grains(const Contacts& contacts, ContactRange range,
                                      std::span<Velocity> velocity) const {
@@ -171,15 +226,14 @@ void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velo
                            std::span<Velocity> last, double beta) const {
   if (lanes_[1])
     return lanes_[1]->advance_bodies(records(velocity), records(last), slots.data(), slots.size(), beta);
-  for (const Slot slot : slots) {
-    const auto s = static_cast<std::size_t>(slot);
-    const Velocity now = velocity[s];
-    for (std::size_t k = 0; k < 3; ++k) {
-      velocity[s].u[k] = now.u[k] + beta * (now.u[k] - last[s].u[k]);
-      velocity[s].w[k] = now.w[k] + beta * (now.w[k] - last[s].w[k]);
-    }
-    last[s] = now;
-  }
+  advance_records(slots, velocity, last, beta);
+}
+
+void SweepKernels::advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
+                           std::span<SingleVelocity> last, double beta) const {
+  if (lanes_[1])
+    return lanes_[1]->advance_single(records(velocity), records(last), slots.data(), slots.size(), beta);
+  advance_records(slots, velocity, last, static_cast<float>(beta));
 }
 
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;

@@ -53,6 +53,11 @@ class SweepKernels {
   template <bool Friction>
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                   WallCopy& wall, const SweepMomentum& momentum) const;
+  void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                    std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum) const;
+  void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                  std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
+                  const SweepMomentum& momentum) const;
   template <bool Friction>
   void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) const;
   template <bool Friction>
@@ -70,6 +75,8 @@ class SweepKernels {
   /// whose masses, equal in both, stay to the bit.
   void advance(std::span<const Slot> slots, std::span<Velocity> velocity, std::span<Velocity> last,
                double beta) const;
+  void advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
+               std::span<SingleVelocity> last, double beta) const;
 
  private:
   InstructionSet set_;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Momentum of bodies, W = 4 or 8 numbers at a time (kernels/momentum.hpp): what stands at s goes on to
+/// Momentum of bodies, 4 or 8 numbers at a time (kernels/momentum.hpp): what stands at s goes on to
 /// s + beta (s - last), and s is remembered.
 
 #include "kernels/detail/lanes.hpp"
@@ -8,16 +8,16 @@
 namespace talus {
 namespace {
 
-template <class V>
-[[gnu::always_inline]] inline void advance_one(double* value, double* last, double beta) {
+template <class V, class Number>
+[[gnu::always_inline]] inline void advance_one(Number* value, Number* last, Number beta) {
   const V s = load<V>(value);
   store(value, s + beta * (s - load<V>(last)));
   store(last, s);
 }
 
 /// Whole records: masses, equal in both, stay to the bit.
-template <int W>
-void advance_bodies(double* bodies, double* last, const std::int32_t* slots, std::size_t count, double beta) {
+template <class V, class Number>
+void advance_bodies(Number* bodies, Number* last, const std::int32_t* slots, std::size_t count, double beta) {
   constexpr std::size_t record = 8, ahead = 8;
   for (std::size_t k = 0; k < count; ++k) {
     if (k + ahead < count) {
@@ -26,8 +26,8 @@ void advance_bodies(double* bodies, double* last, const std::int32_t* slots, std
     }
     const std::size_t at = record * static_cast<std::uint32_t>(slots[k]);
 #pragma GCC unroll 2
-    for (std::size_t part = 0; part < record; part += W)
-      advance_one<Lanes<W>>(bodies + at + part, last + at + part, beta);
+    for (std::size_t part = 0; part < record; part += sizeof(V) / sizeof(Number))
+      advance_one<V>(bodies + at + part, last + at + part, static_cast<Number>(beta));
   }
 }
 

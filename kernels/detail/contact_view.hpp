@@ -9,20 +9,27 @@
 namespace talus {
 
 /// Contacts [begin, end) of one chunk, arrays as in `Contacts`.
-struct ContactView {
-  const double *nx, *ny, *nz, *bias;
-  const double *rx, *ry, *rz;  ///< with friction
-  const double* rn;            ///< without
+template <class Number>
+struct ContactViewOf {
+  const Number *nx, *ny, *nz, *bias;
+  const Number *rx, *ry, *rz;  ///< with friction
+  const Number* rn;            ///< without
   const std::int32_t *first, *second;
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
 };
 
-/// The impulses of `ContactView`, where they are written.
-struct ImpulseView {
-  double *x, *y, *z;  ///< with friction
-  double* n;          ///< without
+using ContactView = ContactViewOf<double>;
+using SingleContactView = ContactViewOf<float>;  ///< arrays as in `SingleContacts`
+
+/// The impulses of a contact view, where they are written.
+template <class Number>
+struct ImpulseViewOf {
+  Number *x, *y, *z;  ///< with friction
+  Number* n;          ///< without
 };
+using ImpulseView = ImpulseViewOf<double>;
+using SingleImpulseView = ImpulseViewOf<float>;
 
 /// Pairs of grains of one chunk, whose gaps are asked for.
 struct PairView {
@@ -70,6 +77,11 @@ struct LaneKernels {
                      double wall_inv_mass);
   void (*momentum_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
                         double wall_inv_mass, const MomentumView&);
+  /// Momentum in single precision, bodies as records of 8 floats; null without friction.
+  void (*single_grains)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
+                        const MomentumView&);
+  void (*single_wall)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
+                      double* wall, double wall_inv_mass, const MomentumView&);
   void (*accumulate_grains)(const ContactView&, double* bodies);
   void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,
@@ -78,6 +90,8 @@ struct LaneKernels {
                             double wall_inv_mass, const std::uint16_t* multiplicity);
   /// Momentum of whole records at `slots`.
   void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
+                         double beta);
+  void (*advance_single)(float* bodies, float* last, const std::int32_t* slots, std::size_t count,
                          double beta);
   /// Narrow phase: true when a pair came half the smaller radius nearer on its way here, or further.
   bool (*find_gaps)(const PairView&, const GapRule&, const GapTarget&);

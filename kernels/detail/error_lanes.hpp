@@ -31,8 +31,8 @@ template <class V>
 }
 
 template <bool Friction, class V, class Only>
-[[gnu::always_inline]] inline void add_error(const Slice& c, Only only, const Space<V>& n, const Space<V>& v,
-                                             V w_nn, double mu, ErrorLanes<V>& sums) {
+[[gnu::always_inline]] inline void add_error(const Slice<double>& c, Only only, const Space<V>& n,
+                                             const Space<V>& v, V w_nn, double mu, ErrorLanes<V>& sums) {
   const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias, 0, only);
   V e, r_n, carried;
   if constexpr (Friction) {
@@ -96,7 +96,7 @@ template <bool Friction, bool AtWall, int W, class Only>
                                                const std::uint16_t* multiplicity,
                                                ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
-  const Slice own = slice(c, k);
+  const Slice<double> own = slice(c, k);
   const Space<V> n = load_normal<V>(own, 0, only);
   Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
   if (multiplicity) {
@@ -129,7 +129,7 @@ template <bool Friction, bool AtWall, int W>
   }
   if (const std::size_t rest = c.end - k; rest > 0) {
     // A lane without a contact sees no motion, and so no error.
-    SpareGrains<W> spare(wall);
+    SpareGrains<Lanes<W>> spare(wall);
     find_bodies<W>(bodies, c.first + k, rest, spare, a);
     if constexpr (!AtWall) find_bodies<W>(bodies, c.second + k, rest, spare, b);
     error_block<Friction, AtWall, W>(c, k, rest, FirstLanes{rest}, a, b, mu, wall, wall_inv_mass,
@@ -154,11 +154,14 @@ constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
                                           momentum_grains<Friction, W>,
                                           sweep_wall<Friction, W>,
                                           momentum_wall<Friction, W>,
+                                          Friction ? single_grains : nullptr,
+                                          Friction ? single_wall : nullptr,
                                           accumulate_grains<Friction, W>,
                                           accumulate_wall<Friction, W>,
                                           error_grains<Friction, W>,
                                           error_wall<Friction, W>,
-                                          advance_bodies<W>,
+                                          advance_bodies<Lanes<W>, double>,
+                                          advance_bodies<NarrowOctet, float>,
                                           find_gaps<W>};
 
 }  // namespace

@@ -1,7 +1,8 @@
 #pragma once
 
-/// Vectors of 4 or 8 doubles and what the sweeps need of them, on the compiler's vector extension (g++ and
-/// clang++), so that one text serves every instruction set; only the square root names intrinsics.
+/// Vectors of 4 or 8 doubles, or of 8 floats, and what the sweeps need of them, on the compiler's vector
+/// extension (g++ and clang++), so that one text serves every instruction set; only masks and the square root
+/// name intrinsics.
 ///
 /// Everything here has internal linkage and includes nothing that has not: each user is compiled for its own
 /// instruction set, and a function shared between them would be kept by the linker in one version, that may
@@ -13,6 +14,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 // Vectors pass between inlined functions only, so that it does not matter how a call would pass them.
 #pragma GCC diagnostic ignored "-Wpsabi"
 #ifdef __AVX__
@@ -25,6 +27,11 @@ namespace {
 /// Half a body record.
 typedef double Quad __attribute__((vector_size(32)));
 typedef double Octet __attribute__((vector_size(64)));
+typedef float NarrowQuad __attribute__((vector_size(16)));
+typedef float NarrowOctet __attribute__((vector_size(32)));
+/// An element of V.
+template <class V>
+using NumberOf = std::remove_cvref_t<decltype(V{}[0])>;
 
 template <int W>
 struct LanesOf;
@@ -52,8 +59,6 @@ template <class V>
 }
 
 /// Floats, widened when they are read and rounded when they are written.
-typedef float NarrowQuad __attribute__((vector_size(16)));
-typedef float NarrowOctet __attribute__((vector_size(32)));
 template <class V>
 struct NarrowOf {
   using Type = NarrowQuad;
@@ -64,9 +69,18 @@ struct NarrowOf<Octet> {
 };
 template <class V>
 [[gnu::always_inline]] inline V load(const float* from) {
-  typename NarrowOf<V>::Type v;
-  __builtin_memcpy(&v, from, sizeof(v));
-  return __builtin_convertvector(v, V);
+  if constexpr (std::same_as<V, NarrowOctet>) {
+    V v;
+    __builtin_memcpy(&v, from, sizeof(v));
+    return v;
+  } else {
+    typename NarrowOf<V>::Type v;
+    __builtin_memcpy(&v, from, sizeof(v));
+    return __builtin_convertvector(v, V);
+  }
+}
+[[gnu::always_inline]] inline void store(float* to, NarrowOctet v) {
+  __builtin_memcpy(to, &v, sizeof(v));
 }
 template <class V>
 [[gnu::always_inline]] inline void store(float* to, V v) {
@@ -119,6 +133,19 @@ template <std::same_as<Quad> V>
   _mm_maskstore_ps(to + at, narrow_mask_of(at, lanes), _mm256_cvtpd_ps(reinterpret_cast<__m256d>(v)));
 }
 #endif
+#if defined(__AVX2__) && !defined(__AVX512VL__)
+[[gnu::always_inline]] inline __m256i single_mask_of(std::size_t at, FirstLanes lanes) {
+  const auto left = static_cast<int>(lanes.count) - static_cast<int>(at);
+  return _mm256_cmpgt_epi32(_mm256_set1_epi32(left), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+}
+template <std::same_as<NarrowOctet> V>
+[[gnu::always_inline]] inline V load(const float* from, std::size_t at, FirstLanes lanes) {
+  return reinterpret_cast<V>(_mm256_maskload_ps(from + at, single_mask_of(at, lanes)));
+}
+[[gnu::always_inline]] inline void store(float* to, std::size_t at, NarrowOctet v, FirstLanes lanes) {
+  _mm256_maskstore_ps(to + at, single_mask_of(at, lanes), reinterpret_cast<__m256>(v));
+}
+#endif
 #ifdef __AVX512VL__
 [[gnu::always_inline]] inline __mmask8 bits_of(std::size_t at, FirstLanes lanes) {
   const std::size_t left = lanes.count - at;
@@ -132,6 +159,13 @@ template <std::same_as<Octet> V>
 [[gnu::always_inline]] inline V load(const float* from, std::size_t at, FirstLanes lanes) {
   return reinterpret_cast<V>(
       _mm512_maskz_cvtps_pd(0xff, _mm256_maskz_loadu_ps(bits_of(at, lanes), from + at)));
+}
+template <std::same_as<NarrowOctet> V>
+[[gnu::always_inline]] inline V load(const float* from, std::size_t at, FirstLanes lanes) {
+  return reinterpret_cast<V>(_mm256_maskz_loadu_ps(bits_of(at, lanes), from + at));
+}
+[[gnu::always_inline]] inline void store(float* to, std::size_t at, NarrowOctet v, FirstLanes lanes) {
+  _mm256_mask_storeu_ps(to + at, bits_of(at, lanes), reinterpret_cast<__m256>(v));
 }
 [[gnu::always_inline]] inline void store(double* to, std::size_t at, Octet v, FirstLanes lanes) {
   _mm512_mask_storeu_pd(to + at, bits_of(at, lanes), reinterpret_cast<__m512d>(v));
@@ -155,6 +189,15 @@ template <std::same_as<Octet> V>
   return reinterpret_cast<Octet>(_mm512_maskz_sqrt_pd(0xff, reinterpret_cast<__m512d>(v)));
 #else
   for (int k = 0; k < 8; ++k) v[k] = __builtin_sqrt(v[k]);
+  return v;
+#endif
+}
+
+[[gnu::always_inline]] inline NarrowOctet root(NarrowOctet v) {
+#ifdef __AVX__
+  return reinterpret_cast<NarrowOctet>(_mm256_sqrt_ps(reinterpret_cast<__m256>(v)));
+#else
+  for (int k = 0; k < 8; ++k) v[k] = __builtin_sqrtf(v[k]);
   return v;
 #endif
 }
@@ -223,11 +266,38 @@ template <class V>
   }
 }
 
+/// The same with floats, whose shuffles stay within 128 bits as long as they can.
+[[gnu::always_inline]] inline void transpose(NarrowOctet (&v)[8]) {
+  NarrowOctet pair[8], four[8];
+#pragma GCC unroll 4
+  for (int k = 0; k < 8; k += 2) {
+    pair[k] = __builtin_shufflevector(v[k], v[k + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+    pair[k + 1] = __builtin_shufflevector(v[k], v[k + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+#pragma GCC unroll 2
+  for (int k = 0; k < 8; k += 4)
+#pragma GCC unroll 2
+    for (int half = 0; half < 2; ++half) {
+      const NarrowOctet a = pair[k + half], b = pair[k + 2 + half];
+      four[k + 2 * half] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
+      four[k + 2 * half + 1] = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+#pragma GCC unroll 4
+  for (int k = 0; k < 4; ++k) {
+    v[k] = __builtin_shufflevector(four[k], four[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+    v[k + 4] = __builtin_shufflevector(four[k], four[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
+}
+
 /// The last element of each half record in all its places.
 [[gnu::always_inline]] inline Quad spread_last(Quad v) {
   return __builtin_shufflevector(v, v, 3, 3, 3, 3);
 }
 [[gnu::always_inline]] inline Octet spread_last(Octet v) {
+  return __builtin_shufflevector(v, v, 3, 3, 3, 3, 7, 7, 7, 7);
+}
+
+[[gnu::always_inline]] inline NarrowOctet spread_last(NarrowOctet v) {
   return __builtin_shufflevector(v, v, 3, 3, 3, 3, 7, 7, 7, 7);
 }
 

@@ -20,30 +20,38 @@
 namespace talus {
 namespace {
 
-constexpr std::size_t record = 8;       ///< doubles of a body
+constexpr std::size_t record = 8;       ///< numbers of a body
 constexpr std::size_t group_size = 16;  ///< contacts of a full group
 constexpr std::size_t wall_lanes = 8;   ///< copies of a wall inside a chunk
 
+/// Contacts in lanes of V.
+template <class V>
+constexpr int width_of = sizeof(V) / sizeof(NumberOf<V>);
+
 /// Contacts that a kernel works on at once: W x blocks of them, from `k` on.
+template <class Number>
 struct Slice {
-  const double *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn;
+  const Number *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn;
 };
 
 /// Where their impulses are written.
+template <class Number>
 struct Target {
-  double *x, *y, *z, *n;
+  Number *x, *y, *z, *n;
 };
 
-[[gnu::always_inline]] inline Slice slice(const ContactView& c, std::size_t k) {
+template <class Number>
+[[gnu::always_inline]] inline Slice<Number> slice(const ContactViewOf<Number>& c, std::size_t k) {
   return {c.nx + k, c.ny + k, c.nz + k, c.bias + k, c.rx + k, c.ry + k, c.rz + k, c.rn + k};
 }
 
-[[gnu::always_inline]] inline Target target(const ImpulseView& r, std::size_t k) {
+template <class Number>
+[[gnu::always_inline]] inline Target<Number> target(const ImpulseViewOf<Number>& r, std::size_t k) {
   return {r.x + k, r.y + k, r.z + k, r.n + k};
 }
 
 template <bool Friction, class V, class Only>
-[[gnu::always_inline]] inline Space<V> load_impulse(const Slice& c, std::size_t at, Only only,
+[[gnu::always_inline]] inline Space<V> load_impulse(const Slice<NumberOf<V>>& c, std::size_t at, Only only,
                                                     const Space<V>& n) {
   if constexpr (Friction)
     return {load<V>(c.rx, at, only), load<V>(c.ry, at, only), load<V>(c.rz, at, only)};
@@ -73,7 +81,7 @@ template <bool Friction, class V>
   return m;
 }
 
-/// Reads W pairs; without b (null) single grains, whose du, w, 1/m and spin are their own.
+/// Reads W pairs; or, without reading b, W grains, whose du, w, 1/m and spin are their own.
 template <bool Friction, bool Pair>
 [[gnu::always_inline]] inline Meeting<Quad> gather(const double* const* a, const double* const* b, Quad) {
   const Quad velocity = {-0.0, -0.0, -0.0, 0.0};
@@ -95,15 +103,16 @@ template <bool Friction, bool Pair>
   return meeting_of<Friction>(column);
 }
 
-template <bool Friction, bool Pair>
-[[gnu::always_inline]] inline Meeting<Octet> gather(const double* const* a, const double* const* b, Octet) {
+/// W = 8, of doubles or floats.
+template <bool Friction, bool Pair, class V, class Number>
+[[gnu::always_inline]] inline Meeting<V> gather(const Number* const* a, const Number* const* b, V) {
   static_assert(Friction, "half records fill lanes of 4 better");
-  const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  Octet column[8];
+  const V velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  V column[8];
 #pragma GCC unroll 8
   for (int l = 0; l < 8; ++l) {
-    column[l] = load<Octet>(a[l]);
-    if constexpr (Pair) column[l] = column[l] + flip(load<Octet>(b[l]), velocity);
+    column[l] = load<V>(a[l]);
+    if constexpr (Pair) column[l] = column[l] + flip(load<V>(b[l]), velocity);
   }
   transpose(column);
   return meeting_of<Friction>(column);
@@ -140,8 +149,9 @@ struct MomentumStart {
   }
   template <class V, class Only>
   [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at, Only only) const {
-    return {s.x + beta * load<V>(x, at, only), s.y + beta * load<V>(y, at, only),
-            s.z + beta * load<V>(z, at, only)};
+    const auto part = static_cast<NumberOf<V>>(beta);
+    return {s.x + part * load<V>(x, at, only), s.y + part * load<V>(y, at, only),
+            s.z + part * load<V>(z, at, only)};
   }
   template <class V, class Only>
   [[gnu::always_inline]] V begin(V s, std::size_t at, Only only) const {
@@ -162,17 +172,23 @@ struct MomentumStart {
 /// The impulse that solves the law, less the one that the velocities know; stores the new one. Without
 /// friction only the first component is meant, along the normal.
 template <bool Friction, class V, class Start, class Only>
-[[gnu::always_inline]] inline Space<V> solve_law(const Slice& c, const Target& out, std::size_t at, Only only,
-                                                 const Space<V>& n, const Space<V>& v, V w_nn, V w_tt,
-                                                 double mu, const Start& start) {
+[[gnu::always_inline]] inline Space<V> solve_law(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
+                                                 std::size_t at, Only only, const Space<V>& n,
+                                                 const Space<V>& v, V w_nn, V w_tt, double mu,
+                                                 const Start& start) {
+  using Number = NumberOf<V>;
+  constexpr Number half = 0.5, one = 1;
+  const auto omega = static_cast<Number>(start.omega);
   const V bias = load<V>(c.bias, at, only), v_n = dot(v, n);
   if constexpr (Friction) {
     const Space<V> s = load_impulse<true, V>(c, at, only, n), r = start.begin(s, at, only);
-    const V r_n = dot(r, n), next = r_n - start.omega * (v_n + bias) / w_nn;
-    const V r_n_new = 0.5 * (next + absolute(next)), limit = mu * r_n_new;
-    const Space<V> t = (r - r_n * n) - (1 / w_tt) * (v - v_n * n);
-    const V t2 = dot(t, t);
-    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + 1.0;
+    const V r_n = dot(r, n), next = r_n - omega * (v_n + bias) / w_nn;
+    const V r_n_new = half * (next + absolute(next)), limit = static_cast<Number>(mu) * r_n_new;
+    const Space<V> t = (r - r_n * n) - (one / w_tt) * (v - v_n * n);
+    V t2 = dot(t, t);
+    // In floats squares vanish early: a contact that carries nothing must not keep what is left of its t.
+    if constexpr (std::same_as<Number, float>) t2 = t2 + __FLT_MIN__;
+    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + one;
     const Space<V> r_new = r_n_new * n + scale * t;
     store(out.x, at, r_new.x, only);
     store(out.y, at, r_new.y, only);
@@ -181,8 +197,8 @@ template <bool Friction, class V, class Start, class Only>
     return r_new - r;
   } else {
     const V s = load<V>(c.rn, at, only), r_n = start.begin(s, at, only);
-    const V next = r_n - start.omega * (v_n + bias) / w_nn;
-    const V r_n_new = 0.5 * (next + absolute(next));
+    const V next = r_n - omega * (v_n + bias) / w_nn;
+    const V r_n_new = half * (next + absolute(next));
     store(out.n, at, r_n_new, only);
     start.end(s, r_n_new, at, only);
     return (r_n_new - r_n) * n;
@@ -220,35 +236,36 @@ template <bool Friction, bool Pair>
   }
 }
 
-template <bool Friction, bool Pair>
-[[gnu::always_inline]] inline void scatter(double* const* a, double* const* b, const Space<Octet>& n,
-                                           const Space<Octet>& dr) {
+template <bool Friction, bool Pair, class V, class Number>
+[[gnu::always_inline]] inline void scatter(Number* const* a, Number* const* b, const Space<V>& n,
+                                           const Space<V>& dr) {
   static_assert(Friction, "half records fill lanes of 4 better");
-  const Octet velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  const Space<Octet> turn = cross(dr, n);
-  Octet row[8] = {dr.x, dr.y, dr.z, Octet{}, turn.x, turn.y, turn.z, Octet{}};
+  const V velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+  const Space<V> turn = cross(dr, n);
+  V row[8] = {dr.x, dr.y, dr.z, V{}, turn.x, turn.y, turn.z, V{}};
   transpose(row);
 #pragma GCC unroll 8
   for (int l = 0; l < 8; ++l) {
-    const Octet i = load<Octet>(a[l]);
+    const V i = load<V>(a[l]);
     store(a[l], i + spread_last(i) * row[l]);
     if constexpr (Pair) {
-      const Octet j = load<Octet>(b[l]);
+      const V j = load<V>(b[l]);
       store(b[l], j + spread_last(j) * flip(row[l], velocity));
     }
   }
 }
 
 template <class V, class Only>
-[[gnu::always_inline]] inline Space<V> load_normal(const Slice& c, std::size_t at, Only only) {
+[[gnu::always_inline]] inline Space<V> load_normal(const Slice<NumberOf<V>>& c, std::size_t at, Only only) {
   return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
 }
 
 /// Blocks x W contacts in three phases.
-template <bool Friction, int W, int Blocks, class Start, class Only>
-[[gnu::always_inline]] inline void sweep_block(const Slice& c, const Target& out, double* const* a,
-                                               double* const* b, double mu, const Start& start, Only only) {
-  using V = Lanes<W>;
+template <bool Friction, class V, int Blocks, class Start, class Only>
+[[gnu::always_inline]] inline void sweep_block(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
+                                               NumberOf<V>* const* a, NumberOf<V>* const* b, double mu,
+                                               const Start& start, Only only) {
+  constexpr int W = width_of<V>;
   Meeting<V> m[Blocks];
   Space<V> dr[Blocks];
 #pragma GCC unroll 4
@@ -290,35 +307,33 @@ template <std::size_t Count, class Number>
 }
 
 /// Grains of mass 1 that no contact knows, for the lanes that hold none. In a sweep they rest.
-template <int W>
+template <class V>
 struct SpareGrains {
-  alignas(64) double record_of[W][record];
+  using Number = NumberOf<V>;
+  alignas(64) Number record_of[width_of<V>][record]{};
 
-  [[gnu::always_inline]] explicit SpareGrains(const double* velocity = nullptr) {
-#pragma GCC unroll 8
+  [[gnu::always_inline]] explicit SpareGrains(const Number* velocity = nullptr) {
     for (auto& grain : record_of) {
-      const Lanes<4> first = {velocity ? velocity[0] : 0, velocity ? velocity[1] : 0,
-                              velocity ? velocity[2] : 0, 1};
-      store(grain, first);
-      store(grain + 4, Lanes<4>{});
+      for (int d = 0; d < 3 && velocity; ++d) grain[d] = velocity[d];
+      grain[3] = 1;
     }
   }
 };
 
 /// Addresses of the first `count` <= Count bodies; the lanes behind them get spare grains, each its own.
-template <std::size_t Count, int W, class Number>
+template <std::size_t Count, class V, class Number>
 [[gnu::always_inline]] inline void find_bodies(Number* bodies, const std::int32_t* slot, std::size_t count,
-                                               SpareGrains<W>& spare, Number** address) {
+                                               SpareGrains<V>& spare, Number** address) {
 #pragma GCC unroll 16
   for (std::size_t l = 0; l < Count; ++l)
     address[l] = l < count ? bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]))
-                           : spare.record_of[l % W];
+                           : spare.record_of[l % width_of<V>];
 }
 
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
 /// them coming, and with 200,000 grains they stand beyond its second cache.
-template <class Number>
-[[gnu::always_inline]] inline void prefetch_group(const ContactView& c, std::size_t k, Number* bodies) {
+template <class View, class Number>
+[[gnu::always_inline]] inline void prefetch_group(const View& c, std::size_t k, Number* bodies) {
   const std::size_t ahead = k + 2 * group_size;
   if (ahead + group_size > c.end) return;
 #pragma GCC unroll 16
@@ -329,38 +344,40 @@ template <class Number>
 }
 
 /// The last contacts of a group, fewer than fill its blocks.
-template <bool Friction, int W, int Blocks, class Start>
-[[gnu::always_inline]] inline void sweep_rest(const ContactView& c, const ImpulseView& r, std::size_t k,
-                                              std::size_t count, double* bodies, SpareGrains<W>& spare,
-                                              double mu, const Start& start) {
-  double *a[W * Blocks], *b[W * Blocks];
-  find_bodies<W * Blocks>(bodies, c.first + k, count, spare, a);
-  find_bodies<W * Blocks>(bodies, c.second + k, count, spare, b);
-  sweep_block<Friction, W, Blocks>(slice(c, k), target(r, k), a, b, mu, start.from(k), FirstLanes{count});
+template <bool Friction, class V, int Blocks, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_rest(const ContactViewOf<Number>& c, const ImpulseViewOf<Number>& r,
+                                              std::size_t k, std::size_t count, Number* bodies,
+                                              SpareGrains<V>& spare, double mu, const Start& start) {
+  constexpr std::size_t room = width_of<V> * Blocks;
+  Number *a[room], *b[room];
+  find_bodies<room>(bodies, c.first + k, count, spare, a);
+  find_bodies<room>(bodies, c.second + k, count, spare, b);
+  sweep_block<Friction, V, Blocks>(slice(c, k), target(r, k), a, b, mu, start.from(k), FirstLanes{count});
 }
 
-template <bool Friction, int W, class Start>
-[[gnu::always_inline]] inline void sweep_grains_from(const ContactView& view, const ImpulseView& impulses,
-                                                     double* bodies, double mu, const Start& start) {
-  constexpr std::size_t at_once = W * blocks_at_once;
-  const ContactView c = view;  // local ones, so that no store can change them
-  const ImpulseView r = impulses;
+template <bool Friction, class V, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_grains_from(const ContactViewOf<Number>& view,
+                                                     const ImpulseViewOf<Number>& impulses, Number* bodies,
+                                                     double mu, const Start& start) {
+  constexpr std::size_t W = width_of<V>, at_once = W * blocks_at_once;
+  const ContactViewOf<Number> c = view;  // local ones, so that no store can change them
+  const ImpulseViewOf<Number> r = impulses;
   const Start all = start;
-  SpareGrains<W> spare;
+  SpareGrains<V> spare;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
     for (; k + at_once <= end; k += at_once) {
-      double *a[at_once], *b[at_once];
+      Number *a[at_once], *b[at_once];
       find_bodies<at_once>(bodies, c.first + k, a);
       find_bodies<at_once>(bodies, c.second + k, b);
-      sweep_block<Friction, W, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, all.from(k), AllLanes{});
+      sweep_block<Friction, V, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, all.from(k), AllLanes{});
     }
     if (k + W < end)
-      sweep_rest<Friction, W, blocks_at_once>(c, r, k, end - k, bodies, spare, mu, all);
+      sweep_rest<Friction, V, blocks_at_once>(c, r, k, end - k, bodies, spare, mu, all);
     else if (k < end)
-      sweep_rest<Friction, W, 1>(c, r, k, end - k, bodies, spare, mu, all);
+      sweep_rest<Friction, V, 1>(c, r, k, end - k, bodies, spare, mu, all);
     k = end;
   }
 }
@@ -371,19 +388,24 @@ template <bool Friction, int W, class Start>
 
 template <bool Friction, int W>
 void sweep_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu) {
-  sweep_grains_from<Friction, W>(c, r, bodies, mu, PlainStart{});
+  sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, PlainStart{});
 }
 
 template <bool Friction, int W>
 void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
                      const MomentumView& momentum) {
-  sweep_grains_from<Friction, W>(c, r, bodies, mu, start_of(momentum));
+  sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, start_of(momentum));
+}
+
+inline void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
+                          const MomentumView& momentum) {
+  sweep_grains_from<true, NarrowOctet>(c, r, bodies, mu, start_of(momentum));
 }
 
 /// V += M^-1 H r for W contacts.
 template <bool Friction, bool Pair, int W, class Only>
-[[gnu::always_inline]] inline void accumulate_block(const Slice& c, double* const* a, double* const* b,
-                                                    Only only) {
+[[gnu::always_inline]] inline void accumulate_block(const Slice<double>& c, double* const* a,
+                                                    double* const* b, Only only) {
   const auto n = load_normal<Lanes<W>>(c, 0, only);
   scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, only, n));
 }
@@ -391,7 +413,7 @@ template <bool Friction, bool Pair, int W, class Only>
 template <bool Friction, int W>
 void accumulate_grains(const ContactView& view, double* bodies) {
   const ContactView c = view;
-  SpareGrains<W> spare;
+  SpareGrains<Lanes<W>> spare;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
@@ -411,22 +433,25 @@ void accumulate_grains(const ContactView& view, double* bodies) {
 }
 
 /// The copies of a wall, one for each of 8 lanes: its velocity, and 1/m of a lane.
-template <int W>
+template <class V>
 struct SplitWall {
-  Space<Lanes<W>> velocity[wall_lanes / W];
-  double inv_mass;
+  using Number = NumberOf<V>;
+  static constexpr int W = width_of<V>;
+  Space<V> velocity[wall_lanes / W];
+  Number inv_mass;
   std::size_t lanes;
 
   SplitWall(const double* wall, double wall_inv_mass, std::size_t contacts) : lanes(minimum(contacts, 8)) {
-    for (auto& v : velocity) v = {Lanes<W>{} + wall[0], Lanes<W>{} + wall[1], Lanes<W>{} + wall[2]};
-    inv_mass = wall_inv_mass * static_cast<double>(lanes);
+    const auto all = [&](int d) { return V{} + static_cast<Number>(wall[d]); };
+    for (auto& v : velocity) v = {all(0), all(1), all(2)};
+    inv_mass = static_cast<Number>(wall_inv_mass * static_cast<double>(lanes));
   }
-  void push(std::size_t part, const Space<Lanes<W>>& n, const Space<Lanes<W>>& dr) {
+  void push(std::size_t part, const Space<V>& n, const Space<V>& dr) {
     velocity[part] = velocity[part] + (-inv_mass * dot(n, dr)) * n;
   }
   void glue(double* wall) const {
     if (inv_mass == 0 || lanes == 0) return;
-    double x[wall_lanes], y[wall_lanes], z[wall_lanes];
+    Number x[wall_lanes], y[wall_lanes], z[wall_lanes];
     for (std::size_t k = 0; k < wall_lanes / W; ++k) {
       store(x + W * k, velocity[k].x);
       store(y + W * k, velocity[k].y);
@@ -443,40 +468,42 @@ struct SplitWall {
 };
 
 /// A block of W grains against as many copies of a wall.
-template <bool Friction, int W, class Start, class Only>
-[[gnu::always_inline]] inline void sweep_wall_block(const Slice& c, const Target& out, double* const* a,
+template <bool Friction, class V, class Start, class Only>
+[[gnu::always_inline]] inline void sweep_wall_block(const Slice<NumberOf<V>>& c,
+                                                    const Target<NumberOf<V>>& out, NumberOf<V>* const* a,
                                                     double mu, const Start& start, Only only,
-                                                    std::size_t lanes, SplitWall<W>& wall) {
-  using V = Lanes<W>;
-  Meeting<V> m = gather<Friction, false>(a, nullptr, V{});
+                                                    std::size_t lanes, SplitWall<V>& wall) {
+  Meeting<V> m = gather<Friction, false>(a, a, V{});
   m.du = m.du - wall.velocity[lanes];
   const Space<V> n = load_normal<V>(c, 0, only);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
   const Space<V> dr = solve_law<Friction>(c, out, 0, only, n, relative_velocity<Friction>(m, n),
                                           m.w_nn + wall.inv_mass, w_tt, mu, start);
-  scatter<Friction, false>(a, nullptr, n, dr);
+  scatter<Friction, false>(a, a, n, dr);
   wall.push(lanes, n, dr);
 }
 
-template <bool Friction, int W, class Start>
-[[gnu::always_inline]] inline void sweep_wall_from(const ContactView& view, const ImpulseView& impulses,
-                                                   double* bodies, double mu, double* wall,
-                                                   double wall_inv_mass, const Start& start) {
-  const ContactView c = view;
-  const ImpulseView r = impulses;
+template <bool Friction, class V, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_wall_from(const ContactViewOf<Number>& view,
+                                                   const ImpulseViewOf<Number>& impulses, Number* bodies,
+                                                   double mu, double* wall, double wall_inv_mass,
+                                                   const Start& start) {
+  constexpr std::size_t W = width_of<V>;
+  const ContactViewOf<Number> c = view;
+  const ImpulseViewOf<Number> r = impulses;
   const Start all = start;
-  SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
+  SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
   std::size_t k = c.begin, lanes = 0;
-  double* a[W];
+  Number* a[W];
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
     find_bodies<W>(bodies, c.first + k, a);
-    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, all.from(k), AllLanes{}, lanes, split);
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, mu, all.from(k), AllLanes{}, lanes, split);
   }
   if (k < c.end) {
-    SpareGrains<W> spare;
+    SpareGrains<V> spare;
     find_bodies<W>(bodies, c.first + k, c.end - k, spare, a);
-    sweep_wall_block<Friction, W>(slice(c, k), target(r, k), a, mu, all.from(k), FirstLanes{c.end - k}, lanes,
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, mu, all.from(k), FirstLanes{c.end - k}, lanes,
                                   split);
   }
   split.glue(wall);
@@ -485,23 +512,28 @@ template <bool Friction, int W, class Start>
 template <bool Friction, int W>
 void sweep_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
                 double wall_inv_mass) {
-  sweep_wall_from<Friction, W>(c, r, bodies, mu, wall, wall_inv_mass, PlainStart{});
+  sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, PlainStart{});
 }
 
 template <bool Friction, int W>
 void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
                    double wall_inv_mass, const MomentumView& momentum) {
-  sweep_wall_from<Friction, W>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+  sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+}
+
+inline void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
+                        double* wall, double wall_inv_mass, const MomentumView& momentum) {
+  sweep_wall_from<true, NarrowOctet>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
 }
 
 template <bool Friction, int W>
 void accumulate_wall(const ContactView& view, double* bodies, double* wall, double wall_inv_mass) {
   using V = Lanes<W>;
   const ContactView c = view;
-  SplitWall<W> split(wall, wall_inv_mass, c.end - c.begin);
-  const auto add = [&](const Slice& own, double* const* a, std::size_t lanes, auto only) {
+  SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
+  const auto add = [&](const Slice<double>& own, double* const* a, std::size_t lanes, auto only) {
     const Space<V> n = load_normal<V>(own, 0, only);
-    accumulate_block<Friction, false, W>(own, a, nullptr, only);
+    accumulate_block<Friction, false, W>(own, a, a, only);
     split.push(lanes, n, load_impulse<Friction, V>(own, 0, only, n));
   };
   std::size_t k = c.begin, lanes = 0;
@@ -511,7 +543,7 @@ void accumulate_wall(const ContactView& view, double* bodies, double* wall, doub
     add(slice(c, k), a, lanes, AllLanes{});
   }
   if (k < c.end) {
-    SpareGrains<W> spare;
+    SpareGrains<Lanes<W>> spare;
     find_bodies<W>(bodies, c.first + k, c.end - k, spare, a);
     add(slice(c, k), a, lanes, FirstLanes{c.end - k});
   }

@@ -62,7 +62,7 @@ void Iteration::first_course() {
 double Iteration::beta(int epoch) const {
   const Course& now = course(epoch);
   if (now.method == SolverMethod::nncg) return conjugate_beta_;
-  const int sweep = number(epoch) - now.from - plain_sweeps;
+  const int sweep = number(epoch) - now.begun - plain_sweeps;
   return sweep <= 0 ? 0 : std::min(now.most, sweep / (sweep + 3.0));
 }
 
@@ -74,11 +74,68 @@ double Iteration::omega(int epoch) const {
 
 void Iteration::begin_course(SolverMethod method, double most) {
   course_before_ = course_;
-  course_ = {method, result_.iterations + 1, most};
+  const int from = result_.iterations + 1;
+  course_ = {method, from, from, most, single_will_do(method)};
   conjugate_beta_ = change2_ = 0;
   if (method == SolverMethod::nlgs) return;
-  allocate(trail_, carry_of(method), state_.contacts, state_.bodies.size(), state_.chunks.size());
+  if (course_.single) allocate(state_.single, state_.contacts, state_.bodies.size());
+  allocate(trail_, carry_of(method), state_.contacts, course_.single ? 0 : state_.bodies.size(),
+           state_.chunks.size());
   changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
+}
+
+/// Whether sweeps in single precision make the error of this problem smaller as those in double do. Not where
+/// it is small already, or bodies are so heavy that single sweeps would not move them. Small problems have no
+/// time to gain.
+bool Iteration::single_will_do(SolverMethod method) const {
+  constexpr double least_error = 1e-5, many = 1000;
+  const bool schwarz = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several();
+  return method == SolverMethod::momentum && settings_.precision == Precision::mixed &&
+         parameters_.friction && !schwarz && alike_ && candidates_everywhere_ >= many &&
+         (history_.empty() || history_.back().error_rms > least_error);
+}
+
+/// The present course, behind the sweep that may have been made since.
+void Iteration::go_on_in_double() {
+  course_before_ = course_;
+  course_.from = result_.iterations + 1;
+  course_.single = false;
+  allocate(trail_, Carry::momentum, state_.contacts, state_.bodies.size(), state_.chunks.size());
+}
+
+/// Brings a chunk's contacts, and the bodies that it is the first to write, to where its sweep looks for
+/// them. Behind a check velocities and impulses are in double precision.
+void Iteration::change_precision(std::size_t c, ContactRange range, int epoch) {
+  SingleState& single = state_.single;
+  std::span<Velocity> velocity = state_.bodies.velocity;
+  const bool first = epoch == sweeps_from_, now = course(epoch).single,
+             before = number(epoch) > 0 && course(epoch - 1).single;
+  if (now) {
+    if (!before) narrow_geometry(state_.contacts, range, single.contacts);
+    if (!first && before) return;
+    narrow_impulses(state_.contacts, range, single.contacts);
+    narrow_bodies(owned(c), velocity, single);
+    if (first) fasten(owned(c), single.velocity, single.last_v);
+    return;
+  }
+  const bool goes_on = course(epoch).method == SolverMethod::momentum && number(epoch) > course(epoch).begun;
+  if (!before) {
+    if (first && course(epoch).method != SolverMethod::nlgs)
+      fasten(owned(c), state_.bodies.velocity, trail_.last_v);
+    return;
+  }
+  if (first) {
+    narrow_bodies(owned(c), velocity, single);
+    fasten(owned(c), single.velocity, single.last_v);
+  } else {
+    widen_impulses(single.contacts, range, state_.contacts);
+    widen_bodies(owned(c), single.velocity, velocity);
+  }
+  if (!goes_on) return;
+  for (const Slot slot : owned(c))
+    trail_.last_v[static_cast<std::size_t>(slot)] = velocity[static_cast<std::size_t>(slot)];
+  widen_bodies(owned(c), single.last_v, trail_.last_v);
+  widen_steps(single.contacts.unit, range, trail_.steps);
 }
 
 std::span<const Slot> Iteration::owned(std::size_t c) const {
@@ -95,14 +152,14 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const double beta = this->beta(epoch);
   if (carry == Carry::conjugate)
     carry_impulses(beta, range, state_.contacts, trail_);
-  else if (number(epoch) == course(epoch).from)
+  else if (number(epoch) == course(epoch).begun)
     begin_steps(range, trail_.steps);
   const bool at_wall = chunks.wall[c] >= 0;
-  if (epoch == sweeps_from_) {
-    fasten(owned(c), state_.bodies.velocity, trail_);
-    if (at_wall) fasten(c, state_.copies[c], trail_);
-  }
-  carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, trail_);
+  if (epoch == sweeps_from_ && at_wall) fasten(c, state_.copies[c], trail_);
+  if (course(epoch).single)
+    carry_velocities(kernels_, beta, owned(c), state_.single.velocity, state_.single.last_v);
+  else
+    carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, trail_);
   if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
 }
 
@@ -110,7 +167,7 @@ void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
 /// sweeps before it, since errors of neighbouring sweeps go up and down. Null when there is none.
 const Iteration::Check* Iteration::check_before() const {
   for (std::size_t k = history_.size() - 1; k-- > history_from_;) {
-    if (history_[k].iterations + 1 < course_.from) return nullptr;
+    if (history_[k].iterations + 1 < course_.begun) return nullptr;
     if (history_[k].iterations + settings_.check_every <= history_.back().iterations) return &history_[k];
   }
   return nullptr;
@@ -276,9 +333,9 @@ void Iteration::call_admm(int epoch) {
   // Anew from the next sweep on: what the last sweeps changed says nothing of where ADMM has gone. Plain ones
   // first: ADMM leaves light bodies behind, and momentum throws them at the heavy ones that it has settled.
   begin_course(course_.method == SolverMethod::momentum ? SolverMethod::nlgs : course_.method, course_.most);
-  course_.from = result_.iterations;
+  course_.from = course_.begun = result_.iterations;
   before_segment_ = sweeps_;
-  segment_ = epoch + 1;
+  sweeps_from_ = segment_ = epoch + 1;
 }
 
 }  // namespace talus

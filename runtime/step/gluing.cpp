@@ -14,15 +14,31 @@ using detail::tag_of;
 
 namespace {
 
-template <std::size_t Width>
-void read_velocity(const Velocity& v, double* out) {
+template <std::size_t Width, class Record>
+void read_velocity(const Record& v, double* out) {
   for (std::size_t k = 0; k < 3; ++k) out[k] = v.u[k];
   if constexpr (Width == 6)
     for (std::size_t k = 0; k < 3; ++k) out[k + 3] = v.w[k];
 }
 
-template <std::size_t Width>
-void write_velocities(std::span<const Velocity> velocity, std::span<const std::size_t> slots, double* out) {
+template <class Record>
+void read_velocity(std::size_t width, const Record& v, double* out) {
+  if (width == 6)
+    read_velocity<6>(v, out);
+  else
+    read_velocity<3>(v, out);
+}
+
+/// Rounds to the numbers of the record.
+template <class Record>
+void assign(std::size_t width, const double* from, Record& v) {
+  using Number = std::remove_cvref_t<decltype(v.u[0])>;
+  for (std::size_t k = 0; k < 3; ++k) v.u[k] = static_cast<Number>(from[k]);
+  for (std::size_t k = 3; k < width; ++k) v.w[k - 3] = static_cast<Number>(from[k]);
+}
+
+template <std::size_t Width, class Record>
+void write_velocities(std::span<const Record> velocity, std::span<const std::size_t> slots, double* out) {
   for (const std::size_t slot : slots) {
     read_velocity<Width>(velocity[slot], out);
     out += Width;
@@ -30,13 +46,13 @@ void write_velocities(std::span<const Velocity> velocity, std::span<const std::s
 }
 
 /// NSCDD between two measurements, what most exchanges are: each shared body takes the mean of its copies.
-template <std::size_t Width>
-void take_means(std::span<Velocity> velocity, std::span<const std::size_t> shared,
+template <std::size_t Width, class Record>
+void take_means(std::span<Record> velocity, std::span<const std::size_t> shared,
                 std::span<const std::int32_t> copies_begin, const double* const* sources) {
   for (std::size_t s = 0; s < shared.size(); ++s) {
     const auto begin = at(copies_begin[s]), end = at(copies_begin[s + 1]);
     if (begin == end) continue;  // a hub
-    Velocity& v = velocity[shared[s]];
+    Record& v = velocity[shared[s]];
     double own[Width], sum[Width] = {};
     read_velocity<Width>(v, own);
     for (std::size_t c = begin; c < end; ++c) {
@@ -44,9 +60,8 @@ void take_means(std::span<Velocity> velocity, std::span<const std::size_t> share
       for (std::size_t k = 0; k < Width; ++k) sum[k] += from[k];
     }
     const auto m = static_cast<double>(end - begin);
-    for (std::size_t k = 0; k < 3; ++k) v.u[k] = sum[k] / m;
-    if constexpr (Width == 6)
-      for (std::size_t k = 0; k < 3; ++k) v.w[k] = sum[k + 3] / m;
+    for (double& number : sum) number /= m;
+    assign(Width, sum, v);
   }
 }
 
@@ -174,23 +189,30 @@ std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
   return readers;
 }
 
-void Gluing::write_velocity(std::size_t slot, double* out) const {
-  if (width_ == 6)
-    read_velocity<6>(state_.bodies.velocity[slot], out);
-  else
-    read_velocity<3>(state_.bodies.velocity[slot], out);
-}
-
-void Gluing::publish(std::size_t e, Mode mode) {
-  if (mode == Mode::local) return;
+template <class Record>
+void Gluing::publish_bodies(std::size_t e, std::span<const Record> velocity) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
     if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
     if (width_ == 6)
-      write_velocities<6>(state_.bodies.velocity, side.slots, side.link.out.data());
+      write_velocities<6>(velocity, side.slots, side.link.out.data());
     else
-      write_velocities<3>(state_.bodies.velocity, side.slots, side.link.out.data());
+      write_velocities<3>(velocity, side.slots, side.link.out.data());
   }
+  if (mine.hub_item.empty()) return;
+  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+  for (std::size_t h = 0; h < interface.hubs.size(); ++h)
+    read_velocity(width_, velocity[mine.shared[at(interface.hubs[h])]],
+                  &mine.partial[3 * walls_.size() + h * width_]);
+}
+
+void Gluing::publish(std::size_t e, Mode mode, bool single) {
+  if (mode == Mode::local) return;
+  Subdomain& mine = subdomains_[e];
+  if (single)
+    publish_bodies<SingleVelocity>(e, state_.single.velocity);
+  else
+    publish_bodies<Velocity>(e, state_.bodies.velocity);
   for (Side& side : mine.sides)
     if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
@@ -199,11 +221,6 @@ void Gluing::publish(std::size_t e, Mode mode) {
     for (std::int32_t c : mine.wall_copies[g])
       for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[at(c)].velocity[k];
   }
-  if (!mine.hub_item.empty()) {
-    const SubdomainInterface& interface = state_.decomposition.interfaces[e];
-    for (std::size_t h = 0; h < interface.hubs.size(); ++h)
-      write_velocity(mine.shared[at(interface.hubs[h])], &mine.partial[3 * walls_.size() + h * width_]);
-  }
   if (!centre_->up || !centre_->links.empty()) return;
   // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
   if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
@@ -211,7 +228,7 @@ void Gluing::publish(std::size_t e, Mode mode) {
   send_up();
 }
 
-void Gluing::glue(std::size_t e, Mode mode) {
+void Gluing::glue(std::size_t e, Mode mode, bool single) {
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     const auto& copies = mine.wall_copies[g];
@@ -227,14 +244,24 @@ void Gluing::glue(std::size_t e, Mode mode) {
   if (mode == Mode::local || !state_.decomposition.several()) return;
   for (Side& side : mine.sides)
     if (side.link.receiver) await(*side.link.receiver, mine.waited, ranks_.trace(), side.link.in_name);
+  if (single)
+    glue_bodies<SingleVelocity>(e, mode, state_.single.velocity);
+  else
+    glue_bodies<Velocity>(e, mode, state_.bodies.velocity);
+  for (Side& side : mine.sides)
+    if (side.link.receiver) side.link.receiver->start();
+}
 
+template <class Record>
+void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
+  Subdomain& mine = subdomains_[e];
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   const bool schwarz = settings_.coupling == Coupling::schwarz;
   JumpSums jump;
   // One shared body: the sum of its copies becomes what all copies go on with.
   const auto settle = [&](std::size_t s, const double* sum) {
     const std::size_t slot = mine.shared[s];
-    Velocity& v = state_.bodies.velocity[slot];
+    Record& v = velocity[slot];
     const double m = state_.decomposition.multiplicity[slot];
     std::array<double, 6> next{};
     double* base = schwarz ? &mine.base[s * width_] : nullptr;
@@ -253,19 +280,18 @@ void Gluing::glue(std::size_t e, Mode mode) {
         jump.velocity2 += next[k] * next[k] / (m * mobility);
       }
     }
-    std::copy_n(next.begin(), 3, v.u);
-    if (width_ == 6) std::copy_n(next.begin() + 3, 3, v.w);
+    assign(width_, next.data(), v);
     if (schwarz && mode != Mode::sum) std::copy_n(next.begin(), width_, base);
   };
   if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
-    const auto means = width_ == 6 ? take_means<6> : take_means<3>;
-    means(state_.bodies.velocity, mine.shared, interface.copies_begin, mine.sources.data());
+    const auto means = width_ == 6 ? take_means<6, Record> : take_means<3, Record>;
+    means(velocity, mine.shared, interface.copies_begin, mine.sources.data());
   } else {
     for (std::size_t s = 0; s < interface.shared.size(); ++s) {
       const auto begin = at(interface.copies_begin[s]), end = at(interface.copies_begin[s + 1]);
       if (begin == end) continue;  // a hub
       std::array<double, 6> sum{}, own;
-      write_velocity(mine.shared[s], own.data());
+      read_velocity(width_, velocity[mine.shared[s]], own.data());
       for (std::size_t c = begin; c < end; ++c) {
         const double* const from = mine.sources[c] ? mine.sources[c] : own.data();
         for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
@@ -275,8 +301,6 @@ void Gluing::glue(std::size_t e, Mode mode) {
   }
   for (std::size_t h = 0; h < interface.hubs.size(); ++h)
     settle(at(interface.hubs[h]), &centre_->sums[3 * walls_.size() + mine.hub_item[h] * width_]);
-  for (Side& side : mine.sides)
-    if (side.link.receiver) side.link.receiver->start();
   if (mode == Mode::measured) jumps_[e] = jump;
 }
 

@@ -71,10 +71,12 @@ class Gluing {
   /// bodies in order of slot, then those walls; w is summed only if plan() was told of rotation.
   void sum_copies(std::span<std::vector<Twist>> field);
 
-  void publish(std::size_t e, Mode mode);
+  /// `single`: of the velocities that sweeps in single precision work on (StepState::single). They travel,
+  /// and are added up, in double precision.
+  void publish(std::size_t e, Mode mode, bool single = false);
   void collect(Mode mode);
   void centre(Mode mode);
-  void glue(std::size_t e, Mode mode);
+  void glue(std::size_t e, Mode mode, bool single = false);
 
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
   void forget_jumps() { jumps_.assign(jumps_.size(), {}); }
@@ -93,7 +95,10 @@ class Gluing {
   void count_messages();
   void send_up();
   void answer();
-  void write_velocity(std::size_t slot, double* out) const;
+  template <class Record>
+  void publish_bodies(std::size_t e, std::span<const Record> velocity);
+  template <class Record>
+  void glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity);
 
   StepState& state_;
   const DecompositionSettings& settings_;

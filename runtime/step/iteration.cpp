@@ -18,7 +18,7 @@ std::size_t memory_used(const StepState& state) {
          memory_used(state.contacts) + memory_used(state.decomposition) +
          (state.free.u.capacity() + state.free.w.capacity()) * sizeof(std::array<double, 3>) +
          state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
-         state.copies.capacity() * sizeof(WallCopy);
+         memory_used(state.single) + state.copies.capacity() * sizeof(WallCopy);
 }
 
 Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
@@ -35,14 +35,25 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
   stiffness_ = {};
-  std::array<double, 2> extremes = {std::numeric_limits<double>::infinity(), 0};
-  for (const Velocity& v : state_.bodies.velocity)
-    extremes = {std::min(extremes[0], v.inv_mass), std::max(extremes[1], v.inv_mass)};
-  const std::vector<double> everywhere = ranks_.gather_records(std::span<const double>(extremes));
-  for (std::size_t k = 0; k < everywhere.size(); k += 2)
-    extremes = {std::min(extremes[0], everywhere[k]), std::max(extremes[1], everywhere[k + 1])};
+  struct Row {
+    double least, most, candidates;
+  };
+  Row all{std::numeric_limits<double>::infinity(), 0, static_cast<double>(state_.candidates.size())};
+  for (const Velocity& v : state_.bodies.velocity) {
+    all.least = std::min(all.least, v.inv_mass);
+    all.most = std::max(all.most, v.inv_mass);
+  }
+  const std::vector<Row> everywhere = ranks_.gather_records(std::span<const Row>(&all, 1));
+  all.candidates = 0;
+  for (const Row& row : everywhere) {
+    all.least = std::min(all.least, row.least);
+    all.most = std::max(all.most, row.most);
+    all.candidates += row.candidates;
+  }
   constexpr double much_heavier = 1000;
-  alike_ = extremes[1] < much_heavier * extremes[0];
+  alike_ = all.most < much_heavier * all.least;
+  candidates_everywhere_ = all.candidates;
+  state_.single.contacts.unit = all.most > 0 ? unit_of_mass(all.most) : 1;
   busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);
 }
 
@@ -92,7 +103,13 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu, int epoch) {
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
   if (course(epoch).method == SolverMethod::momentum) {
     const SweepMomentum momentum{beta(epoch), omega(epoch), trail_.steps};
-    if (at_wall)
+    SingleState& single = state_.single;
+    if (course(epoch).single && at_wall)
+      kernels_.sweep_wall(state_.contacts, single.contacts, range, single.velocity, mu, state_.copies[c],
+                          momentum);
+    else if (course(epoch).single)
+      kernels_.sweep_grains(state_.contacts, single.contacts, range, single.velocity, mu, momentum);
+    else if (at_wall)
       kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c], momentum);
     else
       kernels_.sweep_grains<Friction>(state_.contacts, range, velocity, mu, momentum);
@@ -125,8 +142,14 @@ void Iteration::chunk(std::size_t c, int epoch) {
     case Work::restore:
     case Work::accumulate: {
       if (work == Work::restore) restore_impulses(state_.candidates, chunks, c, contacts);
+      // Behind sweeps; at the start of a step, and behind ADMM, the impulses are those of `contacts`.
+      const bool from_single = work == Work::accumulate && epoch > sweeps_from_ && single(epoch - 1);
+      if (from_single) widen_impulses(state_.single.contacts, range, contacts);
       if (course_.method != SolverMethod::nlgs) {
-        loosen(owned(c), velocity, trail_);
+        if (from_single)
+          loosen(owned(c), state_.single.velocity, state_.single.last_v);
+        else if (!course_.single)
+          loosen(owned(c), state_.bodies.velocity, trail_.last_v);
         if (at_wall) loosen(c, copy, trail_);
       }
       reset_to_free(owned(c), state_.free, velocity);
@@ -148,6 +171,7 @@ void Iteration::chunk(std::size_t c, int epoch) {
       if (ranks_.ranks() > 1) store_impulses(contacts, chunks, c, state_.candidates);
       break;
     case Work::sweep:
+      change_precision(c, range, epoch);
       if (course(epoch).method != SolverMethod::nlgs) carry_on(c, range, epoch);
       sweep<Friction>(c, range, mu, epoch);
       if (course(epoch).method == SolverMethod::nncg)
@@ -189,13 +213,13 @@ void Iteration::node(std::uint32_t node, int epoch) {
   const std::size_t here = state_.decomposition.here.size(), of_rank = gluing_.tasks_of_rank(),
                     task = node - chunks;
   if (task < here)
-    gluing_.publish(task, mode);
+    gluing_.publish(task, mode, single(epoch));
   else if (task < here + of_rank - 1)
     gluing_.collect(mode);
   else if (task < here + of_rank)
     gluing_.centre(mode);
   else
-    gluing_.glue(task - here - of_rank, mode);
+    gluing_.glue(task - here - of_rank, mode, single(epoch));
 }
 
 std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {
@@ -434,6 +458,7 @@ bool Iteration::judge() {
   }
   if (result_.converged || std::isnan(result_.error_rms) || last || result_.stagnated) return false;
   choose_course();
+  if (course_.single && !single_will_do(course_.method)) go_on_in_double();
   return true;
 }
 

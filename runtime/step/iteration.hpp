@@ -111,11 +111,15 @@ class Iteration {
   void sweep(std::size_t c, ContactRange range, double mu, int epoch);
   std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
-  /// How sweeps are carried on, from the sweep with number `from` (counted from 0).
+  bool single(int epoch) const { return work(epoch) == Work::sweep && course(epoch).single; }
+  void change_precision(std::size_t c, ContactRange range, int epoch);
+  /// How sweeps are carried on; sweeps are counted from 0.
   struct Course {
     SolverMethod method = SolverMethod::nlgs;  ///< never automatic
-    int from = 0;
-    double most = 0;  ///< of beta, with momentum, or when it is taken up again
+    int from = 0;                              ///< its first sweep
+    int begun = 0;        ///< the sweep with which its momentum began: `from`, or one in single precision
+    double most = 0;      ///< of beta, with momentum, or when it is taken up again
+    bool single = false;  ///< in single precision
   };
   /// Of the sweep in this epoch. A course that a check calls for begins behind the sweep that may have been
   /// made since.
@@ -126,6 +130,8 @@ class Iteration {
   bool stagnant() const;
   void first_course();
   void begin_course(SolverMethod method, double most);
+  bool single_will_do(SolverMethod method) const;
+  void go_on_in_double();
   bool measured(int epoch);
   bool swept(int epoch);
   std::vector<double> rows_of_subdomains() const;
@@ -181,6 +187,7 @@ class Iteration {
   };
   Stiffness stiffness_;
   bool alike_ = false;  ///< no grain is much heavier than another, whose landing would change the answer
+  double candidates_everywhere_ = 0;
   /// The last look at the error of all velocities.
   struct Look {
     int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM

@@ -59,6 +59,13 @@ enum class SolverMethod {
   admm,       ///< one call of ADMM in body space (kernels/admm.hpp), then sweeps as they are
 };
 
+/// Numbers of the sweeps. All that is judged and written is in double precision.
+enum class Precision {
+  mixed,  ///< single as long as the error is large and the problem is one that they see through
+          ///< (docs/decisions/0015-single-precision.md)
+  full,   ///< double
+};
+
 struct SolverSettings {
   SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
@@ -70,6 +77,7 @@ struct SolverSettings {
   bool warm_start = true;  ///< begin from the impulses of the last step
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
+  Precision precision = Precision::mixed;
   InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps; all give the same bits
 };
 

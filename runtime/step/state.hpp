@@ -8,6 +8,7 @@
 #include "kernels/contacts.hpp"
 #include "kernels/measures.hpp"
 #include "kernels/motion.hpp"
+#include "kernels/single_precision.hpp"
 #include "kernels/sweep.hpp"
 #include "kernels/walls.hpp"
 #include "runtime/step/decomposition.hpp"
@@ -49,6 +50,7 @@ struct StepState {
   Chunks chunks;                       ///< k
   Decomposition decomposition;
   Contacts contacts;              ///< c rooms
+  SingleState single;             ///< c rooms and n, or empty
   std::vector<WallCopy> copies;   ///< k; used by chunks at walls
   bool candidates_valid = false;  ///< false: the next step begins with a broad phase
 };

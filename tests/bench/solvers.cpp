@@ -34,12 +34,14 @@ struct Method {
   const char* name;
   SolverMethod method;
   InstructionSet simd;
+  Precision precision = Precision::full;
 };
 constexpr Method methods[] = {{"NLGS, scalar", SolverMethod::nlgs, InstructionSet::portable},
                               {"NLGS", SolverMethod::nlgs, InstructionSet::automatic},
                               {"momentum", SolverMethod::momentum, InstructionSet::automatic},
                               {"NNCG", SolverMethod::nncg, InstructionSet::automatic},
-                              {"auto", SolverMethod::automatic, InstructionSet::automatic}};
+                              {"auto, double", SolverMethod::automatic, InstructionSet::automatic},
+                              {"auto", SolverMethod::automatic, InstructionSet::automatic, Precision::mixed}};
 
 struct Outcome {
   int sweeps = 0;
@@ -51,6 +53,7 @@ Outcome solve(const bench::Packing& packing, const Case& problem, const Method& 
   Setup setup = bench::packed_scene(packing, problem.pile, problem.tolerance, problem.mu);
   setup.solver.method = method.method;
   setup.solver.simd = method.simd;
+  setup.solver.precision = method.precision;
   setup.solver.balance_tolerance = 1e9;
   setup.solver.max_iterations = 20000;
   setup.decomposition.subdomains = subdomains;

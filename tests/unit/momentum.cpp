@@ -91,10 +91,10 @@ TEST(Momentum, TakesARefreshForNoMotion) {
   velocity[0].inv_mass = 0.3;
   carry_velocities(kernels, Carry::momentum, 0, slots, velocity, trail);
   carry_wall(Carry::momentum, 0, 0, wall, trail);
-  loosen(slots, velocity, trail);
+  loosen(slots, velocity, trail.last_v);
   loosen(0, wall, trail);
   velocity[0].u[0] = wall.velocity[0] = 1;  // made afresh
-  fasten(slots, velocity, trail);
+  fasten(slots, velocity, trail.last_v);
   fasten(0, wall, trail);
   carry_velocities(kernels, Carry::momentum, 0.9, slots, velocity, trail);
   carry_wall(Carry::momentum, 0.9, 0, wall, trail);
