@@ -397,9 +397,10 @@ void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies,
   sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, start_of(momentum));
 }
 
-inline void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
-                          const MomentumView& momentum) {
-  sweep_grains_from<true, NarrowOctet>(c, r, bodies, mu, start_of(momentum));
+template <class V>
+void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
+                   const MomentumView& momentum) {
+  sweep_grains_from<true, V>(c, r, bodies, mu, start_of(momentum));
 }
 
 /// V += M^-1 H r for W contacts.
@@ -521,9 +522,10 @@ void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, d
   sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
 }
 
-inline void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
-                        double* wall, double wall_inv_mass, const MomentumView& momentum) {
-  sweep_wall_from<true, NarrowOctet>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+template <class V>
+void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
+                 double* wall, double wall_inv_mass, const MomentumView& momentum) {
+  sweep_wall_from<true, V>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
 }
 
 template <bool Friction, int W>

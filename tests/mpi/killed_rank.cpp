@@ -111,7 +111,7 @@ TEST_P(KilledRank, EndsTheOthersAndLeavesNothingHalfWritten) {
   if (GetParam() != 0) {
     const std::size_t frames = io::frame_count(results / "results.h5");
     EXPECT_GE(frames, 1U);
-    EXPECT_EQ(io::read_frame(results / "results.h5", frames - 1).id.size(), 300U);
+    EXPECT_EQ(io::read_frame(results / "results.h5", frames - 1).id.size(), 400U);
   }
   std::size_t fields = 0;
   for (const auto& [name, text] : files_below(results)) {

@@ -41,7 +41,7 @@ density = 2600
 friction = 0.3
 [sample]
 kind = "deposition"
-count = 300
+count = 400
 base = [0.12, 0.12]
 radius_distribution = "uniform"
 radius_min = 0.008

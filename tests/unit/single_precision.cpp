@@ -1,0 +1,231 @@
+/// Sweeps in single precision: the same bits by every kernel, and the same answers as sweeps in double.
+
+#include "kernels/single_precision.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "kernels/momentum.hpp"
+#include "kernels/sweep_kernels.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/dense_sample.hpp"
+
+namespace talus {
+namespace {
+
+std::vector<InstructionSet> sets_to_test() {
+  std::vector<InstructionSet> sets;
+  for (const InstructionSet set : {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512})
+    if (set <= best_instruction_set()) sets.push_back(set);
+  return sets;
+}
+
+std::vector<Slot> all_slots(std::size_t bodies) {
+  std::vector<Slot> slots(bodies);
+  for (std::size_t s = 0; s < bodies; ++s) slots[s] = static_cast<Slot>(s);
+  return slots;
+}
+
+/// Of the lightest grain, which has the largest 1/m.
+double unit_of(const Bodies& bodies) {
+  double most = 0;
+  for (const Velocity& v : bodies.velocity) most = std::max(most, v.inv_mass);
+  return unit_of_mass(most);
+}
+
+struct Swept {
+  SingleState single;
+  SweepSteps steps;
+  std::vector<WallCopy> walls;
+  Contacts contacts;  ///< impulses in N s
+};
+
+/// Sweeps with momentum over all chunks, bodies among them.
+Swept sweep(const test::Sample& sample, InstructionSet set, double mu, double wall_inv_mass, int sweeps) {
+  const SweepKernels kernels(set);
+  const std::size_t bodies = sample.bodies.size();
+  const std::vector<Slot> slots = all_slots(bodies);
+  Swept out;
+  out.contacts = sample.contacts;
+  out.steps.x.resize(out.contacts.rx.size());
+  out.steps.y = out.steps.z = out.steps.x;
+  allocate(out.single, out.contacts, bodies);
+  out.single.contacts.unit = unit_of(sample.bodies);
+  narrow_bodies(slots, sample.bodies.velocity, out.single);
+  for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+    out.walls.push_back({{0.1, -0.2, 0.05}, wall_inv_mass});
+    narrow_geometry(out.contacts, sample.range(c), out.single.contacts);
+    narrow_impulses(out.contacts, sample.range(c), out.single.contacts);
+  }
+  for (int s = 0; s < sweeps; ++s) {
+    const double beta = s == 0 ? 0 : 0.8;
+    carry_velocities(kernels, beta, slots, out.single.velocity, out.single.last_v);
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+      if (sample.chunks.wall[c] < 0)
+        kernels.sweep_grains(out.contacts, out.single.contacts, sample.range(c), out.single.velocity, mu,
+                             {beta, 1.2, out.steps});
+      else
+        kernels.sweep_wall(out.contacts, out.single.contacts, sample.range(c), out.single.velocity, mu,
+                           out.walls[c], {beta, 1.2, out.steps});
+  }
+  for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+    widen_impulses(out.single.contacts, sample.range(c), out.contacts);
+  return out;
+}
+
+bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), sizeof(float) * a.size()) == 0;
+}
+
+// Chunks from one contact to many groups; walls fixed and light; friction and none.
+TEST(SingleSweeps, GiveTheBitsOfTheScalarKernelOnEveryInstructionSet) {
+  for (const int target : {1, 5, 16, 37, 384})
+    for (const double wall_inv_mass : {0.0, 1e-3})
+      for (const double mu : {0.3, 0.0}) {
+        SCOPED_TRACE(testing::Message()
+                     << "chunks of " << target << ", walls " << wall_inv_mass << ", mu " << mu);
+        const test::Sample sample = test::dense_sample(6, 11, true, true, target);
+        const Swept expected = sweep(sample, InstructionSet::portable, mu, wall_inv_mass, 5);
+        for (const InstructionSet set : sets_to_test()) {
+          SCOPED_TRACE(name_of(set));
+          const Swept swept = sweep(sample, set, mu, wall_inv_mass, 5);
+          EXPECT_TRUE(same_bits(swept.single.contacts.rx, expected.single.contacts.rx));
+          EXPECT_TRUE(same_bits(swept.single.contacts.ry, expected.single.contacts.ry));
+          EXPECT_TRUE(same_bits(swept.single.contacts.rz, expected.single.contacts.rz));
+          EXPECT_TRUE(same_bits(swept.steps.x, expected.steps.x));
+          EXPECT_EQ(0, std::memcmp(swept.single.velocity.data(), expected.single.velocity.data(),
+                                   sizeof(SingleVelocity) * expected.single.velocity.size()));
+          for (std::size_t c = 0; c < expected.walls.size(); ++c)
+            EXPECT_EQ(0, std::memcmp(&swept.walls[c], &expected.walls[c], sizeof(WallCopy))) << c;
+        }
+      }
+}
+
+TEST(SingleSweeps, FollowThoseInDouble) {
+  const double mu = 0.3;
+  const test::Sample sample = test::dense_sample(6, 11, true, true, 100);
+  const int sweeps = 30;
+  const Swept single = sweep(sample, best_instruction_set(), mu, 1e-4, sweeps);
+
+  const SweepKernels kernels(best_instruction_set());
+  const std::vector<Slot> slots = all_slots(sample.bodies.size());
+  Contacts contacts = sample.contacts;
+  std::vector<Velocity> velocity = sample.bodies.velocity;
+  std::vector<WallCopy> walls(sample.chunks.size(), {{0.1, -0.2, 0.05}, 1e-4});
+  Trail trail;
+  allocate(trail, Carry::momentum, contacts, velocity.size(), walls.size());
+  for (int s = 0; s < sweeps; ++s) {
+    const double beta = s == 0 ? 0 : 0.8;
+    carry_velocities(kernels, Carry::momentum, beta, slots, velocity, trail);
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+      if (sample.chunks.wall[c] < 0)
+        kernels.sweep_grains<true>(contacts, sample.range(c), velocity, mu, {beta, 1.2, trail.steps});
+      else
+        kernels.sweep_wall<true>(contacts, sample.range(c), velocity, mu, walls[c], {beta, 1.2, trail.steps});
+  }
+  double largest = 0, difference = 0;
+  for (std::size_t k = 0; k < contacts.rx.size(); ++k) {
+    largest = std::max(largest, std::abs(contacts.rx[k]));
+    difference = std::max(difference, std::abs(contacts.rx[k] - single.contacts.rx[k]));
+  }
+  EXPECT_GT(largest, 0);
+  EXPECT_GT(difference, 0);
+  EXPECT_LT(difference, 2e-5 * largest);
+}
+
+// Squares of what is smaller than 1e-22 are 0 in floats. What was left of a tangential impulse then made a
+// contact of grains far from one another one that carries.
+TEST(SingleSweeps, LeaveNothingAtContactsThatCarryNothing) {
+  test::Sample sample = test::dense_sample(6, 11, true, false, 100);
+  for (Velocity& v : sample.bodies.velocity)
+    for (int d = 0; d < 3; ++d) {
+      v.u[d] *= 1e-24;
+      v.w[d] *= 1e-24;
+    }
+  std::fill(sample.contacts.bias.begin(), sample.contacts.bias.end(), 1.0);
+  for (const InstructionSet set : sets_to_test()) {
+    const Swept out = sweep(sample, set, 0.3, 0, 4);
+    for (std::size_t k = 0; k < out.contacts.rx.size(); ++k) {
+      ASSERT_EQ(out.contacts.rx[k], 0) << name_of(set) << ", contact " << k;
+      ASSERT_EQ(out.contacts.rz[k], 0) << name_of(set) << ", contact " << k;
+    }
+  }
+}
+
+TEST(SingleSweeps, ChangeNoBitWithTheUnitOfMass) {
+  test::Sample sample = test::dense_sample(5, 11, true, true, 100);
+  const Swept in_kg = sweep(sample, best_instruction_set(), 0.3, std::exp2(-10), 5);
+  const double factor = std::exp2(70);  // far beyond what floats can square
+  for (Velocity& v : sample.bodies.velocity) {
+    v.inv_mass /= factor;
+    v.spin_mobility /= factor;
+  }
+  const Swept scaled = sweep(sample, best_instruction_set(), 0.3, std::exp2(-10) / factor, 5);
+  double largest = 0;
+  for (std::size_t k = 0; k < in_kg.contacts.ry.size(); ++k) {
+    largest = std::max(largest, std::abs(in_kg.contacts.ry[k]));
+    ASSERT_EQ(scaled.contacts.ry[k], factor * in_kg.contacts.ry[k]) << k;
+  }
+  EXPECT_GT(largest, 0);
+}
+
+/// A packing of `edge`^3 grains, pressed on three sides.
+struct Pressed {
+  talus::Setup setup;
+  Bodies bodies;
+
+  explicit Pressed(int edge, double tolerance) : bodies(test::jittered_lattice(edge, 5, 0.1)) {
+    setup = test::pressed_setup(test::box_of_walls(-0.6, edge - 0.4), 0.3, 4, 1e6, 1e4);
+    setup.solver.tolerance = tolerance;
+  }
+  struct Outcome {
+    std::uint64_t digest;
+    double error;  ///< of the last step, like the sweeps
+    int sweeps;
+  };
+  Outcome run(Precision precision, int threads = 1) {
+    setup.solver.precision = precision;
+    graph::Executor executor({.threads = threads});
+    Simulation simulation(setup, bodies, executor);
+    for (int k = 0; k < 4; ++k) simulation.step();
+    return {simulation.digest(), simulation.report().error_rms, simulation.report().iterations};
+  }
+};
+
+TEST(MixedPrecision, ReachesWhatDoubleReaches) {
+  for (const double tolerance : {1e-3, 1e-6}) {
+    SCOPED_TRACE(tolerance);
+    Pressed pressed(8, tolerance);
+    const Pressed::Outcome mixed = pressed.run(Precision::mixed), full = pressed.run(Precision::full);
+    EXPECT_NE(mixed.digest, full.digest) << "single precision was not used";
+    EXPECT_LE(mixed.error, tolerance);
+    EXPECT_LE(full.error, tolerance);
+    EXPECT_LE(mixed.sweeps, 1.3 * full.sweeps + 10);
+  }
+}
+
+TEST(MixedPrecision, IsDoubleInSmallProblems) {
+  Pressed pressed(5, 1e-3);
+  EXPECT_EQ(pressed.run(Precision::mixed).digest, pressed.run(Precision::full).digest);
+}
+
+// To 1e-6 the last sweeps are in double.
+TEST(MixedPrecision, HasTheSameBitsOnAnyThreadsAndInstructionSets) {
+  for (const int subdomains : {1, 5})
+    for (const double tolerance : {1e-3, 1e-6}) {
+      SCOPED_TRACE(testing::Message() << subdomains << " subdomains, tolerance " << tolerance);
+      Pressed pressed(8, tolerance);
+      pressed.setup.decomposition.subdomains = subdomains;
+      pressed.setup.solver.simd = InstructionSet::portable;
+      const std::uint64_t expected = pressed.run(Precision::mixed).digest;
+      EXPECT_EQ(pressed.run(Precision::mixed, 2).digest, expected);
+      pressed.setup.solver.simd = InstructionSet::automatic;
+      EXPECT_EQ(pressed.run(Precision::mixed, 2).digest, expected);
+    }
+}
+
+}  // namespace
+}  // namespace talus
