@@ -42,6 +42,10 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
   line("orientations", !state.bodies.orientation.empty(),
        state.bodies.orientation.empty() ? "spheres need none; not asked for"
                                         : "asked for: 32 bytes per grain");
+  const bool single = !state.single.velocity.empty();
+  line("sweeps in double", !single,
+       single ? "single precision until the error is 1e-5: half the bytes and divisions"
+              : "no momentum with friction on more than 1000 candidates, or precision = \"double\"");
   line("gravity", parameters.gravity.norm() > 0,
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   line("restitution", parameters.law.restitution > 0, fmt::format("e = {:g}", parameters.law.restitution));
@@ -68,6 +72,7 @@ void print_costs(const Simulation& simulation) {
   const auto contacts = static_cast<double>(std::max<std::int64_t>(simulation.report().contacts, 1));
   const double of_bodies = static_cast<double>(
       memory_used(state.bodies) + state.free.u.capacity() * 24 + state.free.w.capacity() * 24 +
+      (state.single.velocity.capacity() + state.single.last_v.capacity()) * sizeof(SingleVelocity) +
       state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * 8);
   const double of_contacts = static_cast<double>(memory_used(state)) - of_bodies;
   fmt::print("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(),

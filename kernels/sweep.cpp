@@ -58,12 +58,29 @@ inline V3<double> impulse_of(const Contacts& c, std::size_t k, V3<double> n) {
     return c.rn[k] * n;
 }
 
-/// What a body meets at a wall: its velocity [m/s] and mobility along the normal.
+/// What a body meets at a wall: its velocity when the sweep began, what it has gained since [m/s], and its
+/// mobility along the normal. Apart, so that the little that a heavy wall gains is not lost in rounding.
 template <class N>
 struct WallPart {
   N velocity[3];
+  N gained[3];
   N inv_mass;
 };
+
+template <class N>
+inline V3<N> velocity_of(const WallPart<N>& wall) {
+  return load(wall.velocity) + load(wall.gained);
+}
+inline V3<double> velocity_of(const WallCopy& wall) {
+  return load(wall.velocity);
+}
+template <class N>
+inline void add_velocity(WallPart<N>& wall, V3<N> dv) {
+  add_to(wall.gained, dv);
+}
+inline void add_velocity(WallCopy& wall, V3<double> dv) {
+  add_to(wall.velocity, dv);
+}
 
 /// Relative velocity of two grains at their contact.
 template <bool Friction, class N>
@@ -76,7 +93,7 @@ inline V3<N> relative(const VelocityOf<N>& a, const VelocityOf<N>& b, V3<N> n) {
 /// `Wall` is a WallPart or a WallCopy.
 template <bool Friction, class N, class Wall>
 inline V3<N> relative(const VelocityOf<N>& a, const Wall& wall, V3<N> n) {
-  const V3<N> du = load(a.u) - load(wall.velocity);
+  const V3<N> du = load(a.u) - velocity_of(wall);
   if constexpr (Friction) return du - cross(load(a.w), n);
   return du;
 }
@@ -96,7 +113,7 @@ inline void push(VelocityOf<N>& a, VelocityOf<N>& b, V3<N> n, V3<N> dr) {
 template <bool Friction, class N, class Wall>
 inline void push(VelocityOf<N>& a, Wall& wall, V3<N> n, V3<N> dr) {
   add_to(a.u, a.inv_mass * dr);
-  add_to(wall.velocity, -wall.inv_mass * dot(n, dr) * n);  // a wall moves along its normal only
+  add_velocity(wall, -wall.inv_mass * dot(n, dr) * n);  // a wall moves along its normal only
   if constexpr (Friction) add_to(a.w, a.spin_mobility * cross(dr, n));
 }
 
@@ -205,7 +222,10 @@ class SplitWall {
       : begin_(range.begin), lanes_(std::min(range.end - range.begin, wall_lanes)) {
     const double inv_mass = wall.inv_mass * unit * static_cast<double>(lanes_);
     for (WallPart<N>& part : parts_) {
-      for (int d = 0; d < 3; ++d) part.velocity[d] = static_cast<N>(wall.velocity[d]);
+      for (int d = 0; d < 3; ++d) {
+        part.velocity[d] = static_cast<N>(wall.velocity[d]);
+        part.gained[d] = 0;
+      }
       part.inv_mass = static_cast<N>(inv_mass);
     }
   }
@@ -214,13 +234,11 @@ class SplitWall {
     if (wall.inv_mass == 0 || lanes_ == 0) return;
     V3<double> sum{0, 0, 0};
     for (std::size_t l = 0; l < lanes_; ++l) {
-      const N* const own = parts_[l].velocity;
+      const N* const own = parts_[l].gained;
       sum = sum + V3<double>{own[0], own[1], own[2]};
     }
     const V3<double> mean = (1 / static_cast<double>(lanes_)) * sum;
-    wall.velocity[0] = mean.x;
-    wall.velocity[1] = mean.y;
-    wall.velocity[2] = mean.z;
+    add_to(wall.velocity, mean);
   }
 
  private:

@@ -433,30 +433,32 @@ void accumulate_grains(const ContactView& view, double* bodies) {
   }
 }
 
-/// The copies of a wall, one for each of 8 lanes: its velocity, and 1/m of a lane.
+/// The copies of a wall, one for each of 8 lanes: its velocity when the sweep began and what each has gained
+/// since, apart, so that the little that a heavy wall gains is not lost in rounding; and 1/m of a lane.
 template <class V>
 struct SplitWall {
   using Number = NumberOf<V>;
   static constexpr int W = width_of<V>;
-  Space<V> velocity[wall_lanes / W];
+  Space<V> velocity;
+  Space<V> gained[wall_lanes / W]{};
   Number inv_mass;
   std::size_t lanes;
 
   SplitWall(const double* wall, double wall_inv_mass, std::size_t contacts) : lanes(minimum(contacts, 8)) {
     const auto all = [&](int d) { return V{} + static_cast<Number>(wall[d]); };
-    for (auto& v : velocity) v = {all(0), all(1), all(2)};
+    velocity = {all(0), all(1), all(2)};
     inv_mass = static_cast<Number>(wall_inv_mass * static_cast<double>(lanes));
   }
   void push(std::size_t part, const Space<V>& n, const Space<V>& dr) {
-    velocity[part] = velocity[part] + (-inv_mass * dot(n, dr)) * n;
+    gained[part] = gained[part] + (-inv_mass * dot(n, dr)) * n;
   }
   void glue(double* wall) const {
     if (inv_mass == 0 || lanes == 0) return;
     Number x[wall_lanes], y[wall_lanes], z[wall_lanes];
     for (std::size_t k = 0; k < wall_lanes / W; ++k) {
-      store(x + W * k, velocity[k].x);
-      store(y + W * k, velocity[k].y);
-      store(z + W * k, velocity[k].z);
+      store(x + W * k, gained[k].x);
+      store(y + W * k, gained[k].y);
+      store(z + W * k, gained[k].z);
     }
     double sum[3] = {0, 0, 0};
     for (std::size_t l = 0; l < lanes; ++l) {
@@ -464,7 +466,7 @@ struct SplitWall {
       sum[1] += y[l];
       sum[2] += z[l];
     }
-    for (int d = 0; d < 3; ++d) wall[d] = 1 / static_cast<double>(lanes) * sum[d];
+    for (int d = 0; d < 3; ++d) wall[d] += 1 / static_cast<double>(lanes) * sum[d];
   }
 };
 
@@ -475,7 +477,7 @@ template <bool Friction, class V, class Start, class Only>
                                                     double mu, const Start& start, Only only,
                                                     std::size_t lanes, SplitWall<V>& wall) {
   Meeting<V> m = gather<Friction, false>(a, a, V{});
-  m.du = m.du - wall.velocity[lanes];
+  m.du = m.du - (wall.velocity + wall.gained[lanes]);
   const Space<V> n = load_normal<V>(c, 0, only);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;

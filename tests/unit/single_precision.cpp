@@ -155,6 +155,30 @@ TEST(SingleSweeps, LeaveNothingAtContactsThatCarryNothing) {
   }
 }
 
+// Added to the wall's own velocity of 0.2 m/s in floats, what it gains would be lost.
+TEST(SingleSweeps, MoveAWallThatIsMuchHeavierThanTheGrains) {
+  const double inv_mass = 1e-13;
+  const test::Sample sample = test::dense_sample(6, 11, true, true, 384);
+  const Swept out = sweep(sample, best_instruction_set(), 0.3, inv_mass, 1);
+  int walls = 0;
+  for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+    if (sample.chunks.wall[c] < 0) continue;
+    double along_normal = 0, gained = 0;
+    for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k) {
+      const Vec3 r(out.contacts.rx[k], out.contacts.ry[k], out.contacts.rz[k]),
+          before(sample.contacts.rx[k], sample.contacts.ry[k], sample.contacts.rz[k]),
+          n(out.contacts.nx[k], out.contacts.ny[k], out.contacts.nz[k]);
+      along_normal += (r - before).dot(n);
+      const Vec3 dv = Vec3(out.walls[c].velocity) - Vec3(0.1, -0.2, 0.05);
+      gained = -dv.dot(n);
+    }
+    if (along_normal == 0) continue;
+    ++walls;
+    EXPECT_NEAR(gained, inv_mass * along_normal, 1e-4 * std::abs(inv_mass * along_normal)) << c;
+  }
+  EXPECT_GT(walls, 3);
+}
+
 TEST(SingleSweeps, ChangeNoBitWithTheUnitOfMass) {
   test::Sample sample = test::dense_sample(5, 11, true, true, 100);
   const Swept in_kg = sweep(sample, best_instruction_set(), 0.3, std::exp2(-10), 5);
