@@ -24,7 +24,8 @@ std::vector<trace::KindInfo> task_kinds() {
                                  {"publish", Phase::exchange, false, false, 0},
                                  {"centre", Phase::exchange, false, false, 0},
                                  {"glue", Phase::sweeps, false, false, 0},
-                                 {"whole", Phase::sweeps, false, true, 0}};
+                                 {"whole", Phase::sweeps, false, true, 0},
+                                 {"leavers", Phase::detection, false, true, 3}};
   kinds.insert(kinds.end(), std::begin(own), std::end(own));
   return kinds;
 }
