@@ -197,12 +197,13 @@ int Iteration::started_at() const {
 
 /// Until the next check: where the tolerance will be met if the error goes on as a power of the sweeps done,
 /// which is what momentum does in the beginning, and later errs to the short side of what exponentials need
-/// by little; at most half of what was done, so that a wrong guess costs no more.
+/// by little. A wrong guess costs no more than half of what was done; with momentum as much again, but few.
 int Iteration::sweeps_ahead() const {
   const int start = started_at();
   const int done = result_.iterations - start;
-  int sweeps = std::max(settings_.check_every, done / 2);
-  if (course_.method == SolverMethod::momentum) sweeps = std::min(sweeps, trusted_sweeps);
+  int sweeps = course_.method == SolverMethod::momentum
+                   ? std::clamp(done, settings_.check_every, std::max(trusted_sweeps, settings_.check_every))
+                   : std::max(settings_.check_every, done / 2);
   const double error = history_.back().error_rms;
   const Check* const before = check_before();
   if (before && error > settings_.tolerance && error < before->error_rms) {
