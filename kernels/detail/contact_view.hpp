@@ -17,6 +17,7 @@ struct ContactViewOf {
   const std::int32_t *first, *second;
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
+  bool far;  ///< the bodies of this process do not fit into a core's own caches: ask for them ahead
 };
 
 using ContactView = ContactViewOf<double>;

@@ -331,11 +331,12 @@ template <std::size_t Count, class V, class Number>
 }
 
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
-/// them coming, and with 200,000 grains they stand beyond its second cache.
+/// them coming, and with 200,000 grains they stand beyond its second cache. Where they do not, asking costs 6
+/// % of a sweep in single precision.
 template <class View, class Number>
 [[gnu::always_inline]] inline void prefetch_group(const View& c, std::size_t k, Number* bodies) {
   const std::size_t ahead = k + 2 * group_size;
-  if (ahead + group_size > c.end) return;
+  if (!c.far || ahead + group_size > c.end) return;
 #pragma GCC unroll 16
   for (std::size_t l = 0; l < group_size; ++l) {
     __builtin_prefetch(body(bodies, c.first[ahead + l]), 1);
