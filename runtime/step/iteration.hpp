@@ -187,7 +187,7 @@ class Iteration {
   };
   Stiffness stiffness_;
   bool alike_ = false;  ///< no grain is much heavier than another, whose landing would change the answer
-  double candidates_everywhere_ = 0;
+  double candidates_everywhere_ = 0;  ///< of all ranks
   /// The last look at the error of all velocities.
   struct Look {
     int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
