@@ -39,42 +39,35 @@ bool far(std::span<Record> velocity) {
   return velocity.size_bytes() > near;
 }
 
-ContactView view(const Contacts& c, ContactRange range, bool far) {
-  return {c.nx.data(),
-          c.ny.data(),
-          c.nz.data(),
-          c.bias.data(),
-          c.rx.data(),
-          c.ry.data(),
-          c.rz.data(),
-          c.rn.data(),
-          c.first.data(),
-          c.second.data(),
-          c.group.data() + range.begin,
+/// `arrays` are Contacts or SingleContacts; `contacts` lends bodies and groups.
+template <class Number, class Arrays>
+ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, const Number* rn,
+                           ContactRange range, bool far) {
+  return {arrays.nx.data(),
+          arrays.ny.data(),
+          arrays.nz.data(),
+          arrays.bias.data(),
+          arrays.rx.data(),
+          arrays.ry.data(),
+          arrays.rz.data(),
+          rn,
+          contacts.first.data(),
+          contacts.second.data(),
+          contacts.group.data() + range.begin,
           range.begin,
           range.end,
           far};
+}
+ContactView view(const Contacts& contacts, ContactRange range, bool far) {
+  return view(contacts, contacts, contacts.rn.data(), range, far);
+}
+SingleContactView view(const Contacts& contacts, const SingleContacts& single, ContactRange range, bool far) {
+  const float* const none = nullptr;
+  return view(contacts, single, none, range, far);
 }
 
 SingleImpulseView impulses(SingleContacts& c) {
   return {c.rx.data(), c.ry.data(), c.rz.data(), nullptr};
-}
-
-SingleContactView view(const Contacts& c, const SingleContacts& single, ContactRange range, bool far) {
-  return {single.nx.data(),
-          single.ny.data(),
-          single.nz.data(),
-          single.bias.data(),
-          single.rx.data(),
-          single.ry.data(),
-          single.rz.data(),
-          nullptr,
-          c.first.data(),
-          c.second.data(),
-          c.group.data() + range.begin,
-          range.begin,
-          range.end,
-          far};
 }
 
 /// Of whole records at `slots`, as LaneKernels::advance_bodies does it.
