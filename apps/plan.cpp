@@ -44,8 +44,8 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
                                         : "asked for: 32 bytes per grain");
   const bool single = !state.single.velocity.empty();
   line("sweeps in double", !single,
-       single ? "single precision until the error is 1e-5: half the bytes and divisions"
-              : "no momentum with friction on more than 1000 candidates, or precision = \"double\"");
+       single ? "single precision until the error is small: half the bytes and divisions"
+              : "no momentum with friction, few candidates, or precision = \"double\"");
   line("gravity", parameters.gravity.norm() > 0,
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   line("restitution", parameters.law.restitution > 0, fmt::format("e = {:g}", parameters.law.restitution));

@@ -32,17 +32,11 @@ ImpulseView impulses(Contacts& c) {
   return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
 }
 
-/// Of what cores have had as their second cache for years.
-template <class Record>
-bool far(std::span<Record> velocity) {
-  constexpr std::size_t near = std::size_t{512} << 10;
-  return velocity.size_bytes() > near;
-}
-
 /// `arrays` are Contacts or SingleContacts; `contacts` lends bodies and groups.
-template <class Number, class Arrays>
+template <class Number, class Arrays, class Record>
 ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, const Number* rn,
-                           ContactRange range, bool far) {
+                           ContactRange range, std::span<Record> velocity) {
+  constexpr std::size_t near = std::size_t{512} << 10;  // what second caches have had for years
   return {arrays.nx.data(),
           arrays.ny.data(),
           arrays.nz.data(),
@@ -56,14 +50,15 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, const
           contacts.group.data() + range.begin,
           range.begin,
           range.end,
-          far};
+          velocity.size_bytes() > near};
 }
-ContactView view(const Contacts& contacts, ContactRange range, bool far) {
-  return view(contacts, contacts, contacts.rn.data(), range, far);
+ContactView view(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity) {
+  return view(contacts, contacts, contacts.rn.data(), range, velocity);
 }
-SingleContactView view(const Contacts& contacts, const SingleContacts& single, ContactRange range, bool far) {
+SingleContactView view(const Contacts& contacts, const SingleContacts& single, ContactRange range,
+                       std::span<const SingleVelocity> velocity) {
   const float* const none = nullptr;
-  return view(contacts, single, none, range, far);
+  return view(contacts, single, none, range, velocity);
 }
 
 SingleImpulseView impulses(SingleContacts& c) {
@@ -146,62 +141,61 @@ template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 double mu) const {
   if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
-  lanes_[Friction]->sweep_grains(view(contacts, range, far(velocity)), impulses(contacts), records(velocity),
-                                 mu);
+  lanes_[Friction]->sweep_grains(view(contacts, range, velocity), impulses(contacts), records(velocity), mu);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 double mu, const SweepMomentum& momentum) const {
   if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu, momentum);
-  lanes_[Friction]->momentum_grains(view(contacts, range, far(velocity)), impulses(contacts),
-                                    records(velocity), mu, view(momentum));
+  lanes_[Friction]->momentum_grains(view(contacts, range, velocity), impulses(contacts), records(velocity),
+                                    mu, view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                               WallCopy& wall) const {
   if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
-  lanes_[Friction]->sweep_wall(view(contacts, range, far(velocity)), impulses(contacts), records(velocity),
-                               mu, wall.velocity, wall.inv_mass);
+  lanes_[Friction]->sweep_wall(view(contacts, range, velocity), impulses(contacts), records(velocity), mu,
+                               wall.velocity, wall.inv_mass);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                               WallCopy& wall, const SweepMomentum& momentum) const {
   if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall, momentum);
-  lanes_[Friction]->momentum_wall(view(contacts, range, far(velocity)), impulses(contacts), records(velocity),
-                                  mu, wall.velocity, wall.inv_mass, view(momentum));
+  lanes_[Friction]->momentum_wall(view(contacts, range, velocity), impulses(contacts), records(velocity), mu,
+                                  wall.velocity, wall.inv_mass, view(momentum));
 }
 
 void SweepKernels::sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                                 std::span<SingleVelocity> velocity, double mu,
                                 const SweepMomentum& momentum) const {
   if (!lanes_[1]) return talus::sweep_grains(contacts, single, range, velocity, mu, momentum);
-  lanes_[1]->single_grains(view(contacts, single, range, far(velocity)), impulses(single), records(velocity),
-                           mu, view(momentum));
+  lanes_[1]->single_grains(view(contacts, single, range, velocity), impulses(single), records(velocity), mu,
+                           view(momentum));
 }
 
 void SweepKernels::sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                               std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
                               const SweepMomentum& momentum) const {
   if (!lanes_[1]) return talus::sweep_wall(contacts, single, range, velocity, mu, wall, momentum);
-  lanes_[1]->single_wall(view(contacts, single, range, far(velocity)), impulses(single), records(velocity),
-                         mu, wall.velocity, wall.inv_mass * single.unit, view(momentum));
+  lanes_[1]->single_wall(view(contacts, single, range, velocity), impulses(single), records(velocity), mu,
+                         wall.velocity, wall.inv_mass * single.unit, view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::accumulate_grains(const Contacts& contacts, ContactRange range,
                                      std::span<Velocity> velocity) const {
   if (!lanes_[Friction]) return talus::accumulate_grains<Friction>(contacts, range, velocity);
-  lanes_[Friction]->accumulate_grains(view(contacts, range, far(velocity)), records(velocity));
+  lanes_[Friction]->accumulate_grains(view(contacts, range, velocity), records(velocity));
 }
 
 template <bool Friction>
 void SweepKernels::accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                    WallCopy& wall) const {
   if (!lanes_[Friction]) return talus::accumulate_wall<Friction>(contacts, range, velocity, wall);
-  lanes_[Friction]->accumulate_wall(view(contacts, range, far(velocity)), records(velocity), wall.velocity,
+  lanes_[Friction]->accumulate_wall(view(contacts, range, velocity), records(velocity), wall.velocity,
                                     wall.inv_mass);
 }
 
@@ -210,7 +204,7 @@ ErrorSums SweepKernels::error_grains(const Contacts& contacts, ContactRange rang
                                      std::span<const Velocity> velocity, double mu,
                                      Multiplicities multiplicity) const {
   if (!lanes_[Friction]) return talus::error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
-  return sums_of(lanes_[Friction]->error_grains(view(contacts, range, far(velocity)), records(velocity), mu,
+  return sums_of(lanes_[Friction]->error_grains(view(contacts, range, velocity), records(velocity), mu,
                                                 multiplicity.data()),
                  range);
 }
@@ -221,7 +215,7 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
                                    double wall_inv_mass, Multiplicities multiplicity) const {
   if (!lanes_[Friction])
     return talus::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, multiplicity);
-  return sums_of(lanes_[Friction]->error_wall(view(contacts, range, far(velocity)), records(velocity), mu,
+  return sums_of(lanes_[Friction]->error_wall(view(contacts, range, velocity), records(velocity), mu,
                                               wall.velocity, wall_inv_mass, multiplicity.data()),
                  range);
 }

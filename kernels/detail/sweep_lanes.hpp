@@ -331,8 +331,8 @@ template <std::size_t Count, class V, class Number>
 }
 
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
-/// them coming, and with 200,000 grains they stand beyond its second cache. Where they do not, asking costs 6
-/// % of a sweep in single precision.
+/// them coming, and with 200,000 grains they stand beyond its second cache. Where they do not, asking costs
+/// 2-6 % of a sweep in single precision.
 template <class View, class Number>
 [[gnu::always_inline]] inline void prefetch_group(const View& c, std::size_t k, Number* bodies) {
   const std::size_t ahead = k + 2 * group_size;

@@ -104,7 +104,8 @@ void Iteration::go_on_in_double() {
 }
 
 /// Brings a chunk's contacts, and the bodies that it is the first to write, to where its sweep looks for
-/// them. Behind a check velocities and impulses are in double precision.
+/// them. Behind a check velocities and impulses are in double precision; what goes on with momentum changes
+/// behind the sweep that follows the check (least_sweeps), and takes it along.
 void Iteration::change_precision(std::size_t c, ContactRange range, int epoch) {
   SingleState& single = state_.single;
   std::span<Velocity> velocity = state_.bodies.velocity;
@@ -118,19 +119,14 @@ void Iteration::change_precision(std::size_t c, ContactRange range, int epoch) {
     if (first) fasten(owned(c), single.velocity, single.last_v);
     return;
   }
-  const bool goes_on = course(epoch).method == SolverMethod::momentum && number(epoch) > course(epoch).begun;
-  if (!before) {
+  if (first || !before) {
     if (first && course(epoch).method != SolverMethod::nlgs)
       fasten(owned(c), state_.bodies.velocity, trail_.last_v);
     return;
   }
-  if (first) {
-    narrow_bodies(owned(c), velocity, single);
-    fasten(owned(c), single.velocity, single.last_v);
-  } else {
-    widen_impulses(single.contacts, range, state_.contacts);
-    widen_bodies(owned(c), single.velocity, velocity);
-  }
+  widen_impulses(single.contacts, range, state_.contacts);
+  widen_bodies(owned(c), single.velocity, velocity);
+  const bool goes_on = course(epoch).method == SolverMethod::momentum && number(epoch) > course(epoch).begun;
   if (!goes_on) return;
   for (const Slot slot : owned(c))
     trail_.last_v[static_cast<std::size_t>(slot)] = velocity[static_cast<std::size_t>(slot)];
@@ -212,8 +208,9 @@ int Iteration::sweeps_ahead() const {
     const int then = before->iterations - start;
     const double to_go = then > 0 ? done * std::expm1(log_missing / log_error * std::log(double(done) / then))
                                   : done * log_missing / log_error;
-    sweeps = std::max(least_sweeps, static_cast<int>(std::ceil(std::min<double>(sweeps, to_go))));
+    sweeps = static_cast<int>(std::ceil(std::min<double>(sweeps, to_go)));
   }
+  sweeps = std::max(least_sweeps, sweeps);
   const int exchange = decomposition_.sweeps_per_exchange;
   sweeps = (sweeps + exchange - 1) / exchange * exchange;
   return std::min(sweeps, settings_.max_iterations - result_.iterations);

@@ -95,7 +95,7 @@ class Iteration {
 
  private:
   /// Between two checks at least: one costs about 1.5 of them. Two, so that what several ranks learn of a
-  /// check behind the first sweep comes before the last one.
+  /// check behind the first sweep, and what it changes there, comes before the last one.
   static constexpr int least_sweeps = 2;
   enum class Work { accumulate, measure, sweep, restore };
   Work work(int epoch) const {

@@ -14,12 +14,21 @@
 #include "kernels/chunks.hpp"
 #include "kernels/narrow_phase.hpp"
 #include "kernels/sweep.hpp"
+#include "kernels/sweep_kernels.hpp"
 #include "kernels/walls.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::test {
 
 using Random = std::mt19937_64;
+
+/// What this processor runs, the scalar kernels first.
+inline std::vector<InstructionSet> sets_to_test() {
+  std::vector<InstructionSet> sets;
+  for (const InstructionSet set : {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512})
+    if (set <= best_instruction_set()) sets.push_back(set);
+  return sets;
+}
 
 inline double uniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);

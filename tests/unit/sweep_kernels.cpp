@@ -16,13 +16,6 @@ using test::Random;
 using test::Sample;
 using test::uniform;
 
-std::vector<InstructionSet> sets_to_test() {
-  std::vector<InstructionSet> sets;
-  for (const InstructionSet set : {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512})
-    if (set <= best_instruction_set()) sets.push_back(set);
-  return sets;
-}
-
 /// Exact bits, NaN and the sign of zero included.
 bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), 8 * a.size()) == 0);
@@ -143,7 +136,7 @@ void expect_same(const Outcome& a, const Outcome& b) {
 template <bool Friction>
 void expect_scalar_bits(const Sample& sample, const Plan& plan) {
   const Outcome expected = run<Friction>(Reference{}, sample, plan);
-  for (const InstructionSet set : sets_to_test()) {
+  for (const InstructionSet set : test::sets_to_test()) {
     SCOPED_TRACE(name_of(set));
     expect_same(run<Friction>(SweepKernels(set), sample, plan), expected);
   }
@@ -222,7 +215,7 @@ TEST(SweepKernels, GiveTheScalarErrorOfCopiesThatCarryAPartOfTheMass) {
 
 TEST(SweepKernels, LetNotANumberSpreadToTheErrorAndNeverSwallowIt) {
   for (const bool friction : {false, true})
-    for (const InstructionSet set : sets_to_test()) {
+    for (const InstructionSet set : test::sets_to_test()) {
       SCOPED_TRACE(name_of(set));
       Sample sample = test::dense_sample(4, 15, friction, false, 384);
       sample.bodies.velocity[20].u[1] = std::numeric_limits<double>::quiet_NaN();

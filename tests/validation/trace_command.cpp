@@ -2,10 +2,36 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "io/trace_file.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::test {
 namespace {
+
+/// Per step of rank 0, what lies within its task `cells`.
+struct WithinCells {
+  int expected = 0;  ///< calls of all ranks, by the kinds of what was done
+  int calls = 0;     ///< calls of all ranks that were recorded
+  bool partition = false, leavers = false;
+};
+std::map<std::uint32_t, WithinCells> within_cells(const trace::Trace& trace) {
+  std::map<std::uint32_t, WithinCells> steps;
+  double end = 0;
+  for (const trace::Record& record : trace.lane(0, 0).records) {
+    const trace::KindInfo& kind = trace.info(record.kind());
+    const bool cells = kind.name == "cells";
+    if (cells) end = record.end();
+    if (!cells && record.end() > end) continue;
+    WithinCells& step = steps[record.step()];
+    step.expected += kind.collectives;
+    step.calls += record.kind() == trace::kind_collective;
+    step.partition |= kind.name == "partition";
+    step.leavers |= kind.name == "leavers";
+  }
+  return steps;
+}
 
 class TraceCommand : public testing::Test {
  protected:
@@ -96,6 +122,32 @@ TEST_F(TraceCommand, RanksWriteOneFile) {
   EXPECT_NE(show.output.find("3 ranks x 1 threads, 3 steps"), std::string::npos) << show.output;
   const Outcome played = talus("replay ranks/trace.h5 --ranks 2 --threads 2");
   EXPECT_EQ(played.code, 0) << played.messages;
+}
+
+// Replay lays a trace of one rank out on many: it must know the calls of all ranks that one rank does not
+// make.
+TEST_F(TraceCommand, OfOneRankNamesTheCallsThatDetectionMakesOnSeveral) {
+  const std::string mpirun =
+      "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe --bind-to none -n 2";
+  const std::string line = "run scene.toml --threads 1 --trace --set decomposition.subdomains=4 --out ";
+  talus(line + "one");
+  talus(line + "two", mpirun);
+  const auto one = within_cells(io::read_trace(folder_ / "one/trace.h5")),
+             two = within_cells(io::read_trace(folder_ / "two/trace.h5"));
+  ASSERT_EQ(one.size(), two.size());
+  int with = 0, without = 0;
+  for (const auto& [step, on_one] : one) {
+    const WithinCells& on_two = two.at(step);
+    EXPECT_EQ(on_one.leavers, on_two.leavers) << "step " << step;
+    EXPECT_EQ(on_one.partition, on_two.partition) << "step " << step;
+    EXPECT_EQ(on_one.calls, 0) << "step " << step;
+    EXPECT_LE(on_two.calls, on_one.expected) << "step " << step;
+    if (on_one.partition) continue;  // at most so many
+    EXPECT_EQ(on_two.calls, on_one.expected) << "step " << step;
+    (on_one.leavers ? with : without) += 1;
+  }
+  EXPECT_GT(with, 0);
+  EXPECT_GT(without, 0);
 }
 
 TEST_F(TraceCommand, HoldsTheStepsAskedFor) {
