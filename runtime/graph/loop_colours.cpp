@@ -1,45 +1,53 @@
 #include "runtime/graph/loop_colours.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace talus::graph {
 
 namespace {
 
-std::vector<ChunkTurn> sorted(std::vector<ChunkTurn> turns) {
+enum Part : std::uint32_t { border, publish, glue_early, inside, glue };
+
+/// What comes first, by its numbers from the left.
+using Turn = std::array<std::uint32_t, 3>;
+
+std::vector<Turn> sorted(std::vector<Turn> turns) {
   std::sort(turns.begin(), turns.end());
   turns.erase(std::unique(turns.begin(), turns.end()), turns.end());
   return turns;
 }
 
-std::size_t place_in(const std::vector<ChunkTurn>& order, const ChunkTurn& turn) {
-  return static_cast<std::size_t>(std::lower_bound(order.begin(), order.end(), turn) - order.begin());
+std::uint32_t place_in(const std::vector<Turn>& order, const Turn& turn) {
+  return static_cast<std::uint32_t>(std::lower_bound(order.begin(), order.end(), turn) - order.begin());
 }
 
 /// Colours that count from 0 in each subdomain, subdomains alike.
-void go_abreast(std::vector<ChunkTurn>& turns) {
-  const std::vector<ChunkTurn> order = sorted(turns);
-  for (ChunkTurn& turn : turns) {
-    const std::size_t first = place_in(order, {turn.inside, turn.subdomain, 0});
-    turn = {turn.inside, 0, static_cast<std::uint32_t>(place_in(order, turn) - first)};
-  }
+void go_abreast(std::vector<Turn>& turns) {
+  const std::vector<Turn> order = sorted(turns);
+  for (Turn& turn : turns)
+    turn = {turn[0], 0, place_in(order, turn) - place_in(order, {turn[0], turn[1], 0})};
 }
 
 }  // namespace
 
-LoopColours loop_colours(std::span<const ChunkTurn> turns, bool overlap, int threads) {
-  std::vector<ChunkTurn> own(turns.begin(), turns.end());
+LoopColours loop_colours(std::span<const ChunkTurn> turns, std::size_t subdomains, bool overlap,
+                         int threads) {
+  std::vector<Turn> own;  // {part, subdomain, colour}
+  for (const ChunkTurn& turn : turns)
+    own.push_back({turn.inside ? inside : border, turn.subdomain, turn.colour});
   if (threads > 1) go_abreast(own);
-  const std::vector<ChunkTurn> order = sorted(own);
-  const std::size_t border = place_in(order, {true, 0, 0});
-  LoopColours colours;
-  colours.publish = static_cast<std::uint32_t>(2 * border);
-  colours.glue = overlap ? static_cast<std::uint32_t>(2 * order.size() + 2) : colours.publish + 2;
-  const std::uint32_t shift = overlap ? 2 : 4;
-  for (const ChunkTurn& turn : own)
-    colours.chunk.push_back(static_cast<std::uint32_t>(2 * place_in(order, turn)) +
-                            (turn.inside ? shift : 0));
-  return colours;
+  for (std::uint32_t e = 0; e < subdomains; ++e) own.push_back({publish, threads > 1 ? 0 : e, 0});
+  const bool one_by_one = threads == 1 && overlap;
+  if (one_by_one)
+    for (Turn& turn : own) std::swap(turn[0], turn[1]);
+  own.push_back(one_by_one ? Turn{static_cast<std::uint32_t>(subdomains), glue, 0}
+                           : Turn{overlap ? glue : glue_early, 0, 0});
+  const std::vector<Turn> order = sorted(own);
+  std::vector<std::uint32_t> colours;
+  for (const Turn& turn : own) colours.push_back(2 * place_in(order, turn));
+  const auto publishes = colours.begin() + static_cast<std::ptrdiff_t>(turns.size());
+  return {{colours.begin(), publishes}, {publishes, colours.end() - 1}, colours.back()};
 }
 
 }  // namespace talus::graph

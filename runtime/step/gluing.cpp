@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <type_traits>
 
 #include "runtime/step/detail/gluing_parts.hpp"
 
@@ -14,54 +16,52 @@ using detail::tag_of;
 
 namespace {
 
+/// A body's velocity as it travels: numbers of the record, 6, or 3 without rotation.
 template <std::size_t Width, class Record>
-void read_velocity(const Record& v, double* out) {
-  for (std::size_t k = 0; k < 3; ++k) out[k] = v.u[k];
-  if constexpr (Width == 6)
-    for (std::size_t k = 0; k < 3; ++k) out[k + 3] = v.w[k];
-}
+using Numbers = std::array<std::remove_cvref_t<decltype(Record{}.u[0])>, Width>;
 
-template <class Record>
-void read_velocity(std::size_t width, const Record& v, double* out) {
-  if (width == 6)
-    read_velocity<6>(v, out);
-  else
-    read_velocity<3>(v, out);
-}
-
-/// Rounds to the numbers of the record.
-template <class Record>
-void assign(std::size_t width, const double* from, Record& v) {
-  using Number = std::remove_cvref_t<decltype(v.u[0])>;
-  for (std::size_t k = 0; k < 3; ++k) v.u[k] = static_cast<Number>(from[k]);
-  for (std::size_t k = 3; k < width; ++k) v.w[k - 3] = static_cast<Number>(from[k]);
+template <std::size_t Width, class Record>
+Numbers<Width, Record> numbers_of(const Record& v) {
+  Numbers<Width, Record> numbers;
+  std::copy_n(v.u, 3, numbers.data());
+  if constexpr (Width == 6) std::copy_n(v.w, 3, numbers.data() + 3);
+  return numbers;
 }
 
 template <std::size_t Width, class Record>
-void write_velocities(std::span<const Record> velocity, std::span<const std::size_t> slots, double* out) {
-  for (const std::size_t slot : slots) {
-    read_velocity<Width>(velocity[slot], out);
-    out += Width;
+void assign(const Numbers<Width, Record>& numbers, Record& v) {
+  std::copy_n(numbers.data(), 3, v.u);
+  if constexpr (Width == 6) std::copy_n(numbers.data() + 3, 3, v.w);
+}
+
+/// Number `k` of those that begin at `from`. One by one: what is copied as a whole goes over the stack.
+template <class Number>
+Number number_at(const std::byte* from, std::size_t k) {
+  Number number;
+  std::memcpy(&number, from + k * sizeof number, sizeof number);
+  return number;
+}
+
+template <std::size_t Width, class Record>
+void write_velocities(std::span<const Record> velocity, std::span<const Slot> slots, std::byte* out) {
+  for (const Slot slot : slots) {
+    const Record& v = velocity[at(slot)];
+    std::memcpy(out, v.u, sizeof v.u);
+    if constexpr (Width == 6) std::memcpy(out + sizeof v.u, v.w, sizeof v.w);
+    out += sizeof(Numbers<Width, Record>);
   }
 }
 
-/// NSCDD between two measurements, what most exchanges are: each shared body takes the mean of its copies.
+/// NSCDD of bodies that have one other copy, most of them: each takes the mean.
 template <std::size_t Width, class Record>
-void take_means(std::span<Record> velocity, std::span<const std::size_t> shared,
-                std::span<const std::int32_t> copies_begin, const double* const* sources) {
-  for (std::size_t s = 0; s < shared.size(); ++s) {
-    const auto begin = at(copies_begin[s]), end = at(copies_begin[s + 1]);
-    if (begin == end) continue;  // a hub
-    Record& v = velocity[shared[s]];
-    double own[Width], sum[Width] = {};
-    read_velocity<Width>(v, own);
-    for (std::size_t c = begin; c < end; ++c) {
-      const double* const from = sources[c] ? sources[c] : own;
-      for (std::size_t k = 0; k < Width; ++k) sum[k] += from[k];
-    }
-    const auto m = static_cast<double>(end - begin);
-    for (double& number : sum) number /= m;
-    assign(Width, sum, v);
+void take_means(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message) {
+  using Number = typename Numbers<Width, Record>::value_type;
+  for (const detail::Pair& pair : pairs) {
+    Record& v = velocity[at(pair.slot)];
+    const std::byte* const other = message + at(pair.place) * sizeof(Numbers<Width, Record>);
+    for (std::size_t k = 0; k < 3; ++k) v.u[k] = (v.u[k] + number_at<Number>(other, k)) / 2;
+    if constexpr (Width == 6)
+      for (std::size_t k = 0; k < 3; ++k) v.w[k] = (v.w[k] + number_at<Number>(other, k + 3)) / 2;
   }
 }
 
@@ -93,13 +93,8 @@ void Gluing::plan(bool rotation) {
       if (side.local < 0) continue;
       const auto e = static_cast<std::int32_t>(&subdomain - subdomains_.data());
       for (const Side& back : subdomains_[at(side.local)].sides)
-        if (back.local == e) side.source = back.link.out.data();
+        if (back.local == e) side.source = detail::bytes_of(back.link.out);
     }
-  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e)
-    for (const CopySource& copy : all.interfaces[e].copies)
-      subdomains_[e].sources.push_back(copy.neighbour < 0 ? nullptr
-                                                          : subdomains_[e].sides[at(copy.neighbour)].source +
-                                                                at(copy.place) * width_);
   plan_centre();
   count_messages();
 }
@@ -110,15 +105,15 @@ void Gluing::plan_sides(std::size_t e) {
   mine.wall_copies.resize(walls_.size());
   if (!all.several()) return;
   const SubdomainInterface& interface = all.interfaces[e];
-  const std::size_t begin = all.slot_begin[e];
-  for (std::int32_t s : interface.shared) mine.shared.push_back(begin + at(s));
+  const auto slot_of = [&](std::int32_t body) { return static_cast<Slot>(all.slot_begin[e] + at(body)); };
+  for (std::int32_t s : interface.shared) mine.shared.push_back(slot_of(s));
   if (settings_.coupling == Coupling::schwarz) mine.base.resize(mine.shared.size() * width_);
   mine.sides.resize(interface.neighbours.size());
   for (std::size_t n = 0; n < mine.sides.size(); ++n) {
     const Neighbour& neighbour = interface.neighbours[n];
     Side& side = mine.sides[n];
     for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
-      side.slots.push_back(begin + at(interface.exchange[at(k)]));
+      side.slots.push_back(slot_of(interface.exchange[at(k)]));
     const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
     const std::size_t length = side.slots.size() * width_;
     side.link.out.resize(length + 1);
@@ -128,7 +123,7 @@ void Gluing::plan_sides(std::size_t e) {
       continue;
     }
     side.link.in.resize(length + 1);
-    side.source = side.link.in.data();
+    side.source = detail::bytes_of(side.link.in);
     const std::int32_t count = all.partition.subdomains;
     side.link.sender =
         ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
@@ -139,6 +134,15 @@ void Gluing::plan_sides(std::size_t e) {
     side.link.in_name = trace::message_name(static_cast<std::uint32_t>(neighbour.subdomain),
                                             static_cast<std::uint32_t>(interface.subdomain));
     side.link.receiver->start();
+  }
+  for (std::size_t s = 0; s < interface.shared.size(); ++s) {
+    const auto copies = std::span(interface.copies)
+                            .subspan(at(interface.copies_begin[s]),
+                                     at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
+    if (copies.size() > 2) mine.corners.push_back(static_cast<std::int32_t>(s));
+    if (copies.size() != 2) continue;  // more, or a hub
+    const CopySource& other = copies[copies[0].neighbour < 0 ? 1 : 0];
+    mine.sides[at(other.neighbour)].pairs.push_back({mine.shared[s], other.place});
   }
 }
 
@@ -189,30 +193,42 @@ std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
   return readers;
 }
 
-template <class Record>
+/// Calls work<width>(velocities) with the records that sweeps work on.
+template <class Work>
+void Gluing::with_bodies(bool single, const Work& work) {
+  const auto with = [&](auto velocity) {
+    if (width_ == 6)
+      work.template operator()<6>(velocity);
+    else
+      work.template operator()<3>(velocity);
+  };
+  if (single)
+    with(std::span(state_.single.velocity));
+  else
+    with(std::span(state_.bodies.velocity));
+}
+
+template <std::size_t Width, class Record>
 void Gluing::publish_bodies(std::size_t e, std::span<const Record> velocity) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
     if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
-    if (width_ == 6)
-      write_velocities<6>(velocity, side.slots, side.link.out.data());
-    else
-      write_velocities<3>(velocity, side.slots, side.link.out.data());
+    write_velocities<Width>(velocity, std::span<const Slot>(side.slots), detail::bytes_of(side.link.out));
   }
   if (mine.hub_item.empty()) return;
-  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
-  for (std::size_t h = 0; h < interface.hubs.size(); ++h)
-    read_velocity(width_, velocity[mine.shared[at(interface.hubs[h])]],
-                  &mine.partial[3 * walls_.size() + h * width_]);
+  double* out = &mine.partial[3 * walls_.size()];
+  for (const std::int32_t hub : state_.decomposition.interfaces[e].hubs) {
+    const Numbers<Width, Record> numbers = numbers_of<Width>(velocity[at(mine.shared[at(hub)])]);
+    out = std::copy(numbers.begin(), numbers.end(), out);
+  }
 }
 
 void Gluing::publish(std::size_t e, Mode mode, bool single) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
-  if (single)
-    publish_bodies<SingleVelocity>(e, state_.single.velocity);
-  else
-    publish_bodies<Velocity>(e, state_.bodies.velocity);
+  with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
+    publish_bodies<Width, Record>(e, velocity);
+  });
   for (Side& side : mine.sides)
     if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
@@ -244,63 +260,82 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
   if (mode == Mode::local || !state_.decomposition.several()) return;
   for (Side& side : mine.sides)
     if (side.link.receiver) await(*side.link.receiver, mine.waited, ranks_.trace(), side.link.in_name);
-  if (single)
-    glue_bodies<SingleVelocity>(e, mode, state_.single.velocity);
-  else
-    glue_bodies<Velocity>(e, mode, state_.bodies.velocity);
+  with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
+    glue_bodies<Width, Record>(e, mode, velocity);
+  });
   for (Side& side : mine.sides)
     if (side.link.receiver) side.link.receiver->start();
 }
 
-template <class Record>
+template <std::size_t Width, class Record>
 void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
+  using Own = Numbers<Width, Record>;
+  using Number = typename Own::value_type;
   Subdomain& mine = subdomains_[e];
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   const bool schwarz = settings_.coupling == Coupling::schwarz;
   JumpSums jump;
-  // One shared body: the sum of its copies becomes what all copies go on with.
-  const auto settle = [&](std::size_t s, const double* sum) {
-    const std::size_t slot = mine.shared[s];
+  // The sum of the copies of interface.shared[s], in order of subdomain.
+  const auto sum_of = [&](std::size_t s) {
+    const Own own = numbers_of<Width>(velocity[at(mine.shared[s])]);
+    Own sum{};
+    for (std::int32_t c = interface.copies_begin[s]; c < interface.copies_begin[s + 1]; ++c) {
+      const CopySource& copy = interface.copies[at(c)];
+      if (copy.neighbour < 0) {
+        for (std::size_t k = 0; k < Width; ++k) sum[k] += own[k];
+        continue;
+      }
+      const std::byte* const from = mine.sides[at(copy.neighbour)].source + at(copy.place) * sizeof own;
+      for (std::size_t k = 0; k < Width; ++k) sum[k] += number_at<Number>(from, k);
+    }
+    return sum;
+  };
+  // That sum becomes what all copies go on with.
+  const auto settle = [&](std::size_t s, const Own& sum) {
+    const std::size_t slot = at(mine.shared[s]);
     Record& v = velocity[slot];
-    const double m = state_.decomposition.multiplicity[slot];
-    std::array<double, 6> next{};
-    double* base = schwarz ? &mine.base[s * width_] : nullptr;
+    const auto m = static_cast<Number>(state_.decomposition.multiplicity[slot]);
+    Own next;
+    double* base = schwarz ? &mine.base[s * Width] : nullptr;
     if (schwarz && mode == Mode::fresh)
-      for (std::size_t k = 0; k < width_; ++k)
+      for (std::size_t k = 0; k < Width; ++k)
         base[k] = k < 3 ? state_.free.u[slot][k] : state_.free.w[slot][k - 3];
-    for (std::size_t k = 0; k < width_; ++k)
-      next[k] = mode == Mode::sum ? sum[k] : schwarz ? base[k] + (sum[k] - m * base[k]) : sum[k] / m;
+    for (std::size_t k = 0; k < Width; ++k)
+      next[k] = mode == Mode::sum ? sum[k]
+                : schwarz         ? static_cast<Number>(base[k] + (sum[k] - m * base[k]))
+                                  : sum[k] / m;
     if (mode == Mode::measured) {
+      const Own now = numbers_of<Width>(v);
       const auto& whole = state_.decomposition.whole[slot];
-      for (std::size_t k = 0; k < width_; ++k) {
-        const double mobility = whole[k < 3 ? 0 : 1];
+      for (std::size_t k = 0; k < Width; ++k) {
+        const double mobility = m * whole[k < 3 ? 0 : 1], change = double{now[k]} - double{next[k]};
         if (mobility == 0) continue;
-        const double now = k < 3 ? v.u[k] : v.w[k - 3];
-        jump.jump2 += (now - next[k]) * (now - next[k]) / (m * mobility);
-        jump.velocity2 += next[k] * next[k] / (m * mobility);
+        jump.jump2 += change * change / mobility;
+        jump.velocity2 += double{next[k]} * double{next[k]} / mobility;
       }
     }
-    assign(width_, next.data(), v);
-    if (schwarz && mode != Mode::sum) std::copy_n(next.begin(), width_, base);
+    assign<Width>(next, v);
+    if (schwarz && mode != Mode::sum) std::copy(next.begin(), next.end(), base);
   };
   if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
-    const auto means = width_ == 6 ? take_means<6, Record> : take_means<3, Record>;
-    means(velocity, mine.shared, interface.copies_begin, mine.sources.data());
-  } else {
-    for (std::size_t s = 0; s < interface.shared.size(); ++s) {
-      const auto begin = at(interface.copies_begin[s]), end = at(interface.copies_begin[s + 1]);
-      if (begin == end) continue;  // a hub
-      std::array<double, 6> sum{}, own;
-      read_velocity(width_, velocity[mine.shared[s]], own.data());
-      for (std::size_t c = begin; c < end; ++c) {
-        const double* const from = mine.sources[c] ? mine.sources[c] : own.data();
-        for (std::size_t k = 0; k < width_; ++k) sum[k] += from[k];
-      }
-      settle(s, sum.data());
+    for (const Side& side : mine.sides)
+      take_means<Width>(velocity, std::span<const detail::Pair>(side.pairs), side.source);
+    for (const std::int32_t s : mine.corners) {
+      Own mean = sum_of(at(s));
+      const auto m = static_cast<Number>(interface.copies_begin[at(s) + 1] - interface.copies_begin[at(s)]);
+      for (Number& number : mean) number /= m;
+      assign<Width>(mean, velocity[at(mine.shared[at(s)])]);
     }
+  } else {
+    for (std::size_t s = 0; s < mine.shared.size(); ++s)
+      if (interface.copies_begin[s] < interface.copies_begin[s + 1]) settle(s, sum_of(s));
   }
-  for (std::size_t h = 0; h < interface.hubs.size(); ++h)
-    settle(at(interface.hubs[h]), &centre_->sums[3 * walls_.size() + mine.hub_item[h] * width_]);
+  for (std::size_t h = 0; h < interface.hubs.size(); ++h) {
+    const double* const from = &centre_->sums[3 * walls_.size() + mine.hub_item[h] * Width];
+    Own sum;
+    for (std::size_t k = 0; k < Width; ++k) sum[k] = static_cast<Number>(from[k]);
+    settle(at(interface.hubs[h]), sum);
+  }
   if (mode == Mode::measured) jumps_[e] = jump;
 }
 
@@ -310,8 +345,8 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
   const auto each_shared = [&](const auto& work) {
     std::size_t k = 0;
     for (std::size_t e = 0; e < subdomains_.size(); ++e)
-      for (const std::size_t slot : subdomains_[e].shared)
-        work(state_.bodies.velocity[slot], field[e][slot - all.slot_begin[e]], k++);
+      for (const Slot slot : subdomains_[e].shared)
+        work(state_.bodies.velocity[at(slot)], field[e][at(slot) - all.slot_begin[e]], k++);
   };
   const auto wall = [&](std::size_t e, std::size_t g) -> Vec3& {
     return field[e][field[e].size() - walls_.size() + g].u;

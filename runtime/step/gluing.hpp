@@ -71,8 +71,8 @@ class Gluing {
   /// bodies in order of slot, then those walls; w is summed only if plan() was told of rotation.
   void sum_copies(std::span<std::vector<Twist>> field);
 
-  /// `single`: of the velocities that sweeps in single precision work on (StepState::single). They travel,
-  /// and are added up, in double precision.
+  /// `single`: of the velocities that sweeps in single precision work on (StepState::single), which travel
+  /// and are added up as they are.
   void publish(std::size_t e, Mode mode, bool single = false);
   void collect(Mode mode);
   void centre(Mode mode);
@@ -95,9 +95,11 @@ class Gluing {
   void count_messages();
   void send_up();
   void answer();
-  template <class Record>
+  template <class Work>
+  void with_bodies(bool single, const Work& work);
+  template <std::size_t Width, class Record>
   void publish_bodies(std::size_t e, std::span<const Record> velocity);
-  template <class Record>
+  template <std::size_t Width, class Record>
   void glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity);
 
   StepState& state_;

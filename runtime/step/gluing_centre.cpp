@@ -25,7 +25,7 @@ void Gluing::plan_centre() {
   for (std::size_t e = 0; e < all.here.size() && all.several(); ++e) {
     const SubdomainInterface& interface = all.interfaces[e];
     for (std::int32_t hub : interface.hubs) {
-      const std::size_t slot = subdomains_[e].shared[at(hub)];
+      const std::size_t slot = at(subdomains_[e].shared[at(hub)]);
       mine.push_back({all.here[e], static_cast<std::int64_t>(state_.bodies.id[slot])});
     }
   }

@@ -312,8 +312,10 @@ void StepGraph::plan_epochs() {
   for (std::size_t c = 0; c < count; ++c)
     turns.push_back({chunks.boundary[c] == 0, static_cast<std::uint32_t>(chunks.subdomain[c]),
                      static_cast<std::uint32_t>(chunks.colour[c])});
-  const graph::LoopColours colours = graph::loop_colours(turns, decomposition_.overlap, executor_.threads());
-  const auto in_tree = graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.publish, colours.glue);
+  const graph::LoopColours colours =
+      graph::loop_colours(turns, here, decomposition_.overlap, executor_.threads());
+  const auto in_tree =
+      graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.publish.back(), colours.glue);
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
@@ -329,7 +331,7 @@ void StepGraph::plan_epochs() {
   }
   if (gluing.needed()) {
     for (std::size_t e = 0; e < here; ++e) {
-      colour[publish(e)] = colours.publish;
+      colour[publish(e)] = colours.publish[e];
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
       for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
         neighbour.push_back(task);

@@ -96,7 +96,7 @@ class Builder {
       if (inside && group.glue != none && plan.colour[group.glue] < node.colour) overlap = false;
       turns.push_back({inside, static_cast<std::uint32_t>(at), node.colour});
     }
-    graph::LoopColours colours = graph::loop_colours(turns, overlap, machine_.threads);
+    graph::LoopColours colours = graph::loop_colours(turns, mine.size(), overlap, machine_.threads);
     for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
   }
@@ -139,11 +139,12 @@ class Builder {
     const graph::LoopColours colours = colours_of(first, mine);
     std::uint32_t publishes = 0;
     bool glued = false;
-    for (std::size_t g : mine) {
+    for (std::size_t at = 0; at < mine.size(); ++at) {
+      const std::size_t g = mine[at];
       if (group_[g].publish == none) continue;
       group_[g].new_publish = add_node(rank, group_[g].source, group_[g].publish);
       out_.nodes.back().worker = owner_of(g);
-      out_.nodes.back().colour = colours.publish;
+      out_.nodes.back().colour = colours.publish[at];
       ++publishes;
       glued = true;
     }
@@ -152,7 +153,7 @@ class Builder {
     collect_.push_back(none);
     if (!glued) return;
     const int own = static_cast<int>(rank);
-    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.publish, colours.glue);
+    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.publish.back(), colours.glue);
     const auto add = [&](std::uint32_t colour) {
       out_.nodes.push_back(centre_node(rank, colour));
       out_.nodes.back().worker = worker(0);

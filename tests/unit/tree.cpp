@@ -61,23 +61,29 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
 using graph::ChunkTurn;
 using graph::loop_colours;
 
-TEST(LoopColours, GoThroughTheBordersThenPublishThenTheInsidesSubdomainAfterSubdomain) {
+TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
   const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 2}, {true, 0, 2},
                                         {false, 1, 0}, {true, 1, 2},  {true, 1, 3}};
-  const graph::LoopColours hidden = loop_colours(turns, true, 1), bare = loop_colours(turns, false, 1);
-  EXPECT_EQ(hidden.chunk, (std::vector<std::uint32_t>{0, 2, 8, 8, 4, 10, 12}));
-  EXPECT_EQ(hidden.publish, 6U);
-  EXPECT_EQ(hidden.glue, 14U);
-  EXPECT_EQ(bare.chunk, (std::vector<std::uint32_t>{0, 2, 10, 10, 4, 12, 14}));
-  EXPECT_EQ(bare.glue, 8U);
+  const graph::LoopColours colours = loop_colours(turns, 3, true, 1);
+  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
+  EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
+  EXPECT_EQ(colours.glue, 18U);
+}
+
+TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
+  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {true, 0, 2}, {false, 1, 0}, {true, 1, 2}};
+  const graph::LoopColours colours = loop_colours(turns, 2, false, 1);
+  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 2, 12}));
+  EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 6}));
+  EXPECT_EQ(colours.glue, 8U);
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
   const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 7},
                                         {false, 1, 4}, {true, 1, 9},  {true, 1, 12}};
-  const graph::LoopColours colours = loop_colours(turns, true, 2);
+  const graph::LoopColours colours = loop_colours(turns, 2, true, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
-  EXPECT_EQ(colours.publish, 4U);
+  EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
   EXPECT_EQ(colours.glue, 10U);
 }
 
@@ -86,15 +92,15 @@ TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
                                       {true, 1, 3},  {true, 1, 5}, {true, 2, 3}};
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
-      const graph::LoopColours among = loop_colours(all, true, threads_then);
+      const graph::LoopColours among = loop_colours(all, 3, true, threads_then);
       std::vector<ChunkTurn> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
           alone.push_back({all[k].inside, 0, all[k].colour});
-          again.push_back({among.publish < among.chunk[k], 0, among.chunk[k]});
+          again.push_back({among.publish[1] < among.chunk[k], 0, among.chunk[k]});
         }
-      const graph::LoopColours here = loop_colours(alone, true, threads),
-                               replayed = loop_colours(again, true, threads);
+      const graph::LoopColours here = loop_colours(alone, 1, true, threads),
+                               replayed = loop_colours(again, 1, true, threads);
       EXPECT_EQ(here.chunk, replayed.chunk);
       EXPECT_EQ(here.glue, replayed.glue);
     }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "runtime/step/gluing.hpp"
@@ -39,6 +40,20 @@ struct Link {
   std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
 };
 
+/// Messages hold numbers of the precision that sweeps work in, which may be half as long.
+inline const std::byte* bytes_of(const std::vector<double>& buffer) {
+  return std::as_bytes(std::span(buffer)).data();
+}
+inline std::byte* bytes_of(std::vector<double>& buffer) {
+  return std::as_writable_bytes(std::span(buffer)).data();
+}
+
+/// A body with one other copy, and that copy's place in the message.
+struct Pair {
+  Slot slot;
+  std::int32_t place;
+};
+
 inline constexpr int centre_tag = graph::Communicator::first_tag;
 inline int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
   return centre_tag + 1 + from * subdomains + to;
@@ -50,18 +65,18 @@ namespace talus {
 
 /// Towards one neighbour.
 struct Gluing::Side {
-  std::vector<std::size_t> slots;  ///< of the bodies in the message, in its order
-  detail::Link link;               ///< `in` and the channels: of neighbours on other ranks only
-  const double* source = nullptr;  ///< the neighbour's message to this subdomain
-  std::int32_t local = -1;         ///< the neighbour's place here, -1 on another rank
+  std::vector<Slot> slots;            ///< of the bodies in the message, in its order
+  std::vector<detail::Pair> pairs;    ///< those in it that stand in no third subdomain
+  detail::Link link;                  ///< `in` and the channels: of neighbours on other ranks only
+  const std::byte* source = nullptr;  ///< the neighbour's message to this subdomain
+  std::int32_t local = -1;            ///< the neighbour's place here, -1 on another rank
 };
 
 struct Gluing::Subdomain {
   std::vector<Side> sides;
-  std::vector<std::size_t> shared;  ///< slots
-  std::vector<const double*>
-      sources;               ///< per copy of `interface.copies`: where it is read; null: the own one
-  std::vector<double> base;  ///< Schwarz: velocities after the last gluing, per shared body
+  std::vector<Slot> shared;           ///< slots of `interface.shared`
+  std::vector<std::int32_t> corners;  ///< indices into `shared`: in three subdomains or more, and no hub
+  std::vector<double> base;           ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
   std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
   std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
