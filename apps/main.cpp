@@ -24,6 +24,17 @@
 
 namespace {
 
+/// From "KIND=X", each.
+void set_speeds(const std::vector<std::string>& given, talus::trace::Machine& machine) {
+  for (const std::string& text : given) {
+    const std::size_t sign = text.find('=');
+    double speed = 0;
+    if (sign == std::string::npos || !CLI::detail::lexical_cast(text.substr(sign + 1), speed))
+      throw CLI::ValidationError("--speed-of", "'" + text + "' is not KIND=X, as in glue=3");
+    machine.speed_of[text.substr(0, sign)] = speed;
+  }
+}
+
 void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_option("--ranks", replay.ranks, "ranks [as recorded]")->type_name("R");
   app.add_option("--threads", replay.threads, "threads of a rank [as recorded]")->type_name("T");
@@ -48,6 +59,11 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_option("--seed", replay.machine.seed, "of the noise")->capture_default_str();
   app.add_option("--speed", replay.machine.speed, "of a core, relative to the recorded one")
       ->capture_default_str();
+  app.add_option_function<std::vector<std::string>>(
+         "--speed-of",
+         [&replay](const std::vector<std::string>& given) { set_speeds(given, replay.machine); },
+         "the same for one kind of tasks, instead: glue=3")
+      ->type_name("KIND=X");
   app.add_option("--contacts-scale", replay.machine.contacts,
                  "contacts per subdomain, relative to the recorded ones")
       ->capture_default_str();

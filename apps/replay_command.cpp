@@ -48,8 +48,8 @@ void report(const ReplayOptions& options, const trace::Timeline& timeline, const
   const trace::Trace& recorded = timeline.trace();
   const bool same = machine.ranks == recorded.ranks && machine.threads == recorded.threads &&
                     machine.map == trace::RankMap::block && machine.schedule == trace::Schedule::fixed &&
-                    machine.speed == 1 && machine.contacts == 1 && machine.noise == 0 && !machine.typical &&
-                    machine.quantile == 0;
+                    machine.speed == 1 && machine.speed_of.empty() && machine.contacts == 1 &&
+                    machine.noise == 0 && !machine.typical && machine.quantile == 0;
   const char* label = same ? "" : "predicted";
   const trace::Replay played = trace::replay(timeline, machine, true);
   trace::Machine chain = machine;

@@ -389,9 +389,10 @@ Section<DecompositionSettings> decomposition_keys() {
           key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
                  &D::sweeps_per_exchange),
           choice<D>(
-              "balance", {"contacts", "time"},
-              "What subdomains get equal shares of. `time`: measured time of their sweeps, for cores of "
-              "unequal speed; results then differ from run to run.",
+              "balance", {"work", "contacts", "time"},
+              "What subdomains get equal shares of. `work`: contacts, and what it takes to glue their "
+              "interfaces; `time`: measured time of their sweeps, for cores of unequal speed; results then "
+              "differ from run to run.",
               &D::balance),
           key<D>("repartition_every", "", countable,
                  "Steps after which space is cut anew, with the next broad phase.", &D::repartition_every),

@@ -190,6 +190,7 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
   if (partition_anew) {
     std::int64_t all[1] = {static_cast<std::int64_t>(candidates.size())};
     ranks.sum(all);
+    decomposition.blind = all[0] == 0;
     const Partition before = decomposition.partition;
     const bool first = before.tree.cuts.empty() && before.table.subdomain.empty();
     PartitionOptions options = partition_options(settings, before.subdomains);

@@ -38,6 +38,7 @@ struct Decomposition {
   std::int64_t migrants = 0;  ///< bodies that came to a subdomain where they did not stand, all ranks
   double imbalance = 0;       ///< candidates of the fullest subdomain over the mean, less 1
   std::vector<double> cost;   ///< of a candidate, per subdomain, the mean being 1; empty: all equal
+  bool blind = false;         ///< space was cut when no candidate was known
 
   bool several() const { return partition.subdomains > 1; }
 };

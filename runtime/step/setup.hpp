@@ -95,6 +95,7 @@ enum class ExchangeScheme {
 
 /// What subdomains are to have equal shares of.
 enum class BalanceBy {
+  work,      ///< candidates, and what it takes to glue the interface, in candidates
   contacts,  ///< candidates
   time,  ///< measured time of their sweeps: for cores of unequal speed. The partition, and with it the bits
          ///< of the results, then depends on the machine's day
@@ -114,7 +115,7 @@ struct DecompositionSettings {
   std::array<std::int64_t, 3> boxes{};  ///< per axis, for the partitioners that cut boxes; zeros: chosen
   SubdomainMapping mapping = SubdomainMapping::block;
   int sweeps_per_exchange = 1;  ///< n_GS >= 1
-  BalanceBy balance = BalanceBy::contacts;
+  BalanceBy balance = BalanceBy::work;
   int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
   double max_imbalance = 0.2;  ///< contacts of the fullest over those of the mean subdomain, less 1: beyond
                                ///< it candidates are found and space is cut anew at once

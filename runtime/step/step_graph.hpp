@@ -93,7 +93,8 @@ class StepGraph {
   double margin_of(const Wall& wall) const;
   bool walls_left_margin() const;
   bool out_of_balance() const;
-  std::vector<double> measured_costs() const;
+  std::vector<double> work() const;
+  std::vector<double> costs(std::span<const double> work) const;
 
   StepState& state_;
   const StepParameters& parameters_;
@@ -113,7 +114,7 @@ class StepGraph {
   Surroundings around_;                       ///< several subdomains: whom the candidates are found among
   std::int64_t all_candidates_ = 0;           ///< of all ranks
   std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
-  double imbalance_then_ = 0;                 ///< what it was made against
+  double imbalance_then_ = 0;                 ///< the least since it was made
   CellGrid cells_;
   std::vector<double> wall_margin_;        ///< at the last broad phase [m]
   std::vector<std::vector<Leaver>> left_;  ///< per lane: grains that have used up their margins

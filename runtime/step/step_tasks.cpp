@@ -48,42 +48,64 @@ SlotRange StepGraph::slots(std::uint32_t lane) const {
 }
 
 bool StepGraph::partition_due() const {
-  return state_.decomposition.several() &&
-         (steps_ - partitioned_ >= decomposition_.repartition_every || out_of_balance());
+  return steps_ - partitioned_ >= decomposition_.repartition_every || out_of_balance();
 }
 
-/// Not if the last partition was made against it in vain: the sample may not be divisible any better.
+/// Not where it has not been much less since the last cut: the sample may not be divisible any better; nor
+/// where contacts are so few that their places are chance. What was cut before there were candidates is cut
+/// again when there are.
 bool StepGraph::out_of_balance() const {
+  constexpr std::int64_t few = 16;
+  if (!state_.decomposition.several()) return false;
+  const std::int64_t contacts = iteration_.result().contacts;
+  if (state_.decomposition.blind && contacts > 0) return true;
   const double imbalance = iteration_.imbalance();
-  return state_.decomposition.several() && imbalance > decomposition_.max_imbalance &&
-         imbalance > 1.25 * imbalance_then_;
+  return contacts > few * state_.decomposition.partition.subdomains &&
+         imbalance > decomposition_.max_imbalance && imbalance > 1.25 * imbalance_then_;
 }
 
-/// Per subdomain: the time of a candidate over the mean, from the time of all ranks since the candidates are
-/// these.
-std::vector<double> StepGraph::measured_costs() const {
+/// Per subdomain here, in candidates: those it has, and what its interface takes besides
+/// (docs/performance.md, "Scaling, predicted"). The same on any ranks.
+std::vector<double> StepGraph::work() const {
+  constexpr double wall = 1,  // more than between grains
+      copy = 1.3,             // to send one and to take one
+      neighbour = 100;        // a message sent and one taken, 0.3 us each
+  std::vector<double> work;
+  for (const SubdomainInterface& interface : state_.decomposition.interfaces)
+    work.push_back(copy * static_cast<double>(interface.exchange.size()) +
+                   neighbour * static_cast<double>(interface.neighbours.size()));
+  const Chunks& chunks = state_.chunks;
+  for (std::size_t c = 0; c < chunks.size(); ++c)
+    work[static_cast<std::size_t>(chunks.subdomain[c])] +=
+        (chunks.wall[c] < 0 ? 1 : 1 + wall) * (chunks.begin[c + 1] - chunks.begin[c]);
+  return work;
+}
+
+/// Per subdomain: the work of a candidate over the mean, from the work of those here. Collective.
+std::vector<double> StepGraph::costs(std::span<const double> work) const {
   struct Row {
-    double subdomain, busy, candidates;
+    double subdomain, work, candidates;
   };
   const Decomposition& all = state_.decomposition;
-  const std::vector<double> busy = iteration_.busy();
   std::vector<Row> rows;
   for (std::size_t e = 0; e < all.here.size(); ++e)
-    rows.push_back({static_cast<double>(all.here[e]), busy[e], 0});
+    rows.push_back({static_cast<double>(all.here[e]), work[e], 0});
   for (std::size_t c = 0; c < state_.chunks.size(); ++c)
     rows[static_cast<std::size_t>(state_.chunks.subdomain[c])].candidates +=
         state_.chunks.begin[c + 1] - state_.chunks.begin[c];
   rows = ranks_.gather_records(std::span<const Row>(rows));
-  double time = 0, candidates = 0;
+  // In order of subdomain: the same sums on any ranks.
+  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return a.subdomain < b.subdomain; });
+  double sum = 0, candidates = 0;
   for (const Row& row : rows) {
-    time += row.busy;
+    sum += row.work;
     candidates += row.candidates;
   }
-  if (time == 0 || candidates == 0) return {};
+  if (sum == 0 || candidates == 0) return {};
   std::vector<double> cost(static_cast<std::size_t>(all.partition.subdomains), 1.0);
   for (const Row& row : rows)
     if (row.candidates > 0)
-      cost[static_cast<std::size_t>(row.subdomain)] = row.busy / row.candidates * (candidates / time);
+      cost[static_cast<std::size_t>(row.subdomain)] = row.work / row.candidates * (candidates / sum);
   return cost;
 }
 
@@ -150,13 +172,15 @@ bool StepGraph::candidates_hold() const {
 void StepGraph::make_cells() {
   const double h = parameters_.time_step;
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
+  if (steps_ == partitioned_ + 1 || iteration_.imbalance() < imbalance_then_)
+    imbalance_then_ = iteration_.imbalance();
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   Bodies& bodies = state_.bodies;
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
-  // Grains that fly between others use up half a skin at once: they get one more, or their way of three
-  // steps.
+  // Grains that fly between others use up half a skin at once: they get one more, or their way
+  // of three steps.
   for (std::size_t s = 0; s < bodies.size(); ++s) {
     const double v = speed(bodies.velocity[s]);
     reach[s] = bodies.radius[s] + half_skin + contact_margin(v, h, parameters_.alert) +
@@ -178,8 +202,9 @@ void StepGraph::make_cells() {
     const bool anew = first || partition_due();
     if (anew) {
       partitioned_ = steps_;
-      imbalance_then_ = iteration_.imbalance();
-      if (decomposition_.balance == BalanceBy::time) state_.decomposition.cost = measured_costs();
+      if (!first && decomposition_.balance != BalanceBy::contacts)
+        state_.decomposition.cost =
+            costs(decomposition_.balance == BalanceBy::time ? iteration_.busy() : work());
     }
     make_room();
     const double began = graph::seconds_now();

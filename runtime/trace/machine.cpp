@@ -94,6 +94,12 @@ void validate(const Machine& machine, const Trace& trace) {
   demand_not_negative(machine.quantile, "quantile");
   if (machine.quantile > 1) refuse(fmt::format("quantile must not be above 1, got {}", machine.quantile));
   demand_positive(machine.speed, "speed");
+  for (const auto& [kind, speed] : machine.speed_of) {
+    demand_positive(speed, ("speed of " + kind).c_str());
+    if (std::none_of(trace.kinds.begin(), trace.kinds.end(),
+                     [&](const KindInfo& info) { return info.name == kind; }))
+      refuse(fmt::format("speed of '{}': no task is called that (talus trace show lists them)", kind));
+  }
   demand_positive(machine.contacts, "contacts scale");
 }
 

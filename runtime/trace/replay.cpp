@@ -49,6 +49,7 @@ class Player {
                Network(machine_),
                Log(machine_, keep ? &out_.trace : nullptr),
                {},
+               speeds(machine_, trace_),
                trace_.predicted ? 0 : dispatch_time(trace_)} {
     validate(machine_, trace_);
     if (groups_.empty()) groups_.push_back(0);
@@ -161,8 +162,8 @@ class Player {
                                         : info.collectives +
                                               (part.exists() ? trace_.info(timed.part_kind).collectives : 0));
     }
-    const double scale =
-        machine_.contacts / machine_.speed * stage_.stretch(index.step, r, ~std::uint64_t{number});
+    const double scale = machine_.contacts / stage_.speed_of(task.task.kind) *
+                         stage_.stretch(index.step, r, ~std::uint64_t{number});
     timed.work *= scale;
     timed.part *= scale;
     return timed;
@@ -202,8 +203,8 @@ class Player {
     for (std::size_t r = 0; r < now.size(); ++r)
       for (std::size_t s = 0; s < index.ranks.size(); ++s) {
         if (!index.ranks[s].outside.exists()) continue;
-        worked[r] +=
-            share(r, s) * stage_.timeline.self(index.ranks[s].outside) * machine_.contacts / machine_.speed;
+        worked[r] += share(r, s) * stage_.timeline.self(index.ranks[s].outside) * machine_.contacts /
+                     stage_.speed_of(kind_outside);
         any = true;
       }
     if (!any) return;
@@ -295,8 +296,10 @@ class Player {
   /// Adds what all ranks did together within the check of recorded epoch e. As long as the rank with the
   /// largest share needs; threads that wait help.
   void do_together(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
-    const double part = machine_.contacts / machine_.speed * trace_.threads / machine_.threads;
     for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
+      const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
+      const double part =
+          machine_.contacts / stage_.speed_of(record.kind()) * trace_.threads / machine_.threads;
       double most = 0;
       for (std::size_t r = 0; r < static_cast<std::size_t>(machine_.ranks); ++r) {
         double work = 0;
@@ -305,7 +308,6 @@ class Player {
             work += share(r, s) * stage_.timeline.self(index.ranks[s].whole[e][k]);
         most = std::max(most, work * part);
       }
-      const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
       epoch.spans.push_back({epoch.whole, epoch.whole + most, record.node, record.kind()});
       epoch.whole += most;
       if (machine_.ranks == 1) continue;

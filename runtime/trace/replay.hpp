@@ -4,6 +4,8 @@
 /// follows from the plan, and messages between ranks are modelled (docs/theory.md, "Replay").
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <string_view>
 
 #include "runtime/trace/timeline.hpp"
@@ -43,6 +45,9 @@ struct Machine {
   double noise = 0;    ///< each task takes up to this part longer, evenly distributed
   std::uint64_t seed = 1;  ///< of the noise
   double speed = 1;        ///< of a core, relative to the recorded one
+  std::map<std::string, double>
+      speed_of;          ///< by the name of a kind of tasks, which it holds for instead: what
+                         ///< was recorded out of the cache gains more from caches than others
   double contacts = 1;   ///< per subdomain, relative to the recorded ones: chunks take longer in proportion,
                          ///< messages grow as the faces, with the power 2/3
   bool typical = false;  ///< a node that took more than three times its median of the step took the median,

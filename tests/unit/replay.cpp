@@ -310,6 +310,20 @@ TEST(Replay, NoMachineBeatsItsBounds) {
     }
 }
 
+TEST(Replay, KindsOfTasksMayHaveSpeedsOfTheirOwn) {
+  const Trace trace = test::two_subdomains(1);
+  const double alone = makespan(trace, bare(1, 1));
+  Machine machine = bare(1, 1);
+  machine.speed = 2;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), alone / 2);
+  double publishes = 0;
+  for (const Record& record : trace.lanes[0].records)
+    if (trace.info(record.kind()).name == "publish") publishes += static_cast<double>(record.duration);
+  ASSERT_GT(publishes, 0);
+  machine.speed_of["publish"] = 4;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), (alone - publishes) / 2 + publishes / 4);
+}
+
 TEST(Replay, RefusesMachinesThatMakeNoSense) {
   const Trace trace = test::two_subdomains(1);
   EXPECT_THROW(makespan(trace, bare(3, 1)), std::invalid_argument);  // more ranks than subdomains
@@ -317,6 +331,9 @@ TEST(Replay, RefusesMachinesThatMakeNoSense) {
   Machine slow = bare(1, 1);
   slow.bandwidth = 0;
   EXPECT_THROW(makespan(trace, slow), std::invalid_argument);
+  Machine misspelt = bare(1, 1);
+  misspelt.speed_of["swep"] = 2;
+  EXPECT_THROW(makespan(trace, misspelt), std::invalid_argument);
   EXPECT_THROW(rank_map_named("random"), std::invalid_argument);
 }
 

@@ -32,9 +32,9 @@ NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node
       index.ranks[static_cast<std::size_t>(node.source_rank)].at(epoch.source, node.source_node);
   if (!place.exists()) return {};
   if (node.waits_only) return {0, true, stage.timeline.record(place).kind()};
-  const double scale = (node.role == Role::compute ? stage.machine.contacts : 1.0) / stage.machine.speed *
-                       stage.stretch(index.step, number, number_of_epoch);
   const Kind kind = stage.timeline.record(place).kind();
+  const double scale = (node.role == Role::compute ? stage.machine.contacts : 1.0) / stage.speed_of(kind) *
+                       stage.stretch(index.step, number, number_of_epoch);
   double work = stage.timeline.self(place);
   if (stage.machine.typical || stage.machine.quantile > 0) {
     const auto usual = static_cast<double>(
@@ -56,6 +56,15 @@ float quantile_of(std::vector<float>& list, double part) {
 }
 
 }  // namespace
+
+std::vector<double> speeds(const Machine& machine, const Trace& trace) {
+  std::vector<double> speed;
+  for (const KindInfo& info : trace.kinds) {
+    const auto own = machine.speed_of.find(info.name);
+    speed.push_back(own == machine.speed_of.end() ? machine.speed : own->second);
+  }
+  return speed;
+}
 
 std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
                                                               const StepIndex& index, double quantile) {
@@ -119,7 +128,7 @@ double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& ep
     else if (!all.empty())
       work = std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
   }
-  return work / stage.machine.speed;
+  return work / stage.speed_of(kind_check);
 }
 
 void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double begin,

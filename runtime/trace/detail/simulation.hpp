@@ -52,11 +52,16 @@ struct Stage {
   /// With Machine::typical or quantile, of the step: per recorded rank and kind, the median of each node, or
   /// that quantile [ns].
   std::vector<std::map<Kind, std::vector<float>>> typical{};
-  double dispatch = 0;  ///< from the end of one node to the beginning of the next on a thread [ns]
+  std::vector<double> speed{};  ///< per kind
+  double dispatch = 0;          ///< from the end of one node to the beginning of the next on a thread [ns]
 
+  double speed_of(Kind kind) const { return speed[static_cast<std::size_t>(kind)]; }
   /// Factor on the work of a task, by what it is: the same in every replay of the same seed.
   double stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const;
 };
+
+/// What Stage::speed holds.
+std::vector<double> speeds(const Machine& machine, const Trace& trace);
 
 /// What Stage::typical holds for a step.
 std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
