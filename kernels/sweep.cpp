@@ -270,24 +270,25 @@ template <bool Friction>
 inline void add_error(ErrorSums& sums, const Contacts& c, std::size_t k, V3<double> n, V3<double> v,
                       double w_nn, double mu) {
   const double v_0 = dot(v, n), v_n = v_0 + c.bias[k];
-  double e, r_n;
+  double e2, r_n;
   if constexpr (Friction) {
     const V3<double> r{c.rx[k], c.ry[k], c.rz[k]};
     const V3<double> v_t = v - v_0 * n;
     const V3<double> v_hat = v_t + (v_n + mu * std::sqrt(dot(v_t, v_t))) * n;
-    const V3<double> miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
-    e = w_nn * std::sqrt(dot(miss, miss));
+    const V3<double> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
+    e2 = dot(miss, miss);
     r_n = dot(r, n);
-    sums.impulse2 += dot(r, r) * (w_nn * w_nn);
+    sums.impulse2 += dot(p, p);
     if (r_n > 0 || v_n < 0) sums.velocity2 += dot(v_t, v_t) + v_n * v_n;
   } else {
     r_n = c.rn[k];
-    e = w_nn * std::abs(r_n - positive_part(r_n - v_n / w_nn));
-    sums.impulse2 += r_n * r_n * (w_nn * w_nn);
+    const double p = w_nn * r_n, miss = p - positive_part(p - v_n);
+    e2 = miss * miss;
+    sums.impulse2 += p * p;
     if (r_n > 0 || v_n < 0) sums.velocity2 += v_n * v_n;
   }
-  sums.residual2 += e * e;
-  sums.residual_max = std::max(sums.residual_max, e);
+  sums.residual2 += e2;
+  sums.residual_max2 = std::max(sums.residual_max2, e2);
   ++sums.contacts;
   if (r_n > 0) ++sums.active;
 }
@@ -419,7 +420,7 @@ ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<con
 
 void ErrorSums::add(const ErrorSums& other) {
   residual2 += other.residual2;
-  residual_max = std::max(residual_max, other.residual_max);
+  residual_max2 = std::max(residual_max2, other.residual_max2);
   impulse2 += other.impulse2;
   velocity2 += other.velocity2;
   for (int c = 0; c < 3; ++c) wall_impulse[c] += other.wall_impulse[c];

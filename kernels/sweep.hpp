@@ -79,7 +79,7 @@ void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Vel
 /// Sums of the certificate over some contacts. Add them in a fixed order only.
 struct ErrorSums {
   double residual2 = 0;      ///< sum of e^2 [m^2/s^2]
-  double residual_max = 0;   ///< max of e [m/s]
+  double residual_max2 = 0;  ///< max of e^2 [m^2/s^2]
   double impulse2 = 0;       ///< sum of (|r|/rho)^2 [m^2/s^2]
   double velocity2 = 0;      ///< sum of |v + b n|^2 over contacts that carry or close [m^2/s^2]
   double wall_impulse[3]{};  ///< sum of r at a wall, on the grains [N s]

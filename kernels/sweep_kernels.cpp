@@ -87,7 +87,7 @@ MomentumView view(const SweepMomentum& m) {
 ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
   ErrorSums sums;
   sums.residual2 = totals.residual2;
-  sums.residual_max = totals.residual_max;
+  sums.residual_max2 = totals.residual_max2;
   sums.impulse2 = totals.impulse2;
   sums.velocity2 = totals.velocity2;
   std::copy_n(totals.wall_impulse, 3, sums.wall_impulse);

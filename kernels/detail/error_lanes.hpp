@@ -12,7 +12,7 @@ namespace {
 
 template <class V>
 struct ErrorLanes {
-  V residual2{}, residual_max{}, impulse2{}, velocity2{};
+  V residual2{}, residual_max2{}, impulse2{}, velocity2{};
   Space<V> wall_impulse{};
   V active{};
 };
@@ -34,27 +34,27 @@ template <bool Friction, class V, class Only>
 [[gnu::always_inline]] inline void add_error(const Slice<double>& c, Only only, const Space<V>& n,
                                              const Space<V>& v, V w_nn, double mu, ErrorLanes<V>& sums) {
   const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias, 0, only);
-  V e, r_n, carried;
+  V e2, r_n, carried;
   if constexpr (Friction) {
     const Space<V> r = load_impulse<true, V>(c, 0, only, n);
     const Space<V> v_t = v - v_0 * n;
     const V v_t2 = dot(v_t, v_t);
     const Space<V> v_hat = v_t + (v_n + mu * root(v_t2)) * n;
-    const Space<V> miss = r - project_on_cone(r - (1 / w_nn) * v_hat, n, mu);
-    e = w_nn * root(dot(miss, miss));
+    const Space<V> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
+    e2 = dot(miss, miss);
     r_n = dot(r, n);
-    sums.impulse2 += dot(r, r) * (w_nn * w_nn);
+    sums.impulse2 += dot(p, p);
     carried = v_t2 + v_n * v_n;
   } else {
     r_n = load<V>(c.rn, 0, only);
-    const V next = r_n - v_n / w_nn;
-    e = w_nn * absolute(r_n - 0.5 * (next + absolute(next)));
-    sums.impulse2 += r_n * r_n * (w_nn * w_nn);
+    const V p = w_nn * r_n, next = p - v_n, miss = p - 0.5 * (next + absolute(next));
+    e2 = miss * miss;
+    sums.impulse2 += p * p;
     carried = v_n * v_n;
   }
   sums.velocity2 += (r_n > 0) | (v_n < 0) ? carried : V{};
-  sums.residual2 += e * e;
-  sums.residual_max = sums.residual_max < e ? e : sums.residual_max;
+  sums.residual2 += e2;
+  sums.residual_max2 = sums.residual_max2 < e2 ? e2 : sums.residual_max2;
   sums.active += r_n > 0 ? V{} + 1.0 : V{};
 }
 
@@ -75,8 +75,8 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
   for (const ErrorLanes<Lanes<W>>& part : sums)
     for (int l = 0; l < W; ++l) {
       total.residual2 += part.residual2[l];
-      total.residual_max =
-          total.residual_max < part.residual_max[l] ? part.residual_max[l] : total.residual_max;
+      total.residual_max2 =
+          total.residual_max2 < part.residual_max2[l] ? part.residual_max2[l] : total.residual_max2;
       total.impulse2 += part.impulse2[l];
       total.velocity2 += part.velocity2[l];
       total.wall_impulse[0] += part.wall_impulse.x[l];

@@ -313,7 +313,7 @@ std::vector<double> Iteration::rows_of_subdomains() const {
     const JumpSums jump = gluing_.jumps().empty() ? JumpSums{} : gluing_.jumps()[e];
     const double values[row_head] = {static_cast<double>(all.here[e]),
                                      sums[e].residual2,
-                                     sums[e].residual_max,
+                                     sums[e].residual_max2,
                                      sums[e].impulse2,
                                      sums[e].velocity2,
                                      static_cast<double>(sums[e].contacts),
@@ -334,7 +334,7 @@ void Iteration::add_up(std::span<const double> rows) {
   for (const double* row : sorted_rows(rows, width, state_.decomposition.partition.subdomains)) {
     ErrorSums part;
     part.residual2 = row[1];
-    part.residual_max = row[2];
+    part.residual_max2 = row[2];
     part.impulse2 = row[3];
     part.velocity2 = row[4];
     part.contacts = static_cast<std::int64_t>(row[5]);
@@ -425,7 +425,7 @@ bool Iteration::judge() {
   const double scale2 = std::max(total.impulse2, total.velocity2);
   const auto count = static_cast<double>(total.contacts);
   result_.error_rms = scale2 > 0 ? std::sqrt(total.residual2 / scale2) : 0;
-  result_.error_max = scale2 > 0 ? total.residual_max / std::sqrt(scale2 / count) : 0;
+  result_.error_max = scale2 > 0 ? std::sqrt(total.residual_max2 * count / scale2) : 0;
   result_.jump = jump_.velocity2 > 0 ? std::sqrt(jump_.jump2 / jump_.velocity2) : 0;
   result_.contacts = total.contacts;
   result_.active = total.active;

@@ -28,7 +28,7 @@ bool same_bits(const Contacts& a, const Contacts& b) {
 }
 bool same_bits(const ErrorSums& a, const ErrorSums& b) {
   return std::memcmp(&a.residual2, &b.residual2, 8) == 0 &&
-         std::memcmp(&a.residual_max, &b.residual_max, 8) == 0 &&
+         std::memcmp(&a.residual_max2, &b.residual_max2, 8) == 0 &&
          std::memcmp(&a.impulse2, &b.impulse2, 8) == 0 && std::memcmp(&a.velocity2, &b.velocity2, 8) == 0 &&
          std::memcmp(a.wall_impulse, b.wall_impulse, 24) == 0 && a.contacts == b.contacts &&
          a.active == b.active;
