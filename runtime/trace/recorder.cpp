@@ -21,6 +21,7 @@ void Recorder::begin_step(std::uint32_t step) {
   step_ = std::min(step, largest_step);
   active_ = step >= options_.first_step && step <= options_.last_step;
   if (!active_) return;
+  last_ = step_;
   if (pending_) plan(std::move(*std::exchange(pending_, std::nullopt)));
   if (left_ >= 0) lane(0).add(left_, now(), 0, -1, kind_outside);
 }
@@ -40,7 +41,11 @@ void Recorder::plan(Plan plan) {
 }
 
 void Recorder::finish() {
-  for (Lane& lane : lanes_) hand_over(lane);
+  for (Lane& lane : lanes_) {
+    // Behind the last step, where results are written, say: between it and no other.
+    while (!lane.records_.empty() && lane.records_.back().step() > last_) lane.records_.pop_back();
+    hand_over(lane);
+  }
 }
 
 void Recorder::hand_over(Lane& lane) {

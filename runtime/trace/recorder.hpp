@@ -111,6 +111,7 @@ class Recorder {
   std::vector<Lane> lanes_;
   std::optional<Plan> pending_;  ///< made while nothing was recorded
   std::uint32_t step_ = 0;
+  std::uint32_t last_ = 0;  ///< step that was recorded
   bool active_ = false;
   std::int64_t left_ = -1;  ///< end of the step before, if it was recorded
 };

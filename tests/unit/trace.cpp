@@ -197,9 +197,10 @@ TEST(Recording, KeepsToItsStepsAndBringsThePlanAlong) {
     if (step == 2) recorder.plan(test::two_subdomains(1).plans[0]);
     { const Span span(&recorder, kind_collective); }
     recorder.end_step();
+    { const Span between(&recorder, kind_collective); }
   }
   recorder.finish();
-  EXPECT_EQ(records, 2u + 1u);  // one span a step, and the time between the two
+  EXPECT_EQ(records, 2u + 2u);  // one span a step, the time between the two and what was done in it
   EXPECT_EQ(plans, 1u);
 }
 
