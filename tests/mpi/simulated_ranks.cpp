@@ -65,10 +65,11 @@ TEST_F(SimulatedRanks, TakeTheTimeOfTheirNetwork) {
 }
 
 // With the same times of tasks and the same network nothing is left but the two models: no clock is in it.
+// The third step cuts no space: replay does not count all calls of one that does (docs/performance.md).
 TEST_F(SimulatedRanks, AgreeWithTheReplayOnGivenTimes) {
   const Outcome one = run(1,
                           "run scene.toml --set decomposition.subdomains=9 --out step --threads 1 --trace "
-                          "--trace-steps 2:2");
+                          "--trace-steps 3:3");
   ASSERT_EQ(one.code, 3) << one.messages;
   for (int ranks : {1, 2, 9}) {
     const Outcome replay =
@@ -82,7 +83,7 @@ TEST_F(SimulatedRanks, AgreeWithTheReplayOnGivenTimes) {
     EXPECT_EQ(digest_of(out), digest_of("one")) << ranks;
     const double played =
         1e-9 * trace::analyse(io::read_trace(at(fmt::format("played{}.h5", ranks)))).makespan;
-    EXPECT_NEAR(read_table(at(out) / "steps.csv").number(1, "wall_s"), played, 0.15 * played) << ranks;
+    EXPECT_NEAR(read_table(at(out) / "steps.csv").number(2, "wall_s"), played, 0.15 * played) << ranks;
   }
 }
 
