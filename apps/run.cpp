@@ -393,7 +393,9 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
     }
   }
   if (any_failed(refused, ranks)) return exit_bad_input;
-  io::Recorder recorder(directory, files, scene.setup, provenance, ranks);
+  // Of one rank it writes on the background lane, from where a trace must hear of no call.
+  io::Recorder recorder(directory, files, scene.setup, provenance,
+                        ranks.ranks() > 1 ? ranks : graph::one_rank());
   const io::Summary summary =
       simulate(options, scene, std::move(sample), threads, directory, recordings, recorder, ranks);
   recorder.finish(summary);

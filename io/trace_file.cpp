@@ -23,7 +23,7 @@ using detail::read_integer;
 using detail::write_array;
 using detail::write_attribute;
 
-constexpr std::int64_t format_version = 1;
+constexpr std::int64_t format_version = 2;         // 1: without the calls of one rank
 constexpr std::size_t largest_machine = 1U << 24;  ///< lanes; more is a damaged number
 
 Hdf5Object record_type(const std::string& file) {
@@ -65,8 +65,6 @@ void write_kinds(Place place, const std::vector<trace::KindInfo>& kinds) {
               column(kinds, [](const KindInfo& k) { return static_cast<std::uint8_t>(k.blocked); }));
   write_array(place, "shared", "1",
               column(kinds, [](const KindInfo& k) { return static_cast<std::uint8_t>(k.shared); }));
-  write_array(place, "collectives", "1",
-              column(kinds, [](const KindInfo& k) { return static_cast<std::int32_t>(k.collectives); }));
 }
 
 void write_tasks(Place place, std::int32_t rank, const std::vector<trace::Task>& tasks) {
@@ -116,14 +114,12 @@ std::vector<trace::KindInfo> read_kinds(Place place) {
   const auto phase = read_array<std::uint8_t>(place, "phase"),
              blocked = read_array<std::uint8_t>(place, "blocked"),
              shared = read_array<std::uint8_t>(place, "shared");
-  const auto collectives = read_array<std::int32_t>(place, "collectives");
-  for (std::size_t length : {phase.size(), blocked.size(), shared.size(), collectives.size()})
+  for (std::size_t length : {phase.size(), blocked.size(), shared.size()})
     demand_length(place.file, "/kinds", length, names.size());
   std::vector<trace::KindInfo> kinds;
   for (std::size_t k = 0; k < names.size(); ++k) {
-    if (phase[k] >= trace::phase_count || collectives[k] < 0) damaged(place.file, "kind '" + names[k] + "'");
-    kinds.push_back(
-        {names[k], static_cast<trace::Phase>(phase[k]), blocked[k] != 0, shared[k] != 0, collectives[k]});
+    if (phase[k] >= trace::phase_count) damaged(place.file, "kind '" + names[k] + "'");
+    kinds.push_back({names[k], static_cast<trace::Phase>(phase[k]), blocked[k] != 0, shared[k] != 0});
   }
   return kinds;
 }
@@ -205,7 +201,8 @@ Hdf5Object open_trace(const std::string& path) {
                                 format));
   if (const std::int64_t version = read_integer({file.id(), path}, "format_version");
       version != format_version)
-    throw FileError(path, fmt::format("is of trace format {}, this talus reads {}", version, format_version));
+    throw FileError(path, fmt::format("is of trace format {}, this talus reads {}: record it again", version,
+                                      format_version));
   return file;
 }
 

@@ -8,12 +8,16 @@ namespace talus::detail {
 
 namespace {
 
-/// A median is found by radix selection: seven rounds of nine bits settle the 63 bits of a key. A round is
-/// one histogram per open node and one sum over the ranks; three rounds are enough unless points coincide.
+/// A median is found by radix selection. A round settles a few of the 63 bits of a key: one histogram per
+/// open node and one sum over the ranks, all histograms together of at most 512 numbers or 8 per node. What a
+/// round takes is the way to all ranks as long as sums are short, so few nodes settle 9 bits at a time;
+/// behind 32 ranks that share a link, sums as long for each of many nodes would take ten times as long as
+/// that.
 constexpr int key_bits = 3 * IntegerFrame::bits;
-constexpr int round_bits = 9;
-constexpr std::size_t bins = std::size_t{1} << round_bits;
-static_assert(key_bits % round_bits == 0);
+constexpr int most_bits = 9, least_bits = 3;
+int bits_of_a_round(std::size_t histograms) {
+  return std::max(least_bits, most_bits - static_cast<int>(std::bit_width(histograms - 1)));
+}
 
 /// Moments are taken of the upper 16 bits of a coordinate: with weights below 2^31 in all, sums of squares
 /// stay below 2^63.
@@ -84,42 +88,50 @@ class Bisection {
 
  private:
   void select_keys() {
-    for (int shift = key_bits - round_bits; shift >= 0; shift -= round_bits) {
-      std::vector<std::int32_t> open;  // level node -> histogram, or -1
-      std::int32_t histograms = 0;
-      for (const Node& node : level_) open.push_back(node.open ? histograms++ : -1);
+    std::vector<std::size_t> among;  // points that the median of their node may still be next to
+    for (std::size_t k = 0; k < node_.size(); ++k)
+      if (node_[k] >= 0) among.push_back(k);
+    for (int shift = key_bits; shift > 0;) {
+      std::vector<std::size_t> histogram;  // of each level node; of one that is closed nobody's
+      std::size_t histograms = 0;
+      for (const Node& node : level_) histogram.push_back(node.open ? histograms++ : histograms);
       if (histograms == 0) return;
-      std::vector<std::int64_t> counts(bins * at(histograms), 0);
-      for (std::size_t k = 0; k < points_.q.size(); ++k) {
-        if (node_[k] < 0) continue;
-        const std::int32_t histogram = open[at(node_[k])];
-        if (histogram < 0) continue;
-        const Node& node = level_[at(node_[k])];
-        const std::uint64_t leading = cut_key(points_.q[k], node.axis) >> shift;
-        if (leading >> round_bits != node.prefix) continue;
-        counts[bins * at(histogram) + (leading & (bins - 1))] += points_.weight_of(k);
+      const int bits = std::min(shift, bits_of_a_round(histograms));
+      const std::size_t bins = std::size_t{1} << bits;
+      shift -= bits;
+      std::vector<std::int64_t> counts(bins * histograms, 0);
+      for (const std::size_t k : among) {
+        const std::size_t node = at(node_[k]);
+        const std::uint64_t leading = cut_key(points_.q[k], level_[node].axis) >> shift;
+        counts[bins * histogram[node] + (leading & (bins - 1))] += points_.weight_of(k);
       }
       reduction_.sum(counts);
       for (std::size_t k = 0; k < level_.size(); ++k)
-        if (open[k] >= 0) narrow(level_[k], std::span(counts).subspan(bins * at(open[k]), bins), shift);
+        if (level_[k].open) narrow(level_[k], std::span(counts).subspan(bins * histogram[k], bins), shift);
+      std::erase_if(among, [&](std::size_t k) {
+        const Node& node = level_[at(node_[k])];
+        return !node.open || cut_key(points_.q[k], node.axis) >> shift != node.prefix;
+      });
     }
   }
 
   /// Narrows the selection to the bin in which the wanted share of the weight is passed. Closes the node, its
   /// key then in `prefix`, when a border of the bin is the best cut there is.
   void narrow(Node& node, std::span<const std::int64_t> counts, int shift) {
-    if (shift == key_bits - round_bits)
+    const auto bits = std::countr_zero(counts.size());
+    if (shift + bits == key_bits)
       for (std::int64_t count : counts) node.total += count;
     // Shares are compared as below x parts against total x parts_below: integers, no rounding; weights stay
     // below 2^31 and so do parts.
     const std::int64_t wanted = node.total * node.parts_below;
     std::size_t bin = 0;
-    while (bin + 1 < bins && (node.below + counts[bin]) * node.parts <= wanted) node.below += counts[bin++];
-    node.prefix = node.prefix << round_bits | bin;
+    while (bin + 1 < counts.size() && (node.below + counts[bin]) * node.parts <= wanted)
+      node.below += counts[bin++];
+    node.prefix = node.prefix << bits | bin;
     const std::int64_t short_of = wanted - node.below * node.parts;
     const std::int64_t too_many = (node.below + counts[bin]) * node.parts - wanted;
-    // A bin of weight 1 holds one point, and shift 0 means one key: neither can be divided.
-    if (short_of > 0 && counts[bin] > 1 && shift > 0) return;
+    // What weighs as little as a point is not worth dividing, and shift 0 means one key.
+    if (short_of > 0 && counts[bin] > points_.a_point && shift > 0) return;
     node.open = false;
     node.prefix += too_many < short_of ? 1 : 0;
     node.prefix <<= shift;

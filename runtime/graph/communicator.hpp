@@ -61,6 +61,8 @@ class Communicator {
   /// Ranks on this machine.
   int ranks_on_node() const noexcept { return ranks_on_node_; }
   /// Collective calls and channels leave spans in `trace` from now on; null: no more. It must outlive them.
+  /// Calls of one rank, which do nothing, leave theirs too: replay counts them for many. Exchanges and
+  /// gathers are two calls, the first of lengths. Only threads of the recorder's team may make calls then.
   void record_to(trace::Recorder* trace) const { trace_ = trace; }
   trace::Recorder* trace() const { return trace_; }
 
@@ -158,7 +160,6 @@ class Communicator::PendingGather {
 template <class Record>
 std::vector<std::vector<Record>> Communicator::exchange_records(std::vector<std::vector<Record>> to) const {
   static_assert(std::is_trivially_copyable_v<Record>);
-  if (ranks_ == 1) return to;
   std::vector<std::span<const std::byte>> bytes;
   for (const auto& part : to) bytes.push_back(std::as_bytes(std::span(part)));
   std::vector<std::vector<Record>> from(to.size());
@@ -173,7 +174,6 @@ std::vector<std::vector<Record>> Communicator::exchange_records(std::vector<std:
 template <class Record>
 std::vector<Record> Communicator::gather_records(std::span<const Record> part) const {
   static_assert(std::is_trivially_copyable_v<Record>);
-  if (ranks_ == 1) return {part.begin(), part.end()};
   const std::vector<std::byte> bytes = gather(std::as_bytes(part));
   std::vector<Record> all(bytes.size() / sizeof(Record));
   if (!all.empty()) std::memcpy(all.data(), bytes.data(), bytes.size());

@@ -105,11 +105,6 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
                                const Bodies& bodies, std::span<const double> reach) {
   Gathered gathered;
   gathered.own.reserve(bodies.size());
-  if (ranks.ranks() == 1) {
-    for (std::size_t s = 0; s < bodies.size(); ++s)
-      if (counts(decomposition, s)) gathered.own.push_back(static_cast<Slot>(s));
-    return gathered;
-  }
   double largest[1] = {0};
   for (double r : reach) largest[0] = std::max(largest[0], r);
   ranks.max(largest);
@@ -118,6 +113,10 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
   std::vector<std::size_t> sent(to.size(), std::numeric_limits<std::size_t>::max());
   for (std::size_t s = 0; s < bodies.size(); ++s) {
     if (!counts(decomposition, s)) continue;
+    if (to.size() == 1) {  // no search for those who want to know
+      gathered.own.push_back(static_cast<Slot>(s));
+      continue;
+    }
     for (std::int32_t subdomain : subdomains_within(decomposition.partition, bodies.x[s], 3 * largest[0])) {
       const std::size_t rank = at(decomposition.rank_of[at(subdomain)]);
       if (sent[rank] == s) continue;
@@ -149,7 +148,6 @@ Slot Surroundings::find(std::int64_t id) const {
 }
 
 Reduction reduction_over(const graph::Communicator& ranks) {
-  if (ranks.ranks() == 1) return {};
   return {[&ranks](std::span<std::int64_t> values) { ranks.sum(values); },
           [&ranks](std::span<double> values) { ranks.max(values); }, ranks.rank() == 0};
 }

@@ -77,10 +77,11 @@ void StepGraph::build() {
 void StepGraph::run() {
   sums_ = {};
   ++steps_;
-  // Nothing else counts in a step whose times are given.
+  // Nothing else counts in a step whose times are given, looking them up included.
   std::optional<graph::GivenTime> none;
   trace::TaskTimes* const times = executor_.times();
-  if (times && times->begin_step(static_cast<std::uint32_t>(steps_))) none.emplace(0);
+  if (times) none.emplace(0);
+  if (times && !times->begin_step(static_cast<std::uint32_t>(steps_))) none.reset();
   started_ = graph::seconds_now();
   trace::Recorder* const trace = executor_.trace();
   if (trace) trace->begin_step(static_cast<std::uint32_t>(steps_));

@@ -148,7 +148,6 @@ bool StepGraph::needs_broad_phase() {
 /// Whether the grains that left their margins, few of them, meet none but their candidates. Collective; the
 /// same for any ranks, since the grains and their candidates are put together from all of them.
 bool StepGraph::candidates_hold() const {
-  const trace::Span span(executor_.trace(), kind_of(TaskKind::leavers));
   constexpr std::size_t few = 32;  // comparing them with all grains costs less than a tenth of a broad phase
   std::vector<Leaver> leavers;
   for (const auto& lane : left_) leavers.insert(leavers.end(), lane.begin(), lane.end());

@@ -26,8 +26,7 @@ enum class TaskKind : std::uint8_t {
   publish,
   centre,
   glue,
-  whole,   ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
-  leavers  ///< within cells: whether grains that left their margins meet none but their candidates
+  whole  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
 };
 
 inline trace::Kind kind_of(TaskKind kind) {

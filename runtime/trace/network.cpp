@@ -16,6 +16,7 @@ Network::Network(const Machine& machine)
   const unsigned inside = std::min(ranks, ranks_per_node_), nodes = (ranks + inside - 1) / inside;
   const auto levels = [](unsigned count) { return static_cast<double>(std::bit_width(count - 1)); };
   collective_ = levels(nodes) * (latency_ + 2 * overhead_) + levels(inside) * (node_latency_ + 2 * overhead_);
+  collective_byte_ = levels(nodes) * inside * per_byte_ + levels(inside) * node_per_byte_;
   // To the next rank, which is mostly on the same node.
   first_ = ranks == 1 ? 0 : (inside > 1 ? node_latency_ : latency_) + 2 * overhead_;
   out_free_.assign(nodes, 0);

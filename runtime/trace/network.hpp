@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/trace/replay.hpp"
+#include "runtime/trace/timeline.hpp"
 
 namespace talus::trace {
 
@@ -19,7 +20,12 @@ class Network {
   /// What all ranks need from when the last has come to know what each brought: log2(ranks) messages, one
   /// behind the other (Communicator::start_gather). [ns]
   double collective() const { return collective_; }
-  /// Of it, what comes when all ranks wait: the first message of each leaves before
+  /// Of calls of all ranks, one behind the other. What a call adds up is in each of its messages, and the
+  /// ranks of a node share its link. [ns]
+  double time_of(const Calls& calls) const {
+    return calls.count * collective_ + calls.bytes * collective_byte_;
+  }
+  /// Of collective(), what comes when all ranks wait: the first message of each leaves before
   /// (Communicator::start_gather).
   double collective_rest() const { return collective_ - first_; }
   /// Between ranks that are farthest from each other.
@@ -30,7 +36,7 @@ class Network {
  private:
   std::size_t node_of(std::uint32_t rank) const { return rank / ranks_per_node_; }
   std::uint32_t ranks_per_node_;
-  double latency_, per_byte_, node_latency_, node_per_byte_, overhead_, collective_, first_;
+  double latency_, per_byte_, node_latency_, node_per_byte_, overhead_, collective_, collective_byte_, first_;
   std::vector<double> out_free_, in_free_;  ///< per node: when its link is free again
 };
 

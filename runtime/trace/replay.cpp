@@ -157,10 +157,7 @@ class Player {
         timed.work = std::max(timed.work, own + inside);
       }
       if (part.exists()) timed.part_kind = stage_.timeline.record(part).kind();
-      timed.calls = std::max(
-          timed.calls, trace_.ranks > 1 ? recorded.calls[source.task]
-                                        : info.collectives +
-                                              (part.exists() ? trace_.info(timed.part_kind).collectives : 0));
+      if (recorded.calls[source.task].count > timed.calls.count) timed.calls = recorded.calls[source.task];
     }
     const double scale = machine_.contacts / stage_.speed_of(task.task.kind) *
                          stage_.stretch(index.step, r, ~std::uint64_t{number});
@@ -196,9 +193,13 @@ class Player {
     now = play_tasks(stage_, tasks_, timed, behind, all, now);
   }
 
-  /// What the program does outside of the graph; all ranks meet there, if only to hear of signals.
+  /// What the program does outside of the graph.
   void go_between_steps(const StepIndex& index, std::vector<double>& now) {
     bool any = false;
+    Calls calls;
+    for (const StepIndex::Rank& rank : index.ranks)
+      if (rank.calls_outside.count > calls.count) calls = rank.calls_outside;
+    const bool meet = now.size() > 1 && calls.count > 0;
     std::vector<double> worked = now;
     for (std::size_t r = 0; r < now.size(); ++r)
       for (std::size_t s = 0; s < index.ranks.size(); ++s) {
@@ -210,7 +211,7 @@ class Player {
     if (!any) return;
     const double last = *std::max_element(worked.begin(), worked.end());
     for (std::uint32_t r = 0; r < now.size(); ++r) {
-      const double end = now.size() > 1 ? last + stage_.network.collective() : worked[r];
+      const double end = meet ? last + stage_.network.time_of(calls) : worked[r];
       stage_.log.task(stage_.log.worker(r, 0), now[r], end, end - worked[r], 0, -1, kind_outside);
       if (end > worked[r]) stage_.log.span(stage_.log.worker(r, 0), worked[r], end, 0, -1, kind_collective);
       now[r] = end;

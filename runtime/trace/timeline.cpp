@@ -83,7 +83,9 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
       if (in_check(*it))
         rank.awaited[static_cast<std::size_t>(record(last_check).epoch)] = 1;
       else if (last_task.exists() && it->end() <= record(last_task).end())
-        ++rank.calls[record(last_task).node];
+        rank.calls[record(last_task).node].add(it->node);
+      else if (!last_task.exists() && rank.outside.exists() && it->end() <= record(rank.outside).end())
+        rank.calls_outside.add(it->node);
     } else if (kind == kind_check) {
       const auto epoch = static_cast<std::size_t>(it->epoch);
       if (rank.check.size() <= epoch) resize_checks(rank, epoch + 1);
@@ -118,7 +120,7 @@ StepIndex Timeline::index(std::uint32_t step) const {
     rank.plan = plan_of(trace_, r, step);
     rank.nodes = rank.plan ? rank.plan->size() : 0;
     rank.task.resize(trace_.tasks[static_cast<std::size_t>(r)].size());
-    rank.calls.resize(rank.task.size(), 0);
+    rank.calls.resize(rank.task.size());
     rank.part.resize(rank.task.size());
   }
   for (std::uint32_t k = 0; k < trace_.lanes.size(); ++k) add(trace_.lanes[k], k, index);

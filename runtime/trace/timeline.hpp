@@ -24,6 +24,17 @@ struct Place {
   bool exists() const { return lane != 0xffffffffU; }
 };
 
+/// Calls of all ranks.
+struct Calls {
+  int count = 0;
+  double bytes = 0;  ///< that they add up
+  void add(std::uint32_t of_one) {
+    ++count;
+    bytes += of_one;
+  }
+  bool operator==(const Calls&) const = default;
+};
+
 /// One step on all ranks.
 struct StepIndex {
   struct Rank {
@@ -33,11 +44,12 @@ struct StepIndex {
     std::vector<Place> node;    ///< epochs x nodes; absent where a node did nothing
     std::vector<Place> check;   ///< per epoch; absent where nothing was decided
     std::vector<Place> task;    ///< per task of the step, absent for teams
-    std::vector<int> calls;     ///< per task: collective calls within
+    std::vector<Calls> calls;   ///< per task: collective calls within
     std::vector<char> awaited;  ///< per epoch: its check waited for other ranks
     std::vector<char> settled;  ///< per epoch: its check reads its own sums on any number of ranks
     std::vector<std::vector<Place>> whole;  ///< per epoch: what all ranks did together within its check
     Place outside;                          ///< before the step; absent for the first of a trace
+    Calls calls_outside;                    ///< collective calls within
     std::vector<Place> part;                ///< per task: a span within that is no wait, or absent
 
     Place at(std::size_t epoch, std::size_t n) const { return node[epoch * nodes + n]; }

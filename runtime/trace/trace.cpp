@@ -60,9 +60,9 @@ const char* name_of(Phase phase) {
 }
 
 std::vector<KindInfo> runtime_kinds() {
-  return {{"team", Phase::waiting, false, false, 0},       {"outside", Phase::outside, false, true, 0},
-          {"collective", Phase::exchange, true, false, 0}, {"receive", Phase::exchange, true, false, 0},
-          {"send", Phase::exchange, false, false, 0},      {"check", Phase::exchange, false, false, 1}};
+  return {{"team", Phase::waiting, false, false},       {"outside", Phase::outside, false, true},
+          {"collective", Phase::exchange, true, false}, {"receive", Phase::exchange, true, false},
+          {"send", Phase::exchange, false, false},      {"check", Phase::exchange, false, false}};
 }
 
 std::size_t Trace::record_count() const {

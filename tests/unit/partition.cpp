@@ -102,6 +102,24 @@ TEST(Partition, BisectionIsOffTheMeanByNoMoreThanTheHeaviestPointsCanCost) {
     }
 }
 
+// Ranks meet in every sum, and all of them carry all of it.
+TEST(Partition, BisectionNeedsFewSumsAndShortOnesWhateverTheUnitOfTheWeights) {
+  PartitionPoints points = random_points(30000, 6);
+  for (std::int32_t unit : {1, 64, 640}) {
+    points.weight.assign(points.x.size(), unit);
+    for (std::size_t k = 0; k < points.weight.size(); k += 3) points.weight[k] += unit / 4;
+    std::size_t sums = 0, longest = 0;
+    Reduction reduction;
+    reduction.sum = [&](std::span<std::int64_t> values) {
+      ++sums;
+      longest = std::max(longest, values.size());
+    };
+    make_partition(points, options_of(PartitionKind::rcb, 96), reduction);
+    EXPECT_LE(sums, 1u + 7 * 6) << unit;  // of seven levels each: moments, and five rounds
+    EXPECT_LE(longest, 512u) << unit;
+  }
+}
+
 TEST(Partition, MetisKeepsContactsWithinTheCellsAndNoRegionWithoutWeight) {
   const PartitionPoints points = random_points(40000, 4);
   const auto weights =

@@ -123,6 +123,35 @@ TEST(Replay, WaitsAreRecordedAsWaits) {
   EXPECT_EQ(sum.messages, 4u);
 }
 
+// What a task or the program between two steps asks of all ranks is in a trace of one rank, where it takes no
+// time.
+TEST(Replay, RanksMeetInEveryCallThatOneRankMade) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  // A step that began at 100 ns, behind 90 ns outside.
+  for (Record& record : records) record.begin += 100;
+  const auto call = [](std::int64_t at, std::uint32_t bytes) {
+    return Record{at, 0, bytes, -1, pack(1, kind_collective)};
+  };
+  records.insert(records.begin(), {Record{10, 90, 0, -1, pack(1, kind_outside)}, call(50, 0)});
+  const double alone = makespan(trace, bare(1, 1));
+  Machine network = bare(2, 1), none = network;
+  network.latency = 1e-6;
+  network.bandwidth = 1e9;
+  const auto calls_alone = [&] { return makespan(trace, network) - makespan(trace, none); };
+  const double before = calls_alone();
+  records.insert(records.begin() + 1, {call(20, 0), call(30, 7)});
+  EXPECT_DOUBLE_EQ(calls_alone() - before, 2 * 1000 + 7);
+  Record& task = records[4];
+  ASSERT_EQ(task.kind(), test::task);
+  task.begin -= 10;  // 10 ns of work, with a call within
+  task.duration = 10;
+  records[0].duration -= 10;
+  records.insert(records.begin() + 5, call(95, 0));
+  EXPECT_DOUBLE_EQ(calls_alone() - before, 3 * 1000 + 7);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), alone);
+}
+
 TEST(Replay, OfAReplayIsTheSame) {
   const Trace trace = test::two_subdomains(1);
   Machine machine = bare(2, 1);
@@ -350,6 +379,21 @@ TEST(Network, MessagesOfOneNodeShareItsLink) {
   EXPECT_DOUBLE_EQ(network.arrival(1, 3, 50, 0), 200);      // leaves behind the first
   EXPECT_DOUBLE_EQ(network.arrival(0, 1, 50, 0), 35);       // inside the node
   EXPECT_DOUBLE_EQ(network.arrival(0, 2, 50, 1000), 1150);  // the link is free again
+}
+
+TEST(Network, AddsUpInAMessageForEachDoublingOfRanks) {
+  Machine machine = bare(16, 1);
+  machine.ranks_per_node = 4;
+  machine.latency = 100e-9;
+  machine.overhead = 5e-9;
+  machine.bandwidth = 1e9;  // a byte a ns
+  machine.node_latency = 10e-9;
+  machine.node_bandwidth = 2e9;
+  const Network network(machine);
+  const double round_between = 110, round_inside = 20;
+  EXPECT_DOUBLE_EQ(network.time_of({3, 0}), 3 * (2 * round_between + 2 * round_inside));
+  // 8 bytes: four times over the link in each round between nodes.
+  EXPECT_DOUBLE_EQ(network.time_of({1, 8}), 2 * (round_between + 32) + 2 * (round_inside + 4));
 }
 
 }  // namespace

@@ -15,11 +15,11 @@ inline constexpr Kind task{6}, sweep{7}, publish{8}, centre{9}, glue{10};
 
 inline std::vector<KindInfo> kinds() {
   std::vector<KindInfo> all = runtime_kinds();
-  all.push_back({"task", Phase::update, false, true, 0});
-  all.push_back({"sweep", Phase::sweeps, false, false, 0});
-  all.push_back({"publish", Phase::exchange, false, false, 0});
-  all.push_back({"centre", Phase::exchange, false, false, 0});
-  all.push_back({"glue", Phase::sweeps, false, false, 0});
+  all.push_back({"task", Phase::update, false, true});
+  all.push_back({"sweep", Phase::sweeps, false, false});
+  all.push_back({"publish", Phase::exchange, false, false});
+  all.push_back({"centre", Phase::exchange, false, false});
+  all.push_back({"glue", Phase::sweeps, false, false});
   return all;
 }
 

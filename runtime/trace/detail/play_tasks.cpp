@@ -71,13 +71,13 @@ std::vector<double> play_tasks(Stage& stage, const std::vector<std::vector<SimTa
     const std::uint32_t r = event.a, i = event.b;
     const TimedTask& task = timed[r][begin[r] + i];
     const Kind kind = tasks[r][begin[r] + i].task.kind;
-    if (event.what == work_ends && task.calls > 0 && ranks > 1) {
+    if (event.what == work_ends && task.calls.count > 0 && ranks > 1) {
       Call& call = calls[kind];
       call.task.resize(ranks);
       call.task[r] = i;
       call.last = std::max(call.last, event.time);
       if (++call.came < static_cast<int>(ranks)) continue;
-      const double known = call.last + task.calls * stage.network.collective();
+      const double known = call.last + stage.network.time_of(task.calls);
       for (std::uint32_t other = 0; other < ranks; ++other)
         agenda.add(known, task_ends, other, call.task[other]);
       calls.erase(kind);

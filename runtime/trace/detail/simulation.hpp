@@ -103,7 +103,7 @@ struct TimedTask {
   double work = 0;  ///< [ns]
   double part = 0;  ///< of it, in a span of kind `part_kind` [ns]
   Kind part_kind{};
-  int calls = 0;  ///< of all ranks
+  Calls calls{};
 };
 
 /// Tasks [begin[r], end[r]) of each rank from `start`, each thread taking the ready task that was submitted
