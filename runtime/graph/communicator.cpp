@@ -73,21 +73,24 @@ std::string Communicator::thread_level() const {
                                           : "single";
 }
 
+void Communicator::note_calls(int count, std::uint32_t bytes) const {
+  for (int k = 0; k < count; ++k) const trace::Span span(trace_, trace::kind_collective, bytes);
+}
+
 void Communicator::exchange(std::span<const std::span<const std::byte>> to,
                             const std::function<std::byte*(std::size_t, std::size_t)>& room) const {
   const auto n = static_cast<std::size_t>(ranks_), own = static_cast<std::size_t>(rank_);
   if (to.size() != n) throw std::invalid_argument("Communicator::exchange wants one part per rank");
+  if (n == 1) return note_calls(2);
   const MpiCall call;
   trace::Span sizes(trace_, trace::kind_collective);
   std::vector<std::uint64_t> out_bytes(n, 0), in_bytes(n);
   for (std::size_t r = 0; r < n; ++r)
     if (r != own) out_bytes[r] = to[r].size();
-  if (n > 1)
-    check(MPI_Alltoall(out_bytes.data(), 1, MPI_UINT64_T, in_bytes.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD),
-          "MPI_Alltoall");
+  check(MPI_Alltoall(out_bytes.data(), 1, MPI_UINT64_T, in_bytes.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD),
+        "MPI_Alltoall");
   sizes.end();
   const trace::Span parts(trace_, trace::kind_collective);
-  if (n == 1) return;
   constexpr std::uint64_t limit = 0x7fffffff;
   std::vector<MPI_Request> requests;
   for (std::size_t r = 0; r < n; ++r) {
@@ -107,34 +110,38 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
 }
 
 void Communicator::sum(std::span<std::int64_t> values) const {
+  const auto bytes = static_cast<std::uint32_t>(values.size_bytes());
+  if (ranks_ == 1) return note_calls(1, bytes);
   const MpiCall call;
-  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
-  if (ranks_ == 1) return;
+  const trace::Span span(trace_, trace::kind_collective, bytes);
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_INT64_T, MPI_SUM,
                       MPI_COMM_WORLD),
         "MPI_Allreduce");
 }
 
 void Communicator::max(std::span<double> values) const {
+  const auto bytes = static_cast<std::uint32_t>(values.size_bytes());
+  if (ranks_ == 1) return note_calls(1, bytes);
   const MpiCall call;
-  const trace::Span span(trace_, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
-  if (ranks_ == 1) return;
+  const trace::Span span(trace_, trace::kind_collective, bytes);
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX,
                       MPI_COMM_WORLD),
         "MPI_Allreduce");
 }
 
 std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) const {
+  if (ranks_ == 1) {
+    note_calls(2);
+    return {part.begin(), part.end()};
+  }
   const MpiCall call;
   trace::Span sizes(trace_, trace::kind_collective);
   const auto n = static_cast<std::size_t>(ranks_);
   const int own = static_cast<int>(part.size());
   std::vector<int> bytes(n), begin(n + 1, 0);
-  if (n > 1)
-    check(MPI_Allgather(&own, 1, MPI_INT, bytes.data(), 1, MPI_INT, MPI_COMM_WORLD), "MPI_Allgather");
+  check(MPI_Allgather(&own, 1, MPI_INT, bytes.data(), 1, MPI_INT, MPI_COMM_WORLD), "MPI_Allgather");
   sizes.end();
   const trace::Span parts(trace_, trace::kind_collective);
-  if (n == 1) return {part.begin(), part.end()};
   for (std::size_t r = 0; r < n; ++r) begin[r + 1] = begin[r] + bytes[r];
   std::vector<std::byte> all(static_cast<std::size_t>(begin[n]));
   check(MPI_Allgatherv(part.data(), own, MPI_BYTE, all.data(), bytes.data(), begin.data(), MPI_BYTE,

@@ -111,6 +111,8 @@ class Communicator {
   std::unique_ptr<Channel> open_receive(int from, int tag, std::span<double> buffer) const;
 
  private:
+  /// In the trace, what a single rank would have called.
+  void note_calls(int count, std::uint32_t bytes = 0) const;
   int rank_ = 0, ranks_ = 1, ranks_on_node_ = 1;
   bool any_thread_ = true;
   mutable trace::Recorder* trace_ = nullptr;  ///< watches; changes nothing of what is sent
