@@ -32,7 +32,8 @@ struct SingleContacts {
   double unit = 1;                ///< [kg] of impulses and of bodies' mobilities, a power of two
   std::vector<float> nx, ny, nz;  ///< normal
   std::vector<float> bias;        ///< b [m/s]
-  std::vector<float> rx, ry, rz;  ///< impulse on the first body over `unit` [m/s]
+  std::vector<float> rx, ry, rz;  ///< impulse on the first body over `unit` [m/s]; empty without friction
+  std::vector<float> rn;          ///< normal impulse over `unit` [m/s]; empty with friction
 };
 
 /// Room for the contacts of `chunks`, of which there are none yet; `friction` decides which impulses exist.

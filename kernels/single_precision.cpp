@@ -11,8 +11,9 @@ double unit_of_mass(double inv_mass) {
 
 void allocate(SingleState& single, const Contacts& contacts, std::size_t bodies) {
   SingleContacts& c = single.contacts;
-  for (std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz})
-    part->resize(contacts.nx.size());
+  for (std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias}) part->resize(contacts.nx.size());
+  for (std::vector<float>* part : {&c.rx, &c.ry, &c.rz}) part->resize(contacts.rx.size());
+  c.rn.resize(contacts.rn.size());
   single.velocity.resize(bodies);
   single.last_v.resize(bodies);
 }
@@ -21,6 +22,7 @@ namespace {
 
 void round_numbers(const std::vector<double>& from, ContactRange range, double factor,
                    std::vector<float>& to) {
+  if (from.empty()) return;
   for (std::size_t k = range.begin; k < range.end; ++k) to[k] = static_cast<float>(factor * from[k]);
 }
 
@@ -37,6 +39,7 @@ void narrow_impulses(const Contacts& contacts, ContactRange range, SingleContact
   round_numbers(contacts.rx, range, 1 / single.unit, single.rx);
   round_numbers(contacts.ry, range, 1 / single.unit, single.ry);
   round_numbers(contacts.rz, range, 1 / single.unit, single.rz);
+  round_numbers(contacts.rn, range, 1 / single.unit, single.rn);
 }
 
 void narrow_bodies(std::span<const Slot> slots, std::span<const Velocity> velocity, SingleState& single) {
@@ -56,11 +59,13 @@ void narrow_bodies(std::span<const Slot> slots, std::span<const Velocity> veloci
 
 void widen_impulses(const SingleContacts& single, ContactRange range, Contacts& contacts) {
   const auto copy = [&](const std::vector<float>& from, std::vector<double>& to) {
+    if (from.empty()) return;
     for (std::size_t k = range.begin; k < range.end; ++k) to[k] = single.unit * static_cast<double>(from[k]);
   };
   copy(single.rx, contacts.rx);
   copy(single.ry, contacts.ry);
   copy(single.rz, contacts.rz);
+  copy(single.rn, contacts.rn);
 }
 
 void widen_bodies(std::span<const Slot> slots, std::span<const SingleVelocity> single,
@@ -73,15 +78,15 @@ void widen_bodies(std::span<const Slot> slots, std::span<const SingleVelocity> s
 }
 
 void widen_steps(double unit, ContactRange range, SweepSteps& steps) {
-  for (std::vector<float>* part : {&steps.x, &steps.y, &steps.z})
-    for (std::size_t k = range.begin; k < range.end; ++k)
+  for (std::vector<float>* part : {&steps.x, &steps.y, &steps.z, &steps.n})
+    for (std::size_t k = range.begin; k < std::min(range.end, part->size()); ++k)
       (*part)[k] = static_cast<float>(unit * static_cast<double>((*part)[k]));
 }
 
 std::size_t memory_used(const SingleState& single) {
   const SingleContacts& c = single.contacts;
   std::size_t numbers = 0;
-  for (const std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz})
+  for (const std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn})
     numbers += part->capacity();
   return numbers * sizeof(float) +
          sizeof(SingleVelocity) * (single.velocity.capacity() + single.last_v.capacity());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <limits>
 #include <type_traits>
 
@@ -163,7 +164,10 @@ struct WithMomentum {
   V3<N> begin(V3<N> s, std::size_t k) const {
     return s + static_cast<N>(beta) * V3<N>{steps.x[k], steps.y[k], steps.z[k]};
   }
-  double begin(double s, std::size_t k) const { return s + beta * static_cast<double>(steps.n[k]); }
+  template <std::floating_point N>
+  N begin(N s, std::size_t k) const {
+    return s + static_cast<N>(beta) * static_cast<N>(steps.n[k]);
+  }
   template <class N>
   void end(V3<N> s, V3<N> s_new, std::size_t k) const {
     const V3<N> step = s_new - s;
@@ -171,7 +175,10 @@ struct WithMomentum {
     steps.y[k] = static_cast<float>(step.y);
     steps.z[k] = static_cast<float>(step.z);
   }
-  void end(double s, double s_new, std::size_t k) const { steps.n[k] = static_cast<float>(s_new - s); }
+  template <std::floating_point N>
+  void end(N s, N s_new, std::size_t k) const {
+    steps.n[k] = static_cast<float>(s_new - s);
+  }
 };
 
 /// Closed form of Signorini-Coulomb with a diagonal W: stores the new impulse and returns what it adds to the
@@ -352,17 +359,19 @@ void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velo
                             WithMomentum{momentum.beta, momentum.omega, momentum.steps});
 }
 
+template <bool Friction>
 void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                   std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum) {
-  sweep_grains_from<true>(contacts, single, range, velocity, mu,
-                          WithMomentum{momentum.beta, momentum.omega, momentum.steps});
+  sweep_grains_from<Friction>(contacts, single, range, velocity, mu,
+                              WithMomentum{momentum.beta, momentum.omega, momentum.steps});
 }
 
+template <bool Friction>
 void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                 std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
                 const SweepMomentum& momentum) {
-  sweep_wall_from<true>(contacts, single, range, velocity, mu, wall, single.unit,
-                        WithMomentum{momentum.beta, momentum.omega, momentum.steps});
+  sweep_wall_from<Friction>(contacts, single, range, velocity, mu, wall, single.unit,
+                            WithMomentum{momentum.beta, momentum.omega, momentum.steps});
 }
 
 template <bool Friction>
@@ -478,6 +487,14 @@ void relax(Contacts& contacts, ContactRange range, std::span<const double> befor
   }
 }
 
+template void sweep_grains<true>(const Contacts&, SingleContacts&, ContactRange, std::span<SingleVelocity>,
+                                 double, const SweepMomentum&);
+template void sweep_wall<true>(const Contacts&, SingleContacts&, ContactRange, std::span<SingleVelocity>,
+                               double, WallCopy&, const SweepMomentum&);
+template void sweep_grains<false>(const Contacts&, SingleContacts&, ContactRange, std::span<SingleVelocity>,
+                                  double, const SweepMomentum&);
+template void sweep_wall<false>(const Contacts&, SingleContacts&, ContactRange, std::span<SingleVelocity>,
+                                double, WallCopy&, const SweepMomentum&);
 template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double);
 template void sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double, const SweepMomentum&);
 template void sweep_wall<true>(Contacts&, ContactRange, std::span<Velocity>, double, WallCopy&);

@@ -61,10 +61,12 @@ template <bool Friction>
 void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                 WallCopy& wall, const SweepMomentum& momentum);
 
-/// Sweeps with momentum and friction in single precision, on what `narrow` has made of contacts and bodies
+/// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
 /// (single_precision.hpp); `contacts` lends groups and bodies. The steps are in the units of `single`.
+template <bool Friction>
 void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                   std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum);
+template <bool Friction>
 void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                 std::span<SingleVelocity> velocity, double mu, WallCopy& wall, const SweepMomentum& momentum);
 

@@ -57,12 +57,11 @@ ContactView view(const Contacts& contacts, ContactRange range, std::span<const V
 }
 SingleContactView view(const Contacts& contacts, const SingleContacts& single, ContactRange range,
                        std::span<const SingleVelocity> velocity) {
-  const float* const none = nullptr;
-  return view(contacts, single, none, range, velocity);
+  return view(contacts, single, single.rn.data(), range, velocity);
 }
 
 SingleImpulseView impulses(SingleContacts& c) {
-  return {c.rx.data(), c.ry.data(), c.rz.data(), nullptr};
+  return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
 }
 
 /// Of whole records at `slots`, as LaneKernels::advance_bodies does it.
@@ -168,20 +167,24 @@ void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<
                                   wall.velocity, wall.inv_mass, view(momentum));
 }
 
+template <bool Friction>
 void SweepKernels::sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                                 std::span<SingleVelocity> velocity, double mu,
                                 const SweepMomentum& momentum) const {
-  if (!lanes_[1]) return talus::sweep_grains(contacts, single, range, velocity, mu, momentum);
-  lanes_[1]->single_grains(view(contacts, single, range, velocity), impulses(single), records(velocity), mu,
-                           view(momentum));
+  if (!lanes_[Friction])
+    return talus::sweep_grains<Friction>(contacts, single, range, velocity, mu, momentum);
+  lanes_[Friction]->single_grains(view(contacts, single, range, velocity), impulses(single),
+                                  records(velocity), mu, view(momentum));
 }
 
+template <bool Friction>
 void SweepKernels::sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                               std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
                               const SweepMomentum& momentum) const {
-  if (!lanes_[1]) return talus::sweep_wall(contacts, single, range, velocity, mu, wall, momentum);
-  lanes_[1]->single_wall(view(contacts, single, range, velocity), impulses(single), records(velocity), mu,
-                         wall.velocity, wall.inv_mass * single.unit, view(momentum));
+  if (!lanes_[Friction])
+    return talus::sweep_wall<Friction>(contacts, single, range, velocity, mu, wall, momentum);
+  lanes_[Friction]->single_wall(view(contacts, single, range, velocity), impulses(single), records(velocity),
+                                mu, wall.velocity, wall.inv_mass * single.unit, view(momentum));
 }
 
 template <bool Friction>
@@ -234,6 +237,17 @@ void SweepKernels::advance(std::span<const Slot> slots, std::span<SingleVelocity
   advance_records(slots, velocity, last, static_cast<float>(beta));
 }
 
+template void SweepKernels::sweep_grains<true>(const Contacts&, SingleContacts&, ContactRange,
+                                               std::span<SingleVelocity>, double, const SweepMomentum&) const;
+template void SweepKernels::sweep_wall<true>(const Contacts&, SingleContacts&, ContactRange,
+                                             std::span<SingleVelocity>, double, WallCopy&,
+                                             const SweepMomentum&) const;
+template void SweepKernels::sweep_grains<false>(const Contacts&, SingleContacts&, ContactRange,
+                                                std::span<SingleVelocity>, double,
+                                                const SweepMomentum&) const;
+template void SweepKernels::sweep_wall<false>(const Contacts&, SingleContacts&, ContactRange,
+                                              std::span<SingleVelocity>, double, WallCopy&,
+                                              const SweepMomentum&) const;
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double) const;
 template void SweepKernels::sweep_grains<true>(Contacts&, ContactRange, std::span<Velocity>, double,
                                                const SweepMomentum&) const;

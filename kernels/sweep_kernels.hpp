@@ -53,8 +53,10 @@ class SweepKernels {
   template <bool Friction>
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                   WallCopy& wall, const SweepMomentum& momentum) const;
+  template <bool Friction>
   void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                     std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum) const;
+  template <bool Friction>
   void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                   std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
                   const SweepMomentum& momentum) const;

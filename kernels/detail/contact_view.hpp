@@ -78,7 +78,7 @@ struct LaneKernels {
                      double wall_inv_mass);
   void (*momentum_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
                         double wall_inv_mass, const MomentumView&);
-  /// Momentum in single precision, bodies as records of 8 floats; null without friction.
+  /// Momentum in single precision, bodies as records of 8 floats.
   void (*single_grains)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
                         const MomentumView&);
   void (*single_wall)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,

@@ -88,6 +88,20 @@ template <class V>
   __builtin_memcpy(to, &narrow, sizeof(narrow));
 }
 
+/// Two half records beside each other.
+[[gnu::always_inline]] inline NarrowOctet load_halves(const float* left, const float* right) {
+  NarrowQuad l, r;
+  __builtin_memcpy(&l, left, sizeof(l));
+  __builtin_memcpy(&r, right, sizeof(r));
+  return __builtin_shufflevector(l, r, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+[[gnu::always_inline]] inline void store_halves(float* left, float* right, NarrowOctet v) {
+  const NarrowQuad l = __builtin_shufflevector(v, v, 0, 1, 2, 3),
+                   r = __builtin_shufflevector(v, v, 4, 5, 6, 7);
+  __builtin_memcpy(left, &l, sizeof(l));
+  __builtin_memcpy(right, &r, sizeof(r));
+}
+
 /// Which lanes a load or store means: all of them ...
 struct AllLanes {};
 /// ... or those of the first `count` elements of an array: behind them zeros are read and nothing is written.
@@ -242,6 +256,18 @@ template <class V>
   c1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   c2 = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   c3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+/// The same on the left and on the right half at once.
+[[gnu::always_inline]] inline void swap_rows_and_columns(NarrowOctet& c0, NarrowOctet& c1, NarrowOctet& c2,
+                                                         NarrowOctet& c3) {
+  const NarrowOctet a = __builtin_shufflevector(c0, c1, 0, 8, 1, 9, 4, 12, 5, 13),
+                    b = __builtin_shufflevector(c0, c1, 2, 10, 3, 11, 6, 14, 7, 15),
+                    c = __builtin_shufflevector(c2, c3, 0, 8, 1, 9, 4, 12, 5, 13),
+                    d = __builtin_shufflevector(c2, c3, 2, 10, 3, 11, 6, 14, 7, 15);
+  c0 = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
+  c1 = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
+  c2 = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
+  c3 = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
 }
 /// 8 x 8: rows become columns, in 24 shuffles.
 [[gnu::always_inline]] inline void transpose(Octet (&v)[8]) {

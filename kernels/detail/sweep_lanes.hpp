@@ -103,10 +103,26 @@ template <bool Friction, bool Pair>
   return meeting_of<Friction>(column);
 }
 
+/// W = 8, of floats without friction: contacts 0..3 on the left, 4..7 on the right.
+template <bool Friction, bool Pair>
+requires(!Friction)
+    [[gnu::always_inline]] inline Meeting<NarrowOctet> gather(const float* const* a, const float* const* b,
+                                                              NarrowOctet) {
+  const NarrowOctet velocity = {-0.0, -0.0, -0.0, 0.0, -0.0, -0.0, -0.0, 0.0};
+  NarrowOctet column[8];
+#pragma GCC unroll 4
+  for (int l = 0; l < 4; ++l) {
+    column[l] = load_halves(a[l], a[l + 4]);
+    if constexpr (Pair) column[l] = column[l] + flip(load_halves(b[l], b[l + 4]), velocity);
+  }
+  swap_rows_and_columns(column[0], column[1], column[2], column[3]);
+  return meeting_of<false>(column);
+}
+
 /// W = 8, of doubles or floats.
 template <bool Friction, bool Pair, class V, class Number>
-[[gnu::always_inline]] inline Meeting<V> gather(const Number* const* a, const Number* const* b, V) {
-  static_assert(Friction, "half records fill lanes of 4 better");
+requires Friction [[gnu::always_inline]] inline Meeting<V> gather(const Number* const* a,
+                                                                  const Number* const* b, V) {
   const V velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   V column[8];
 #pragma GCC unroll 8
@@ -155,7 +171,7 @@ struct MomentumStart {
   }
   template <class V, class Only>
   [[gnu::always_inline]] V begin(V s, std::size_t at, Only only) const {
-    return s + beta * load<V>(n, at, only);
+    return s + static_cast<NumberOf<V>>(beta) * load<V>(n, at, only);
   }
   template <class V, class Only>
   [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at, Only only) const {
@@ -236,10 +252,26 @@ template <bool Friction, bool Pair>
   }
 }
 
+template <bool Friction, bool Pair>
+requires(!Friction) [[gnu::always_inline]] inline void scatter(float* const* a, float* const* b,
+                                                               const Space<NarrowOctet>& /*n*/,
+                                                               const Space<NarrowOctet>& dr) {
+  NarrowOctet row[4] = {dr.x, dr.y, dr.z, NarrowOctet{}};
+  swap_rows_and_columns(row[0], row[1], row[2], row[3]);
+#pragma GCC unroll 4
+  for (int l = 0; l < 4; ++l) {
+    const NarrowOctet i = load_halves(a[l], a[l + 4]);
+    store_halves(a[l], a[l + 4], i + spread_last(i) * row[l]);
+    if constexpr (Pair) {
+      const NarrowOctet j = load_halves(b[l], b[l + 4]);
+      store_halves(b[l], b[l + 4], j - spread_last(j) * row[l]);
+    }
+  }
+}
+
 template <bool Friction, bool Pair, class V, class Number>
-[[gnu::always_inline]] inline void scatter(Number* const* a, Number* const* b, const Space<V>& n,
-                                           const Space<V>& dr) {
-  static_assert(Friction, "half records fill lanes of 4 better");
+requires Friction [[gnu::always_inline]] inline void scatter(Number* const* a, Number* const* b,
+                                                             const Space<V>& n, const Space<V>& dr) {
   const V velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   const Space<V> turn = cross(dr, n);
   V row[8] = {dr.x, dr.y, dr.z, V{}, turn.x, turn.y, turn.z, V{}};
@@ -398,10 +430,10 @@ void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies,
   sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, start_of(momentum));
 }
 
-template <class V>
+template <bool Friction, class V>
 void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
                    const MomentumView& momentum) {
-  sweep_grains_from<true, V>(c, r, bodies, mu, start_of(momentum));
+  sweep_grains_from<Friction, V>(c, r, bodies, mu, start_of(momentum));
 }
 
 /// V += M^-1 H r for W contacts.
@@ -525,10 +557,10 @@ void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, d
   sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
 }
 
-template <class V>
+template <bool Friction, class V>
 void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
                  double* wall, double wall_inv_mass, const MomentumView& momentum) {
-  sweep_wall_from<true, V>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+  sweep_wall_from<Friction, V>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
 }
 
 template <bool Friction, int W>

@@ -90,9 +90,8 @@ void Iteration::begin_course(SolverMethod method, double most) {
 bool Iteration::single_will_do(SolverMethod method) const {
   constexpr double least_error = 1e-5, many = 1000;
   const bool schwarz = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several();
-  return method == SolverMethod::momentum && settings_.precision == Precision::mixed &&
-         parameters_.friction && !schwarz && alike_ && candidates_everywhere_ >= many &&
-         (history_.empty() || history_.back().error_rms > least_error);
+  return method == SolverMethod::momentum && settings_.precision == Precision::mixed && !schwarz && alike_ &&
+         candidates_everywhere_ >= many && (history_.empty() || history_.back().error_rms > least_error);
 }
 
 /// The present course, behind the sweep that may have been made since.

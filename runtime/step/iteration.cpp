@@ -105,10 +105,10 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu, int epoch) {
     const SweepMomentum momentum{beta(epoch), omega(epoch), trail_.steps};
     SingleState& single = state_.single;
     if (course(epoch).single && at_wall)
-      kernels_.sweep_wall(state_.contacts, single.contacts, range, single.velocity, mu, state_.copies[c],
-                          momentum);
+      kernels_.sweep_wall<Friction>(state_.contacts, single.contacts, range, single.velocity, mu,
+                                    state_.copies[c], momentum);
     else if (course(epoch).single)
-      kernels_.sweep_grains(state_.contacts, single.contacts, range, single.velocity, mu, momentum);
+      kernels_.sweep_grains<Friction>(state_.contacts, single.contacts, range, single.velocity, mu, momentum);
     else if (at_wall)
       kernels_.sweep_wall<Friction>(state_.contacts, range, velocity, mu, state_.copies[c], momentum);
     else

@@ -249,20 +249,19 @@ void report(const bench::Packing& packing, std::size_t grains, int repeats) {
             kernels.sweep_grains<Friction>(contacts, range, own, mu, {0.5, 1.2, steps});
           });
         }));
-    if constexpr (Friction) {
-      SingleState single;
-      allocate(single, contacts, own.size());
-      single.contacts.unit = unit_of_mass(own[0].inv_mass);
-      std::vector<Slot> slots(own.size());
-      std::iota(slots.begin(), slots.end(), 0);
-      narrow_bodies(slots, sample.bodies.velocity, single);
-      narrow_geometry(contacts, {0, contacts.nx.size()}, single.contacts);
-      row("  the same, single", time_of(sample.count, repeats, [&] {
-            over_chunks([&](ContactRange range) {
-              kernels.sweep_grains(contacts, single.contacts, range, single.velocity, mu, {0.5, 1.2, steps});
-            });
-          }));
-    }
+    SingleState single;
+    allocate(single, contacts, own.size());
+    single.contacts.unit = unit_of_mass(own[0].inv_mass);
+    std::vector<Slot> slots(own.size());
+    std::iota(slots.begin(), slots.end(), 0);
+    narrow_bodies(slots, sample.bodies.velocity, single);
+    narrow_geometry(contacts, {0, contacts.nx.size()}, single.contacts);
+    row("  the same, single", time_of(sample.count, repeats, [&] {
+          over_chunks([&](ContactRange range) {
+            kernels.sweep_grains<Friction>(contacts, single.contacts, range, single.velocity, mu,
+                                           {0.5, 1.2, steps});
+          });
+        }));
     row("  natural map", time_of(sample.count, repeats, [&] {
           over_chunks([&](ContactRange range) { kernels.error_grains<Friction>(contacts, range, own, mu); });
         }));

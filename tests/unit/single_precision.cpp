@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "kernels/momentum.hpp"
 #include "kernels/sweep_kernels.hpp"
@@ -37,6 +38,7 @@ struct Swept {
 };
 
 /// Sweeps with momentum over all chunks, bodies among them.
+template <bool Friction>
 Swept sweep(const test::Sample& sample, InstructionSet set, double mu, double wall_inv_mass, int sweeps) {
   const SweepKernels kernels(set);
   const std::size_t bodies = sample.bodies.size();
@@ -45,6 +47,7 @@ Swept sweep(const test::Sample& sample, InstructionSet set, double mu, double wa
   out.contacts = sample.contacts;
   out.steps.x.resize(out.contacts.rx.size());
   out.steps.y = out.steps.z = out.steps.x;
+  out.steps.n.resize(out.contacts.rn.size());
   allocate(out.single, out.contacts, bodies);
   out.single.contacts.unit = unit_of(sample.bodies);
   narrow_bodies(slots, sample.bodies.velocity, out.single);
@@ -58,11 +61,11 @@ Swept sweep(const test::Sample& sample, InstructionSet set, double mu, double wa
     carry_velocities(kernels, beta, slots, out.single.velocity, out.single.last_v);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
       if (sample.chunks.wall[c] < 0)
-        kernels.sweep_grains(out.contacts, out.single.contacts, sample.range(c), out.single.velocity, mu,
-                             {beta, 1.2, out.steps});
+        kernels.sweep_grains<Friction>(out.contacts, out.single.contacts, sample.range(c),
+                                       out.single.velocity, mu, {beta, 1.2, out.steps});
       else
-        kernels.sweep_wall(out.contacts, out.single.contacts, sample.range(c), out.single.velocity, mu,
-                           out.walls[c], {beta, 1.2, out.steps});
+        kernels.sweep_wall<Friction>(out.contacts, out.single.contacts, sample.range(c), out.single.velocity,
+                                     mu, out.walls[c], {beta, 1.2, out.steps});
   }
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     widen_impulses(out.single.contacts, sample.range(c), out.contacts);
@@ -73,35 +76,42 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), sizeof(float) * a.size()) == 0;
 }
 
-// Chunks from one contact to many groups; walls fixed and light; friction and none.
-TEST(SingleSweeps, GiveTheBitsOfTheScalarKernelOnEveryInstructionSet) {
-  for (const int target : {1, 5, 16, 37, 384})
-    for (const double wall_inv_mass : {0.0, 1e-3})
-      for (const double mu : {0.3, 0.0}) {
-        SCOPED_TRACE(testing::Message()
-                     << "chunks of " << target << ", walls " << wall_inv_mass << ", mu " << mu);
-        const test::Sample sample = test::dense_sample(6, 11, true, true, target);
-        const Swept expected = sweep(sample, InstructionSet::portable, mu, wall_inv_mass, 5);
-        for (const InstructionSet set : test::sets_to_test()) {
-          SCOPED_TRACE(name_of(set));
-          const Swept swept = sweep(sample, set, mu, wall_inv_mass, 5);
-          EXPECT_TRUE(same_bits(swept.single.contacts.rx, expected.single.contacts.rx));
-          EXPECT_TRUE(same_bits(swept.single.contacts.ry, expected.single.contacts.ry));
-          EXPECT_TRUE(same_bits(swept.single.contacts.rz, expected.single.contacts.rz));
-          EXPECT_TRUE(same_bits(swept.steps.x, expected.steps.x));
-          EXPECT_EQ(0, std::memcmp(swept.single.velocity.data(), expected.single.velocity.data(),
-                                   sizeof(SingleVelocity) * expected.single.velocity.size()));
-          for (std::size_t c = 0; c < expected.walls.size(); ++c)
-            EXPECT_EQ(0, std::memcmp(&swept.walls[c], &expected.walls[c], sizeof(WallCopy))) << c;
-        }
-      }
+template <bool Friction>
+void expect_scalar_bits(int target, double wall_inv_mass, double mu) {
+  SCOPED_TRACE(testing::Message() << "chunks of " << target << ", walls " << wall_inv_mass << ", friction "
+                                  << Friction << ", mu " << mu);
+  const test::Sample sample = test::dense_sample(6, 11, Friction, true, target);
+  const Swept expected = sweep<Friction>(sample, InstructionSet::portable, mu, wall_inv_mass, 5);
+  for (const InstructionSet set : test::sets_to_test()) {
+    SCOPED_TRACE(name_of(set));
+    const Swept swept = sweep<Friction>(sample, set, mu, wall_inv_mass, 5);
+    EXPECT_TRUE(same_bits(swept.single.contacts.rx, expected.single.contacts.rx));
+    EXPECT_TRUE(same_bits(swept.single.contacts.ry, expected.single.contacts.ry));
+    EXPECT_TRUE(same_bits(swept.single.contacts.rz, expected.single.contacts.rz));
+    EXPECT_TRUE(same_bits(swept.single.contacts.rn, expected.single.contacts.rn));
+    EXPECT_TRUE(same_bits(swept.steps.x, expected.steps.x));
+    EXPECT_TRUE(same_bits(swept.steps.n, expected.steps.n));
+    EXPECT_EQ(0, std::memcmp(swept.single.velocity.data(), expected.single.velocity.data(),
+                             sizeof(SingleVelocity) * expected.single.velocity.size()));
+    for (std::size_t c = 0; c < expected.walls.size(); ++c)
+      EXPECT_EQ(0, std::memcmp(&swept.walls[c], &expected.walls[c], sizeof(WallCopy))) << c;
+  }
 }
 
-TEST(SingleSweeps, FollowThoseInDouble) {
-  const double mu = 0.3;
-  const test::Sample sample = test::dense_sample(6, 11, true, true, 100);
-  const int sweeps = 30;
-  const Swept single = sweep(sample, best_instruction_set(), mu, 1e-4, sweeps);
+// Chunks from one contact to many groups; walls fixed and light; friction, mu = 0, and no friction at all.
+TEST(SingleSweeps, GiveTheBitsOfTheScalarKernelOnEveryInstructionSet) {
+  for (const int target : {1, 5, 16, 37, 384})
+    for (const double wall_inv_mass : {0.0, 1e-3}) {
+      for (const double mu : {0.3, 0.0}) expect_scalar_bits<true>(target, wall_inv_mass, mu);
+      expect_scalar_bits<false>(target, wall_inv_mass, 0);
+    }
+}
+
+/// Of the impulses in double and in single precision after as many sweeps, over the largest: how far apart.
+template <bool Friction>
+double difference_to_double(double mu, int sweeps) {
+  const test::Sample sample = test::dense_sample(6, 11, Friction, true, 100);
+  const Swept single = sweep<Friction>(sample, best_instruction_set(), mu, 1e-4, sweeps);
 
   const SweepKernels kernels(best_instruction_set());
   const std::vector<Slot> slots = all_slots(sample.bodies.size());
@@ -115,18 +125,27 @@ TEST(SingleSweeps, FollowThoseInDouble) {
     carry_velocities(kernels, Carry::momentum, beta, slots, velocity, trail);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
       if (sample.chunks.wall[c] < 0)
-        kernels.sweep_grains<true>(contacts, sample.range(c), velocity, mu, {beta, 1.2, trail.steps});
+        kernels.sweep_grains<Friction>(contacts, sample.range(c), velocity, mu, {beta, 1.2, trail.steps});
       else
-        kernels.sweep_wall<true>(contacts, sample.range(c), velocity, mu, walls[c], {beta, 1.2, trail.steps});
+        kernels.sweep_wall<Friction>(contacts, sample.range(c), velocity, mu, walls[c],
+                                     {beta, 1.2, trail.steps});
   }
+  const std::vector<double>&r = Friction ? contacts.rx : contacts.rn,
+        &r_single = Friction ? single.contacts.rx : single.contacts.rn;
   double largest = 0, difference = 0;
-  for (std::size_t k = 0; k < contacts.rx.size(); ++k) {
-    largest = std::max(largest, std::abs(contacts.rx[k]));
-    difference = std::max(difference, std::abs(contacts.rx[k] - single.contacts.rx[k]));
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    largest = std::max(largest, std::abs(r[k]));
+    difference = std::max(difference, std::abs(r[k] - r_single[k]));
   }
   EXPECT_GT(largest, 0);
-  EXPECT_GT(difference, 0);
-  EXPECT_LT(difference, 2e-5 * largest);
+  return difference / largest;
+}
+
+TEST(SingleSweeps, FollowThoseInDouble) {
+  for (const double difference : {difference_to_double<true>(0.3, 30), difference_to_double<false>(0, 30)}) {
+    EXPECT_GT(difference, 0);
+    EXPECT_LT(difference, 2e-5);
+  }
 }
 
 // Squares of what is smaller than 1e-22 are 0 in floats. What was left of a tangential impulse then made a
@@ -140,7 +159,7 @@ TEST(SingleSweeps, LeaveNothingAtContactsThatCarryNothing) {
     }
   std::fill(sample.contacts.bias.begin(), sample.contacts.bias.end(), 1.0);
   for (const InstructionSet set : test::sets_to_test()) {
-    const Swept out = sweep(sample, set, 0.3, 0, 4);
+    const Swept out = sweep<true>(sample, set, 0.3, 0, 4);
     for (std::size_t k = 0; k < out.contacts.rx.size(); ++k) {
       ASSERT_EQ(out.contacts.rx[k], 0) << name_of(set) << ", contact " << k;
       ASSERT_EQ(out.contacts.rz[k], 0) << name_of(set) << ", contact " << k;
@@ -152,7 +171,7 @@ TEST(SingleSweeps, LeaveNothingAtContactsThatCarryNothing) {
 TEST(SingleSweeps, MoveAWallThatIsMuchHeavierThanTheGrains) {
   const double inv_mass = 1e-13;
   const test::Sample sample = test::dense_sample(6, 11, true, true, 384);
-  const Swept out = sweep(sample, best_instruction_set(), 0.3, inv_mass, 1);
+  const Swept out = sweep<true>(sample, best_instruction_set(), 0.3, inv_mass, 1);
   int walls = 0;
   for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
     if (sample.chunks.wall[c] < 0) continue;
@@ -174,13 +193,13 @@ TEST(SingleSweeps, MoveAWallThatIsMuchHeavierThanTheGrains) {
 
 TEST(SingleSweeps, ChangeNoBitWithTheUnitOfMass) {
   test::Sample sample = test::dense_sample(5, 11, true, true, 100);
-  const Swept in_kg = sweep(sample, best_instruction_set(), 0.3, std::exp2(-10), 5);
+  const Swept in_kg = sweep<true>(sample, best_instruction_set(), 0.3, std::exp2(-10), 5);
   const double factor = std::exp2(70);  // far beyond what floats can square
   for (Velocity& v : sample.bodies.velocity) {
     v.inv_mass /= factor;
     v.spin_mobility /= factor;
   }
-  const Swept scaled = sweep(sample, best_instruction_set(), 0.3, std::exp2(-10) / factor, 5);
+  const Swept scaled = sweep<true>(sample, best_instruction_set(), 0.3, std::exp2(-10) / factor, 5);
   double largest = 0;
   for (std::size_t k = 0; k < in_kg.contacts.ry.size(); ++k) {
     largest = std::max(largest, std::abs(in_kg.contacts.ry[k]));
@@ -194,8 +213,9 @@ struct Pressed {
   talus::Setup setup;
   Bodies bodies;
 
-  explicit Pressed(int edge, double tolerance) : bodies(test::jittered_lattice(edge, 5, 0.1)) {
-    setup = test::pressed_setup(test::box_of_walls(-0.6, edge - 0.4), 0.3, 4, 1e6, 1e4);
+  explicit Pressed(int edge, double tolerance, double friction = 0.3)
+      : bodies(test::jittered_lattice(edge, 5, 0.1)) {
+    setup = test::pressed_setup(test::box_of_walls(-0.6, edge - 0.4), friction, 4, 1e6, 1e4);
     setup.solver.tolerance = tolerance;
   }
   struct Outcome {
@@ -214,17 +234,19 @@ struct Pressed {
 
 // The change to double precision within a step keeps the momentum, at whatever sweep a check calls for it.
 TEST(MixedPrecision, ReachesWhatDoubleReaches) {
-  for (const double tolerance : {1e-3, 1e-6, 1e-8})
-    for (const int check_every : {1, 5, 10}) {
-      SCOPED_TRACE(testing::Message() << tolerance << ", checks every " << check_every);
-      Pressed pressed(8, tolerance);
-      pressed.setup.solver.check_every = check_every;
-      const Pressed::Outcome mixed = pressed.run(Precision::mixed), full = pressed.run(Precision::full);
-      EXPECT_NE(mixed.digest, full.digest) << "single precision was not used";
-      EXPECT_LE(mixed.error, tolerance);
-      EXPECT_LE(full.error, tolerance);
-      EXPECT_LE(mixed.sweeps, 1.1 * full.sweeps + 5);
-    }
+  for (const double friction : {0.3, 0.0})
+    for (const double tolerance : {1e-3, 1e-6, 1e-8})
+      for (const int check_every : {1, 5, 10}) {
+        SCOPED_TRACE(testing::Message()
+                     << "friction " << friction << ", " << tolerance << ", checks every " << check_every);
+        Pressed pressed(8, tolerance, friction);
+        pressed.setup.solver.check_every = check_every;
+        const Pressed::Outcome mixed = pressed.run(Precision::mixed), full = pressed.run(Precision::full);
+        EXPECT_NE(mixed.digest, full.digest) << "single precision was not used";
+        EXPECT_LE(mixed.error, tolerance);
+        EXPECT_LE(full.error, tolerance);
+        EXPECT_LE(mixed.sweeps, 1.1 * full.sweeps + 5);
+      }
 }
 
 TEST(MixedPrecision, IsDoubleInSmallProblems) {
@@ -235,9 +257,11 @@ TEST(MixedPrecision, IsDoubleInSmallProblems) {
 // To 1e-6 the last sweeps are in double.
 TEST(MixedPrecision, HasTheSameBitsOnAnyThreadsAndInstructionSets) {
   for (const int subdomains : {1, 5})
-    for (const double tolerance : {1e-3, 1e-6}) {
-      SCOPED_TRACE(testing::Message() << subdomains << " subdomains, tolerance " << tolerance);
-      Pressed pressed(8, tolerance);
+    for (const auto& [tolerance, friction] :
+         {std::pair(1e-3, 0.3), std::pair(1e-6, 0.3), std::pair(1e-6, 0.0)}) {
+      SCOPED_TRACE(testing::Message()
+                   << subdomains << " subdomains, tolerance " << tolerance << ", friction " << friction);
+      Pressed pressed(8, tolerance, friction);
       pressed.setup.decomposition.subdomains = subdomains;
       pressed.setup.solver.simd = InstructionSet::portable;
       const std::uint64_t expected = pressed.run(Precision::mixed).digest;
