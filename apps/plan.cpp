@@ -45,7 +45,7 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
   const bool single = !state.single.velocity.empty();
   line("sweeps in double", !single,
        single ? "single precision until the error is small: half the bytes and divisions"
-              : "no momentum with friction, few candidates, or precision = \"double\"");
+              : "no momentum, few candidates, or precision = \"double\"");
   line("gravity", parameters.gravity.norm() > 0,
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   line("restitution", parameters.law.restitution > 0, fmt::format("e = {:g}", parameters.law.restitution));
