@@ -78,9 +78,11 @@ void widen_bodies(std::span<const Slot> slots, std::span<const SingleVelocity> s
 }
 
 void widen_steps(double unit, ContactRange range, SweepSteps& steps) {
-  for (std::vector<float>* part : {&steps.x, &steps.y, &steps.z, &steps.n})
-    for (std::size_t k = range.begin; k < std::min(range.end, part->size()); ++k)
+  for (std::vector<float>* part : {&steps.x, &steps.y, &steps.z, &steps.n}) {
+    if (part->empty()) continue;
+    for (std::size_t k = range.begin; k < range.end; ++k)
       (*part)[k] = static_cast<float>(unit * static_cast<double>((*part)[k]));
+  }
 }
 
 std::size_t memory_used(const SingleState& single) {

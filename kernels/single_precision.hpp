@@ -2,7 +2,7 @@
 
 /// Sweeps in single precision: half the bytes, and more contacts a second. They make the error small to
 /// about 1e-6 of the velocities and impulses of the problem; what is certified, and everything but sweeps, is
-/// in double precision (docs/decisions/0014-single-precision.md).
+/// in double precision (docs/decisions/0015-single-precision.md).
 ///
 /// Impulses and mobilities stand in a unit of mass near that of the lightest grain, so that numbers of any
 /// scale fit into floats; a power of two, so that a change of units by powers of two changes no bit.

@@ -34,8 +34,8 @@ ImpulseView impulses(Contacts& c) {
 
 /// `arrays` are Contacts or SingleContacts; `contacts` lends bodies and groups.
 template <class Number, class Arrays, class Record>
-ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, const Number* rn,
-                           ContactRange range, std::span<Record> velocity) {
+ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, ContactRange range,
+                           std::span<Record> velocity) {
   constexpr std::size_t near = std::size_t{512} << 10;  // what second caches have had for years
   return {arrays.nx.data(),
           arrays.ny.data(),
@@ -44,7 +44,7 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, const
           arrays.rx.data(),
           arrays.ry.data(),
           arrays.rz.data(),
-          rn,
+          arrays.rn.data(),
           contacts.first.data(),
           contacts.second.data(),
           contacts.group.data() + range.begin,
@@ -53,11 +53,11 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, const
           velocity.size_bytes() > near};
 }
 ContactView view(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity) {
-  return view(contacts, contacts, contacts.rn.data(), range, velocity);
+  return view<double>(contacts, contacts, range, velocity);
 }
 SingleContactView view(const Contacts& contacts, const SingleContacts& single, ContactRange range,
                        std::span<const SingleVelocity> velocity) {
-  return view(contacts, single, single.rn.data(), range, velocity);
+  return view<float>(contacts, single, range, velocity);
 }
 
 SingleImpulseView impulses(SingleContacts& c) {

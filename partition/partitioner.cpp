@@ -18,9 +18,8 @@ constexpr std::int64_t cells_per_subdomain = 128;
 
 constexpr std::array<std::string_view, 5> names{"auto", "boxes", "fitted", "rcb", "metis"};
 
-/// Returns the weight of a point, of heavy ones too: twice the mean, rounded up; 1 where all are 1.
-std::int64_t check_weights(const PartitionPoints& points, const Reduction& reduction) {
-  std::array<std::int64_t, 3> sums{0, 0, static_cast<std::int64_t>(points.x.size())};  // total, negative ones
+void check_weights(const PartitionPoints& points, const Reduction& reduction) {
+  std::array<std::int64_t, 2> sums{0, 0};  // total, negative ones
   for (std::int32_t weight : points.weight) {
     sums[0] += weight;
     sums[1] += weight < 0;
@@ -31,7 +30,13 @@ std::int64_t check_weights(const PartitionPoints& points, const Reduction& reduc
     throw std::invalid_argument("partition: weights must be >= 0 and their sum below 2^31; " +
                                 std::to_string(sums[1]) + " are negative, the sum is " +
                                 std::to_string(sums[0]));
-  return sums[0] <= sums[2] ? 1 : 2 * (1 + (sums[0] - 1) / sums[2]);
+}
+
+std::int64_t heaviest(const PartitionPoints& points, const Reduction& reduction) {
+  std::array<double, 1> most{points.weight.empty() ? 1.0 : 0.0};
+  for (std::int32_t weight : points.weight) most[0] = std::max(most[0], static_cast<double>(weight));
+  reduction.max(most);
+  return static_cast<std::int64_t>(most[0]);
 }
 
 std::array<std::int32_t, 3> boxes_of(const PartitionOptions& options, const IntegerFrame& frame) {
@@ -88,7 +93,7 @@ Partition make_partition(const PartitionPoints& points, const PartitionOptions& 
   if (options.subdomains < 1)
     throw std::invalid_argument("partition: " + std::to_string(options.subdomains) +
                                 " subdomains; there must be at least 1");
-  const std::int64_t a_point = check_weights(points, reduction);
+  check_weights(points, reduction);
   const Partition* previous = options.previous;
   if (previous != nullptr && previous->subdomains != options.subdomains) previous = nullptr;
 
@@ -116,7 +121,7 @@ Partition make_partition(const PartitionPoints& points, const PartitionOptions& 
                            reduction);
     return partition;
   }
-  detail::WeightedPoints weighted{{}, points.weight, a_point};
+  detail::WeightedPoints weighted{{}, points.weight, heaviest(points, reduction)};
   weighted.q.reserve(points.x.size());
   for (const Vec3& point : points.x) weighted.q.push_back(partition.frame.coordinates(point));
   if (partition.kind == PartitionKind::fitted) {

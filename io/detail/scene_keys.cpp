@@ -345,7 +345,7 @@ Section<SolverSettings> solver_keys() {
                   &SolverSettings::overlap_correction),
               choice<SolverSettings>(
                   "precision", {"mixed", "double"},
-                  "Numbers of the sweeps. `mixed`: single precision with momentum and friction, on more "
+                  "Numbers of the sweeps. `mixed`: single precision with momentum, on more "
                   "than 1000 candidates, until the error is 1e-5; what is judged and written is in "
                   "double precision.",
                   &SolverSettings::precision),

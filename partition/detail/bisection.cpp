@@ -11,8 +11,8 @@ namespace {
 /// A median is found by radix selection. A round settles a few of the 63 bits of a key: one histogram per
 /// open node and one sum over the ranks, all histograms together of at most 512 numbers or 8 per node. What a
 /// round takes is the way to all ranks as long as sums are short, so few nodes settle 9 bits at a time;
-/// behind 32 ranks that share a link, sums as long for each of many nodes would take ten times as long as
-/// that.
+/// behind 32 ranks that share a link, sums as long for each of many nodes would take twenty times as long as
+/// the way.
 constexpr int key_bits = 3 * IntegerFrame::bits;
 constexpr int most_bits = 9, least_bits = 3;
 int bits_of_a_round(std::size_t histograms) {
@@ -116,7 +116,7 @@ class Bisection {
   }
 
   /// Narrows the selection to the bin in which the wanted share of the weight is passed. Closes the node, its
-  /// key then in `prefix`, when a border of the bin is the best cut there is.
+  /// key then in `prefix`, when a border of the bin is near enough.
   void narrow(Node& node, std::span<const std::int64_t> counts, int shift) {
     const auto bits = std::countr_zero(counts.size());
     if (shift + bits == key_bits)
@@ -130,8 +130,8 @@ class Bisection {
     node.prefix = node.prefix << bits | bin;
     const std::int64_t short_of = wanted - node.below * node.parts;
     const std::int64_t too_many = (node.below + counts[bin]) * node.parts - wanted;
-    // What weighs as little as a point is not worth dividing, and shift 0 means one key.
-    if (short_of > 0 && counts[bin] > points_.a_point && shift > 0) return;
+    // No cut need be nearer than by half of the heaviest point; shift 0 means one key.
+    if (2 * std::min(short_of, too_many) > points_.heaviest * node.parts && shift > 0) return;
     node.open = false;
     node.prefix += too_many < short_of ? 1 : 0;
     node.prefix <<= shift;

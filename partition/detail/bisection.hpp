@@ -18,7 +18,7 @@ std::uint64_t cut_key(const Coordinates& q, std::int32_t axis);
 struct WeightedPoints {
   std::vector<Coordinates> q;
   std::span<const std::int32_t> weight;  ///< empty: all 1
-  std::int64_t a_point = 1;              ///< weight that a part may have too much; the same on all ranks
+  std::int64_t heaviest = 1;             ///< largest weight on any rank
 
   std::int64_t weight_of(std::size_t k) const { return weight.empty() ? 1 : weight[k]; }
 };

@@ -61,8 +61,9 @@ class Communicator {
   /// Ranks on this machine.
   int ranks_on_node() const noexcept { return ranks_on_node_; }
   /// Collective calls and channels leave spans in `trace` from now on; null: no more. It must outlive them.
-  /// Calls of one rank, which do nothing, leave theirs too: replay counts them for many. Exchanges and
-  /// gathers are two calls, the first of lengths. Only threads of the recorder's team may make calls then.
+  /// Calls of one rank, which do nothing, leave theirs too (start_gather none): replay counts them for many.
+  /// Exchanges and gathers are two calls, the first of lengths. Only threads of the recorder's team may make
+  /// calls then.
   void record_to(trace::Recorder* trace) const { trace_ = trace; }
   trace::Recorder* trace() const { return trace_; }
 

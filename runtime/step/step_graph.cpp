@@ -80,8 +80,10 @@ void StepGraph::run() {
   // Nothing else counts in a step whose times are given, looking them up included.
   std::optional<graph::GivenTime> none;
   trace::TaskTimes* const times = executor_.times();
-  if (times) none.emplace(0);
-  if (times && !times->begin_step(static_cast<std::uint32_t>(steps_))) none.reset();
+  if (times) {
+    none.emplace(0);
+    if (!times->begin_step(static_cast<std::uint32_t>(steps_))) none.reset();
+  }
   started_ = graph::seconds_now();
   trace::Recorder* const trace = executor_.trace();
   if (trace) trace->begin_step(static_cast<std::uint32_t>(steps_));

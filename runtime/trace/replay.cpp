@@ -213,7 +213,7 @@ class Player {
     for (std::uint32_t r = 0; r < now.size(); ++r) {
       const double end = meet ? last + stage_.network.time_of(calls) : worked[r];
       stage_.log.task(stage_.log.worker(r, 0), now[r], end, end - worked[r], 0, -1, kind_outside);
-      if (end > worked[r]) stage_.log.span(stage_.log.worker(r, 0), worked[r], end, 0, -1, kind_collective);
+      stage_.log.calls(stage_.log.worker(r, 0), now[r], worked[r], end, calls);
       now[r] = end;
     }
   }

@@ -70,8 +70,8 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
   const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(lane.rank)];
   Place last_task, last_check;
   // By its beginning: ends of long ones are rounded.
-  const auto in_check = [&](const Record& span) {
-    return last_check.exists() && static_cast<double>(span.begin) < record(last_check).end();
+  const auto within = [&](const Record& span, Place place) {
+    return place.exists() && static_cast<double>(span.begin) < record(place).end();
   };
   for (auto it = first; it != lane.records.end() && it->step() == index.step; ++it) {
     const Place place{number, static_cast<std::uint32_t>(it - lane.records.begin())};
@@ -80,11 +80,11 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
     if (kind == kind_outside) {
       rank.outside = place;
     } else if (kind == kind_collective) {
-      if (in_check(*it))
+      if (within(*it, last_check))
         rank.awaited[static_cast<std::size_t>(record(last_check).epoch)] = 1;
-      else if (last_task.exists() && it->end() <= record(last_task).end())
+      else if (within(*it, last_task))
         rank.calls[record(last_task).node].add(it->node);
-      else if (!last_task.exists() && rank.outside.exists() && it->end() <= record(rank.outside).end())
+      else if (within(*it, rank.outside))
         rank.calls_outside.add(it->node);
     } else if (kind == kind_check) {
       const auto epoch = static_cast<std::size_t>(it->epoch);
@@ -103,9 +103,9 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
       rank.node[epoch * rank.nodes + it->node] = place;
     } else if (it->node < tasks.size() && tasks[it->node].kind == kind && !tasks[it->node].team) {
       rank.task[it->node] = last_task = place;
-    } else if (last_task.exists() && it->end() <= record(last_task).end()) {
+    } else if (within(*it, last_task)) {
       rank.part[record(last_task).node] = place;
-    } else if (in_check(*it)) {
+    } else if (within(*it, last_check)) {
       rank.whole[static_cast<std::size_t>(record(last_check).epoch)].push_back(place);
     }
   }

@@ -43,13 +43,12 @@ struct KindInfo {
 };
 
 /// Kinds that the runtime itself records, which every trace has first.
-inline constexpr Kind kind_team{0};     ///< one thread's stay in a team task
-inline constexpr Kind kind_outside{1};  ///< from the end of one step to the beginning of the next
-inline constexpr Kind kind_collective{
-    2};  ///< inside a call of all ranks, of one too; node = bytes that it adds up, or 0
-inline constexpr Kind kind_receive{3};  ///< waits for a message; node = message_name
-inline constexpr Kind kind_send{4};     ///< starts a message; node = message_name
-inline constexpr Kind kind_check{5};    ///< decides after an epoch; node = 0 or check_settles
+inline constexpr Kind kind_team{0};        ///< one thread's stay in a team task
+inline constexpr Kind kind_outside{1};     ///< from the end of one step to the beginning of the next
+inline constexpr Kind kind_collective{2};  ///< inside a call of all ranks; node = bytes it adds up
+inline constexpr Kind kind_receive{3};     ///< waits for a message; node = message_name
+inline constexpr Kind kind_send{4};        ///< starts a message; node = message_name
+inline constexpr Kind kind_check{5};       ///< decides after an epoch; node = 0 or check_settles
 /// A check that reads its own sums at once on any number of ranks; others are read a sweep later by several.
 inline constexpr std::uint32_t check_settles = 1;
 std::vector<KindInfo> runtime_kinds();

@@ -108,6 +108,8 @@ TEST(Partition, BisectionNeedsFewSumsAndShortOnesWhateverTheUnitOfTheWeights) {
   for (std::int32_t unit : {1, 64, 640}) {
     points.weight.assign(points.x.size(), unit);
     for (std::size_t k = 0; k < points.weight.size(); k += 3) points.weight[k] += unit / 4;
+    for (std::size_t k = 0; k < points.weight.size(); ++k)
+      if (points.x[k][0] > 0.9) points.weight[k] *= 5;  // a subdomain that costs more
     std::size_t sums = 0, longest = 0;
     Reduction reduction;
     reduction.sum = [&](std::span<std::int64_t> values) {

@@ -150,6 +150,12 @@ TEST(Replay, RanksMeetInEveryCallThatOneRankMade) {
   records.insert(records.begin() + 5, call(95, 0));
   EXPECT_DOUBLE_EQ(calls_alone() - before, 3 * 1000 + 7);
   EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), alone);
+  // A prediction is a trace, and has them too.
+  const double of_two = makespan(trace, network);
+  for (const Machine& machine : {bare(1, 1), network}) {
+    const Replay played = replay(Timeline(trace), machine, true);
+    EXPECT_DOUBLE_EQ(makespan(played.trace, network), of_two) << machine.ranks << " ranks";
+  }
 }
 
 TEST(Replay, OfAReplayIsTheSame) {

@@ -122,14 +122,14 @@ TEST_F(TraceCommand, RanksWriteOneFile) {
   EXPECT_EQ(played.code, 0) << played.messages;
 }
 
-// Replay lays a trace of one rank out on many, which meet in every call.
+// Replay lays a trace of one rank out on many, which meet in every call. Without frames, which several ranks
+// write together and one writes in the background.
 TEST_F(TraceCommand, OfOneRankHoldsTheCallsThatSeveralMake) {
   const std::string mpirun =
       "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 mpirun --oversubscribe --bind-to none -n 2";
   const std::string line =
       "run scene.toml --threads 1 --trace --set decomposition.subdomains=4 --set output.every_steps=100 "
-      "--set output.stage_frames=false --set output.pictures=false --out ";  // several ranks write frames
-                                                                             // together
+      "--set output.stage_frames=false --set output.pictures=false --out ";
   talus(line + "one");
   talus(line + "two", mpirun);
   const auto one = calls_of_first(io::read_trace(folder_ / "one/trace.h5")),

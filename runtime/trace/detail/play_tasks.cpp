@@ -88,7 +88,7 @@ std::vector<double> play_tasks(Stage& stage, const std::vector<std::vector<SimTa
     stage.log.task(worker, run.begin, event.time, event.time - run.end,
                    static_cast<std::uint32_t>(begin[r] + i), -1, kind);
     if (task.part > 0) stage.log.span(worker, run.begin, run.begin + task.part, 0, -1, task.part_kind);
-    if (event.time > run.end) stage.log.span(worker, run.end, event.time, 0, -1, kind_collective);
+    stage.log.calls(worker, run.begin, run.end, event.time, task.calls);
     Rank& rank = state[r];
     rank.idle.push_back(run.thread);
     left[r] = std::max(left[r], event.time);

@@ -14,6 +14,13 @@ void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t nod
       {from, static_cast<float>(std::llround(end) - from), node, epoch, pack(step_, kind)});
 }
 
+void Log::calls(std::uint32_t worker, double begin, double end, double known, const Calls& calls) {
+  const double at = known > end ? end : begin;
+  for (int k = 0; k < calls.count; ++k)
+    span(worker, at, at + (k == 0 ? known - end : 0), k == 0 ? static_cast<std::uint32_t>(calls.bytes) : 0,
+         -1, kind_collective);
+}
+
 double Stage::stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const {
   if (machine.noise == 0) return 1;
   // splitmix64 (Steele, Lea, Flood 2014) of the task's name.

@@ -31,6 +31,10 @@ class Log {
   /// A part of a task, or a thread's stay in a team.
   void span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
             Kind kind);
+  /// Calls of all ranks in what began at `begin`, had done its own work at `end` and knew what it had asked
+  /// for at `known`: one wait, and what else is called takes no time. One rank knows at once; its calls stand
+  /// at the beginning, where they are within.
+  void calls(std::uint32_t worker, double begin, double end, double known, const Calls& calls);
   double work() const { return work_; }
   std::size_t tasks() const { return tasks_; }
   std::uint32_t worker(std::uint32_t rank, std::uint32_t thread) const { return rank * threads_ + thread; }
