@@ -32,7 +32,6 @@ struct Calls {
     ++count;
     bytes += of_one;
   }
-  bool operator==(const Calls&) const = default;
 };
 
 /// One step on all ranks.
