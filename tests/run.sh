@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-source apps/setup.sh
+source apps/setup.sh tests
 status=0
 
 # An archive without .git holds sources only; `safe.directory`: a container may not own the checkout.
