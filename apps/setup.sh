@@ -22,8 +22,9 @@ talus_install_missing() {
   if [ "$(id -u)" -ne 0 ]; then
     if ! command -v sudo >/dev/null; then
       echo "setup: not root and no sudo; as root, run: apt-get update && apt-get install ${missing[*]} ${wished[*]}" >&2
-      [ ${#missing[@]} -eq 0 ] && echo "$without" >&2
-      return
+      [ ${#missing[@]} -eq 0 ] || return 1
+      echo "$without" >&2
+      return 0
     fi
     become=(sudo)
   fi

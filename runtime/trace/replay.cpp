@@ -157,7 +157,7 @@ class Player {
         timed.work = std::max(timed.work, own + inside);
       }
       if (part.exists()) timed.part_kind = stage_.timeline.record(part).kind();
-      if (recorded.calls[source.task].count > timed.calls.count) timed.calls = recorded.calls[source.task];
+      timed.calls.raise_to(recorded.calls[source.task]);
     }
     const double scale = machine_.contacts / stage_.speed_of(task.task.kind) *
                          stage_.stretch(index.step, r, ~std::uint64_t{number});
@@ -197,8 +197,7 @@ class Player {
   void go_between_steps(const StepIndex& index, std::vector<double>& now) {
     bool any = false;
     Calls calls;
-    for (const StepIndex::Rank& rank : index.ranks)
-      if (rank.calls_outside.count > calls.count) calls = rank.calls_outside;
+    for (const StepIndex::Rank& rank : index.ranks) calls.raise_to(rank.calls_outside);
     const bool meet = now.size() > 1 && calls.count > 0;
     std::vector<double> worked = now;
     for (std::size_t r = 0; r < now.size(); ++r)

@@ -32,6 +32,10 @@ struct Calls {
     ++count;
     bytes += of_one;
   }
+  /// Ranks call together: what one of them made more often counts.
+  void raise_to(const Calls& other) {
+    if (other.count > count) *this = other;
+  }
 };
 
 /// One step on all ranks.

@@ -158,6 +158,19 @@ TEST(Replay, RanksMeetInEveryCallThatOneRankMade) {
   }
 }
 
+// Durations are floats: the end of what took a second is known to 64 ns.
+TEST(Replay, CountsACallAtTheVeryEndOfALongTask) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  constexpr std::int64_t second = 1'000'000'031;
+  for (Record& record : records) record.begin += second;
+  const Record outside{0, static_cast<float>(second), 0, -1, pack(1, kind_outside)},
+      call{second - 41, 31, 0, -1, pack(1, kind_collective)};
+  ASSERT_GT(call.end(), outside.end());
+  records.insert(records.begin(), {outside, call});
+  EXPECT_EQ(Timeline(trace).index(1).ranks[0].calls_outside.count, 1);
+}
+
 TEST(Replay, OfAReplayIsTheSame) {
   const Trace trace = test::two_subdomains(1);
   Machine machine = bare(2, 1);
