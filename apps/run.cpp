@@ -371,7 +371,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
   const std::string directory = options.out.empty() ? scene.output.directory : options.out;
   io::Provenance provenance = io::collect_provenance();
   provenance.threads = threads;
-  provenance.simd = name_of(SweepKernels(scene.setup.solver.simd).set());
+  provenance.simd = name_of(SweepKernels(settled(scene.setup.solver.simd, ranks)).set());
   provenance.command_line = options.command_line;
   provenance.seed = scene.setup.seed;
   provenance.scene_file = scene.source_file;

@@ -24,6 +24,7 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   contacts.rn.resize(friction ? 0 : n);
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
+  for (auto* values : {&contacts.first_record, &contacts.second_record}) values->resize(n);
   contacts.candidate.resize(n);
   std::iota(contacts.candidate.begin(), contacts.candidate.end(), 0);
   contacts.group.resize(n);
@@ -97,8 +98,9 @@ std::size_t memory_used(const Contacts& contacts) {
                              &contacts.ry, &contacts.rz, &contacts.rn})
     bytes += values->capacity() * sizeof(double);
   return bytes +
-         (contacts.first.capacity() + contacts.second.capacity() + contacts.candidate.capacity() +
-          contacts.count.capacity() + contacts.passed.capacity()) *
+         (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +
+          contacts.second_record.capacity() + contacts.candidate.capacity() + contacts.count.capacity() +
+          contacts.passed.capacity()) *
              4 +
          contacts.group.capacity();
 }

@@ -203,6 +203,8 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Candidates&
       const GrainPair& pair = candidates.grain_pairs[index(contacts.candidate[at])];
       contacts.first[at] = pair.first;
       contacts.second[at] = pair.second;
+      contacts.first_record[at] = record_of(pair.first);
+      contacts.second_record[at] = record_of(pair.second);
     }
   }
 }
@@ -226,6 +228,7 @@ void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& c
     contacts.ny[at] = wall.normal[1];
     contacts.nz[at] = wall.normal[2];
     contacts.first[at] = body;
+    contacts.first_record[at] = record_of(body);
     contacts.second[at] = -1;
     contacts.candidate[at++] = static_cast<std::int32_t>(k);
   }

@@ -36,7 +36,7 @@ ImpulseView impulses(Contacts& c) {
 template <class Number, class Arrays, class Record>
 ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, ContactRange range,
                            std::span<Record> velocity) {
-  constexpr std::size_t near = std::size_t{512} << 10;  // what second caches have had for years
+  constexpr std::size_t near = std::size_t{256} << 10;  // what second caches have had for years
   return {arrays.nx.data(),
           arrays.ny.data(),
           arrays.nz.data(),
@@ -45,8 +45,8 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, Conta
           arrays.ry.data(),
           arrays.rz.data(),
           arrays.rn.data(),
-          contacts.first.data(),
-          contacts.second.data(),
+          contacts.first_record.data(),
+          contacts.second_record.data(),
           contacts.group.data() + range.begin,
           range.begin,
           range.end,
@@ -98,9 +98,9 @@ ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
 bool runs(InstructionSet set) {
 #ifdef __x86_64__
   if (set == InstructionSet::avx512)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-           __builtin_cpu_supports("avx512vl");
-  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2");
+    return runs(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") &&
+           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
 #endif
   return set == InstructionSet::portable;
 }

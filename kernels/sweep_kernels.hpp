@@ -1,6 +1,6 @@
 #pragma once
 
-/// The kernels of kernels/sweep.hpp for the processor at hand: the same functions, the same bits.
+/// The kernels of kernels/sweep.hpp for the processor at hand.
 ///
 ///     const SweepKernels kernels(best_instruction_set());
 ///     kernels.sweep_grains<true>(contacts, range, velocity, mu);
@@ -14,12 +14,13 @@ namespace talus {
 
 struct LaneKernels;
 
-/// From the weakest to the strongest. Results do not depend on the set, to the bit: every lane does what the
-/// scalar kernel does, nothing is fused (docs/decisions/0008-lanes.md). So ranks may differ in it.
+/// From the weakest to the strongest. Those on vectors give the same bits, as every lane does what the scalar
+/// kernel does; but they fuse products into sums, which the portable one does not
+/// (docs/decisions/0008-lanes.md).
 enum class InstructionSet {
   automatic,  ///< the strongest that runs here
   portable,   ///< the scalar kernels
-  avx2,       ///< 4 contacts at a time
+  avx2,       ///< 4 contacts at a time (AVX2, FMA)
   avx512,     ///< 8 contacts at a time (F, DQ, VL)
 };
 
@@ -30,8 +31,8 @@ std::optional<InstructionSet> instruction_set_of(std::string_view name);
 /// The strongest that the processor and the operating system run.
 InstructionSet best_instruction_set();
 
-/// A choice of kernels. Each does what its namesake in kernels/sweep.hpp does; a range is that of a whole
-/// chunk, and `contacts.group` holds its groups (narrow_chunk).
+/// A choice of kernels. Each does what its namesake in kernels/sweep.hpp does, but for rounding; a range is
+/// that of a whole chunk, and `contacts.group` holds its groups (narrow_chunk).
 class SweepKernels {
  public:
   /// Throws std::invalid_argument when this processor does not run `set`.

@@ -314,46 +314,48 @@ Section<DetectionSettings> detection_keys() {
 }
 
 Section<SolverSettings> solver_keys() {
-  return {"[solver]",
-          "When a step counts as solved, and how hard to try.",
-          {
-              choice<SolverSettings>(
-                  "method", {"auto", "nlgs", "nlgs+momentum", "nncg", "admm"},
-                  "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
-                  "ended; `nncg`: nonsmooth conjugate gradients; `admm`: for long chains and heavy bodies, "
-                  "then sweeps; `auto`: momentum, and admm where sweeps leave forces out of balance.",
-                  &SolverSettings::method),
-              key<SolverSettings>("tolerance", "", positive,
-                                  "Bound on the relative error of the contact law (error_rms).",
-                                  &SolverSettings::tolerance),
-              key<SolverSettings>(
-                  "balance_tolerance", "", positive,
-                  "Bound on the estimated error of the forces and on the momentum defect (balance).",
-                  &SolverSettings::balance_tolerance),
-              key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
-                                  &SolverSettings::max_iterations),
-              key<SolverSettings>(
-                  "check_every", "", countable,
-                  "Sweeps between the first checks of the error, at least 2; later checks are rarer.",
-                  &SolverSettings::check_every),
-              key<SolverSettings>("warm_start", "", any, "Begin from the impulses of the last step.",
-                                  &SolverSettings::warm_start),
-              key<SolverSettings>(
-                  "overlap_correction", "", {.low = 0, .high = 1},
-                  "Part of an overlap that a step undoes. 0: overlaps stay, and what the tolerance "
-                  "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
-                  &SolverSettings::overlap_correction),
-              choice<SolverSettings>(
-                  "precision", {"mixed", "double"},
-                  "Numbers of the sweeps. `mixed`: single precision with momentum, on more "
-                  "than 1000 candidates, until the error is 1e-5; what is judged and written is in "
-                  "double precision.",
-                  &SolverSettings::precision),
-              choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
-                                     "Instructions of the sweeps. All give the same bits; `auto`: the "
-                                     "widest that the processor has.",
-                                     &SolverSettings::simd),
-          }};
+  return {
+      "[solver]",
+      "When a step counts as solved, and how hard to try.",
+      {
+          choice<SolverSettings>(
+              "method", {"auto", "nlgs", "nlgs+momentum", "nncg", "admm"},
+              "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
+              "ended; `nncg`: nonsmooth conjugate gradients; `admm`: for long chains and heavy bodies, "
+              "then sweeps; `auto`: momentum, and admm where sweeps leave forces out of balance.",
+              &SolverSettings::method),
+          key<SolverSettings>("tolerance", "", positive,
+                              "Bound on the relative error of the contact law (error_rms).",
+                              &SolverSettings::tolerance),
+          key<SolverSettings>(
+              "balance_tolerance", "", positive,
+              "Bound on the estimated error of the forces and on the momentum defect (balance).",
+              &SolverSettings::balance_tolerance),
+          key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
+                              &SolverSettings::max_iterations),
+          key<SolverSettings>(
+              "check_every", "", countable,
+              "Sweeps between the first checks of the error, at least 2; later checks are rarer.",
+              &SolverSettings::check_every),
+          key<SolverSettings>("warm_start", "", any, "Begin from the impulses of the last step.",
+                              &SolverSettings::warm_start),
+          key<SolverSettings>(
+              "overlap_correction", "", {.low = 0, .high = 1},
+              "Part of an overlap that a step undoes. 0: overlaps stay, and what the tolerance "
+              "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
+              &SolverSettings::overlap_correction),
+          choice<SolverSettings>(
+              "precision", {"mixed", "double"},
+              "Numbers of the sweeps. `mixed`: single precision with momentum, on more "
+              "than 1000 candidates, until the error is 1e-5; what is judged and written is in "
+              "double precision.",
+              &SolverSettings::precision),
+          choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
+                                 "Instructions of the sweeps; `auto`: the widest that the processors of all "
+                                 "ranks have. AVX2 and AVX-512 give the same bits, the portable sweeps round "
+                                 "otherwise.",
+                                 &SolverSettings::simd),
+      }};
 }
 
 Section<DecompositionSettings> decomposition_keys() {

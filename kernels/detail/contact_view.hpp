@@ -12,9 +12,9 @@ namespace talus {
 template <class Number>
 struct ContactViewOf {
   const Number *nx, *ny, *nz, *bias;
-  const Number *rx, *ry, *rz;  ///< with friction
-  const Number* rn;            ///< without
-  const std::int32_t *first, *second;
+  const Number *rx, *ry, *rz;           ///< with friction
+  const Number* rn;                     ///< without
+  const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
   bool far;  ///< the bodies of this process do not fit into a core's own caches: ask for them ahead

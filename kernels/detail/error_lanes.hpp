@@ -20,11 +20,11 @@ struct ErrorLanes {
 /// Projection of z on the Coulomb cone about n.
 template <class V>
 [[gnu::always_inline]] inline Space<V> project_on_cone(const Space<V>& z, const Space<V>& n, double mu) {
-  const V z_n = dot(z, n);
-  const Space<V> t = z - z_n * n;
-  const V length = root(dot(t, t));
-  const V r_n = (z_n + mu * length) * (1 / (1 + mu * mu));
-  const Space<V> edge = r_n * n + (mu * r_n / length) * t;
+  const V z_n = fused_dot(z, n);
+  const Space<V> t = add_scaled(-z_n, n, z);
+  const V length = root(fused_dot(t, t));
+  const V r_n = fused(V{} + mu, length, z_n) * (1 / (1 + mu * mu));
+  const Space<V> edge = add_scaled(mu * r_n / length, t, r_n * n);
   const auto apex = mu * length <= -z_n, inside = length <= mu * z_n;
   const auto choose = [&](V on_edge, V own) { return apex ? V{} : inside ? own : on_edge; };
   return {choose(edge.x, z.x), choose(edge.y, z.y), choose(edge.z, z.z)};
@@ -33,21 +33,21 @@ template <class V>
 template <bool Friction, class V, class Only>
 [[gnu::always_inline]] inline void add_error(const Slice<double>& c, Only only, const Space<V>& n,
                                              const Space<V>& v, V w_nn, double mu, ErrorLanes<V>& sums) {
-  const V v_0 = dot(v, n), v_n = v_0 + load<V>(c.bias, 0, only);
+  const V v_0 = fused_dot(v, n), v_n = v_0 + load<V>(c.bias, 0, only);
   V e2, r_n, carried;
   if constexpr (Friction) {
     const Space<V> r = load_impulse<true, V>(c, 0, only, n);
-    const Space<V> v_t = v - v_0 * n;
-    const V v_t2 = dot(v_t, v_t);
-    const Space<V> v_hat = v_t + (v_n + mu * root(v_t2)) * n;
+    const Space<V> v_t = add_scaled(-v_0, n, v);
+    const V v_t2 = fused_dot(v_t, v_t);
+    const Space<V> v_hat = add_scaled(fused(V{} + mu, root(v_t2), v_n), n, v_t);
     const Space<V> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
-    e2 = dot(miss, miss);
-    r_n = dot(r, n);
-    sums.impulse2 += dot(p, p);
-    carried = v_t2 + v_n * v_n;
+    e2 = fused_dot(miss, miss);
+    r_n = fused_dot(r, n);
+    sums.impulse2 += fused_dot(p, p);
+    carried = fused(v_n, v_n, v_t2);
   } else {
     r_n = load<V>(c.rn, 0, only);
-    const V p = w_nn * r_n, next = p - v_n, miss = p - 0.5 * (next + absolute(next));
+    const V p = w_nn * r_n, miss = p - positive_part(p - v_n);
     e2 = miss * miss;
     sums.impulse2 += p * p;
     carried = v_n * v_n;
@@ -59,11 +59,11 @@ template <bool Friction, class V, class Only>
 }
 
 /// 1/M of the bodies whose copies these are, by which the error counts.
-template <class V>
-[[gnu::always_inline]] inline V whole(const double* const* a, const std::int32_t* slot, std::size_t count,
+template <class V, class Grains>
+[[gnu::always_inline]] inline V whole(const Grains& a, const std::uint32_t* begin, std::size_t count,
                                       const std::uint16_t* multiplicity) {
   V inv_mass = V{} + 1.0;
-  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / multiplicity[slot[l]];
+  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / multiplicity[begin[l] / record];
   return inv_mass;
 }
 
@@ -89,10 +89,10 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
 }
 
 /// Adds up the error of `count` <= W contacts from k on, whose bodies are a, b.
-template <bool Friction, bool AtWall, int W, class Only>
+template <bool Friction, bool AtWall, int W, class Only, class Grains>
 [[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
-                                               Only only, const double* const* a, const double* const* b,
-                                               double mu, const double* wall, double wall_inv_mass,
+                                               Only only, const Grains& a, const Grains& b, double mu,
+                                               const double* wall, double wall_inv_mass,
                                                const std::uint16_t* multiplicity,
                                                ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
@@ -119,19 +119,19 @@ template <bool Friction, bool AtWall, int W>
   const ContactView c = view;
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
-  const double *a[W], *b[W];
+  // At a wall nothing is read of b.
+  const auto second = [&](std::size_t at) {
+    return AtWall ? first_of(c, at, bodies) : second_of(c, at, bodies);
+  };
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
     if (!AtWall && (k - c.begin) % group_size == 0) prefetch_group(c, k, bodies);
-    find_bodies<W>(bodies, c.first + k, a);
-    if constexpr (!AtWall) find_bodies<W>(bodies, c.second + k, b);
-    error_block<Friction, AtWall, W>(c, k, W, AllLanes{}, a, b, mu, wall, wall_inv_mass, multiplicity,
-                                     sums[lanes]);
+    error_block<Friction, AtWall, W>(c, k, W, AllLanes{}, first_of(c, k, bodies), second(k), mu, wall,
+                                     wall_inv_mass, multiplicity, sums[lanes]);
   }
   if (const std::size_t rest = c.end - k; rest > 0) {
     // A lane without a contact sees no motion, and so no error.
     SpareGrains<Lanes<W>> spare(wall);
-    find_bodies<W>(bodies, c.first + k, rest, spare, a);
-    if constexpr (!AtWall) find_bodies<W>(bodies, c.second + k, rest, spare, b);
+    const FewRecords<const double, W> a(first_of(c, k, bodies), rest, spare), b(second(k), rest, spare);
     error_block<Friction, AtWall, W>(c, k, rest, FirstLanes{rest}, a, b, mu, wall, wall_inv_mass,
                                      multiplicity, sums[lanes]);
   }

@@ -8,8 +8,8 @@
 /// instruction set, and a function shared between them would be kept by the linker in one version, that may
 /// be one that the processor does not know.
 ///
-/// No operation here is fused or reordered (-ffp-contract=off): a lane computes to the bit what the scalar
-/// kernel computes for the same contact (docs/decisions/0008-lanes.md).
+/// Nothing is fused that does not say so (-ffp-contract=off): a lane computes to the bit what the scalar
+/// kernel with the same rounding computes for the same contact (docs/decisions/0008-lanes.md).
 
 #include <concepts>
 #include <cstddef>
@@ -216,6 +216,47 @@ template <std::same_as<NarrowOctet> V>
 #endif
 }
 
+/// a b + c, rounded once.
+template <class V>
+[[gnu::always_inline]] inline V fused(V a, V b, V c) {
+#ifdef __FMA__
+  if constexpr (std::same_as<V, Quad>)
+    return reinterpret_cast<V>(_mm256_fmadd_pd(reinterpret_cast<__m256d>(a), reinterpret_cast<__m256d>(b),
+                                               reinterpret_cast<__m256d>(c)));
+  if constexpr (std::same_as<V, NarrowOctet>)
+    return reinterpret_cast<V>(_mm256_fmadd_ps(reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(b),
+                                               reinterpret_cast<__m256>(c)));
+#endif
+#ifdef __AVX512F__
+  if constexpr (std::same_as<V, Octet>)
+    return reinterpret_cast<V>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a), reinterpret_cast<__m512d>(b),
+                                               reinterpret_cast<__m512d>(c)));
+#endif
+  V sum{};
+  for (std::size_t l = 0; l < sizeof(V) / sizeof(NumberOf<V>); ++l)
+    if constexpr (std::same_as<NumberOf<V>, float>)
+      sum[l] = __builtin_fmaf(a[l], b[l], c[l]);
+    else
+      sum[l] = __builtin_fma(a[l], b[l], c[l]);
+  return sum;
+}
+
+/// The larger of 0 and v; a NaN stays one.
+template <class V>
+[[gnu::always_inline]] inline V positive_part(V v) {
+#ifdef __AVX__
+  if constexpr (std::same_as<V, Quad>)
+    return reinterpret_cast<V>(_mm256_max_pd(_mm256_setzero_pd(), reinterpret_cast<__m256d>(v)));
+  if constexpr (std::same_as<V, NarrowOctet>)
+    return reinterpret_cast<V>(_mm256_max_ps(_mm256_setzero_ps(), reinterpret_cast<__m256>(v)));
+#endif
+#ifdef __AVX512F__
+  if constexpr (std::same_as<V, Octet>)
+    return reinterpret_cast<V>(_mm512_maskz_max_pd(0xff, _mm512_setzero_pd(), reinterpret_cast<__m512d>(v)));
+#endif
+  return V{} > v ? V{} : v;
+}
+
 template <class V>
 [[gnu::always_inline]] inline V absolute(V v) {
   using Bits = decltype(v < v);
@@ -243,9 +284,24 @@ template <class V>
 [[gnu::always_inline]] inline V dot(const Space<V>& a, const Space<V>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
+/// s a + b, and products of which all but the first is fused.
 template <class V>
-[[gnu::always_inline]] inline Space<V> cross(const Space<V>& a, const Space<V>& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+[[gnu::always_inline]] inline Space<V> add_scaled(V s, const Space<V>& a, const Space<V>& b) {
+  return {fused(s, a.x, b.x), fused(s, a.y, b.y), fused(s, a.z, b.z)};
+}
+template <class V>
+[[gnu::always_inline]] inline V fused_dot(const Space<V>& a, const Space<V>& b) {
+  return fused(a.z, b.z, fused(a.y, b.y, a.x * b.x));
+}
+template <class V>
+[[gnu::always_inline]] inline Space<V> fused_cross(const Space<V>& a, const Space<V>& b) {
+  return {fused(a.y, b.z, -(a.z * b.y)), fused(a.z, b.x, -(a.x * b.z)), fused(a.x, b.y, -(a.y * b.x))};
+}
+/// v - w x n.
+template <class V>
+[[gnu::always_inline]] inline Space<V> less_cross(const Space<V>& v, const Space<V>& w, const Space<V>& n) {
+  return {fused(w.z, n.y, fused(-w.y, n.z, v.x)), fused(w.x, n.z, fused(-w.z, n.x, v.y)),
+          fused(w.y, n.x, fused(-w.x, n.y, v.z))};
 }
 
 /// 4 x 4: swaps rows and columns: c0 becomes the first elements of the rows, and so on.

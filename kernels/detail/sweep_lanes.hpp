@@ -82,14 +82,14 @@ template <bool Friction, class V>
 }
 
 /// Reads W pairs; or, without reading b, W grains, whose du, w, 1/m and spin are their own.
-template <bool Friction, bool Pair>
-[[gnu::always_inline]] inline Meeting<Quad> gather(const double* const* a, const double* const* b, Quad) {
-  const Quad velocity = {-0.0, -0.0, -0.0, 0.0};
+template <bool Friction, bool Pair, class Grains>
+[[gnu::always_inline]] inline Meeting<Quad> gather(const Grains& a, const Grains& b, Quad) {
+  const Quad sign = {-1, -1, -1, 1};
   Quad column[8];
 #pragma GCC unroll 4
   for (int l = 0; l < 4; ++l) {
     column[l] = load<Quad>(a[l]);
-    if constexpr (Pair) column[l] = column[l] + flip(load<Quad>(b[l]), velocity);
+    if constexpr (Pair) column[l] = fused(load<Quad>(b[l]), sign, column[l]);
   }
   swap_rows_and_columns(column[0], column[1], column[2], column[3]);
   if constexpr (Friction) {
@@ -104,31 +104,29 @@ template <bool Friction, bool Pair>
 }
 
 /// W = 8, of floats without friction: contacts 0..3 on the left, 4..7 on the right.
-template <bool Friction, bool Pair>
+template <bool Friction, bool Pair, class Grains>
 requires(!Friction)
-    [[gnu::always_inline]] inline Meeting<NarrowOctet> gather(const float* const* a, const float* const* b,
-                                                              NarrowOctet) {
-  const NarrowOctet velocity = {-0.0, -0.0, -0.0, 0.0, -0.0, -0.0, -0.0, 0.0};
+    [[gnu::always_inline]] inline Meeting<NarrowOctet> gather(const Grains& a, const Grains& b, NarrowOctet) {
+  const NarrowOctet sign = {-1, -1, -1, 1, -1, -1, -1, 1};
   NarrowOctet column[8];
 #pragma GCC unroll 4
   for (int l = 0; l < 4; ++l) {
     column[l] = load_halves(a[l], a[l + 4]);
-    if constexpr (Pair) column[l] = column[l] + flip(load_halves(b[l], b[l + 4]), velocity);
+    if constexpr (Pair) column[l] = fused(load_halves(b[l], b[l + 4]), sign, column[l]);
   }
   swap_rows_and_columns(column[0], column[1], column[2], column[3]);
   return meeting_of<false>(column);
 }
 
 /// W = 8, of doubles or floats.
-template <bool Friction, bool Pair, class V, class Number>
-requires Friction [[gnu::always_inline]] inline Meeting<V> gather(const Number* const* a,
-                                                                  const Number* const* b, V) {
-  const V velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+template <bool Friction, bool Pair, class V, class Grains>
+requires Friction [[gnu::always_inline]] inline Meeting<V> gather(const Grains& a, const Grains& b, V) {
+  const V sign = {-1, -1, -1, 1, 1, 1, 1, 1};
   V column[8];
 #pragma GCC unroll 8
   for (int l = 0; l < 8; ++l) {
     column[l] = load<V>(a[l]);
-    if constexpr (Pair) column[l] = column[l] + flip(load<V>(b[l]), velocity);
+    if constexpr (Pair) column[l] = fused(load<V>(b[l]), sign, column[l]);
   }
   transpose(column);
   return meeting_of<Friction>(column);
@@ -136,7 +134,7 @@ requires Friction [[gnu::always_inline]] inline Meeting<V> gather(const Number* 
 
 template <bool Friction, class V>
 [[gnu::always_inline]] inline Space<V> relative_velocity(const Meeting<V>& m, const Space<V>& n) {
-  if constexpr (Friction) return m.du - cross(m.w, n);
+  if constexpr (Friction) return less_cross(m.du, m.w, n);
   return m.du;
 }
 
@@ -165,13 +163,12 @@ struct MomentumStart {
   }
   template <class V, class Only>
   [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at, Only only) const {
-    const auto part = static_cast<NumberOf<V>>(beta);
-    return {s.x + part * load<V>(x, at, only), s.y + part * load<V>(y, at, only),
-            s.z + part * load<V>(z, at, only)};
+    return add_scaled(V{} + static_cast<NumberOf<V>>(beta),
+                      Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)}, s);
   }
   template <class V, class Only>
   [[gnu::always_inline]] V begin(V s, std::size_t at, Only only) const {
-    return s + static_cast<NumberOf<V>>(beta) * load<V>(n, at, only);
+    return fused(V{} + static_cast<NumberOf<V>>(beta), load<V>(n, at, only), s);
   }
   template <class V, class Only>
   [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at, Only only) const {
@@ -185,6 +182,19 @@ struct MomentumStart {
   }
 };
 
+/// 1/W_nn and 1/W_tt: as in kernels/detail/scalar_sweeps.hpp.
+template <class V>
+struct Inverses {
+  V nn, tt;
+};
+template <class V>
+[[gnu::always_inline]] inline Inverses<V> invert(V w_nn, V w_tt) {
+  constexpr NumberOf<V> one = 1;
+  if constexpr (std::same_as<NumberOf<V>, float>) return {one / w_nn, one / w_tt};
+  const V inverse = one / (w_nn * w_tt);
+  return {inverse * w_tt, inverse * w_nn};
+}
+
 /// The impulse that solves the law, less the one that the velocities know; stores the new one. Without
 /// friction only the first component is meant, along the normal.
 template <bool Friction, class V, class Start, class Only>
@@ -193,19 +203,20 @@ template <bool Friction, class V, class Start, class Only>
                                                  const Space<V>& v, V w_nn, V w_tt, double mu,
                                                  const Start& start) {
   using Number = NumberOf<V>;
-  constexpr Number half = 0.5, one = 1;
-  const auto omega = static_cast<Number>(start.omega);
-  const V bias = load<V>(c.bias, at, only), v_n = dot(v, n);
+  const V omega = V{} + static_cast<Number>(start.omega);
+  const V bias = load<V>(c.bias, at, only), v_n = fused_dot(v, n);
   if constexpr (Friction) {
     const Space<V> s = load_impulse<true, V>(c, at, only, n), r = start.begin(s, at, only);
-    const V r_n = dot(r, n), next = r_n - omega * (v_n + bias) / w_nn;
-    const V r_n_new = half * (next + absolute(next)), limit = static_cast<Number>(mu) * r_n_new;
-    const Space<V> t = (r - r_n * n) - (one / w_tt) * (v - v_n * n);
-    V t2 = dot(t, t);
+    const Inverses<V> inverse = invert(w_nn, w_tt);
+    const V r_n = fused_dot(r, n);
+    const V r_n_new = positive_part(fused(-omega, (v_n + bias) * inverse.nn, r_n));
+    const V limit = static_cast<Number>(mu) * r_n_new;
+    const Space<V> t = add_scaled(-fused(-inverse.tt, v_n, r_n), n, add_scaled(-inverse.tt, v, r));
+    V t2 = fused_dot(t, t);
     // In floats squares vanish early: a contact that carries nothing must not keep what is left of its t.
     if constexpr (std::same_as<Number, float>) t2 = t2 + __FLT_MIN__;
-    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + one;
-    const Space<V> r_new = r_n_new * n + scale * t;
+    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + Number{1};
+    const Space<V> r_new = add_scaled(scale, t, r_n_new * n);
     store(out.x, at, r_new.x, only);
     store(out.y, at, r_new.y, only);
     store(out.z, at, r_new.z, only);
@@ -213,8 +224,7 @@ template <bool Friction, class V, class Start, class Only>
     return r_new - r;
   } else {
     const V s = load<V>(c.rn, at, only), r_n = start.begin(s, at, only);
-    const V next = r_n - omega * (v_n + bias) / w_nn;
-    const V r_n_new = half * (next + absolute(next));
+    const V r_n_new = positive_part(fused(-omega, (v_n + bias) / w_nn, r_n));
     store(out.n, at, r_n_new, only);
     start.end(s, r_n_new, at, only);
     return (r_n_new - r_n) * n;
@@ -222,38 +232,38 @@ template <bool Friction, class V, class Start, class Only>
 }
 
 /// Adds dr to the grains a and, if there is a second one, takes it from b.
-template <bool Friction, bool Pair>
-[[gnu::always_inline]] inline void scatter(double* const* a, double* const* b, const Space<Quad>& n,
+template <bool Friction, bool Pair, class Grains>
+[[gnu::always_inline]] inline void scatter(const Grains& a, const Grains& b, const Space<Quad>& n,
                                            const Space<Quad>& dr) {
   Quad row[4] = {dr.x, dr.y, dr.z, Quad{}};
   swap_rows_and_columns(row[0], row[1], row[2], row[3]);
 #pragma GCC unroll 4
   for (int l = 0; l < 4; ++l) {
     const Quad i = load<Quad>(a[l]);
-    store(a[l], i + spread_last(i) * row[l]);
+    store(a[l], fused(spread_last(i), row[l], i));
     if constexpr (Pair) {
       const Quad j = load<Quad>(b[l]);
-      store(b[l], j - spread_last(j) * row[l]);
+      store(b[l], fused(-spread_last(j), row[l], j));
     }
   }
   if constexpr (Friction) {
-    const Space<Quad> turn = cross(dr, n);
+    const Space<Quad> turn = fused_cross(dr, n);
     Quad turns[4] = {turn.x, turn.y, turn.z, Quad{}};
     swap_rows_and_columns(turns[0], turns[1], turns[2], turns[3]);
 #pragma GCC unroll 4
     for (int l = 0; l < 4; ++l) {
       const Quad i = load<Quad>(a[l] + 4);
-      store(a[l] + 4, i + spread_last(i) * turns[l]);
+      store(a[l] + 4, fused(spread_last(i), turns[l], i));
       if constexpr (Pair) {
         const Quad j = load<Quad>(b[l] + 4);
-        store(b[l] + 4, j + spread_last(j) * turns[l]);
+        store(b[l] + 4, fused(spread_last(j), turns[l], j));
       }
     }
   }
 }
 
-template <bool Friction, bool Pair>
-requires(!Friction) [[gnu::always_inline]] inline void scatter(float* const* a, float* const* b,
+template <bool Friction, bool Pair, class Grains>
+requires(!Friction) [[gnu::always_inline]] inline void scatter(const Grains& a, const Grains& b,
                                                                const Space<NarrowOctet>& /*n*/,
                                                                const Space<NarrowOctet>& dr) {
   NarrowOctet row[4] = {dr.x, dr.y, dr.z, NarrowOctet{}};
@@ -261,29 +271,32 @@ requires(!Friction) [[gnu::always_inline]] inline void scatter(float* const* a, 
 #pragma GCC unroll 4
   for (int l = 0; l < 4; ++l) {
     const NarrowOctet i = load_halves(a[l], a[l + 4]);
-    store_halves(a[l], a[l + 4], i + spread_last(i) * row[l]);
+    store_halves(a[l], a[l + 4], fused(spread_last(i), row[l], i));
     if constexpr (Pair) {
       const NarrowOctet j = load_halves(b[l], b[l + 4]);
-      store_halves(b[l], b[l + 4], j - spread_last(j) * row[l]);
+      store_halves(b[l], b[l + 4], fused(-spread_last(j), row[l], j));
     }
   }
 }
 
-template <bool Friction, bool Pair, class V, class Number>
-requires Friction [[gnu::always_inline]] inline void scatter(Number* const* a, Number* const* b,
+template <bool Friction, bool Pair, class V, class Grains>
+requires Friction [[gnu::always_inline]] inline void scatter(const Grains& a, const Grains& b,
                                                              const Space<V>& n, const Space<V>& dr) {
   const V velocity = {-0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-  const Space<V> turn = cross(dr, n);
+  const Space<V> turn = fused_cross(dr, n);
   V row[8] = {dr.x, dr.y, dr.z, V{}, turn.x, turn.y, turn.z, V{}};
   transpose(row);
+  // All loads first: no load then waits for the address of a store before it.
+  V i[8], j[8];
 #pragma GCC unroll 8
   for (int l = 0; l < 8; ++l) {
-    const V i = load<V>(a[l]);
-    store(a[l], i + spread_last(i) * row[l]);
-    if constexpr (Pair) {
-      const V j = load<V>(b[l]);
-      store(b[l], j + spread_last(j) * flip(row[l], velocity));
-    }
+    i[l] = load<V>(a[l]);
+    if constexpr (Pair) j[l] = load<V>(b[l]);
+  }
+#pragma GCC unroll 8
+  for (int l = 0; l < 8; ++l) {
+    store(a[l], fused(spread_last(i[l]), row[l], i[l]));
+    if constexpr (Pair) store(b[l], fused(spread_last(j[l]), flip(row[l], velocity), j[l]));
   }
 }
 
@@ -293,9 +306,9 @@ template <class V, class Only>
 }
 
 /// Blocks x W contacts in three phases.
-template <bool Friction, class V, int Blocks, class Start, class Only>
+template <bool Friction, class V, int Blocks, class Start, class Grains, class Only>
 [[gnu::always_inline]] inline void sweep_block(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
-                                               NumberOf<V>* const* a, NumberOf<V>* const* b, double mu,
+                                               const Grains& a, const Grains& b, double mu,
                                                const Start& start, Only only) {
   constexpr int W = width_of<V>;
   Meeting<V> m[Blocks];
@@ -324,18 +337,22 @@ constexpr std::size_t minimum(std::size_t a, std::size_t b) {
   return a < b ? a : b;
 }
 
-/// `Number` is double, or const double where bodies are only read.
+/// The records of the first (or second) bodies of contacts from some place on.
 template <class Number>
-[[gnu::always_inline]] inline Number* body(Number* bodies, std::int32_t slot) {
-  return bodies + record * static_cast<std::size_t>(slot);
-}
+struct Records {
+  Number* bodies;
+  const std::uint32_t* begin;  ///< in numbers, as in ContactViewOf
+  [[gnu::always_inline]] Number* operator[](std::size_t l) const { return bodies + begin[l]; }
+  [[gnu::always_inline]] Records operator+(std::size_t l) const { return {bodies, begin + l}; }
+};
 
-/// Addresses of bodies. Slots are not negative: without a sign the address takes one instruction less.
-template <std::size_t Count, class Number>
-[[gnu::always_inline]] inline void find_bodies(Number* bodies, const std::int32_t* slot, Number** address) {
-#pragma GCC unroll 16
-  for (std::size_t l = 0; l < Count; ++l)
-    address[l] = bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]));
+template <class View, class Number>
+[[gnu::always_inline]] inline Records<Number> first_of(const View& c, std::size_t k, Number* bodies) {
+  return {bodies, c.first + k};
+}
+template <class View, class Number>
+[[gnu::always_inline]] inline Records<Number> second_of(const View& c, std::size_t k, Number* bodies) {
+  return {bodies, c.second + k};
 }
 
 /// Grains of mass 1 that no contact knows, for the lanes that hold none. In a sweep they rest.
@@ -352,15 +369,25 @@ struct SpareGrains {
   }
 };
 
-/// Addresses of the first `count` <= Count bodies; the lanes behind them get spare grains, each its own.
-template <std::size_t Count, class V, class Number>
-[[gnu::always_inline]] inline void find_bodies(Number* bodies, const std::int32_t* slot, std::size_t count,
-                                               SpareGrains<V>& spare, Number** address) {
+/// The same of a few contacts, fewer than fill the lanes: behind them are spare grains, each its own.
+template <class Number, std::size_t Count>
+struct FewRecords {
+  Number* address[Count];
+
+  template <class V>
+  [[gnu::always_inline]] FewRecords(const Records<Number>& records, std::size_t count,
+                                    SpareGrains<V>& spare) {
 #pragma GCC unroll 16
-  for (std::size_t l = 0; l < Count; ++l)
-    address[l] = l < count ? bodies + record * static_cast<std::size_t>(static_cast<std::uint32_t>(slot[l]))
-                           : spare.record_of[l % width_of<V>];
-}
+    for (std::size_t l = 0; l < Count; ++l)
+      address[l] = l < count ? records[l] : spare.record_of[l % width_of<V>];
+  }
+  [[gnu::always_inline]] Number* const* operator+(std::size_t l) const {
+    return address + l;
+  }
+  [[gnu::always_inline]] Number* operator[](std::size_t l) const {
+    return address[l];
+  }
+};
 
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
 /// them coming, and with 200,000 grains they stand beyond its second cache. Where they do not, asking costs
@@ -371,8 +398,8 @@ template <class View, class Number>
   if (!c.far || ahead + group_size > c.end) return;
 #pragma GCC unroll 16
   for (std::size_t l = 0; l < group_size; ++l) {
-    __builtin_prefetch(body(bodies, c.first[ahead + l]), 1);
-    __builtin_prefetch(body(bodies, c.second[ahead + l]), 1);
+    __builtin_prefetch(bodies + c.first[ahead + l], 1);
+    __builtin_prefetch(bodies + c.second[ahead + l], 1);
   }
 }
 
@@ -382,9 +409,8 @@ template <bool Friction, class V, int Blocks, class Start, class Number>
                                               std::size_t k, std::size_t count, Number* bodies,
                                               SpareGrains<V>& spare, double mu, const Start& start) {
   constexpr std::size_t room = width_of<V> * Blocks;
-  Number *a[room], *b[room];
-  find_bodies<room>(bodies, c.first + k, count, spare, a);
-  find_bodies<room>(bodies, c.second + k, count, spare, b);
+  const FewRecords<Number, room> a(first_of(c, k, bodies), count, spare),
+      b(second_of(c, k, bodies), count, spare);
   sweep_block<Friction, V, Blocks>(slice(c, k), target(r, k), a, b, mu, start.from(k), FirstLanes{count});
 }
 
@@ -401,12 +427,9 @@ template <bool Friction, class V, class Start, class Number>
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
-    for (; k + at_once <= end; k += at_once) {
-      Number *a[at_once], *b[at_once];
-      find_bodies<at_once>(bodies, c.first + k, a);
-      find_bodies<at_once>(bodies, c.second + k, b);
-      sweep_block<Friction, V, blocks_at_once>(slice(c, k), target(r, k), a, b, mu, all.from(k), AllLanes{});
-    }
+    for (; k + at_once <= end; k += at_once)
+      sweep_block<Friction, V, blocks_at_once>(slice(c, k), target(r, k), first_of(c, k, bodies),
+                                               second_of(c, k, bodies), mu, all.from(k), AllLanes{});
     if (k + W < end)
       sweep_rest<Friction, V, blocks_at_once>(c, r, k, end - k, bodies, spare, mu, all);
     else if (k < end)
@@ -437,9 +460,9 @@ void single_grains(const SingleContactView& c, const SingleImpulseView& r, float
 }
 
 /// V += M^-1 H r for W contacts.
-template <bool Friction, bool Pair, int W, class Only>
-[[gnu::always_inline]] inline void accumulate_block(const Slice<double>& c, double* const* a,
-                                                    double* const* b, Only only) {
+template <bool Friction, bool Pair, int W, class Grains, class Only>
+[[gnu::always_inline]] inline void accumulate_block(const Slice<double>& c, const Grains& a, const Grains& b,
+                                                    Only only) {
   const auto n = load_normal<Lanes<W>>(c, 0, only);
   scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, only, n));
 }
@@ -452,15 +475,12 @@ void accumulate_grains(const ContactView& view, double* bodies) {
   for (std::size_t k = c.begin; k < c.end; ++group) {
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
-    double *a[W], *b[W];
-    for (; k + W <= end; k += W) {
-      find_bodies<W>(bodies, c.first + k, a);
-      find_bodies<W>(bodies, c.second + k, b);
-      accumulate_block<Friction, true, W>(slice(c, k), a, b, AllLanes{});
-    }
+    for (; k + W <= end; k += W)
+      accumulate_block<Friction, true, W>(slice(c, k), first_of(c, k, bodies), second_of(c, k, bodies),
+                                          AllLanes{});
     if (k == end) continue;
-    find_bodies<W>(bodies, c.first + k, end - k, spare, a);
-    find_bodies<W>(bodies, c.second + k, end - k, spare, b);
+    const FewRecords<double, W> a(first_of(c, k, bodies), end - k, spare),
+        b(second_of(c, k, bodies), end - k, spare);
     accumulate_block<Friction, true, W>(slice(c, k), a, b, FirstLanes{end - k});
     k = end;
   }
@@ -483,7 +503,7 @@ struct SplitWall {
     inv_mass = static_cast<Number>(wall_inv_mass * static_cast<double>(lanes));
   }
   void push(std::size_t part, const Space<V>& n, const Space<V>& dr) {
-    gained[part] = gained[part] + (-inv_mass * dot(n, dr)) * n;
+    gained[part] = add_scaled(-inv_mass * fused_dot(n, dr), n, gained[part]);
   }
   void glue(double* wall) const {
     if (inv_mass == 0 || lanes == 0) return;
@@ -504,9 +524,9 @@ struct SplitWall {
 };
 
 /// A block of W grains against as many copies of a wall.
-template <bool Friction, class V, class Start, class Only>
+template <bool Friction, class V, class Grains, class Start, class Only>
 [[gnu::always_inline]] inline void sweep_wall_block(const Slice<NumberOf<V>>& c,
-                                                    const Target<NumberOf<V>>& out, NumberOf<V>* const* a,
+                                                    const Target<NumberOf<V>>& out, const Grains& a,
                                                     double mu, const Start& start, Only only,
                                                     std::size_t lanes, SplitWall<V>& wall) {
   Meeting<V> m = gather<Friction, false>(a, a, V{});
@@ -531,14 +551,12 @@ template <bool Friction, class V, class Start, class Number>
   const Start all = start;
   SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
   std::size_t k = c.begin, lanes = 0;
-  Number* a[W];
-  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
-    find_bodies<W>(bodies, c.first + k, a);
-    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, mu, all.from(k), AllLanes{}, lanes, split);
-  }
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W))
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), first_of(c, k, bodies), mu, all.from(k),
+                                  AllLanes{}, lanes, split);
   if (k < c.end) {
     SpareGrains<V> spare;
-    find_bodies<W>(bodies, c.first + k, c.end - k, spare, a);
+    const FewRecords<Number, W> a(first_of(c, k, bodies), c.end - k, spare);
     sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, mu, all.from(k), FirstLanes{c.end - k}, lanes,
                                   split);
   }
@@ -568,20 +586,17 @@ void accumulate_wall(const ContactView& view, double* bodies, double* wall, doub
   using V = Lanes<W>;
   const ContactView c = view;
   SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
-  const auto add = [&](const Slice<double>& own, double* const* a, std::size_t lanes, auto only) {
+  const auto add = [&](const Slice<double>& own, const auto& a, std::size_t lanes, auto only) {
     const Space<V> n = load_normal<V>(own, 0, only);
     accumulate_block<Friction, false, W>(own, a, a, only);
     split.push(lanes, n, load_impulse<Friction, V>(own, 0, only, n));
   };
   std::size_t k = c.begin, lanes = 0;
-  double* a[W];
-  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W)) {
-    find_bodies<W>(bodies, c.first + k, a);
-    add(slice(c, k), a, lanes, AllLanes{});
-  }
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W))
+    add(slice(c, k), first_of(c, k, bodies), lanes, AllLanes{});
   if (k < c.end) {
     SpareGrains<Lanes<W>> spare;
-    find_bodies<W>(bodies, c.first + k, c.end - k, spare, a);
+    const FewRecords<double, W> a(first_of(c, k, bodies), c.end - k, spare);
     add(slice(c, k), a, lanes, FirstLanes{c.end - k});
   }
   split.glue(wall);

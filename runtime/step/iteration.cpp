@@ -21,6 +21,13 @@ std::size_t memory_used(const StepState& state) {
          memory_used(state.single) + state.copies.capacity() * sizeof(WallCopy);
 }
 
+InstructionSet settled(InstructionSet set, const graph::Communicator& ranks) {
+  if (set != InstructionSet::automatic || ranks.ranks() == 1) return set;
+  double weakest[1] = {-static_cast<double>(best_instruction_set())};
+  ranks.max(weakest);
+  return static_cast<InstructionSet>(static_cast<int>(-weakest[0]));
+}
+
 Iteration::Iteration(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
                      const DecompositionSettings& decomposition, const graph::Communicator& ranks)
     : state_(state),
@@ -28,7 +35,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       settings_(settings),
       decomposition_(decomposition),
       ranks_(ranks),
-      kernels_(settings.simd),
+      kernels_(settled(settings.simd, ranks)),
       gluing_(state, decomposition, ranks),
       admm_(state, parameters, decomposition, gluing_, ranks) {}
 

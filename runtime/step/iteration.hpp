@@ -30,6 +30,10 @@ struct IterationResult {
   bool stagnated = false;  ///< more sweeps would not have made the error smaller
 };
 
+/// What `automatic` means on these ranks: the strongest set that all of them run, since they shall round
+/// alike. Any other set as it is. Collective.
+InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
+
 /// The iteration part of a step as a program on the chunk graph: every epoch, each chunk does one thing, in
 /// the order of its colour.
 ///

@@ -78,7 +78,7 @@ struct SolverSettings {
   double overlap_correction =
       0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
   Precision precision = Precision::mixed;
-  InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps; all give the same bits
+  InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps
 };
 
 /// How subdomains act on one another.

@@ -12,6 +12,7 @@
 #include "kernels/bodies.hpp"
 #include "kernels/broad_phase.hpp"
 #include "kernels/chunks.hpp"
+#include "kernels/detail/scalar_sweeps.hpp"
 #include "kernels/narrow_phase.hpp"
 #include "kernels/sweep.hpp"
 #include "kernels/sweep_kernels.hpp"
@@ -28,6 +29,13 @@ inline std::vector<InstructionSet> sets_to_test() {
   for (const InstructionSet set : {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512})
     if (set <= best_instruction_set()) sets.push_back(set);
   return sets;
+}
+
+/// Calls `work` with the scalar kernels that round as those of `set` do.
+template <class Work>
+auto with_scalar_kernels(InstructionSet set, const Work& work) {
+  return set == InstructionSet::portable ? work(scalar::Sweeps<scalar::Separate>{})
+                                         : work(scalar::Sweeps<scalar::Fused>{});
 }
 
 inline double uniform(Random& random, double low, double high) {
