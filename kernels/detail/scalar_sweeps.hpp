@@ -14,17 +14,27 @@
 
 namespace talus::scalar {
 
-/// How a b + c is rounded.
+/// How a b + c is rounded, and the larger of 0 and a number found; a NaN stays one.
 struct Separate {
   template <class N>
   static N multiply_add(N a, N b, N c) {
     return a * b + c;
+  }
+  /// Without a jump: nobody can predict which contacts are open.
+  template <class N>
+  static N positive_part(N value) {
+    return N(0.5) * (value + std::abs(value));
   }
 };
 struct Fused {
   template <class N>
   static N multiply_add(N a, N b, N c) {
     return std::fma(a, b, c);
+  }
+  /// As vectors do it, down to the sign of 0.
+  template <class N>
+  static N positive_part(N value) {
+    return N(0) > value ? N(0) : value;
   }
 };
 
@@ -155,13 +165,6 @@ inline void push(VelocityOf<N>& a, Wall& wall, V3<N> n, V3<N> dr) {
   if constexpr (Friction) add_to<R>(a.w, a.spin_mobility, cross<R>(dr, n));
 }
 
-/// The larger of 0 and value, which takes one instruction and no jump: nobody can predict which contacts are
-/// open. A NaN stays one.
-template <class N>
-inline N positive_part(N value) {
-  return N(0) > value ? N(0) : value;
-}
-
 /// 1/W_nn and 1/W_tt. In doubles one division for both: it is divisions that sweeps in double wait for.
 /// Floats have not the range for the product.
 template <class N>
@@ -243,7 +246,7 @@ inline V3<N> solve_law(Arrays& c, std::size_t k, V3<N> n, V3<N> v, N w_nn, N w_t
     const V3<N> s{c.rx[k], c.ry[k], c.rz[k]}, r = start.begin(s, k);
     const Inverses<N> inverse = invert(w_nn, w_tt);
     const N r_n = dot<R>(r, n);
-    const N r_n_new = positive_part(R::multiply_add(-omega, (v_n + c.bias[k]) * inverse.nn, r_n));
+    const N r_n_new = R::positive_part(R::multiply_add(-omega, (v_n + c.bias[k]) * inverse.nn, r_n));
     const N limit = static_cast<N>(mu) * r_n_new;
     // r - v/W_tt, less what of it is normal.
     const V3<N> t =
@@ -257,7 +260,7 @@ inline V3<N> solve_law(Arrays& c, std::size_t k, V3<N> n, V3<N> v, N w_nn, N w_t
     return r_new - r;
   } else {
     const N s = c.rn[k], r_n = start.begin(s, k);
-    const N r_n_new = positive_part(R::multiply_add(-omega, (v_n + c.bias[k]) / w_nn, r_n));
+    const N r_n_new = R::positive_part(R::multiply_add(-omega, (v_n + c.bias[k]) / w_nn, r_n));
     c.rn[k] = r_n_new;
     start.end(s, r_n_new, k);
     return (r_n_new - r_n) * n;
@@ -346,7 +349,7 @@ inline void add_error(ErrorSums& sums, const Contacts& c, std::size_t k, V3<doub
     if (r_n > 0 || v_n < 0) sums.velocity2 += R::multiply_add(v_n, v_n, v_t2);
   } else {
     r_n = c.rn[k];
-    const double p = w_nn * r_n, miss = p - positive_part(p - v_n);
+    const double p = w_nn * r_n, miss = p - R::positive_part(p - v_n);
     e2 = miss * miss;
     sums.impulse2 += p * p;
     if (r_n > 0 || v_n < 0) sums.velocity2 += v_n * v_n;
