@@ -27,9 +27,14 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
                              std::span<const Vec3> x, std::span<const double> radius,
                              std::span<const Wall> walls);
 
-/// Impulse on the first body [N s] and its normal, whatever the storage.
-Vec3 contact_impulse(const Contacts& contacts, std::size_t k);
-Vec3 contact_normal(const Contacts& contacts, std::size_t k);
+/// Its normal, and its impulse on the first body [N s], whatever the storage.
+inline Vec3 contact_normal(const Contacts& contacts, std::size_t k) {
+  return {contacts.nx[k], contacts.ny[k], contacts.nz[k]};
+}
+inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
+  if (contacts.rn.empty()) return {contacts.rx[k], contacts.ry[k], contacts.rz[k]};
+  return contacts.rn[k] * contact_normal(contacts, k);
+}
 
 /// Active contacts (r_n > 0) of each grain: one entry per slot.
 std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies);
