@@ -165,15 +165,14 @@ inline void push(VelocityOf<N>& a, Wall& wall, V3<N> n, V3<N> dr) {
   if constexpr (Friction) add_to<R>(a.w, a.spin_mobility, cross<R>(dr, n));
 }
 
-/// 1/W_nn and 1/W_tt. In doubles one division for both: it is divisions that sweeps in double wait for.
-/// Floats have not the range for the product.
+/// 1/W_nn and 1/W_tt by one division: it is divisions that sweeps in double wait for. The product stays in
+/// range: masses of grains do, and those that floats are used for are within 1000 of their unit.
 template <class N>
 struct Inverses {
   N nn, tt;
 };
 template <class N>
 inline Inverses<N> invert(N w_nn, N w_tt) {
-  if constexpr (std::is_same_v<N, float>) return {1 / w_nn, 1 / w_tt};
   const N inverse = 1 / (w_nn * w_tt);
   return {inverse * w_tt, inverse * w_nn};
 }

@@ -189,9 +189,7 @@ struct Inverses {
 };
 template <class V>
 [[gnu::always_inline]] inline Inverses<V> invert(V w_nn, V w_tt) {
-  constexpr NumberOf<V> one = 1;
-  if constexpr (std::same_as<NumberOf<V>, float>) return {one / w_nn, one / w_tt};
-  const V inverse = one / (w_nn * w_tt);
+  const V inverse = NumberOf<V>{1} / (w_nn * w_tt);
   return {inverse * w_tt, inverse * w_nn};
 }
 
