@@ -36,7 +36,7 @@ ImpulseView impulses(Contacts& c) {
 template <class Number, class Arrays, class Record>
 ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, ContactRange range,
                            std::span<Record> velocity) {
-  constexpr std::size_t near = std::size_t{256} << 10;  // what second caches have had for years
+  constexpr std::size_t near = std::size_t{256} << 10;  // with fewer, asking costs more than it gains
   return {arrays.nx.data(),
           arrays.ny.data(),
           arrays.nz.data(),
