@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 
 namespace talus {
 
@@ -200,6 +202,9 @@ std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates
 }
 
 Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies) {
+  if (bodies > most_bodies_of_a_process)
+    throw std::runtime_error(std::to_string(bodies) + " bodies in one process, of at most " +
+                             std::to_string(most_bodies_of_a_process) + "; use more ranks");
   Chunks chunks;
   place_boundaries(groups, chunks);
   list_bodies(candidates, bodies, chunks);

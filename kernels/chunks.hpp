@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -40,6 +41,9 @@ struct CandidateGroup {
   int target;              ///< candidates in a chunk at most, a few hundred, < 32768
 };
 
+/// So that 32 bits tell where the record of a body begins (record_of).
+inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
+
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
 /// neither grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept
 /// first, and what they leave at the interface can travel while the inner chunks are swept. Two chunks
@@ -71,6 +75,7 @@ struct Chunks {
 };
 
 /// Cuts the groups into chunks, colours them greedily in order, and lists who resets which body.
+/// Throws std::runtime_error when there are more than most_bodies_of_a_process.
 Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies);
 
 /// The same with all candidates of one subdomain and nothing glued.

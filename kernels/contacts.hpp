@@ -10,9 +10,12 @@
 
 namespace talus {
 
-/// Where the record of a body begins, in numbers (VelocityOf).
+/// Where the record of a body begins, in numbers (VelocityOf). Of most_bodies_of_a_process, which cut_chunks
+/// sees to.
 inline std::uint32_t record_of(Slot slot) {
-  return 8 * static_cast<std::uint32_t>(slot);
+  constexpr std::uint32_t numbers = sizeof(Velocity) / sizeof(double);
+  static_assert(most_bodies_of_a_process * numbers <= std::size_t{1} << 32);
+  return numbers * static_cast<std::uint32_t>(slot);
 }
 
 /// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],

@@ -1,9 +1,26 @@
+#include "kernels/sweep.hpp"
+
+#include <algorithm>
+#include <vector>
+
 #include "kernels/detail/scalar_sweeps.hpp"
 
 namespace talus {
 
 using namespace scalar;
 using Portable = Sweeps<Separate>;
+
+namespace {
+
+template <bool Friction>
+inline void store_impulse(Contacts& c, std::size_t k, V3<double> r, V3<double> n) {
+  if constexpr (Friction)
+    store_vector(c, k, r);
+  else
+    c.rn[k] = dot<Separate>(r, n);
+}
+
+}  // namespace
 
 template <bool Friction>
 void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) {

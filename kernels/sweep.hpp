@@ -43,8 +43,8 @@ struct SweepMomentum {
 ///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
 ///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
 /// `Friction` false: only r_n exists and only u is read and written. Per contact: reads 2 body records (128
-/// bytes) and 56 bytes of contact, writes 128 + 24; about 117 flop, 2 divisions and, when sliding, 1 square
-/// root. Momentum reads and writes 12 more.
+/// bytes) and 56 bytes of contact, writes 128 + 24; about 108 flop, 2 divisions and a square root.
+/// Momentum reads and writes 12 more.
 template <bool Friction>
 void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu);
 template <bool Friction>

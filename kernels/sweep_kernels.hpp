@@ -18,7 +18,7 @@ struct LaneKernels;
 /// kernel does; but they fuse products into sums, which the portable one does not
 /// (docs/decisions/0008-lanes.md).
 enum class InstructionSet {
-  automatic,  ///< the strongest that runs here
+  automatic,  ///< the strongest that runs here, and in a simulation on all ranks (`settled`)
   portable,   ///< the scalar kernels
   avx2,       ///< 4 contacts at a time (AVX2, FMA)
   avx512,     ///< 8 contacts at a time (F, DQ, VL)

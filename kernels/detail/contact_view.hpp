@@ -17,7 +17,7 @@ struct ContactViewOf {
   const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
-  bool far;  ///< the bodies of this process do not fit into a core's own caches: ask for them ahead
+  bool far;  ///< so many bodies that a core's first cache misses most: ask for them ahead
 };
 
 using ContactView = ContactViewOf<double>;

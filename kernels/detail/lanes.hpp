@@ -1,8 +1,8 @@
 #pragma once
 
 /// Vectors of 4 or 8 doubles, or of 8 floats, and what the sweeps need of them, on the compiler's vector
-/// extension (g++ and clang++), so that one text serves every instruction set; only masks and the square root
-/// name intrinsics.
+/// extension (g++ and clang++), so that one text serves every instruction set; only masks, the square root,
+/// fused products and the maximum name intrinsics.
 ///
 /// Everything here has internal linkage and includes nothing that has not: each user is compiled for its own
 /// instruction set, and a function shared between them would be kept by the linker in one version, that may

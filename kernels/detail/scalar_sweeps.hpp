@@ -193,14 +193,6 @@ inline void store_vector(Arrays& c, std::size_t k, V3<N> r) {
   c.rz[k] = r.z;
 }
 
-template <bool Friction>
-inline void store_impulse(Contacts& c, std::size_t k, V3<double> r, V3<double> n) {
-  if constexpr (Friction)
-    store_vector(c, k, r);
-  else
-    c.rn[k] = dot<Separate>(r, n);
-}
-
 /// A plain sweep begins where the last one ended.
 struct Plain {
   double omega = 1;

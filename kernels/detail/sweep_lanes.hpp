@@ -10,7 +10,7 @@
 ///   compute  the law, without branches;
 ///   scatter  one transposition of (dr, dr x n) back to rows, then record += mobility * row: no record is
 ///            transposed for its mobility.
-/// Per contact: 2 records of 64 bytes read and written, 56 bytes of contact read and 24 written, about 117
+/// Per contact: 2 records of 64 bytes read and written, 56 bytes of contact read and 24 written, about 108
 /// flop, 1.5 shuffles of 8 lanes. In a group that is not full the free lanes read n = r = bias = 0 and meet a
 /// grain of their own of mass 1 at rest, so that nothing happens there.
 
@@ -388,8 +388,7 @@ struct FewRecords {
 };
 
 /// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
-/// them coming, and with 200,000 grains they stand beyond its second cache. Where they do not, asking costs
-/// 2-6 % of a sweep in single precision.
+/// them coming. Where the first cache holds most of them, asking costs 2-6 % of a sweep.
 template <class View, class Number>
 [[gnu::always_inline]] inline void prefetch_group(const View& c, std::size_t k, Number* bodies) {
   const std::size_t ahead = k + 2 * group_size;

@@ -1,4 +1,5 @@
-/// Sweeps in single precision: the same bits by every kernel, and the same answers as sweeps in double.
+/// Sweeps in single precision: the bits of the scalar text that rounds alike, and the same answers as sweeps
+/// in double.
 
 #include "kernels/single_precision.hpp"
 
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "kernels/momentum.hpp"
@@ -166,6 +168,15 @@ TEST(SingleSweeps, LeaveNothingAtContactsThatCarryNothing) {
       ASSERT_EQ(out.contacts.rx[k], 0) << name_of(set) << ", contact " << k;
       ASSERT_EQ(out.contacts.rz[k], 0) << name_of(set) << ", contact " << k;
     }
+  }
+}
+
+TEST(SingleSweeps, KeepAnImpulseThatIsNoNumber) {
+  test::Sample sample = test::dense_sample(4, 15, true, false, 384);
+  sample.contacts.bias.assign(sample.contacts.bias.size(), std::numeric_limits<double>::quiet_NaN());
+  for (const InstructionSet set : test::sets_to_test()) {
+    const Swept out = sweep<true>(sample, SweepKernels(set), 0, 0, 1);
+    EXPECT_TRUE(std::isnan(out.contacts.rx[sample.range(0).begin])) << name_of(set);
   }
 }
 

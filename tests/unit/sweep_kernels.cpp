@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <set>
 
 #include "tests/unit/dense_sample.hpp"
 
@@ -199,6 +198,39 @@ TEST(SweepKernels, LetNotANumberSpreadToTheErrorAndNeverSwallowIt) {
       EXPECT_TRUE(std::isnan(out.errors.back().residual2));
       EXPECT_TRUE(std::isnan(out.velocity[20].u[1]));
     }
+}
+
+// The largest of 0 and a number that is none must not be 0: the contact would open in silence.
+TEST(SweepKernels, KeepAnImpulseThatIsNoNumber) {
+  for (const bool friction : {false, true})
+    for (const InstructionSet set : test::sets_to_test()) {
+      SCOPED_TRACE(name_of(set));
+      Sample sample = test::dense_sample(4, 15, friction, false, 384);
+      sample.contacts.bias.assign(sample.contacts.bias.size(), std::numeric_limits<double>::quiet_NaN());
+      const SweepKernels kernels(set);
+      const Plan once{.mu = 0, .sweeps = 1};
+      const Outcome out = friction ? run<true>(kernels, sample, once) : run<false>(kernels, sample, once);
+      for (std::size_t k = sample.range(0).begin; k < sample.range(0).end; ++k)
+        ASSERT_TRUE(std::isnan(friction ? out.contacts.rx[k] : out.contacts.rn[k])) << k;
+    }
+}
+
+// What the two roundings share is the formula.
+TEST(SweepKernels, FusedAndSeparateRoundingDifferByRounding) {
+  Sample sample = test::dense_sample(6, 11, true, true, 100);
+  start_from_random_impulses(sample, 3);
+  const Plan once{.mu = 0.3, .wall_inv_mass = 1e-3, .sweeps = 1};
+  const Outcome fused = run<true>(scalar::Sweeps<scalar::Fused>{}, sample, once),
+                separate = run<true>(scalar::Sweeps<scalar::Separate>{}, sample, once);
+  double largest = 0, difference = 0;
+  for (std::size_t k = 0; k < fused.contacts.rx.size(); ++k) {
+    largest = std::max(largest, std::abs(fused.contacts.rx[k]));
+    difference = std::max(difference, std::abs(fused.contacts.rx[k] - separate.contacts.rx[k]));
+  }
+  EXPECT_GT(difference, 0);
+  EXPECT_LT(difference, 1e-12 * largest);
+  for (std::size_t c = 0; c < fused.errors.size(); ++c)
+    EXPECT_NEAR(fused.errors[c].residual2, separate.errors[c].residual2, 1e-10 * fused.errors[c].impulse2);
 }
 
 TEST(InstructionSets, AreNamedAndRefusedWhereTheProcessorLacksThem) {
