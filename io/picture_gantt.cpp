@@ -169,7 +169,16 @@ class Gantt {
     }
   }
 
-  /// The glue or centre that takes a message.
+  static std::uint32_t turn_of(const trace::StepIndex& index, std::uint32_t group) {
+    for (const trace::StepIndex::Rank& rank : index.ranks)
+      for (std::size_t n = 0; rank.plan && n < rank.nodes; ++n)
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(trace::Role::take) &&
+            rank.plan->group[n] == group)
+          return rank.plan->place[n];
+    return 0;
+  }
+
+  /// The glue, take or centre that takes a message.
   static trace::Place taker(const trace::StepIndex& index, std::size_t epoch, std::uint32_t name) {
     const std::uint32_t from = name >> 16, to = name & 0xffffU;
     for (const trace::StepIndex::Rank& rank : index.ranks) {
@@ -180,11 +189,12 @@ class Gantt {
                             : std::find(groups.begin(), groups.end(), to) != groups.end();
       if (!here) continue;
       const bool by_centre = to == trace::centre_group || from == trace::centre_group;
-      for (std::size_t n = 0; n < rank.nodes; ++n) {
-        const auto role = static_cast<trace::Role>(rank.plan->role[n]);
-        if (by_centre ? role == trace::Role::centre : role == trace::Role::glue && groups[n] == to)
+      const trace::Role role = by_centre                                   ? trace::Role::centre
+                               : turn_of(index, from) < turn_of(index, to) ? trace::Role::take
+                                                                           : trace::Role::glue;
+      for (std::size_t n = 0; n < rank.nodes; ++n)
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(role) && (by_centre || groups[n] == to))
           return rank.at(epoch, n);
-      }
     }
     return {};
   }

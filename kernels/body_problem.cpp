@@ -15,7 +15,7 @@ std::size_t at(std::int32_t k) {
 
 /// Of a body over that of the copy at a slot.
 double masses_of_slot(const BodyProblemSource& source, std::size_t slot) {
-  return source.multiplicity.empty() ? 1 : source.multiplicity[slot];
+  return source.parts.empty() ? 1 : source.parts[slot];
 }
 
 double mass_of_slot(const BodyProblemSource& source, std::size_t slot) {

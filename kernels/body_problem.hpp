@@ -96,7 +96,7 @@ struct BodyProblemSource {
   const Contacts& contacts;
   double mu_grains = 0;
   double mu_walls = 0;
-  Multiplicities multiplicity;  ///< of the slots when copies carry M/m; empty when they carry M
+  Multiplicities parts;  ///< of the slots: copies carry M/parts
 };
 
 /// The slots and chunks of one subdomain among those of a step.

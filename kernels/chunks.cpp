@@ -14,7 +14,9 @@ std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
+/// Per chunk whether its subdomain follows.
+std::vector<char> place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
+  std::vector<char> follows;
   for (const CandidateGroup& group : groups) {
     // Pieces of equal length: a short last piece would be a poor task.
     const std::int32_t pieces = (group.end - group.begin + group.target - 1) / group.target;
@@ -24,9 +26,11 @@ void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
       chunks.wall.push_back(group.wall);
       chunks.subdomain.push_back(group.subdomain);
       chunks.boundary.push_back(group.boundary ? 1 : 0);
+      follows.push_back(group.follows ? 1 : 0);
     }
   }
   chunks.begin.push_back(groups.empty() ? 0 : groups.back().end);
+  return follows;
 }
 
 void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunks) {
@@ -121,32 +125,39 @@ void find_conflicts(const Incidence& incidence, Chunks& chunks) {
   }
 }
 
-/// Greedily, those at the boundary first and the others above them.
-void colour_chunks(Chunks& chunks) {
+/// Greedily: those at the boundary, those inside above them, and those at the boundary of subdomains that
+/// follow above all.
+void colour_chunks(std::span<const char> follows, Chunks& chunks) {
   const std::size_t count = chunks.wall.size();
   chunks.colour.assign(count, -1);
   std::vector<std::uint32_t> taken_by(count + 1, ~0u);  // colour -> last chunk that found it taken
-  for (const char boundary : {char{1}, char{0}}) {
+  enum Turn { boundary, inside, late };
+  const auto turn_of = [&](std::size_t c) {
+    return chunks.boundary[c] == 0 ? inside : follows[c] != 0 ? late : boundary;
+  };
+  for (const Turn turn : {boundary, inside, late}) {
+    const std::int32_t lowest = chunks.colours;
     for (std::size_t c = 0; c < count; ++c) {
-      if (chunks.boundary[c] != boundary) continue;
+      if (turn_of(c) != turn) continue;
       for (auto k = chunks.conflict_begin[c]; k < chunks.conflict_begin[c + 1]; ++k) {
         const std::int32_t colour = chunks.colour[chunks.conflicts[index(k)]];
         if (colour >= 0) taken_by[index(colour)] = static_cast<std::uint32_t>(c);
       }
-      std::int32_t colour = boundary ? 0 : chunks.boundary_colours;
+      std::int32_t colour = lowest;
       while (taken_by[index(colour)] == c) ++colour;
       chunks.colour[c] = colour;
       chunks.colours = std::max(chunks.colours, colour + 1);
     }
-    if (boundary) chunks.boundary_colours = chunks.colours;
   }
 }
 
-void assign_resets(const Incidence& incidence, std::size_t bodies, Chunks& chunks) {
+void assign_resets(const Incidence& incidence, std::size_t bodies, std::span<const char> taken,
+                   Chunks& chunks) {
   const std::size_t count = chunks.wall.size();
   std::vector<std::int32_t> owner(bodies, -1);
   chunks.owned_begin.assign(count + 1, 0);
   for (std::size_t s = 0; s < bodies; ++s) {
+    if (!taken.empty() && taken[s] != 0) continue;
     for (auto m = incidence.begin[s]; m < incidence.begin[s + 1]; ++m) {
       const auto c = static_cast<std::int32_t>(incidence.chunk[index(m)]);
       if (owner[s] < 0 || chunks.colour[index(c)] < chunks.colour[index(owner[s])]) owner[s] = c;
@@ -201,18 +212,19 @@ std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates
   return groups;
 }
 
-Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies) {
+Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies,
+                  std::span<const char> taken) {
   if (bodies > most_bodies_of_a_process)
     throw std::runtime_error(std::to_string(bodies) + " bodies in one process, of at most " +
                              std::to_string(most_bodies_of_a_process) + "; use more ranks");
   Chunks chunks;
-  place_boundaries(groups, chunks);
+  const std::vector<char> follows = place_boundaries(groups, chunks);
   list_bodies(candidates, bodies, chunks);
   order_candidates(candidates, chunks);
   const Incidence incidence = chunks_of_bodies(chunks, bodies);
   find_conflicts(incidence, chunks);
-  colour_chunks(chunks);
-  assign_resets(incidence, bodies, chunks);
+  colour_chunks(follows, chunks);
+  assign_resets(incidence, bodies, taken, chunks);
   return chunks;
 }
 

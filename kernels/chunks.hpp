@@ -39,6 +39,7 @@ struct CandidateGroup {
   std::int32_t subdomain;  ///< index among those of this process
   bool boundary;           ///< a body of each stands in several subdomains, or its wall is glued
   int target;              ///< candidates in a chunk at most, a few hundred, < 32768
+  bool follows = false;    ///< its subdomain has the boundary swept last
 };
 
 /// So that 32 bits tell where the record of a body begins (record_of).
@@ -46,17 +47,17 @@ inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
 /// neither grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept
-/// first, and what they leave at the interface can travel while the inner chunks are swept. Two chunks
-/// conflict when they share a grain, and then differ in colour: the sweep's result depends on colours alone.
-/// Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
+/// first, and what they leave at the interface can travel while the inner chunks are swept; where their
+/// subdomain follows they have the higher ones, and are swept when something has come. Two chunks conflict
+/// when they share a grain, and then differ in colour: the sweep's result depends on colours alone. Example:
+/// candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
 struct Chunks {
   std::vector<std::int32_t> begin;      ///< chunks + 1 offsets into the candidates
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
   std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
   std::vector<char> boundary;           ///< per chunk: that of its group
   std::vector<std::int32_t>
-      colour;  ///< per chunk; at the boundary 0 .. boundary_colours - 1, inside the rest
-  int boundary_colours = 0;
+      colour;  ///< per chunk; at the boundary the lowest, or the highest where the subdomain follows
   int colours = 0;
   std::vector<std::int32_t> body_begin;  ///< chunks + 1 offsets into `bodies`
   std::vector<Slot> bodies;              ///< the grains that a chunk touches, in order of first use
@@ -74,9 +75,11 @@ struct Chunks {
   std::size_t size() const { return colour.size(); }
 };
 
-/// Cuts the groups into chunks, colours them greedily in order, and lists who resets which body.
+/// Cuts the groups into chunks, colours them greedily in order, and lists who resets which body: nobody those
+/// that are `taken` (per body, or empty), whose velocities come from elsewhere before a chunk writes them.
 /// Throws std::runtime_error when there are more than most_bodies_of_a_process.
-Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies);
+Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies,
+                  std::span<const char> taken = {});
 
 /// The same with all candidates of one subdomain and nothing glued.
 Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target);

@@ -42,10 +42,10 @@ struct MotionSums {
   void add(const MotionSums& other);
 };
 
-/// Second half: x += h/2 u, with the sums. Where copies carry the whole mass (Schwarz), `multiplicity`
-/// divides what a copy adds to the sums.
+/// Second half: x += h/2 u, with the sums. `multiplicity` and `parts` tell what a copy adds to them where the
+/// masses of a body's copies, M/parts each, are not those of one body together: M/m_i. Both empty elsewhere.
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free, Multiplicities multiplicity = {});
+                  const FreeVelocity& free, Multiplicities multiplicity = {}, Multiplicities parts = {});
 
 /// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
 void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,

@@ -17,8 +17,9 @@ enum class BodyId : std::int64_t {};
 /// to compile.
 using Slot = std::int32_t;
 
-/// Where the multiplicities m_i of bodies matter: one entry per slot, or empty when all are 1. Copies of a
-/// body carry M/m_i (Visseq et al. 2013, (7)), but its error is that of the whole body.
+/// Where it matters that bodies have copies: one entry per slot, or empty when all are 1. Either the
+/// multiplicities m_i, or the parts into which a mass is divided for the copies: they carry M/m_i (Visseq et
+/// al. 2013, (7)), or M over those of them that act at a time; the error is that of the whole body.
 using Multiplicities = std::span<const std::uint16_t>;
 
 }  // namespace talus

@@ -377,8 +377,10 @@ Section<DecompositionSettings> decomposition_keys() {
           key<D>("boxes", "", countable, "Boxes along x, y and z; their product is `subdomains`.", &D::boxes)
               .blank_when_zero(),
           choice<D>(
-              "coupling", {"nscdd", "schwarz"},
-              "`nscdd`: copies of a body share its mass and are glued; `schwarz`: copies have its mass and "
+              "coupling", {"nscdd", "alternating", "schwarz"},
+              "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but half of "
+              "the subdomains sweep their borders when they know what the others did: few more sweeps than "
+              "one subdomain takes, and messages are harder to hide; `schwarz`: copies have its mass and "
               "exchange what they gain.",
               &D::coupling),
           choice<D>("exchange", {"dcs", "ccs"},

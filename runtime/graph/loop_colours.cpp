@@ -7,10 +7,14 @@ namespace talus::graph {
 
 namespace {
 
-enum Part : std::uint32_t { border, publish, glue_early, inside, glue };
+/// What a rank goes through one after the other. Turn t is phase first_turn + t.
+enum Phase : std::uint32_t { inside_of_later, first_turn, early_glue = 1000, inside_of_first, glue };
 
-/// What comes first, by its numbers from the left.
-using Turn = std::array<std::uint32_t, 3>;
+/// Of a subdomain, within a phase.
+enum Part : std::uint32_t { inner, take, border, publish, inner_behind };
+
+/// What comes first, by its numbers from the left: phase, subdomain, part, colour.
+using Turn = std::array<std::uint32_t, 4>;
 
 std::vector<Turn> sorted(std::vector<Turn> turns) {
   std::sort(turns.begin(), turns.end());
@@ -22,32 +26,47 @@ std::uint32_t place_in(const std::vector<Turn>& order, const Turn& turn) {
   return static_cast<std::uint32_t>(std::lower_bound(order.begin(), order.end(), turn) - order.begin());
 }
 
-/// Colours that count from 0 in each subdomain, subdomains alike.
+/// Colours that count from 0 in each part of a subdomain, subdomains alike.
 void go_abreast(std::vector<Turn>& turns) {
   const std::vector<Turn> order = sorted(turns);
   for (Turn& turn : turns)
-    turn = {turn[0], 0, place_in(order, turn) - place_in(order, {turn[0], turn[1], 0})};
+    turn = {turn[0], 0, turn[2], place_in(order, turn) - place_in(order, {turn[0], turn[1], turn[2], 0})};
 }
 
 }  // namespace
 
-LoopColours loop_colours(std::span<const ChunkTurn> turns, std::size_t subdomains, bool overlap,
-                         int threads) {
-  std::vector<Turn> own;  // {part, subdomain, colour}
-  for (const ChunkTurn& turn : turns)
-    own.push_back({turn.inside ? inside : border, turn.subdomain, turn.colour});
+LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool overlap,
+                         int threads, int ranks) {
+  const bool later = std::ranges::any_of(turn_of, [](char turn) { return turn > 0; });
+  const auto subdomains = static_cast<std::uint32_t>(turn_of.size());
+  // One after another as a whole where no message between ranks wants to be hidden.
+  const Phase behind = overlap && threads == 1 && (ranks == 1 || !later) ? first_turn : inside_of_first;
+  std::vector<Turn> own;
+  const auto add = [&](std::uint32_t e, Part part, std::uint32_t colour) {
+    const auto turn = static_cast<std::uint32_t>(turn_of[e]);
+    const std::uint32_t phase = part == inner_behind        ? behind
+                                : part == inner && !overlap ? inside_of_later
+                                                            : first_turn + turn;
+    own.push_back({phase, e, part, colour});
+  };
+  for (const ChunkTurn& chunk : turns)
+    add(chunk.subdomain,
+        !chunk.inside                  ? border
+        : turn_of[chunk.subdomain] > 0 ? inner
+                                       : inner_behind,
+        chunk.colour);
+  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, publish, 0);
+  // In the first turn it is not looked at, and begins nothing.
+  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, turn_of[e] > 0 ? take : publish, 0);
   if (threads > 1) go_abreast(own);
-  for (std::uint32_t e = 0; e < subdomains; ++e) own.push_back({publish, threads > 1 ? 0 : e, 0});
-  const bool one_by_one = threads == 1 && overlap;
-  if (one_by_one)
-    for (Turn& turn : own) std::swap(turn[0], turn[1]);
-  own.push_back(one_by_one ? Turn{static_cast<std::uint32_t>(subdomains), glue, 0}
-                           : Turn{overlap ? glue : glue_early, 0, 0});
+  own.push_back({overlap ? glue : early_glue, 0, 0, 0});
   const std::vector<Turn> order = sorted(own);
   std::vector<std::uint32_t> colours;
   for (const Turn& turn : own) colours.push_back(2 * place_in(order, turn));
-  const auto publishes = colours.begin() + static_cast<std::ptrdiff_t>(turns.size());
-  return {{colours.begin(), publishes}, {publishes, colours.end() - 1}, colours.back()};
+  const auto publishes = colours.begin() + static_cast<std::ptrdiff_t>(turns.size()),
+             takes = publishes + subdomains;
+  const std::uint32_t last = subdomains > 0 ? *std::max_element(publishes, takes) : 0;
+  return {{colours.begin(), publishes}, {publishes, takes}, {takes, colours.end() - 1}, last, colours.back()};
 }
 
 }  // namespace talus::graph

@@ -5,6 +5,10 @@
 /// that it stays with one while that is in the cache. Threads go through all of them colour by colour: two
 /// may have parts of one subdomain, and the one that comes to it late would keep the other waiting. As
 /// subdomains share no grain, the order among them changes no bit.
+///
+/// Where subdomains have turns, those of the first have their border, then those of each later one chunks
+/// inside, take, border and publish, then those of the first their chunks inside: each hides the messages of
+/// the others. A rank alone has none to hide, and stays with each subdomain.
 
 #include <cstddef>
 #include <cstdint>
@@ -24,9 +28,13 @@ struct ChunkTurn {
 /// glue (tree.hpp).
 struct LoopColours {
   std::vector<std::uint32_t> chunk;    ///< as the turns that were given
-  std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border; ascending
-  std::uint32_t glue = 0;              ///< behind everything, or before all insides without overlap
+  std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border
+  std::vector<std::uint32_t> take;     ///< per subdomain, before its border; means nothing in the first turn
+  std::uint32_t last_publish = 0;
+  std::uint32_t glue = 0;  ///< behind everything, or before all insides without overlap
 };
-LoopColours loop_colours(std::span<const ChunkTurn> turns, std::size_t subdomains, bool overlap, int threads);
+/// `turn_of`: per subdomain of the rank.
+LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool overlap,
+                         int threads, int ranks);
 
 }  // namespace talus::graph

@@ -266,7 +266,8 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
 
 std::size_t memory_used(const Decomposition& decomposition) {
   std::size_t bytes =
-      memory_used(decomposition.partition) + decomposition.multiplicity.capacity() * sizeof(std::uint16_t) +
+      memory_used(decomposition.partition) +
+      (decomposition.multiplicity.capacity() + decomposition.parts.capacity()) * sizeof(std::uint16_t) +
       decomposition.counts.capacity() + decomposition.whole.capacity() * sizeof(std::array<double, 2>);
   for (const SubdomainInterface& interface : decomposition.interfaces) bytes += memory_used(interface);
   return bytes;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "kernels/release.hpp"
+#include "partition/turns.hpp"
 #include "runtime/step/decomposition.hpp"
 
 namespace talus {
@@ -142,10 +143,35 @@ OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& fou
   return own;
 }
 
-/// Multiplicities of the copies, who counts, and where each subdomain's begin.
-void list_copies(Decomposition& decomposition, const BodySubdomains& standings, std::span<const BodyId> id) {
+/// Collective.
+void settle_turns(Decomposition& decomposition, const graph::Communicator& ranks) {
+  std::vector<Tie> ties;
+  for (const SubdomainInterface& interface : decomposition.interfaces)
+    for (const Neighbour& neighbour : interface.neighbours)
+      ties.push_back({interface.subdomain, neighbour.subdomain, neighbour.end - neighbour.begin});
+  decomposition.turn =
+      choose_turns(decomposition.partition.subdomains, ranks.gather_records(std::span<const Tie>(ties)));
+}
+
+/// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
+/// without knowing of one another. Hubs are glued once a sweep, whosever turn it is.
+std::int32_t parts_of(const Decomposition& decomposition, Coupling coupling,
+                      std::span<const std::int32_t> standings, std::int32_t subdomain, std::int32_t hubs) {
+  const auto m = static_cast<std::int32_t>(standings.size());
+  if (coupling == Coupling::schwarz) return 1;
+  if (coupling == Coupling::nscdd || m >= hubs) return m;
+  return static_cast<std::int32_t>(std::ranges::count_if(standings, [&](std::int32_t other) {
+    return decomposition.turn_of(other) == decomposition.turn_of(subdomain);
+  }));
+}
+
+/// Multiplicities of the copies, their parts of the mass, who counts, and where each subdomain's begin.
+void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& standings,
+                 std::span<const BodyId> id, std::int32_t hubs) {
   decomposition.slot_begin.assign(1, 0);
   decomposition.multiplicity.clear();
+  decomposition.parts.clear();
+  decomposition.taken.clear();
   decomposition.counts.clear();
   for (const SubdomainInterface& interface : decomposition.interfaces) {
     for (std::size_t k = 0; k < interface.bodies.size(); ++k) {
@@ -156,6 +182,14 @@ void list_copies(Decomposition& decomposition, const BodySubdomains& standings, 
                                              static_cast<std::int64_t>(id[b]), m));
       decomposition.multiplicity.push_back(static_cast<std::uint16_t>(m));
       decomposition.counts.push_back(standings.of(b).front() == interface.subdomain ? 1 : 0);
+      const std::int32_t parts =
+          parts_of(decomposition, coupling, standings.of(b), interface.subdomain, hubs);
+      decomposition.parts.push_back(static_cast<std::uint16_t>(parts));
+      if (decomposition.turn.empty()) continue;
+      const bool taken = m < hubs && std::ranges::any_of(standings.of(b), [&](std::int32_t other) {
+                           return decomposition.turn_of(other) < decomposition.turn_of(interface.subdomain);
+                         });
+      decomposition.taken.push_back(taken ? 1 : 0);
     }
     decomposition.slot_begin.push_back(decomposition.multiplicity.size());
   }
@@ -163,7 +197,7 @@ void list_copies(Decomposition& decomposition, const BodySubdomains& standings, 
 
 /// Copies of the bodies of the interfaces, field by field: each field of the surroundings goes when it has
 /// been copied.
-Bodies make_copies(Decomposition& decomposition, bool split, Bodies& around) {
+Bodies make_copies(Decomposition& decomposition, Bodies& around) {
   Bodies copies;
   const auto copy = [&](auto& from, auto& to) {
     to.reserve(decomposition.slot_begin.back());
@@ -181,9 +215,8 @@ Bodies make_copies(Decomposition& decomposition, bool split, Bodies& around) {
   for (std::size_t s = 0; s < copies.size(); ++s) {
     Velocity& v = copies.velocity[s];
     decomposition.whole.push_back({v.inv_mass, v.spin_mobility});
-    if (!split) continue;
-    v.inv_mass *= decomposition.multiplicity[s];
-    v.spin_mobility *= decomposition.multiplicity[s];
+    v.inv_mass *= decomposition.parts[s];
+    v.spin_mobility *= decomposition.parts[s];
   }
   return copies;
 }
@@ -213,7 +246,8 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
         grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);
     const std::int32_t hubs = settings.exchange == ExchangeScheme::ccs ? 2 : 9;
     decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
-    list_copies(decomposition, standings, around.bodies.id);
+    if (settings.coupling == Coupling::alternating) settle_turns(decomposition, ranks);
+    list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);
     own = sort_own(decomposition, found, subdomain, standings, glued);
     for (std::int32_t k : own.candidate) ++load[at(subdomain[at(k)])];
   }
@@ -236,7 +270,8 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     if (begin == end) continue;
     const std::size_t local = group / 2 % decomposition.here.size();
     const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
-    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), group % 2 == 0, target});
+    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), group % 2 == 0, target,
+                      decomposition.turn_of(decomposition.here[local]) > 0});
     auto next = static_cast<Slot>(decomposition.slot_begin[local]);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
     for (std::int32_t place = begin; place < end; ++place) {
@@ -252,7 +287,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   own = {};
   found = {};
 
-  Bodies copies = make_copies(decomposition, settings.coupling == Coupling::nscdd, around.bodies);
+  Bodies copies = make_copies(decomposition, around.bodies);
   std::int64_t migrants[1] = {arrivals(decomposition, around, slot_begin_before)};
   ranks.sum(migrants);
   decomposition.migrants = first ? 0 : migrants[0];

@@ -52,7 +52,23 @@ void write_velocities(std::span<const Record> velocity, std::span<const Slot> sl
   }
 }
 
-/// NSCDD of bodies that have one other copy, most of them: each takes the mean.
+/// Turns are below the first of these; the second stands for all of them.
+constexpr int no_turn = 1000, any_turn = no_turn + 1;
+
+/// Copies that become what the neighbour's are.
+template <std::size_t Width, class Record>
+void take_over(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message) {
+  using Number = typename Numbers<Width, Record>::value_type;
+  for (const detail::Pair& pair : pairs) {
+    Record& v = velocity[at(pair.slot)];
+    const std::byte* const other = message + at(pair.place) * sizeof(Numbers<Width, Record>);
+    for (std::size_t k = 0; k < 3; ++k) v.u[k] = number_at<Number>(other, k);
+    if constexpr (Width == 6)
+      for (std::size_t k = 0; k < 3; ++k) v.w[k] = number_at<Number>(other, k + 3);
+  }
+}
+
+/// Bodies that have one other copy, most of them: each takes the mean.
 template <std::size_t Width, class Record>
 void take_means(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message) {
   using Number = typename Numbers<Width, Record>::value_type;
@@ -83,10 +99,15 @@ void Gluing::plan(bool rotation) {
   subdomains_.clear();
   centre_.reset();
   subdomains_.resize(all.here.size());
+  followers_.clear();
   jumps_.assign(all.here.size(), {});
   messages_ = {};
   if (!needed_) return;
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) plan_sides(e);
+  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+    plan_sides(e);
+    plan_copies(e);
+    if (turn(e) > 0) followers_.push_back(static_cast<std::uint32_t>(e));
+  }
   for (Subdomain& subdomain : subdomains_)
     for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
       Side& side = subdomain.sides[n];
@@ -99,9 +120,14 @@ void Gluing::plan(bool rotation) {
   count_messages();
 }
 
+int Gluing::turn(std::size_t e) const {
+  return state_.decomposition.turn_of(state_.decomposition.here[e]);
+}
+
 void Gluing::plan_sides(std::size_t e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];
+  mine.turn = turn(e);
   mine.wall_copies.resize(walls_.size());
   if (!all.several()) return;
   const SubdomainInterface& interface = all.interfaces[e];
@@ -114,6 +140,7 @@ void Gluing::plan_sides(std::size_t e) {
     Side& side = mine.sides[n];
     for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
       side.slots.push_back(slot_of(interface.exchange[at(k)]));
+    side.turn = all.turn_of(neighbour.subdomain);
     const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
     const std::size_t length = side.slots.size() * width_;
     side.link.out.resize(length + 1);
@@ -135,14 +162,48 @@ void Gluing::plan_sides(std::size_t e) {
                                             static_cast<std::uint32_t>(interface.subdomain));
     side.link.receiver->start();
   }
-  for (std::size_t s = 0; s < interface.shared.size(); ++s) {
+}
+
+/// Who reads which copies of a shared body, and when.
+void Gluing::plan_copies(std::size_t e) {
+  const Decomposition& all = state_.decomposition;
+  Subdomain& mine = subdomains_[e];
+  for (std::size_t s = 0; s < mine.shared.size(); ++s) {
+    const SubdomainInterface& interface = all.interfaces[e];
     const auto copies = std::span(interface.copies)
                             .subspan(at(interface.copies_begin[s]),
                                      at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
-    if (copies.size() > 2) mine.corners.push_back(static_cast<std::int32_t>(s));
-    if (copies.size() != 2) continue;  // more, or a hub
-    const CopySource& other = copies[copies[0].neighbour < 0 ? 1 : 0];
-    mine.sides[at(other.neighbour)].pairs.push_back({mine.shared[s], other.place});
+    if (copies.empty()) continue;  // a hub
+    const Slot slot = mine.shared[s];
+    const auto turn_of = [&](const CopySource& copy) {
+      return copy.neighbour < 0 ? mine.turn : mine.sides[at(copy.neighbour)].turn;
+    };
+    const auto latest_before = [&](int turn) {
+      std::vector<CopySource> latest;
+      for (const CopySource& copy : copies) {
+        if (turn_of(copy) >= turn || (!latest.empty() && turn_of(copy) < turn_of(latest[0]))) continue;
+        if (!latest.empty() && turn_of(copy) > turn_of(latest[0])) latest.clear();
+        latest.push_back(copy);
+      }
+      return latest;
+    };
+    if (const std::vector<CopySource> earlier = latest_before(mine.turn); !earlier.empty()) {
+      mine.taken.push_back(slot);
+      if (earlier.size() > 1)
+        mine.led.push_back(static_cast<std::int32_t>(s));
+      else
+        mine.sides[at(earlier[0].neighbour)].taken.push_back({slot, earlier[0].place});
+    }
+    const std::vector<CopySource> last = latest_before(no_turn);
+    const bool own = turn_of(last[0]) == mine.turn;
+    if (last.size() > 2 || (last.size() == 2 && !own)) {
+      mine.corners.push_back(static_cast<std::int32_t>(s));
+    } else if (last.size() == 2) {
+      const CopySource& other = last[last[0].neighbour < 0 ? 1 : 0];
+      mine.sides[at(other.neighbour)].pairs.push_back({slot, other.place});
+    } else if (!own) {
+      mine.sides[at(last[0].neighbour)].given.push_back({slot, last[0].place});
+    }
   }
 }
 
@@ -191,6 +252,10 @@ std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
   for (const Side& side : subdomains_[e].sides)
     if (side.local >= 0) readers.push_back(static_cast<std::uint32_t>(side.local));
   return readers;
+}
+
+std::span<const Slot> Gluing::taken(std::size_t e) const {
+  return subdomains_[e].taken;
 }
 
 /// Calls work<width>(velocities) with the records that sweeps work on.
@@ -258,13 +323,85 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
       for (std::size_t k = 0; k < 3; ++k) state_.copies[at(c)].velocity[k] = part * centre_->sums[3 * g + k];
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
-  for (Side& side : mine.sides)
-    if (side.link.receiver) await(*side.link.receiver, mine.waited, ranks_.trace(), side.link.in_name);
+  const auto of_glue = [&](const Side& side) { return mode == Mode::sum || side.turn >= mine.turn; };
+  await_messages(e, of_glue);
   with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
     glue_bodies<Width, Record>(e, mode, velocity);
   });
+  ask_for_messages(e, of_glue);
+}
+
+void Gluing::take(std::size_t e, Mode mode, bool single) {
+  if (mode == Mode::local) return;
+  const auto of_take = [mine = turn(e)](const Side& side) { return side.turn < mine; };
+  await_messages(e, of_take);
+  with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
+    take_bodies<Width, Record>(e, velocity);
+  });
+  ask_for_messages(e, of_take);
+}
+
+template <class Which>
+void Gluing::await_messages(std::size_t e, const Which& which) {
+  Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides)
-    if (side.link.receiver) side.link.receiver->start();
+    if (side.link.receiver && which(side))
+      await(*side.link.receiver, mine.waited, ranks_.trace(), side.link.in_name);
+}
+
+template <class Which>
+void Gluing::ask_for_messages(std::size_t e, const Which& which) {
+  for (Side& side : subdomains_[e].sides)
+    if (side.link.receiver && which(side)) side.link.receiver->start();
+}
+
+/// The copies of interface.shared[s] that are of the latest turn below `before`, or all with `any_turn`:
+/// their sum in order of subdomain, how many they are, and whether the own one is among them.
+template <std::size_t Width, class Record>
+auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const {
+  using Own = Numbers<Width, Record>;
+  using Number = typename Own::value_type;
+  const Subdomain& mine = subdomains_[e];
+  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+  const auto copies = std::span(interface.copies)
+                          .subspan(at(interface.copies_begin[s]),
+                                   at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
+  const auto turn_of = [&](const CopySource& copy) {
+    return copy.neighbour < 0 ? mine.turn : mine.sides[at(copy.neighbour)].turn;
+  };
+  int latest = 0;
+  for (const CopySource& copy : copies)
+    if (turn_of(copy) < before) latest = std::max(latest, turn_of(copy));
+  struct {
+    Own sum{};
+    Number count = 0;
+    bool own = false;
+  } added;
+  for (const CopySource& copy : copies) {
+    if (before != any_turn && turn_of(copy) != latest) continue;
+    added.count += 1;
+    if (copy.neighbour < 0) {
+      const Own own = numbers_of<Width>(velocity[at(mine.shared[s])]);
+      for (std::size_t k = 0; k < Width; ++k) added.sum[k] += own[k];
+      added.own = true;
+      continue;
+    }
+    const std::byte* const from = mine.sides[at(copy.neighbour)].source + at(copy.place) * sizeof(Own);
+    for (std::size_t k = 0; k < Width; ++k) added.sum[k] += number_at<Number>(from, k);
+  }
+  return added;
+}
+
+template <std::size_t Width, class Record>
+void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
+  const Subdomain& mine = subdomains_[e];
+  for (const Side& side : mine.sides)
+    take_over<Width>(velocity, std::span<const detail::Pair>(side.taken), side.source);
+  for (const std::int32_t s : mine.led) {
+    auto mean = add_copies<Width, Record>(e, at(s), mine.turn, velocity);
+    for (auto& number : mean.sum) number /= mean.count;
+    assign<Width>(mean.sum, velocity[at(mine.shared[at(s)])]);
+  }
 }
 
 template <std::size_t Width, class Record>
@@ -275,26 +412,10 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   const bool schwarz = settings_.coupling == Coupling::schwarz;
   JumpSums jump;
-  // The sum of the copies of interface.shared[s], in order of subdomain.
-  const auto sum_of = [&](std::size_t s) {
-    const Own own = numbers_of<Width>(velocity[at(mine.shared[s])]);
-    Own sum{};
-    for (std::int32_t c = interface.copies_begin[s]; c < interface.copies_begin[s + 1]; ++c) {
-      const CopySource& copy = interface.copies[at(c)];
-      if (copy.neighbour < 0) {
-        for (std::size_t k = 0; k < Width; ++k) sum[k] += own[k];
-        continue;
-      }
-      const std::byte* const from = mine.sides[at(copy.neighbour)].source + at(copy.place) * sizeof own;
-      for (std::size_t k = 0; k < Width; ++k) sum[k] += number_at<Number>(from, k);
-    }
-    return sum;
-  };
-  // That sum becomes what all copies go on with.
-  const auto settle = [&](std::size_t s, const Own& sum) {
+  // What all copies go on with.
+  const auto settle = [&](std::size_t s, const Own& sum, Number m, bool own_counts) {
     const std::size_t slot = at(mine.shared[s]);
     Record& v = velocity[slot];
-    const auto m = static_cast<Number>(state_.decomposition.multiplicity[slot]);
     Own next;
     double* base = schwarz ? &mine.base[s * Width] : nullptr;
     if (schwarz && mode == Mode::fresh)
@@ -304,7 +425,7 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
       next[k] = mode == Mode::sum ? sum[k]
                 : schwarz         ? static_cast<Number>(base[k] + (sum[k] - m * base[k]))
                                   : sum[k] / m;
-    if (mode == Mode::measured) {
+    if (mode == Mode::measured && own_counts) {
       const Own now = numbers_of<Width>(v);
       const auto& whole = state_.decomposition.whole[slot];
       for (std::size_t k = 0; k < Width; ++k) {
@@ -317,24 +438,26 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
     assign<Width>(next, v);
     if (schwarz && mode != Mode::sum) std::copy(next.begin(), next.end(), base);
   };
+  const auto settle_copies = [&](std::size_t s) {
+    const auto copies = add_copies<Width, Record>(e, s, mode == Mode::sum ? any_turn : no_turn, velocity);
+    settle(s, copies.sum, copies.count, copies.own);
+  };
   if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
-    for (const Side& side : mine.sides)
+    for (const Side& side : mine.sides) {
       take_means<Width>(velocity, std::span<const detail::Pair>(side.pairs), side.source);
-    for (const std::int32_t s : mine.corners) {
-      Own mean = sum_of(at(s));
-      const auto m = static_cast<Number>(interface.copies_begin[at(s) + 1] - interface.copies_begin[at(s)]);
-      for (Number& number : mean) number /= m;
-      assign<Width>(mean, velocity[at(mine.shared[at(s)])]);
+      take_over<Width>(velocity, std::span<const detail::Pair>(side.given), side.source);
     }
+    for (const std::int32_t s : mine.corners) settle_copies(at(s));
   } else {
     for (std::size_t s = 0; s < mine.shared.size(); ++s)
-      if (interface.copies_begin[s] < interface.copies_begin[s + 1]) settle(s, sum_of(s));
+      if (interface.copies_begin[s] < interface.copies_begin[s + 1]) settle_copies(s);
   }
   for (std::size_t h = 0; h < interface.hubs.size(); ++h) {
     const double* const from = &centre_->sums[3 * walls_.size() + mine.hub_item[h] * Width];
     Own sum;
     for (std::size_t k = 0; k < Width; ++k) sum[k] = static_cast<Number>(from[k]);
-    settle(at(interface.hubs[h]), sum);
+    const std::size_t hub = at(interface.hubs[h]);
+    settle(hub, sum, state_.decomposition.multiplicity[at(mine.shared[hub])], true);
   }
   if (mode == Mode::measured) jumps_[e] = jump;
 }

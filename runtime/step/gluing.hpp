@@ -34,8 +34,17 @@ struct JumpSums {
 ///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >= 9
 ///                always, so that k copies cost O(k) messages)
 ///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
-///   what
-///                all have gained (Schwarz); summed in order of subdomain
+///                what all have gained (Schwarz); summed in order of subdomain
+///
+/// Alternating, subdomains have turns (partition/turns.hpp). One whose turn is not the first begins its
+/// boundary with
+///
+///   take[e]      copies of bodies that stand in subdomains of earlier turns, too, get the mean of the latest
+///   of
+///                those
+///
+/// In the end all copies of a body get the mean of those of its last turn. Each message is sent once, as
+/// without turns: a take reads those of earlier turns, glue the others.
 ///
 /// Between subdomains of one rank the messages are memory. A body sends its velocity, 6 numbers or 3 without
 /// rotation.
@@ -53,8 +62,15 @@ class Gluing {
   /// False when there is nothing to glue: no tasks then.
   bool needed() const { return needed_; }
   std::span<const std::int32_t> walls() const { return walls_; }  ///< of finite mass
-  /// Subdomains here (index among those) whose glue reads what e publishes; ascending, without e.
+  /// Subdomains here (index among those) that read what e publishes; ascending, without e. They do so in
+  /// their take where reads_early() is true, else in their glue.
   std::vector<std::uint32_t> readers_here(std::size_t e) const;
+  bool reads_early(std::size_t reader, std::size_t from) const { return turn(from) < turn(reader); }
+  int turn(std::size_t e) const;
+  /// Slots of the copies that its take writes.
+  std::span<const Slot> taken(std::size_t e) const;
+  /// Subdomains here whose turn is not the first, ascending: those that have a take.
+  std::span<const std::uint32_t> followers() const { return followers_; }
 
   /// Tasks between publish and glue: the centre, behind collect where there is one.
   std::size_t tasks_of_rank() const;
@@ -76,6 +92,7 @@ class Gluing {
   void publish(std::size_t e, Mode mode, bool single = false);
   void collect(Mode mode);
   void centre(Mode mode);
+  void take(std::size_t e, Mode mode, bool single = false);
   void glue(std::size_t e, Mode mode, bool single = false);
 
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
@@ -91,14 +108,23 @@ class Gluing {
   struct Subdomain;
   struct Centre;
   void plan_sides(std::size_t e);
+  void plan_copies(std::size_t e);
   void plan_centre();
   void count_messages();
+  template <class Which>
+  void await_messages(std::size_t e, const Which& which);
+  template <class Which>
+  void ask_for_messages(std::size_t e, const Which& which);
+  template <std::size_t Width, class Record>
+  auto add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const;
   void send_up();
   void answer();
   template <class Work>
   void with_bodies(bool single, const Work& work);
   template <std::size_t Width, class Record>
   void publish_bodies(std::size_t e, std::span<const Record> velocity);
+  template <std::size_t Width, class Record>
+  void take_bodies(std::size_t e, std::span<Record> velocity);
   template <std::size_t Width, class Record>
   void glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity);
 
@@ -109,6 +135,7 @@ class Gluing {
   std::size_t width_ = 6;  ///< numbers per body
   std::vector<std::int32_t> walls_;
   std::vector<Subdomain> subdomains_;  ///< per subdomain here
+  std::vector<std::uint32_t> followers_;
   std::unique_ptr<Centre> centre_;
   std::vector<JumpSums> jumps_;
   MessageCount messages_;

@@ -140,10 +140,8 @@ void Iteration::chunk(std::size_t c, int epoch) {
   std::span<Velocity> velocity = state_.bodies.velocity;
   const bool at_wall = chunks.wall[c] >= 0;
   const double mu = at_wall ? parameters_.law.mu_walls : parameters_.law.mu_grains;
-  // With Schwarz a copy has the whole mass.
-  const Multiplicities multiplicity = decomposition_.coupling == Coupling::nscdd && chunks.boundary[c] != 0
-                                          ? Multiplicities(state_.decomposition.multiplicity)
-                                          : Multiplicities();
+  const Multiplicities parts =
+      chunks.boundary[c] != 0 ? Multiplicities(state_.decomposition.parts) : Multiplicities();
   WallCopy& copy = state_.copies[c];
   switch (work) {
     case Work::restore:
@@ -170,11 +168,10 @@ void Iteration::chunk(std::size_t c, int epoch) {
       break;
     }
     case Work::measure:
-      sums_[c] = at_wall
-                     ? kernels_.error_wall<Friction>(
-                           contacts, range, velocity, mu, copy,
-                           state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(), multiplicity)
-                     : kernels_.error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
+      sums_[c] = at_wall ? kernels_.error_wall<Friction>(
+                               contacts, range, velocity, mu, copy,
+                               state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(), parts)
+                         : kernels_.error_grains<Friction>(contacts, range, velocity, mu, parts);
       if (ranks_.ranks() > 1) store_impulses(contacts, chunks, c, state_.candidates);
       break;
     case Work::sweep:
@@ -225,8 +222,18 @@ void Iteration::node(std::uint32_t node, int epoch) {
     gluing_.collect(mode);
   else if (task < here + of_rank)
     gluing_.centre(mode);
-  else
+  else if (task < 2 * here + of_rank)
     gluing_.glue(task - here - of_rank, mode, single(epoch));
+  else
+    take(gluing_.followers()[task - 2 * here - of_rank], mode, epoch);
+}
+
+/// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
+/// look for it with the first of them.
+void Iteration::take(std::size_t e, Gluing::Mode mode, int epoch) {
+  const bool now = single(epoch), before = number(epoch) > 0 && course(epoch - 1).single;
+  if (now && !before) narrow_bodies(gluing_.taken(e), state_.bodies.velocity, state_.single);
+  gluing_.take(e, mode, now);
 }
 
 std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {
@@ -235,9 +242,11 @@ std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const 
   if (node >= chunks) {
     if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
     const std::size_t task = node - chunks;
-    return kind_of(task < here                             ? TaskKind::publish
-                   : task < here + gluing_.tasks_of_rank() ? TaskKind::centre
-                                                           : TaskKind::glue);
+    const std::size_t of_rank = gluing_.tasks_of_rank();
+    return kind_of(task < here                 ? TaskKind::publish
+                   : task < here + of_rank     ? TaskKind::centre
+                   : task < 2 * here + of_rank ? TaskKind::glue
+                                               : TaskKind::take);
   }
   switch (now) {
     case Work::accumulate:

@@ -24,6 +24,18 @@ void validate_load(const std::string& where, const WallLoad& load) {
 }
 }  // namespace
 
+const char* name_of(Coupling coupling) {
+  switch (coupling) {
+    case Coupling::nscdd:
+      return "NSCDD";
+    case Coupling::alternating:
+      return "alternating NSCDD";
+    case Coupling::schwarz:
+      break;
+  }
+  return "Schwarz";
+}
+
 void validate(const Setup& setup) {
   for (const Wall& wall : setup.walls) {
     require(std::abs(wall.normal.norm() - 1) < 1e-9,
@@ -58,6 +70,11 @@ void validate(const Setup& setup) {
                       setup.solver.tolerance, setup.solver.balance_tolerance));
   require(setup.solver.max_iterations >= 1, "solver.max_iterations must be >= 1");
   require(setup.solver.check_every >= 1, "solver.check_every must be >= 1");
+  require(
+      setup.decomposition.coupling != Coupling::alternating || setup.decomposition.sweeps_per_exchange == 1,
+      fmt::format("decomposition.sweeps_per_exchange = {}: subdomains that alternate exchange in every "
+                  "sweep. Set it to 1, or coupling to \"nscdd\"",
+                  setup.decomposition.sweeps_per_exchange));
 }
 
 }  // namespace talus

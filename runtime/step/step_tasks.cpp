@@ -256,7 +256,7 @@ void StepGraph::make_chunks() {
     state_.candidates = std::move(fresh);
     groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(state_.candidates.size()));
   }
-  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size());
+  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
   const double planning = graph::seconds_now();
   iteration_.plan();
@@ -317,16 +317,26 @@ void StepGraph::plan_iteration() {
 }
 
 /// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the
-/// centre and, where the tree has one, collect behind them, glue[e] last (iteration.hpp).
+/// centre and, where the tree has one, collect behind them, glue[e] last, and take[e] before the boundary
+/// chunks of those e whose turn is not the first (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
   const std::size_t count = chunks.size(), here = state_.decomposition.here.size();
   const std::size_t of_rank = gluing.tasks_of_rank(),
-                    nodes = count + (gluing.needed() ? 2 * here + of_rank : 0);
+                    nodes = count + (gluing.needed() ? 2 * here + of_rank + gluing.followers().size() : 0);
   const auto publish = [&](std::size_t e) { return static_cast<std::uint32_t>(count + e); };
   const auto centre = static_cast<std::uint32_t>(count + here + of_rank - 1);
   const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + of_rank + e); };
+  std::vector<char> turn;
+  for (std::size_t e = 0; e < here; ++e) turn.push_back(static_cast<char>(gluing.turn(e)));
+  std::vector<std::uint32_t> take(here, 0);
+  for (std::uint32_t next = static_cast<std::uint32_t>(count + 2 * here + of_rank);
+       const std::uint32_t e : gluing.followers())
+    take[e] = next++;
+  const auto reading = [&](std::size_t reader, std::size_t from) {
+    return gluing.reads_early(reader, from) ? take[reader] : glue(reader);
+  };
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here);
@@ -337,9 +347,9 @@ void StepGraph::plan_epochs() {
     turns.push_back({chunks.boundary[c] == 0, static_cast<std::uint32_t>(chunks.subdomain[c]),
                      static_cast<std::uint32_t>(chunks.colour[c])});
   const graph::LoopColours colours =
-      graph::loop_colours(turns, here, decomposition_.overlap, executor_.threads());
+      graph::loop_colours(turns, turn, decomposition_.overlap, executor_.threads(), ranks_.ranks());
   const auto in_tree =
-      graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.publish.back(), colours.glue);
+      graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.last_publish, colours.glue);
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
@@ -349,6 +359,7 @@ void StepGraph::plan_epochs() {
     if (at_interface) {
       neighbour.push_back(publish(e));
       neighbour.push_back(glue(e));
+      if (turn[e] > 0) neighbour.push_back(take[e]);
       boundary[e].push_back(static_cast<std::uint32_t>(c));
     }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
@@ -360,7 +371,8 @@ void StepGraph::plan_epochs() {
       for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
         neighbour.push_back(task);
       neighbour.push_back(glue(e));
-      for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(glue(reader));
+      if (turn[e] > 0) neighbour.push_back(take[e]);
+      for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(reading(reader, e));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
     if (of_rank > 1) {
@@ -379,7 +391,18 @@ void StepGraph::plan_epochs() {
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
       neighbour.push_back(centre);
       neighbour.push_back(publish(e));
-      for (std::uint32_t writer : gluing.readers_here(e)) neighbour.push_back(publish(writer));
+      if (turn[e] > 0) neighbour.push_back(take[e]);
+      for (std::uint32_t writer : gluing.readers_here(e))
+        if (!gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
+      offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
+    }
+    for (const std::uint32_t e : gluing.followers()) {
+      colour[take[e]] = colours.take[e];
+      neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
+      neighbour.push_back(publish(e));
+      neighbour.push_back(glue(e));
+      for (std::uint32_t writer : gluing.readers_here(e))
+        if (gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
   }
@@ -402,6 +425,7 @@ void StepGraph::plan_epochs() {
     if (!gluing.needed() || (ranks_.ranks() > 1 && !ranks_.any_thread())) continue;
     const auto e = static_cast<std::size_t>(chunks.subdomain[order[k]]);
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
+    if (turn[e] > 0) owner[take[e]] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
   if (executor_.trace() || executor_.times() || order_) note_plan({colour, offset, neighbour}, owner);
@@ -411,9 +435,11 @@ void StepGraph::plan_epochs() {
 void StepGraph::finish_lane(std::uint32_t lane) {
   Bodies& bodies = state_.bodies;
   const SlotRange range = slots(lane);
-  const bool whole = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several();
+  const Decomposition& all = state_.decomposition;
+  const bool uneven = decomposition_.coupling != Coupling::nscdd;
   motion_[lane] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
-                         whole ? Multiplicities(state_.decomposition.multiplicity) : Multiplicities());
+                         uneven ? Multiplicities(all.multiplicity) : Multiplicities(),
+                         uneven ? Multiplicities(all.parts) : Multiplicities());
   if (!bodies.orientation.empty())
     turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
 }

@@ -70,16 +70,23 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
     }
     const std::size_t task = node - count;
     const std::size_t of_rank = iteration_.gluing().tasks_of_rank();
-    const bool centre = task >= here.size() && task < here.size() + of_rank;
-    const trace::Role role = centre               ? trace::Role::centre
-                             : task < here.size() ? trace::Role::publish
-                                                  : trace::Role::glue;
-    plan.role.push_back(static_cast<std::uint8_t>(role));
-    plan.group.push_back(
-        centre ? trace::centre_group
-               : static_cast<std::uint32_t>(here[task - (task < here.size() ? 0 : here.size() + of_rank)]));
+    const std::size_t glues = here.size() + of_rank, takes = glues + here.size();
+    const auto name = [&](trace::Role role, std::size_t e) {
+      plan.role.push_back(static_cast<std::uint8_t>(role));
+      plan.group.push_back(role == trace::Role::centre ? trace::centre_group
+                                                       : static_cast<std::uint32_t>(here[e]));
+      plan.place.push_back(
+          role == trace::Role::centre ? 0 : static_cast<std::uint32_t>(iteration_.gluing().turn(e)));
+    };
+    if (task < here.size())
+      name(trace::Role::publish, task);
+    else if (task < glues)
+      name(trace::Role::centre, 0);
+    else if (task < takes)
+      name(trace::Role::glue, task - glues);
+    else
+      name(trace::Role::take, iteration_.gluing().followers()[task - takes]);
     plan.weight.push_back(0);
-    plan.place.push_back(0);
   }
   plan.messages = iteration_.gluing().message_plan();
   return plan;

@@ -26,6 +26,7 @@ enum class TaskKind : std::uint8_t {
   publish,
   centre,
   glue,
+  take,
   whole  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
 };
 

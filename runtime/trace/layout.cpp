@@ -48,9 +48,15 @@ class Builder {
   struct Group {
     std::int32_t source = -1;           ///< recorded rank
     std::vector<std::uint32_t> chunks;  ///< recorded nodes
-    std::uint32_t publish = none, glue = none;
-    std::uint32_t new_publish = none, new_glue = none;
+    std::uint32_t publish = none, glue = none, take = none;
+    std::uint32_t new_publish = none, new_glue = none, new_take = none;
+    std::uint32_t turn = 0;
   };
+
+  /// The node that takes a message.
+  static std::uint32_t receiver(const Group& from, const Group& to) {
+    return from.turn < to.turn ? to.new_take : to.new_glue;
+  }
 
   std::size_t place_of(std::uint32_t group) const {
     const auto at = std::lower_bound(groups_.begin(), groups_.end(), group);
@@ -71,8 +77,23 @@ class Builder {
         if (role == Role::compute) group.chunks.push_back(n);
         if (role == Role::publish) group.publish = n;
         if (role == Role::glue) group.glue = n;
+        if (role == Role::take) {
+          group.take = n;
+          group.turn = plan.place[n];
+        }
       }
     }
+    for (const Group& group : group_)
+      for (std::uint32_t n : group.chunks)
+        if (const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
+            group.glue != none && group.turn == 0 && plan.colour[group.glue] < plan.colour[n])
+          overlap_ = false;
+  }
+
+  bool is_inside(const Group& group, const SimNode& node) const {
+    const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
+    return group.turn > 0 ? node.colour < plan.colour[group.take]
+                          : group.publish == none || plan.colour[group.publish] < node.colour;
   }
 
   std::uint32_t add_node(std::uint32_t rank, std::int32_t source, std::uint32_t n) {
@@ -85,23 +106,21 @@ class Builder {
   /// As the program would have them with these subdomains on one rank; `first`: the rank's first chunk, all
   /// of which get theirs.
   graph::LoopColours colours_of(std::uint32_t first, std::span<const std::size_t> mine) {
-    bool overlap = true;
     std::vector<graph::ChunkTurn> turns;
+    std::vector<char> turn_of;
+    for (std::size_t g : mine) turn_of.push_back(static_cast<char>(group_[g].turn));
     for (std::size_t n = first, at = 0; n < out_.nodes.size(); ++n) {
       const SimNode& node = out_.nodes[n];
       while (groups_[mine[at]] != node.group) ++at;
-      const Group& group = group_[mine[at]];
-      const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
-      const bool inside = group.publish == none || plan.colour[group.publish] < node.colour;
-      if (inside && group.glue != none && plan.colour[group.glue] < node.colour) overlap = false;
-      turns.push_back({inside, static_cast<std::uint32_t>(at), node.colour});
+      turns.push_back({is_inside(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
-    graph::LoopColours colours = graph::loop_colours(turns, mine.size(), overlap, machine_.threads);
+    graph::LoopColours colours =
+        graph::loop_colours(turns, turn_of, overlap_, machine_.threads, machine_.ranks);
     for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
   }
 
-  /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues; and their owners.
+  /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues, takes; and their owners.
   void add_rank(std::uint32_t rank) {
     const auto first = static_cast<std::uint32_t>(out_.nodes.size());
     out_.rank_begin.push_back(first);
@@ -153,7 +172,7 @@ class Builder {
     collect_.push_back(none);
     if (!glued) return;
     const int own = static_cast<int>(rank);
-    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.publish.back(), colours.glue);
+    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.last_publish, colours.glue);
     const auto add = [&](std::uint32_t colour) {
       out_.nodes.push_back(centre_node(rank, colour));
       out_.nodes.back().worker = worker(0);
@@ -166,6 +185,13 @@ class Builder {
       group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);
       out_.nodes.back().worker = owner_of(g);
       out_.nodes.back().colour = colours.glue;
+    }
+    for (std::size_t at = 0; at < mine.size(); ++at) {
+      Group& group = group_[mine[at]];
+      if (group.turn == 0) continue;
+      group.new_take = add_node(rank, group.source, group.take);
+      out_.nodes.back().worker = owner_of(mine[at]);
+      out_.nodes.back().colour = colours.take[at];
     }
   }
 
@@ -198,6 +224,10 @@ class Builder {
     for (const Group& group : group_) {
       if (group.new_publish == none) continue;
       join(group.new_publish, group.new_glue);
+      if (group.turn > 0) {
+        join(group.new_publish, group.new_take);
+        join(group.new_glue, group.new_take);
+      }
       const std::uint32_t centre = centre_[out_.nodes[group.new_publish].rank];
       join(group.new_publish, centre);
       join(group.new_glue, centre);
@@ -211,7 +241,7 @@ class Builder {
         if (from.new_publish == none || to.new_glue == none)
           throw TraceError("a message between subdomains without gluing");
         if (out_.nodes[from.new_publish].rank == out_.nodes[to.new_glue].rank)
-          join(from.new_publish, to.new_glue);
+          join(from.new_publish, receiver(from, to));
       }
     out_.offset.push_back(0);
     for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
@@ -254,8 +284,8 @@ class Builder {
         } else if (m.from == centre_group) {
           down[rank_of_[place_of(m.to)]] += bytes;
         } else {
-          const std::uint32_t from = group_[place_of(m.from)].new_publish,
-                              to = group_[place_of(m.to)].new_glue;
+          const Group &sender = group_[place_of(m.from)], &taker = group_[place_of(m.to)];
+          const std::uint32_t from = sender.new_publish, to = receiver(sender, taker);
           if (out_.nodes[from].rank == out_.nodes[to].rank) {
             if (!newly_shared(*plan, out_.nodes[from], out_.nodes[to])) continue;
             out_.handed[from] += bytes;
@@ -344,6 +374,7 @@ class Builder {
   const Machine& machine_;
   const double faces_;
   std::vector<Group> group_;            ///< like groups_
+  bool overlap_ = true;                 ///< glue comes behind the chunks inside
   std::vector<std::uint32_t> centre_;   ///< per rank
   std::vector<std::uint32_t> collect_;  ///< per rank; none unless it is between rank 0 and the leaves
   LoopLayout out_;

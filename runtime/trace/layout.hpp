@@ -21,7 +21,7 @@ struct SimNode {
   bool waits_only = false;  ///< takes messages, and does none of the recorded work
 };
 
-/// A message of each exchange, from the node `from` to the glue or centre `to`.
+/// A message of each exchange, from the node `from` to the glue, take or centre `to`.
 struct SimMessage {
   std::uint32_t from = 0, to = 0;
   std::uint32_t bytes = 0;

@@ -88,13 +88,15 @@ enum class Role : std::uint8_t {
   publish,  ///< sends what its group shows to others
   centre,   ///< of a rank: what goes through rank 0; before it, on ranks between, what goes up to it
   glue,     ///< takes what others have published
+  take,  ///< of a group whose turn is not 0, before its border: takes what those of earlier turns published
 };
 
 /// Names the centre as the end of a message.
 inline constexpr std::uint16_t centre_group = 0xffffU;
 
 /// Sent in each epoch that exchanges, from the publish of one group to the glue of another (`from` to `to`),
-/// or to and from the centre. Groups on one rank need no message.
+/// or to its take if the turn of the first is the earlier; or to and from the centre. Groups on one rank need
+/// no message.
 struct Message {
   std::uint16_t from = 0, to = 0;
   std::uint32_t bytes = 0;
@@ -107,13 +109,14 @@ inline std::uint32_t message_name(std::uint32_t from, std::uint32_t to) {
 struct Plan {
   std::int32_t rank = 0;
   std::uint32_t step = 0;
-  std::vector<std::uint32_t> colour;     ///< n
-  std::vector<std::uint32_t> group;      ///< n: subdomain among all; of the centre 0xffff
-  std::vector<std::uint8_t> role;        ///< n: of Role
-  std::vector<std::uint32_t> weight;     ///< n: expected work, in contacts; 0 for what no work is planned for
-  std::vector<std::uint32_t> place;      ///< n: order in space within the rank, for owners
-  std::vector<std::uint32_t> owner;      ///< n: thread
-  std::vector<std::uint32_t> offset;     ///< n + 1, into neighbour
+  std::vector<std::uint32_t> colour;  ///< n
+  std::vector<std::uint32_t> group;   ///< n: subdomain among all; of the centre 0xffff
+  std::vector<std::uint8_t> role;     ///< n: of Role
+  std::vector<std::uint32_t> weight;  ///< n: expected work, in contacts; 0 for what no work is planned for
+  std::vector<std::uint32_t> place;   ///< n: order in space within the rank, for owners; of publish, take and
+                                      ///< glue the turn of their group
+  std::vector<std::uint32_t> owner;   ///< n: thread
+  std::vector<std::uint32_t> offset;  ///< n + 1, into neighbour
   std::vector<std::uint32_t> neighbour;  ///< conflicting nodes
   std::vector<Message> messages;         ///< that leave a group of this rank, and those from the centre
 

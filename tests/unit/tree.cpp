@@ -64,7 +64,7 @@ using graph::loop_colours;
 TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
   const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 2}, {true, 0, 2},
                                         {false, 1, 0}, {true, 1, 2},  {true, 1, 3}};
-  const graph::LoopColours colours = loop_colours(turns, 3, true, 1);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(3, 0), true, 1, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
   EXPECT_EQ(colours.glue, 18U);
@@ -72,7 +72,7 @@ TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
 
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
   const std::vector<ChunkTurn> turns = {{false, 0, 0}, {true, 0, 2}, {false, 1, 0}, {true, 1, 2}};
-  const graph::LoopColours colours = loop_colours(turns, 2, false, 1);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, 1, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 2, 12}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 6}));
   EXPECT_EQ(colours.glue, 8U);
@@ -81,7 +81,7 @@ TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
   const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 7},
                                         {false, 1, 4}, {true, 1, 9},  {true, 1, 12}};
-  const graph::LoopColours colours = loop_colours(turns, 2, true, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), true, 2, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
   EXPECT_EQ(colours.glue, 10U);
@@ -92,15 +92,15 @@ TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
                                       {true, 1, 3},  {true, 1, 5}, {true, 2, 3}};
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
-      const graph::LoopColours among = loop_colours(all, 3, true, threads_then);
+      const graph::LoopColours among = loop_colours(all, std::vector<char>(3, 0), true, threads_then, 2);
       std::vector<ChunkTurn> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
           alone.push_back({all[k].inside, 0, all[k].colour});
           again.push_back({among.publish[1] < among.chunk[k], 0, among.chunk[k]});
         }
-      const graph::LoopColours here = loop_colours(alone, 1, true, threads),
-                               replayed = loop_colours(again, 1, true, threads);
+      const graph::LoopColours here = loop_colours(alone, std::vector<char>(1, 0), true, threads, 2),
+                               replayed = loop_colours(again, std::vector<char>(1, 0), true, threads, 2);
       EXPECT_EQ(here.chunk, replayed.chunk);
       EXPECT_EQ(here.glue, replayed.glue);
     }

@@ -48,7 +48,7 @@ inline std::byte* bytes_of(std::vector<double>& buffer) {
   return std::as_writable_bytes(std::span(buffer)).data();
 }
 
-/// A body with one other copy, and that copy's place in the message.
+/// A body, and the place of its copy in a neighbour's message.
 struct Pair {
   Slot slot;
   std::int32_t place;
@@ -66,17 +66,24 @@ namespace talus {
 /// Towards one neighbour.
 struct Gluing::Side {
   std::vector<Slot> slots;            ///< of the bodies in the message, in its order
-  std::vector<detail::Pair> pairs;    ///< those in it that stand in no third subdomain
+  std::vector<detail::Pair> pairs;    ///< those in it of which these two copies alone are of the last turn
+  std::vector<detail::Pair> given;    ///< where only the neighbour's copy is
+  std::vector<detail::Pair> taken;    ///< where only the neighbour's copy is of the turn before this one's
   detail::Link link;                  ///< `in` and the channels: of neighbours on other ranks only
   const std::byte* source = nullptr;  ///< the neighbour's message to this subdomain
+  int turn = 0;                       ///< of the neighbour
   std::int32_t local = -1;            ///< the neighbour's place here, -1 on another rank
 };
 
 struct Gluing::Subdomain {
   std::vector<Side> sides;
-  std::vector<Slot> shared;           ///< slots of `interface.shared`
-  std::vector<std::int32_t> corners;  ///< indices into `shared`: in three subdomains or more, and no hub
-  std::vector<double> base;           ///< Schwarz: velocities after the last gluing, per shared body
+  std::vector<Slot> shared;  ///< slots of `interface.shared`
+  std::vector<Slot> taken;   ///< those of `shared` that are
+  int turn = 0;
+  std::vector<std::int32_t>
+      corners;                    ///< indices into `shared`, without hubs: of the last turn are more copies
+  std::vector<std::int32_t> led;  ///< likewise of the turn before this one's
+  std::vector<double> base;       ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
   std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
   std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results

@@ -1,0 +1,106 @@
+#include "partition/turns.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <queue>
+#include <stdexcept>
+#include <utility>
+
+namespace talus {
+
+namespace {
+
+/// Ties by subdomain, as offsets and lists.
+struct Ties {
+  std::vector<std::size_t> begin;
+  std::vector<Tie> tie;
+
+  Ties(std::size_t subdomains, std::span<const Tie> ties) : begin(subdomains + 1, 0), tie(ties.size()) {
+    const auto known = [&](std::int32_t e) { return e >= 0 && static_cast<std::size_t>(e) < subdomains; };
+    for (const Tie& one : ties) {
+      if (!known(one.subdomain) || !known(one.other))
+        throw std::out_of_range("a tie of a subdomain that there is not");
+      ++begin[static_cast<std::size_t>(one.subdomain) + 1];
+    }
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    std::vector<std::size_t> next(begin.begin(), begin.end() - 1);
+    for (const Tie& one : ties) tie[next[static_cast<std::size_t>(one.subdomain)]++] = one;
+  }
+  std::size_t subdomains() const { return begin.size() - 1; }
+  std::span<const Tie> of(std::size_t e) const {
+    return std::span(tie).subspan(begin[e], begin[e + 1] - begin[e]);
+  }
+};
+
+constexpr char none = -1;
+
+/// Grains that subdomain e shares with those of each turn.
+std::vector<std::int64_t> shared_with(const Ties& ties, const std::vector<char>& turn, std::size_t e,
+                                      int turns) {
+  std::vector<std::int64_t> shared(static_cast<std::size_t>(turns), 0);
+  for (const Tie& tie : ties.of(e))
+    if (const char other = turn[static_cast<std::size_t>(tie.other)]; other != none)
+      shared[static_cast<std::size_t>(other)] += tie.grains;
+  return shared;
+}
+
+char least(const std::vector<std::int64_t>& shared) {
+  return static_cast<char>(std::ranges::min_element(shared) - shared.begin());
+}
+
+std::vector<char> grow(const Ties& ties, int turns) {
+  std::vector<char> turn(ties.subdomains(), none);
+  // The most strongly tied to those that have a turn; of equals the first. What is out of date is passed
+  // over.
+  std::vector<std::int64_t> strength(turn.size(), 0);
+  std::priority_queue<std::pair<std::int64_t, std::int64_t>> next;
+  for (std::size_t e = 0; e < turn.size(); ++e) next.emplace(0, -static_cast<std::int64_t>(e));
+  while (!next.empty()) {
+    const auto [strong, minus] = next.top();
+    next.pop();
+    const auto e = static_cast<std::size_t>(-minus);
+    if (turn[e] != none || strong != strength[e]) continue;
+    turn[e] = least(shared_with(ties, turn, e, turns));
+    for (const Tie& tie : ties.of(e)) {
+      const auto other = static_cast<std::size_t>(tie.other);
+      if (turn[other] != none) continue;
+      strength[other] += tie.grains;
+      next.emplace(strength[other], -static_cast<std::int64_t>(other));
+    }
+  }
+  return turn;
+}
+
+/// Each move takes ties out of a turn, so they end.
+void improve(const Ties& ties, int turns, std::vector<char>& turn) {
+  for (bool moved = true; moved;) {
+    moved = false;
+    for (std::size_t e = 0; e < turn.size(); ++e) {
+      const std::vector<std::int64_t> shared = shared_with(ties, turn, e, turns);
+      const char best = least(shared);
+      if (shared[static_cast<std::size_t>(best)] == shared[static_cast<std::size_t>(turn[e])]) continue;
+      turn[e] = best;
+      moved = true;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<char> choose_turns(std::int32_t subdomains, std::span<const Tie> list) {
+  constexpr int most = 4;
+  const Ties ties(static_cast<std::size_t>(subdomains), list);
+  for (int turns = 2;; ++turns) {
+    std::vector<char> turn = grow(ties, turns);
+    improve(ties, turns, turn);
+    std::int64_t all = 0, within = 0;
+    for (const Tie& tie : list) {
+      all += tie.grains;
+      if (turn[static_cast<std::size_t>(tie.subdomain)] == turn[static_cast<std::size_t>(tie.other)])
+        within += tie.grains;
+    }
+    if (4 * within <= all || turns == most) return turn;
+  }
+}
+
+}  // namespace talus
