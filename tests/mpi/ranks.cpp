@@ -99,7 +99,7 @@ TEST_F(Ranks, EndStepsOnTheStateThatWasCertified) {
 }
 
 TEST_F(Ranks, MayHaveAnySubdomainsOfAllCouplings) {
-  for (const std::string coupling : {"nscdd", "schwarz"})
+  for (const std::string coupling : {"nscdd", "alternating", "schwarz"})
     for (const std::string exchange : {"dcs", "ccs"}) {
       const std::string keys = fmt::format(
           "run scene.toml --force --threads 1 --set decomposition.coupling={} --set "
@@ -107,7 +107,9 @@ TEST_F(Ranks, MayHaveAnySubdomainsOfAllCouplings) {
           coupling, exchange);
       ASSERT_EQ(run(1, keys + " --out one").code, 3);
       // All of them once; with three ranks, neighbours in number are never neighbours on a rank.
-      for (int ranks : coupling + exchange == "nscddccs" ? std::vector{2, 3, 4} : std::vector{3}) {
+      for (int ranks : coupling + exchange == "nscddccs" || coupling + exchange == "alternatingdcs"
+                           ? std::vector{2, 3, 4}
+                           : std::vector{3}) {
         const Outcome dealt = run(ranks, keys + " --out dealt --set decomposition.mapping=cyclic");
         ASSERT_EQ(dealt.code, 3) << dealt.messages;
         EXPECT_EQ(digest_of("dealt"), digest_of("one")) << coupling << " " << exchange << ", " << ranks;
@@ -211,7 +213,7 @@ TEST_F(Ranks, BearAPileInOneCornerAndABoulderLargerThanSubdomains) {
                           0.0101 + 0.0201 * (k / 9));
   grains += "100,0.02,0.02,0.37,0.3\n101,5,5,0.0101,0.01\n";
   write(at("grains.csv"), grains);
-  for (const std::string coupling : {"nscdd", "schwarz"}) {
+  for (const std::string coupling : {"nscdd", "alternating", "schwarz"}) {
     const std::string keys =
         "run scene.toml --force --threads 1 --set allow_unconverged=true --set decomposition.coupling=" +
         coupling;

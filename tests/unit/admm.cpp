@@ -338,7 +338,7 @@ TEST(AdmmStep, IsCalledInTheStepInWhichAHeavyPlateLands) {
 
 TEST(AdmmStep, NeedsNoMoreIterationsInSubdomains) {
   const int alone = plate_on_block(SolverMethod::admm, 1e6).iterations.stiff.iterations;
-  for (const Coupling coupling : {Coupling::nscdd, Coupling::schwarz})
+  for (const Coupling coupling : {Coupling::nscdd, Coupling::alternating, Coupling::schwarz})
     for (const int subdomains : {4, 12}) {
       const PlateOutcome outcome = plate_on_block(SolverMethod::admm, 1e6, subdomains, 1, coupling);
       EXPECT_LE(outcome.iterations.stiff.iterations, 2 * alone);

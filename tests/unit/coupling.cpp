@@ -15,13 +15,13 @@
 namespace talus {
 namespace {
 
-constexpr std::array couplings{Coupling::nscdd, Coupling::schwarz};
+constexpr std::array couplings{Coupling::nscdd, Coupling::alternating, Coupling::schwarz};
 constexpr std::array exchanges{ExchangeScheme::dcs, ExchangeScheme::ccs};
 constexpr std::array partitioners{PartitionKind::boxes, PartitionKind::fitted, PartitionKind::rcb,
                                   PartitionKind::metis};
 
 std::string label(const DecompositionSettings& settings) {
-  return std::string(settings.coupling == Coupling::nscdd ? "nscdd" : "schwarz") +
+  return std::string(name_of(settings.coupling)) +
          (settings.exchange == ExchangeScheme::dcs ? " dcs " : " ccs ") +
          std::string(name_of(settings.partitioner)) + " " + std::to_string(settings.subdomains);
 }

@@ -26,6 +26,9 @@ const std::vector<Variant> variants = {
     {"nscdd, dcs, boxes", Coupling::nscdd, ExchangeScheme::dcs, PartitionKind::boxes},
     {"nscdd, ccs, rcb", Coupling::nscdd, ExchangeScheme::ccs, PartitionKind::rcb},
     {"nscdd, dcs, metis", Coupling::nscdd, ExchangeScheme::dcs, PartitionKind::metis},
+    {"alternating, dcs, boxes", Coupling::alternating, ExchangeScheme::dcs, PartitionKind::boxes},
+    {"alternating, dcs, metis", Coupling::alternating, ExchangeScheme::dcs, PartitionKind::metis},
+    {"alternating, ccs, rcb", Coupling::alternating, ExchangeScheme::ccs, PartitionKind::rcb},
     {"schwarz, dcs, fitted", Coupling::schwarz, ExchangeScheme::dcs, PartitionKind::fitted},
     {"schwarz, ccs, boxes", Coupling::schwarz, ExchangeScheme::ccs, PartitionKind::boxes},
 };
@@ -91,11 +94,13 @@ TEST(Decomposition, HasTheSameBitsWithAnyNumberOfThreads) {
 }
 
 TEST(Decomposition, HasTheSameBitsWithInnerChunksBehindTheExchange) {
-  talus::Setup setup = pressed_box(0.3, 8);
-  choose(setup, variants[0], 4);
-  const Outcome overlapped = run(setup, lattice(6, 9), {.threads = 2});
-  setup.decomposition.overlap = false;
-  EXPECT_EQ(run(setup, lattice(6, 9), {.threads = 2}).digest, overlapped.digest);
+  for (const Variant& variant : {variants[0], variants[3]}) {
+    talus::Setup setup = pressed_box(0.3, 8);
+    choose(setup, variant, 4);
+    const Outcome overlapped = run(setup, lattice(6, 9), {.threads = 2});
+    setup.decomposition.overlap = false;
+    EXPECT_EQ(run(setup, lattice(6, 9), {.threads = 2}).digest, overlapped.digest) << variant.name;
+  }
 }
 
 TEST(Decomposition, GivesTheForcesOfTheSequentialSolver) {
@@ -120,10 +125,41 @@ TEST(Decomposition, GivesTheForcesOfTheSequentialSolver) {
             << label << ", wall " << whole.walls[w].name;
       EXPECT_GT(cut.last.contacts, 300) << label;
       // Damped impulses of open contacts fade instead of ending at 0, so that Schwarz counts a few more.
-      if (variant.coupling == Coupling::nscdd) {
+      if (variant.coupling != Coupling::schwarz) {
         EXPECT_NEAR(cut.coordination, whole.coordination, 0.05) << label;
       }
     }
+}
+
+TEST(Decomposition, TakesHardlyMoreSweepsThanOneSubdomainWhereSubdomainsAlternate) {
+  // 27 and 64 subdomains of a few grains: nearly every contact is at a border.
+  const auto sweeps_of = [](const Variant& variant, int subdomains) {
+    talus::Setup setup = pressed_box(0.3, 6);
+    setup.solver.tolerance = 1e-4;
+    setup.solver.balance_tolerance = 1e9;
+    setup.solver.warm_start = false;
+    setup.solver.check_every = 2;
+    choose(setup, variant, subdomains);
+    const Outcome outcome = run(setup, lattice(8, 5));
+    EXPECT_EQ(outcome.unconverged, 0) << variant.name;
+    return outcome.last.iterations;
+  };
+  const int whole = sweeps_of(variants[0], 1);
+  for (int subdomains : {27, 64}) {
+    const int together = sweeps_of(variants[0], subdomains);
+    for (const Variant& variant : {variants[3], variants[4]}) {
+      const int alternating = sweeps_of(variant, subdomains);
+      EXPECT_LE(alternating, 1.15 * whole) << variant.name << ", " << subdomains;
+      EXPECT_LT(alternating, together) << variant.name << ", " << subdomains;
+    }
+  }
+}
+
+TEST(Decomposition, ExchangesInEverySweepWhereSubdomainsAlternate) {
+  talus::Setup setup = pressed_box(0.3, 2);
+  choose(setup, variants[3], 4);
+  setup.decomposition.sweeps_per_exchange = 2;
+  EXPECT_THROW(validate(setup), std::invalid_argument);
 }
 
 TEST(Decomposition, ConservesMomentumAcrossABorder) {
@@ -188,7 +224,7 @@ TEST(Decomposition, LetsBodiesMigrateAndKeepsTheirContactsMemory) {
 
 TEST(Decomposition, NamesTheDivergenceOfUndampedSchwarz) {
   talus::Setup setup = pressed_box(0.3, 20);
-  choose(setup, variants[3], 27);
+  choose(setup, variants[6], 27);
   setup.decomposition.damping = false;
   setup.solver.tolerance = 1e-6;
   try {

@@ -73,9 +73,25 @@ TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
   const std::vector<ChunkTurn> turns = {{false, 0, 0}, {true, 0, 2}, {false, 1, 0}, {true, 1, 2}};
   const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, 1, 2);
-  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 2, 12}));
-  EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 6}));
+  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 4, 12}));
+  EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(colours.glue, 8U);
+}
+
+TEST(LoopColours, OfLaterTurnsPutTakeAndBorderBehindTheInside) {
+  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {true, 0, 3}, {true, 1, 0}, {false, 1, 4}};
+  const std::vector<char> turn_of = {0, 1};
+  const graph::LoopColours two = loop_colours(turns, turn_of, true, 1, 2);
+  // Border and publish of the first; inside, take, border and publish of the second; inside of the first.
+  EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 12, 4, 8}));
+  EXPECT_EQ(two.publish, (std::vector<std::uint32_t>{2, 10}));
+  EXPECT_EQ(two.take[1], 6U);
+  EXPECT_EQ(two.last_publish, 10U);
+  EXPECT_EQ(two.glue, 14U);
+  // A rank alone stays with each.
+  EXPECT_EQ(loop_colours(turns, turn_of, true, 1, 1).chunk, (std::vector<std::uint32_t>{0, 4, 6, 10}));
+  // Without overlap nothing is between a publish and who waits for it.
+  EXPECT_EQ(loop_colours(turns, turn_of, false, 1, 2).chunk, (std::vector<std::uint32_t>{2, 14, 0, 8}));
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
