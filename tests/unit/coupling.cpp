@@ -103,6 +103,32 @@ TEST_P(EveryCoupling, GivesTheAggregatesOfTheSequentialSolver) {
 INSTANTIATE_TEST_SUITE_P(OfSubdomains, EveryCoupling, testing::Values(2, 4, 8, 12, 16, 96),
                          [](const auto& n) { return std::to_string(n.param); });
 
+TEST(Coupling, TakesHardlyMoreSweepsThanOneSubdomainWhereSubdomainsAlternate) {
+  // 27 subdomains of some 50 grains: most contacts are at a border.
+  talus::Setup setup = pressed_lattice(11, 0.3, 1);
+  for (auto& [wall, load] : setup.stages[0].loads) load.mass = 1e7;
+  setup.solver.tolerance = 1e-4;
+  setup.solver.balance_tolerance = 1e9;
+  const Bodies bodies = test::jittered_lattice(11, 3, 0);
+  const auto sweeps_of = [&](Coupling coupling, PartitionKind partitioner, int subdomains) {
+    setup.decomposition.coupling = coupling;
+    setup.decomposition.partitioner = partitioner;
+    setup.decomposition.subdomains = subdomains;
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(setup, bodies, executor);
+    const StepReport& report = simulation.step();
+    EXPECT_TRUE(report.converged);
+    return report.iterations;
+  };
+  const int whole = sweeps_of(Coupling::nscdd, PartitionKind::boxes, 1);
+  for (const PartitionKind partitioner : partitioners) {
+    const int together = sweeps_of(Coupling::nscdd, partitioner, 27),
+              alternating = sweeps_of(Coupling::alternating, partitioner, 27);
+    EXPECT_LE(alternating, 1.2 * whole) << name_of(partitioner);
+    EXPECT_LT(alternating, together) << name_of(partitioner);
+  }
+}
+
 /// From the standings of bodies alone: who shares one with whom, and how often a body is told.
 struct Formula {
   std::int64_t messages = 0, bytes = 0;

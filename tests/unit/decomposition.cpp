@@ -131,30 +131,6 @@ TEST(Decomposition, GivesTheForcesOfTheSequentialSolver) {
     }
 }
 
-TEST(Decomposition, TakesHardlyMoreSweepsThanOneSubdomainWhereSubdomainsAlternate) {
-  // 27 and 64 subdomains of a few grains: nearly every contact is at a border.
-  const auto sweeps_of = [](const Variant& variant, int subdomains) {
-    talus::Setup setup = pressed_box(0.3, 6);
-    setup.solver.tolerance = 1e-4;
-    setup.solver.balance_tolerance = 1e9;
-    setup.solver.warm_start = false;
-    setup.solver.check_every = 2;
-    choose(setup, variant, subdomains);
-    const Outcome outcome = run(setup, lattice(8, 5));
-    EXPECT_EQ(outcome.unconverged, 0) << variant.name;
-    return outcome.last.iterations;
-  };
-  const int whole = sweeps_of(variants[0], 1);
-  for (int subdomains : {27, 64}) {
-    const int together = sweeps_of(variants[0], subdomains);
-    for (const Variant& variant : {variants[3], variants[4]}) {
-      const int alternating = sweeps_of(variant, subdomains);
-      EXPECT_LE(alternating, 1.15 * whole) << variant.name << ", " << subdomains;
-      EXPECT_LT(alternating, together) << variant.name << ", " << subdomains;
-    }
-  }
-}
-
 TEST(Decomposition, ExchangesInEverySweepWhereSubdomainsAlternate) {
   talus::Setup setup = pressed_box(0.3, 2);
   choose(setup, variants[3], 4);
