@@ -14,9 +14,7 @@ std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-/// Per chunk whether its subdomain follows.
-std::vector<char> place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
-  std::vector<char> follows;
+void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
   for (const CandidateGroup& group : groups) {
     // Pieces of equal length: a short last piece would be a poor task.
     const std::int32_t pieces = (group.end - group.begin + group.target - 1) / group.target;
@@ -26,11 +24,10 @@ std::vector<char> place_boundaries(std::span<const CandidateGroup> groups, Chunk
       chunks.wall.push_back(group.wall);
       chunks.subdomain.push_back(group.subdomain);
       chunks.boundary.push_back(group.boundary ? 1 : 0);
-      follows.push_back(group.follows ? 1 : 0);
+      chunks.late.push_back(group.boundary && group.late ? 1 : 0);
     }
   }
   chunks.begin.push_back(groups.empty() ? 0 : groups.back().end);
-  return follows;
 }
 
 void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunks) {
@@ -125,15 +122,14 @@ void find_conflicts(const Incidence& incidence, Chunks& chunks) {
   }
 }
 
-/// Greedily: those at the boundary, those inside above them, and those at the boundary of subdomains that
-/// follow above all.
-void colour_chunks(std::span<const char> follows, Chunks& chunks) {
+/// Greedily: those at the boundary, those inside above them, and the late ones above all.
+void colour_chunks(Chunks& chunks) {
   const std::size_t count = chunks.wall.size();
   chunks.colour.assign(count, -1);
   std::vector<std::uint32_t> taken_by(count + 1, ~0u);  // colour -> last chunk that found it taken
   enum Turn { boundary, inside, late };
   const auto turn_of = [&](std::size_t c) {
-    return chunks.boundary[c] == 0 ? inside : follows[c] != 0 ? late : boundary;
+    return chunks.boundary[c] == 0 ? inside : chunks.late[c] != 0 ? late : boundary;
   };
   for (const Turn turn : {boundary, inside, late}) {
     const std::int32_t lowest = chunks.colours;
@@ -218,12 +214,12 @@ Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> 
     throw std::runtime_error(std::to_string(bodies) + " bodies in one process, of at most " +
                              std::to_string(most_bodies_of_a_process) + "; use more ranks");
   Chunks chunks;
-  const std::vector<char> follows = place_boundaries(groups, chunks);
+  place_boundaries(groups, chunks);
   list_bodies(candidates, bodies, chunks);
   order_candidates(candidates, chunks);
   const Incidence incidence = chunks_of_bodies(chunks, bodies);
   find_conflicts(incidence, chunks);
-  colour_chunks(follows, chunks);
+  colour_chunks(chunks);
   assign_resets(incidence, bodies, taken, chunks);
   return chunks;
 }
@@ -304,7 +300,8 @@ std::size_t memory_used(const Chunks& chunks) {
           chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
           chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
              4 +
-         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.boundary.capacity();
+         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.boundary.capacity() +
+         chunks.late.capacity();
 }
 
 }  // namespace talus

@@ -39,7 +39,7 @@ struct CandidateGroup {
   std::int32_t subdomain;  ///< index among those of this process
   bool boundary;           ///< a body of each stands in several subdomains, or its wall is glued
   int target;              ///< candidates in a chunk at most, a few hundred, < 32768
-  bool follows = false;    ///< its subdomain has the boundary swept last
+  bool late = false;       ///< at the boundary, and swept behind what is inside
 };
 
 /// So that 32 bits tell where the record of a body begins (record_of).
@@ -47,8 +47,8 @@ inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
 /// neither grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept
-/// first, and what they leave at the interface can travel while the inner chunks are swept; where their
-/// subdomain follows they have the higher ones, and are swept when something has come. Two chunks conflict
+/// first, and what they leave at the interface can travel while the inner chunks are swept; late
+/// ones have the highest, and are swept when something has come. Two chunks conflict
 /// when they share a grain, and then differ in colour: the sweep's result depends on colours alone. Example:
 /// candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
 struct Chunks {
@@ -56,8 +56,8 @@ struct Chunks {
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
   std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
   std::vector<char> boundary;           ///< per chunk: that of its group
-  std::vector<std::int32_t>
-      colour;  ///< per chunk; at the boundary the lowest, or the highest where the subdomain follows
+  std::vector<char> late;               ///< likewise
+  std::vector<std::int32_t> colour;     ///< per chunk; at the boundary the lowest, or, late, the highest
   int colours = 0;
   std::vector<std::int32_t> body_begin;  ///< chunks + 1 offsets into `bodies`
   std::vector<Slot> bodies;              ///< the grains that a chunk touches, in order of first use

@@ -8,10 +8,10 @@ namespace talus::graph {
 namespace {
 
 /// What a rank goes through one after the other. Turn t is phase first_turn + t.
-enum Phase : std::uint32_t { inside_of_later, first_turn, early_glue = 1000, inside_of_first, glue };
+enum Phase : std::uint32_t { early_of_later, first_turn, early_glue = 1000, inside_of_first, glue };
 
 /// Of a subdomain, within a phase.
-enum Part : std::uint32_t { inner, take, border, publish, inner_behind };
+enum Part : std::uint32_t { walls, tell, inner, take, border, publish, inner_behind };
 
 /// What comes first, by its numbers from the left: phase, subdomain, part, colour.
 using Turn = std::array<std::uint32_t, 4>;
@@ -45,28 +45,31 @@ LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char>
   const auto add = [&](std::uint32_t e, Part part, std::uint32_t colour) {
     const auto turn = static_cast<std::uint32_t>(turn_of[e]);
     const std::uint32_t phase = part == inner_behind        ? behind
-                                : part == inner && !overlap ? inside_of_later
+                                : part <= inner && !overlap ? early_of_later
                                                             : first_turn + turn;
     own.push_back({phase, e, part, colour});
   };
-  for (const ChunkTurn& chunk : turns)
+  for (const ChunkTurn& chunk : turns) {
+    const bool first = turn_of[chunk.subdomain] == 0;
     add(chunk.subdomain,
-        !chunk.inside                  ? border
-        : turn_of[chunk.subdomain] > 0 ? inner
-                                       : inner_behind,
+        chunk.side == ChunkTurn::inside          ? (first ? inner_behind : inner)
+        : first || chunk.side == ChunkTurn::late ? border
+                                                 : walls,
         chunk.colour);
-  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, publish, 0);
-  // In the first turn it is not looked at, and begins nothing.
-  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, turn_of[e] > 0 ? take : publish, 0);
+  }
+  // In the first turn publish is take and tell: nothing more begins.
+  for (const Part part : {publish, take, tell})
+    for (std::uint32_t e = 0; e < subdomains; ++e) add(e, turn_of[e] > 0 ? part : publish, 0);
   if (threads > 1) go_abreast(own);
   own.push_back({overlap ? glue : early_glue, 0, 0, 0});
   const std::vector<Turn> order = sorted(own);
   std::vector<std::uint32_t> colours;
   for (const Turn& turn : own) colours.push_back(2 * place_in(order, turn));
   const auto publishes = colours.begin() + static_cast<std::ptrdiff_t>(turns.size()),
-             takes = publishes + subdomains;
-  const std::uint32_t last = subdomains > 0 ? *std::max_element(publishes, takes) : 0;
-  return {{colours.begin(), publishes}, {publishes, takes}, {takes, colours.end() - 1}, last, colours.back()};
+             takes = publishes + subdomains, tells = takes + subdomains, end = tells + subdomains;
+  const std::uint32_t last = subdomains > 0 ? *std::max_element(tells, end) : 0;
+  return {
+      {colours.begin(), publishes}, {publishes, takes}, {takes, tells}, {tells, end}, last, colours.back()};
 }
 
 }  // namespace talus::graph

@@ -6,9 +6,10 @@
 /// may have parts of one subdomain, and the one that comes to it late would keep the other waiting. As
 /// subdomains share no grain, the order among them changes no bit.
 ///
-/// Where subdomains have turns, those of the first have their border, then those of each later one chunks
-/// inside, take, border and publish, then those of the first their chunks inside: each hides the messages of
-/// the others. A rank alone has none to hide, and stays with each subdomain.
+/// Where subdomains have turns, those of the first have their border, then those of each later one what is
+/// early, tell, chunks inside, take, the late border and publish, then those of the first their chunks
+/// inside: each hides the messages of the others. A rank alone has none to hide, and stays with each
+/// subdomain.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +20,11 @@ namespace talus::graph {
 
 /// A chunk by what decides when its turn comes.
 struct ChunkTurn {
-  bool inside;              ///< no grain of it stands in another subdomain
+  enum Side {
+    early,   ///< the border, or in a later turn what of it waits for nobody
+    inside,  ///< no grain of it stands in another subdomain
+    late,    ///< the border of a later turn
+  } side;
   std::uint32_t subdomain;  ///< or its place among those of the rank
   std::uint32_t colour;  ///< counts within its side of the border of its subdomain, whatever it begins with
 };
@@ -30,7 +35,8 @@ struct LoopColours {
   std::vector<std::uint32_t> chunk;    ///< as the turns that were given
   std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border
   std::vector<std::uint32_t> take;     ///< per subdomain, before its border; means nothing in the first turn
-  std::uint32_t last_publish = 0;
+  std::vector<std::uint32_t> tell;     ///< per subdomain: when it tells the centre; publish in the first turn
+  std::uint32_t last_tell = 0;
   std::uint32_t glue = 0;  ///< behind everything, or before all insides without overlap
 };
 /// `turn_of`: per subdomain of the rank.

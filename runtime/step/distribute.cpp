@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <stdexcept>
 
@@ -143,14 +144,73 @@ OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& fou
   return own;
 }
 
+/// Grains are hubs from this multiplicity on, glued once a sweep through one rank. By then those of all turns
+/// must have been swept, and what waits for them cannot be hidden: where there is one, there are no turns.
+std::int32_t hubs_from(const DecompositionSettings& settings) {
+  if (settings.exchange == ExchangeScheme::ccs) return 2;
+  return settings.coupling == Coupling::alternating ? 33 : 9;
+}
+
 /// Collective.
-void settle_turns(Decomposition& decomposition, const graph::Communicator& ranks) {
+void settle_turns(Decomposition& decomposition, const graph::Communicator& ranks,
+                  const BodySubdomains& standings, std::int32_t hubs) {
+  const auto is_here = [&](std::int32_t e) { return decomposition.rank_of[at(e)] == ranks.rank(); };
+  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> shared;
+  double hub[1] = {0};
+  for (std::size_t b = 0; b < standings.bodies(); ++b) {
+    const auto stands = standings.of(b);
+    for (const std::int32_t e : stands) {
+      if (stands.size() == 1 || !is_here(e)) continue;
+      if (standings.multiplicity(b) >= hubs) hub[0] = 1;
+      for (const std::int32_t other : stands)
+        if (other != e && hub[0] == 0) ++shared[{e, other}];
+    }
+  }
+  ranks.max(hub);
   std::vector<Tie> ties;
-  for (const SubdomainInterface& interface : decomposition.interfaces)
-    for (const Neighbour& neighbour : interface.neighbours)
-      ties.push_back({interface.subdomain, neighbour.subdomain, neighbour.end - neighbour.begin});
+  if (hub[0] == 0)
+    for (const auto& [pair, grains] : shared) ties.push_back({pair.first, pair.second, grains});
   decomposition.turn =
       choose_turns(decomposition.partition.subdomains, ranks.gather_records(std::span<const Tie>(ties)));
+}
+
+/// Contacts at glued walls of grains that stand in several subdomains go where the grain's turn comes first:
+/// a later turn then has its walls swept, and can tell, before it takes over what others did to its grains.
+/// Collective: impulses of what goes to another rank follow.
+void move_wall_contacts(const Decomposition& decomposition, const graph::Communicator& ranks,
+                        const BodySubdomains& standings, const Surroundings& around,
+                        std::span<const char> glued, Candidates& found,
+                        std::vector<std::int32_t>& subdomain) {
+  const std::size_t grains = found.grain_pairs.size();
+  const auto components = static_cast<std::size_t>(found.components);
+  std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
+  for (std::size_t k = grains; k < found.size(); ++k) {
+    const WallPair& pair = found.wall_pairs[k - grains];
+    if (glued[at(pair.wall)] == 0) continue;
+    const auto stands = standings.of(at(pair.body));
+    const std::int32_t first =
+        *std::ranges::min_element(stands, {}, [&](std::int32_t e) { return decomposition.turn_of(e); });
+    const std::int32_t before = subdomain[k];
+    if (decomposition.turn_of(first) == decomposition.turn_of(before)) continue;
+    subdomain[k] = first;
+    const std::int32_t from = decomposition.rank_of[at(before)], rank = decomposition.rank_of[at(first)];
+    if (from != ranks.rank() || rank == from) continue;
+    ImpulseRecord record{};
+    record.first = static_cast<std::int64_t>(around.bodies.id[at(pair.body)]);
+    record.second = -1 - std::int64_t{pair.wall};
+    std::copy_n(&found.impulse[components * k], components, record.r);
+    to[at(rank)].push_back(record);
+  }
+  for (const auto& part : ranks.exchange_records(std::move(to)))
+    for (const ImpulseRecord& record : part) {
+      const WallPair pair{static_cast<std::int32_t>(-1 - record.second), around.find(record.first)};
+      const auto place = std::ranges::lower_bound(found.wall_pairs, std::pair{pair.wall, pair.body}, {},
+                                                  [](const WallPair& other) {
+                                                    return std::pair{other.wall, other.body};
+                                                  });
+      const auto k = grains + static_cast<std::size_t>(place - found.wall_pairs.begin());
+      std::copy_n(record.r, components, &found.impulse[components * k]);
+    }
 }
 
 /// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
@@ -242,11 +302,17 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     for (std::size_t k = 0; k < found.size(); ++k)
       subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x));
     for (const Vec3& x : around.bodies.x) home.push_back(partition.subdomain_of(x));
-    const BodySubdomains standings =
-        grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);
-    const std::int32_t hubs = settings.exchange == ExchangeScheme::ccs ? 2 : 9;
+    const auto stand = [&] {
+      return grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);
+    };
+    BodySubdomains standings = stand();
+    const std::int32_t hubs = hubs_from(settings);
+    if (settings.coupling == Coupling::alternating) {
+      settle_turns(decomposition, ranks, standings, hubs);
+      move_wall_contacts(decomposition, ranks, standings, around, glued, found, subdomain);
+      standings = stand();
+    }
     decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
-    if (settings.coupling == Coupling::alternating) settle_turns(decomposition, ranks);
     list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);
     own = sort_own(decomposition, found, subdomain, standings, glued);
     for (std::int32_t k : own.candidate) ++load[at(subdomain[at(k)])];
@@ -270,8 +336,9 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     if (begin == end) continue;
     const std::size_t local = group / 2 % decomposition.here.size();
     const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
-    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), group % 2 == 0, target,
-                      decomposition.turn_of(decomposition.here[local]) > 0});
+    groups.push_back(
+        {begin, end, wall, static_cast<std::int32_t>(local), group % 2 == 0, target,
+         decomposition.turn_of(decomposition.here[local]) > 0 && (wall < 0 || glued[at(wall)] == 0)});
     auto next = static_cast<Slot>(decomposition.slot_begin[local]);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
     for (std::int32_t place = begin; place < end; ++place) {

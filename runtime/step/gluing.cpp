@@ -296,6 +296,12 @@ void Gluing::publish(std::size_t e, Mode mode, bool single) {
   });
   for (Side& side : mine.sides)
     if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
+  if (mine.turn == 0 || mode == Mode::sum) tell(e, mode);
+}
+
+void Gluing::tell(std::size_t e, Mode mode) {
+  if (mode == Mode::local) return;
+  Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);

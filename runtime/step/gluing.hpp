@@ -43,6 +43,10 @@ struct JumpSums {
 ///   of
 ///                those
 ///
+/// Contacts at glued walls that it has wait for nobody (distribute.cpp); behind them
+///
+///   tell[e]      its part for the centre leaves, which in the first turn is done by publish
+///
 /// In the end all copies of a body get the mean of those of its last turn. Each message is sent once, as
 /// without turns: a take reads those of earlier turns, glue the others.
 ///
@@ -72,6 +76,8 @@ class Gluing {
   /// Subdomains here whose turn is not the first, ascending: those that have a take.
   std::span<const std::uint32_t> followers() const { return followers_; }
 
+  /// Subdomains of later turns tell the centre something: there are glued walls.
+  bool tells() const { return !walls_.empty(); }
   /// Tasks between publish and glue: the centre, behind collect where there is one.
   std::size_t tasks_of_rank() const;
 
@@ -90,6 +96,7 @@ class Gluing {
   /// `single`: of the velocities that sweeps in single precision work on (StepState::single), which travel
   /// and are added up as they are.
   void publish(std::size_t e, Mode mode, bool single = false);
+  void tell(std::size_t e, Mode mode);
   void collect(Mode mode);
   void centre(Mode mode);
   void take(std::size_t e, Mode mode, bool single = false);

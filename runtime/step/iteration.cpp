@@ -224,8 +224,10 @@ void Iteration::node(std::uint32_t node, int epoch) {
     gluing_.centre(mode);
   else if (task < 2 * here + of_rank)
     gluing_.glue(task - here - of_rank, mode, single(epoch));
+  else if (const auto followers = gluing_.followers(); task < 2 * here + of_rank + followers.size())
+    take(followers[task - 2 * here - of_rank], mode, epoch);
   else
-    take(gluing_.followers()[task - 2 * here - of_rank], mode, epoch);
+    gluing_.tell(followers[task - 2 * here - of_rank - followers.size()], mode);
 }
 
 /// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
@@ -243,10 +245,11 @@ std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const 
     if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
     const std::size_t task = node - chunks;
     const std::size_t of_rank = gluing_.tasks_of_rank();
-    return kind_of(task < here                 ? TaskKind::publish
-                   : task < here + of_rank     ? TaskKind::centre
-                   : task < 2 * here + of_rank ? TaskKind::glue
-                                               : TaskKind::take);
+    return kind_of(task < here                                              ? TaskKind::publish
+                   : task < here + of_rank                                  ? TaskKind::centre
+                   : task < 2 * here + of_rank                              ? TaskKind::glue
+                   : task < 2 * here + of_rank + gluing_.followers().size() ? TaskKind::take
+                                                                            : TaskKind::tell);
   }
   switch (now) {
     case Work::accumulate:

@@ -323,8 +323,9 @@ void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
   const std::size_t count = chunks.size(), here = state_.decomposition.here.size();
-  const std::size_t of_rank = gluing.tasks_of_rank(),
-                    nodes = count + (gluing.needed() ? 2 * here + of_rank + gluing.followers().size() : 0);
+  const std::size_t of_rank = gluing.tasks_of_rank(), followers = gluing.followers().size(),
+                    nodes = count +
+                            (gluing.needed() ? 2 * here + of_rank + (gluing.tells() ? 2 : 1) * followers : 0);
   const auto publish = [&](std::size_t e) { return static_cast<std::uint32_t>(count + e); };
   const auto centre = static_cast<std::uint32_t>(count + here + of_rank - 1);
   const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + of_rank + e); };
@@ -334,6 +335,7 @@ void StepGraph::plan_epochs() {
   for (std::uint32_t next = static_cast<std::uint32_t>(count + 2 * here + of_rank);
        const std::uint32_t e : gluing.followers())
     take[e] = next++;
+  const auto tell = [&](std::size_t e) { return take[e] + static_cast<std::uint32_t>(followers); };
   const auto reading = [&](std::size_t reader, std::size_t from) {
     return gluing.reads_early(reader, from) ? take[reader] : glue(reader);
   };
@@ -344,12 +346,14 @@ void StepGraph::plan_epochs() {
   // are both hidden. Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
   std::vector<graph::ChunkTurn> turns;
   for (std::size_t c = 0; c < count; ++c)
-    turns.push_back({chunks.boundary[c] == 0, static_cast<std::uint32_t>(chunks.subdomain[c]),
+    turns.push_back({chunks.boundary[c] == 0 ? graph::ChunkTurn::inside
+                     : chunks.late[c] != 0   ? graph::ChunkTurn::late
+                                             : graph::ChunkTurn::early,
+                     static_cast<std::uint32_t>(chunks.subdomain[c]),
                      static_cast<std::uint32_t>(chunks.colour[c])});
   const graph::LoopColours colours =
       graph::loop_colours(turns, turn, decomposition_.overlap, executor_.threads(), ranks_.ranks());
-  const auto in_tree =
-      graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.last_publish, colours.glue);
+  const auto in_tree = graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.last_tell, colours.glue);
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
@@ -360,16 +364,27 @@ void StepGraph::plan_epochs() {
       neighbour.push_back(publish(e));
       neighbour.push_back(glue(e));
       if (turn[e] > 0) neighbour.push_back(take[e]);
+      if (turn[e] > 0 && gluing.tells()) neighbour.push_back(tell(e));
       boundary[e].push_back(static_cast<std::uint32_t>(c));
     }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
   }
+  const auto to_centre = [&] {
+    for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
+      neighbour.push_back(task);
+  };
+  const auto from_subdomains = [&] {
+    for (std::size_t e = 0; e < here; ++e)
+      if (turn[e] == 0)
+        neighbour.push_back(publish(e));
+      else if (gluing.tells())
+        neighbour.push_back(tell(e));
+  };
   if (gluing.needed()) {
     for (std::size_t e = 0; e < here; ++e) {
       colour[publish(e)] = colours.publish[e];
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
-      for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
-        neighbour.push_back(task);
+      if (turn[e] == 0) to_centre();
       neighbour.push_back(glue(e));
       if (turn[e] > 0) neighbour.push_back(take[e]);
       for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(reading(reader, e));
@@ -377,14 +392,12 @@ void StepGraph::plan_epochs() {
     }
     if (of_rank > 1) {
       colour[count + here] = in_tree.up;
-      for (std::size_t e = 0; e < here; ++e) neighbour.push_back(publish(e));
+      from_subdomains();
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
     colour[centre] = in_tree.down;
-    for (std::size_t e = 0; e < here; ++e) {
-      neighbour.push_back(publish(e));
-      neighbour.push_back(glue(e));
-    }
+    from_subdomains();
+    for (std::size_t e = 0; e < here; ++e) neighbour.push_back(glue(e));
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     for (std::size_t e = 0; e < here; ++e) {
       colour[glue(e)] = colours.glue;
@@ -392,6 +405,7 @@ void StepGraph::plan_epochs() {
       neighbour.push_back(centre);
       neighbour.push_back(publish(e));
       if (turn[e] > 0) neighbour.push_back(take[e]);
+      if (turn[e] > 0 && gluing.tells()) neighbour.push_back(tell(e));
       for (std::uint32_t writer : gluing.readers_here(e))
         if (!gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
@@ -403,6 +417,14 @@ void StepGraph::plan_epochs() {
       neighbour.push_back(glue(e));
       for (std::uint32_t writer : gluing.readers_here(e))
         if (gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
+      offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
+    }
+    for (const std::uint32_t e : gluing.followers()) {
+      if (!gluing.tells()) break;
+      colour[tell(e)] = colours.tell[e];
+      neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
+      to_centre();
+      neighbour.push_back(glue(e));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
   }
@@ -426,6 +448,7 @@ void StepGraph::plan_epochs() {
     const auto e = static_cast<std::size_t>(chunks.subdomain[order[k]]);
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
     if (turn[e] > 0) owner[take[e]] = owner_in_order[k];
+    if (turn[e] > 0 && gluing.tells()) owner[tell(e)] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
   if (executor_.trace() || executor_.times() || order_) note_plan({colour, offset, neighbour}, owner);

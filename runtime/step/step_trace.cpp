@@ -84,8 +84,10 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
       name(trace::Role::centre, 0);
     else if (task < takes)
       name(trace::Role::glue, task - glues);
+    else if (const auto followers = iteration_.gluing().followers(); task < takes + followers.size())
+      name(trace::Role::take, followers[task - takes]);
     else
-      name(trace::Role::take, iteration_.gluing().followers()[task - takes]);
+      name(trace::Role::tell, followers[task - takes - followers.size()]);
     plan.weight.push_back(0);
   }
   plan.messages = iteration_.gluing().message_plan();

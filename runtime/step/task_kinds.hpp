@@ -27,6 +27,7 @@ enum class TaskKind : std::uint8_t {
   centre,
   glue,
   take,
+  tell,
   whole  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
 };
 

@@ -158,7 +158,8 @@ class Walker {
         const Role role = static_cast<Role>(rank.plan->role[n]);
         const bool sends = from == centre_group || (to == centre_group && role == Role::centre)
                                ? role == Role::centre
-                               : role == Role::publish && (to == centre_group || rank.plan->group[n] == from);
+                           : to == centre_group ? role == Role::publish || role == Role::tell
+                                                : role == Role::publish && rank.plan->group[n] == from;
         if (sends) keep_later(best, rank.at(epoch, n), received.end());
       }
     }

@@ -48,8 +48,9 @@ class Builder {
   struct Group {
     std::int32_t source = -1;           ///< recorded rank
     std::vector<std::uint32_t> chunks;  ///< recorded nodes
-    std::uint32_t publish = none, glue = none, take = none;
-    std::uint32_t new_publish = none, new_glue = none, new_take = none;
+    std::uint32_t publish = none, glue = none, take = none, tell = none;
+    std::uint32_t new_publish = none, new_glue = none, new_take = none, new_tell = none;
+    std::uint32_t teller() const { return turn == 0 ? new_publish : new_tell; }
     std::uint32_t turn = 0;
   };
 
@@ -81,6 +82,7 @@ class Builder {
           group.take = n;
           group.turn = plan.place[n];
         }
+        if (role == Role::tell) group.tell = n;
       }
     }
     for (const Group& group : group_)
@@ -90,10 +92,13 @@ class Builder {
           overlap_ = false;
   }
 
-  bool is_inside(const Group& group, const SimNode& node) const {
+  graph::ChunkTurn::Side side_of(const Group& group, const SimNode& node) const {
     const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
-    return group.turn > 0 ? node.colour < plan.colour[group.take]
-                          : group.publish == none || plan.colour[group.publish] < node.colour;
+    using enum graph::ChunkTurn::Side;
+    if (group.turn == 0)
+      return group.publish == none || plan.colour[group.publish] < node.colour ? inside : early;
+    if (plan.colour[group.take] < node.colour) return late;
+    return group.tell != none && node.colour < plan.colour[group.tell] ? early : inside;
   }
 
   std::uint32_t add_node(std::uint32_t rank, std::int32_t source, std::uint32_t n) {
@@ -112,7 +117,7 @@ class Builder {
     for (std::size_t n = first, at = 0; n < out_.nodes.size(); ++n) {
       const SimNode& node = out_.nodes[n];
       while (groups_[mine[at]] != node.group) ++at;
-      turns.push_back({is_inside(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
+      turns.push_back({side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
     graph::LoopColours colours =
         graph::loop_colours(turns, turn_of, overlap_, machine_.threads, machine_.ranks);
@@ -120,7 +125,8 @@ class Builder {
     return colours;
   }
 
-  /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues, takes; and their owners.
+  /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues, takes, tells; and their
+  /// owners.
   void add_rank(std::uint32_t rank) {
     const auto first = static_cast<std::uint32_t>(out_.nodes.size());
     out_.rank_begin.push_back(first);
@@ -156,7 +162,7 @@ class Builder {
       return worker(found == first_owner.end() ? 0 : found->second);
     };
     const graph::LoopColours colours = colours_of(first, mine);
-    std::uint32_t publishes = 0;
+    std::uint32_t tellers = 0;
     bool glued = false;
     for (std::size_t at = 0; at < mine.size(); ++at) {
       const std::size_t g = mine[at];
@@ -164,15 +170,16 @@ class Builder {
       group_[g].new_publish = add_node(rank, group_[g].source, group_[g].publish);
       out_.nodes.back().worker = owner_of(g);
       out_.nodes.back().colour = colours.publish[at];
-      ++publishes;
+      out_.nodes.back().tells = group_[g].turn == 0;
+      tellers += group_[g].turn == 0 || group_[g].tell != none ? 1 : 0;
       glued = true;
     }
-    out_.publishes.push_back(publishes);
+    out_.tellers.push_back(tellers);
     centre_.push_back(none);
     collect_.push_back(none);
     if (!glued) return;
     const int own = static_cast<int>(rank);
-    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.last_publish, colours.glue);
+    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.last_tell, colours.glue);
     const auto add = [&](std::uint32_t colour) {
       out_.nodes.push_back(centre_node(rank, colour));
       out_.nodes.back().worker = worker(0);
@@ -192,6 +199,14 @@ class Builder {
       group.new_take = add_node(rank, group.source, group.take);
       out_.nodes.back().worker = owner_of(mine[at]);
       out_.nodes.back().colour = colours.take[at];
+    }
+    for (std::size_t at = 0; at < mine.size(); ++at) {
+      Group& group = group_[mine[at]];
+      if (group.tell == none) continue;
+      group.new_tell = add_node(rank, group.source, group.tell);
+      out_.nodes.back().worker = owner_of(mine[at]);
+      out_.nodes.back().colour = colours.tell[at];
+      out_.nodes.back().tells = true;
     }
   }
 
@@ -227,12 +242,14 @@ class Builder {
       if (group.turn > 0) {
         join(group.new_publish, group.new_take);
         join(group.new_glue, group.new_take);
+        if (group.new_tell != none) join(group.new_glue, group.new_tell);
       }
       const std::uint32_t centre = centre_[out_.nodes[group.new_publish].rank];
-      join(group.new_publish, centre);
       join(group.new_glue, centre);
+      if (group.teller() == none) continue;
+      join(group.teller(), centre);
       const std::uint32_t collect = collect_[out_.nodes[group.new_publish].rank];
-      if (collect != none) join(group.new_publish, collect);
+      if (collect != none) join(group.teller(), collect);
     }
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {

@@ -18,6 +18,7 @@ struct SimNode {
   std::uint32_t rank = 0;
   std::uint32_t worker = 0;  ///< rank x threads + thread
   std::uint32_t colour = 0;
+  bool tells = false;       ///< the part of its group for the centre leaves with it
   bool waits_only = false;  ///< takes messages, and does none of the recorded work
 };
 
@@ -36,8 +37,8 @@ struct LoopLayout {
   std::vector<std::uint32_t> walk_begin, walk;   ///< per worker: its nodes by (colour, index)
   std::vector<std::uint32_t> send_begin;         ///< n + 1, into sends
   std::vector<SimMessage> sends;                 ///< of publishes and centres
-  std::vector<SimMessage> to_centre;             ///< per rank: sent by the last publish of a leaf of the tree
-  std::vector<std::uint32_t> publishes;          ///< per rank
+  std::vector<SimMessage> to_centre;             ///< per rank: sent by the last of a leaf that tells
+  std::vector<std::uint32_t> tellers;            ///< per rank: nodes that tell
   std::vector<std::uint32_t> handed;    ///< n: bytes that a node newly shares with other threads of its rank
   std::vector<std::uint32_t> incoming;  ///< n: messages that a node takes per exchange
   std::vector<Plan> plans;              ///< per rank, as the program would have made them

@@ -25,7 +25,7 @@ void check(const Plan& plan, int ranks) {
   for (std::uint32_t other : plan.neighbour)
     if (other >= n) refuse(fmt::format("{}: a conflict with node {} of {}", where, other, n));
   for (std::uint8_t role : plan.role)
-    if (role > static_cast<std::uint8_t>(Role::take)) refuse(fmt::format("{}: role {}", where, role));
+    if (role > static_cast<std::uint8_t>(Role::tell)) refuse(fmt::format("{}: role {}", where, role));
 }
 
 void check(const std::vector<Task>& tasks, std::size_t kinds) {

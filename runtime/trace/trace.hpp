@@ -89,6 +89,7 @@ enum class Role : std::uint8_t {
   centre,   ///< of a rank: what goes through rank 0; before it, on ranks between, what goes up to it
   glue,     ///< takes what others have published
   take,  ///< of a group whose turn is not 0, before its border: takes what those of earlier turns published
+  tell,  ///< of such a group: its part for the centre leaves, that of others with their publish
 };
 
 /// Names the centre as the end of a message.

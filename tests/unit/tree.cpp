@@ -60,10 +60,11 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
 
 using graph::ChunkTurn;
 using graph::loop_colours;
+using enum ChunkTurn::Side;
 
 TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
-  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 2}, {true, 0, 2},
-                                        {false, 1, 0}, {true, 1, 2},  {true, 1, 3}};
+  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 2}, {inside, 0, 2},
+                                        {early, 1, 0}, {inside, 1, 2}, {inside, 1, 3}};
   const graph::LoopColours colours = loop_colours(turns, std::vector<char>(3, 0), true, 1, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
@@ -71,32 +72,35 @@ TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
 }
 
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
-  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {true, 0, 2}, {false, 1, 0}, {true, 1, 2}};
+  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {inside, 0, 2}, {early, 1, 0}, {inside, 1, 2}};
   const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, 1, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 4, 12}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(colours.glue, 8U);
 }
 
-TEST(LoopColours, OfLaterTurnsPutTakeAndBorderBehindTheInside) {
-  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {true, 0, 3}, {true, 1, 0}, {false, 1, 4}};
+TEST(LoopColours, OfLaterTurnsTellFirstAndPutTakeAndBorderBehindTheInside) {
+  const std::vector<ChunkTurn> turns = {
+      {early, 0, 0}, {inside, 0, 3}, {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
   const std::vector<char> turn_of = {0, 1};
   const graph::LoopColours two = loop_colours(turns, turn_of, true, 1, 2);
-  // Border and publish of the first; inside, take, border and publish of the second; inside of the first.
-  EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 12, 4, 8}));
-  EXPECT_EQ(two.publish, (std::vector<std::uint32_t>{2, 10}));
-  EXPECT_EQ(two.take[1], 6U);
-  EXPECT_EQ(two.last_publish, 10U);
-  EXPECT_EQ(two.glue, 14U);
+  // Border and publish of the first; early, tell, inside, take, border, publish of the second; inside of the
+  // first.
+  EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 16, 4, 8, 12}));
+  EXPECT_EQ(two.publish, (std::vector<std::uint32_t>{2, 14}));
+  EXPECT_EQ(two.tell, (std::vector<std::uint32_t>{2, 6}));
+  EXPECT_EQ(two.take[1], 10U);
+  EXPECT_EQ(two.last_tell, 6U);
+  EXPECT_EQ(two.glue, 18U);
   // A rank alone stays with each.
-  EXPECT_EQ(loop_colours(turns, turn_of, true, 1, 1).chunk, (std::vector<std::uint32_t>{0, 4, 6, 10}));
+  EXPECT_EQ(loop_colours(turns, turn_of, true, 1, 1).chunk, (std::vector<std::uint32_t>{0, 4, 6, 10, 14}));
   // Without overlap nothing is between a publish and who waits for it.
-  EXPECT_EQ(loop_colours(turns, turn_of, false, 1, 2).chunk, (std::vector<std::uint32_t>{2, 14, 0, 8}));
+  EXPECT_EQ(loop_colours(turns, turn_of, false, 1, 2).chunk, (std::vector<std::uint32_t>{6, 18, 0, 4, 12}));
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
-  const std::vector<ChunkTurn> turns = {{false, 0, 0}, {false, 0, 1}, {true, 0, 7},
-                                        {false, 1, 4}, {true, 1, 9},  {true, 1, 12}};
+  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 7},
+                                        {early, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
   const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), true, 2, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
@@ -104,16 +108,16 @@ TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
 }
 
 TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
-  const std::vector<ChunkTurn> all = {{false, 0, 0}, {true, 0, 3}, {false, 1, 0}, {false, 1, 2},
-                                      {true, 1, 3},  {true, 1, 5}, {true, 2, 3}};
+  const std::vector<ChunkTurn> all = {{early, 0, 0},  {inside, 0, 3}, {early, 1, 0}, {early, 1, 2},
+                                      {inside, 1, 3}, {inside, 1, 5}, {inside, 2, 3}};
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
       const graph::LoopColours among = loop_colours(all, std::vector<char>(3, 0), true, threads_then, 2);
       std::vector<ChunkTurn> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
-          alone.push_back({all[k].inside, 0, all[k].colour});
-          again.push_back({among.publish[1] < among.chunk[k], 0, among.chunk[k]});
+          alone.push_back({all[k].side, 0, all[k].colour});
+          again.push_back({among.publish[1] < among.chunk[k] ? inside : early, 0, among.chunk[k]});
         }
       const graph::LoopColours here = loop_colours(alone, std::vector<char>(1, 0), true, threads, 2),
                                replayed = loop_colours(again, std::vector<char>(1, 0), true, threads, 2);

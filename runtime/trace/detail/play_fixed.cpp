@@ -81,8 +81,8 @@ class FixedLoop {
     std::uint32_t last_name = 0;  ///< and which that was
   };
   struct Rank {
-    std::uint32_t at_gate = 0;    ///< threads
-    std::uint32_t published = 0;  ///< in this exchange
+    std::uint32_t at_gate = 0;  ///< threads
+    std::uint32_t told = 0;     ///< in this exchange
     double time = 0;
     double ready = 0;  ///< decided, but for the sums of others
     bool left = false;
@@ -166,9 +166,9 @@ class FixedLoop {
         stage_.log.span(w, me.waited_to - waited, me.waited_to, me.last_name, number, kind_receive);
     }
     me.time = end + (recorded.recorded ? stage_.dispatch : 0);
-    const bool sends = epoch.exchange &&
-                       (layout_.send_begin[node + 1] > layout_.send_begin[node] ||
-                        (layout_.nodes[node].role == Role::publish && layout_.to_centre[me.rank].bytes > 0));
+    const bool sends =
+        epoch.exchange && (layout_.send_begin[node + 1] > layout_.send_begin[node] ||
+                           (layout_.nodes[node].tells && layout_.to_centre[me.rank].bytes > 0));
     for (std::uint32_t k = layout_.send_begin[node]; epoch.exchange && k < layout_.send_begin[node + 1]; ++k)
       agenda_.add(worked + (k - layout_.send_begin[node] + 1) * stage_.network.overhead(), message_leaves, k,
                   me.epoch);
@@ -196,11 +196,10 @@ class FixedLoop {
     advance(w, now);
   }
 
-  /// The last publish of a leaf of the tree sends for all.
+  /// The last of a leaf of the tree that tells sends for all.
   void send_up(std::uint32_t node, std::uint32_t rank, std::uint32_t epoch, double now) {
-    if (layout_.nodes[node].role != Role::publish || ++ranks_[rank].published < layout_.publishes[rank])
-      return;
-    ranks_[rank].published = 0;
+    if (!layout_.nodes[node].tells || ++ranks_[rank].told < layout_.tellers[rank]) return;
+    ranks_[rank].told = 0;
     if (layout_.to_centre[rank].bytes > 0)
       message_left(static_cast<std::uint32_t>(layout_.sends.size() + rank), epoch, now);
   }

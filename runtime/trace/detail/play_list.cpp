@@ -76,7 +76,7 @@ class ListLoop {
     std::vector<std::uint32_t> idle;  ///< threads
     std::uint32_t allowed = 0;        ///< last epoch that may be worked on
     std::size_t ended = 0;            ///< nodes that have ended that epoch
-    std::uint32_t published = 0;
+    std::uint32_t told = 0;
     double time = 0, decided = 0;
     bool left = false;
   };
@@ -153,12 +153,12 @@ class ListLoop {
     dispatch(node.rank, now);
   }
 
-  /// The last publish of a leaf of the tree sends for all.
+  /// The last of a leaf of the tree that tells sends for all.
   void send_up(std::uint32_t n, std::uint32_t e, double now) {
     const SimNode& node = layout_.nodes[n];
     Rank& rank = ranks_[node.rank];
-    if (node.role != Role::publish || ++rank.published < layout_.publishes[node.rank]) return;
-    rank.published = 0;
+    if (!node.tells || ++rank.told < layout_.tellers[node.rank]) return;
+    rank.told = 0;
     if (layout_.to_centre[node.rank].bytes > 0)
       message_left(static_cast<std::uint32_t>(layout_.sends.size() + node.rank), e, now);
   }

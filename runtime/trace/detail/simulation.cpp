@@ -114,8 +114,7 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
 ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
   const SimNode& of = layout.nodes[node];
   double sent = layout.send_begin[node + 1] - layout.send_begin[node];
-  if (of.role == Role::publish && layout.to_centre[of.rank].bytes > 0)
-    sent += 1.0 / layout.publishes[of.rank];
+  if (of.tells && layout.to_centre[of.rank].bytes > 0) sent += 1.0 / layout.tellers[of.rank];
   const double overhead = stage.network.overhead();
   return {layout.incoming[node] * overhead, 0.5e9 * stage.machine.line / 64 * layout.handed[node],
           sent * overhead};
