@@ -7,8 +7,8 @@ namespace talus::graph {
 
 namespace {
 
-/// What a rank goes through one after the other. Turn t is phase first_turn + t.
-enum Phase : std::uint32_t { early_of_later, first_turn, early_glue = 1000, inside_of_first, glue };
+/// What a rank goes through one after the other. Turn t > 0 is phase telling + t.
+enum Phase : std::uint32_t { early_of_later, first_turn, telling, early_glue = 1000, inside_of_first, glue };
 
 /// Of a subdomain, within a phase.
 enum Part : std::uint32_t { walls, tell, inner, take, border, publish, inner_behind };
@@ -36,18 +36,21 @@ void go_abreast(std::vector<Turn>& turns) {
 }  // namespace
 
 LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool overlap,
-                         int threads, int ranks) {
+                         int threads, int rank, int ranks) {
   const bool later = std::ranges::any_of(turn_of, [](char turn) { return turn > 0; });
   const auto subdomains = static_cast<std::uint32_t>(turn_of.size());
   // One after another as a whole where no message between ranks wants to be hidden.
-  const Phase behind = overlap && threads == 1 && (ranks == 1 || !later) ? first_turn : inside_of_first;
+  const bool alone = ranks == 1;
+  const Phase behind = overlap && threads == 1 && (alone || !later) ? first_turn : inside_of_first;
   std::vector<Turn> own;
+  const auto phase_of = [&](std::uint32_t turn, Part part) -> std::uint32_t {
+    if (part == inner_behind) return behind;
+    if (turn == 0) return first_turn;
+    if (part <= inner && !overlap) return early_of_later;
+    return part <= tell && !alone ? telling : telling + turn;
+  };
   const auto add = [&](std::uint32_t e, Part part, std::uint32_t colour) {
-    const auto turn = static_cast<std::uint32_t>(turn_of[e]);
-    const std::uint32_t phase = part == inner_behind        ? behind
-                                : part <= inner && !overlap ? early_of_later
-                                                            : first_turn + turn;
-    own.push_back({phase, e, part, colour});
+    own.push_back({phase_of(static_cast<std::uint32_t>(turn_of[e]), part), e, part, colour});
   };
   for (const ChunkTurn& chunk : turns) {
     const bool first = turn_of[chunk.subdomain] == 0;
@@ -67,9 +70,13 @@ LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char>
   for (const Turn& turn : own) colours.push_back(2 * place_in(order, turn));
   const auto publishes = colours.begin() + static_cast<std::ptrdiff_t>(turns.size()),
              takes = publishes + subdomains, tells = takes + subdomains, end = tells + subdomains;
-  const std::uint32_t last = subdomains > 0 ? *std::max_element(tells, end) : 0;
-  return {
-      {colours.begin(), publishes}, {publishes, takes}, {takes, tells}, {tells, end}, last, colours.back()};
+  LoopColours result{
+      {colours.begin(), publishes}, {publishes, takes}, {takes, tells}, {tells, end}, colours.back(), {}};
+  const std::uint32_t last_publish = subdomains > 0 ? *std::max_element(publishes, takes) : 0;
+  result.tree = tree::colours(rank, ranks, last_publish, result.glue);
+  for (std::uint32_t e = 0; e < subdomains; ++e)
+    if (turn_of[e] > 0) result.tree.up = std::min(result.tree.up, result.take[e] - 1);
+  return result;
 }
 
 }  // namespace talus::graph

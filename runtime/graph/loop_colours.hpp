@@ -6,15 +6,21 @@
 /// may have parts of one subdomain, and the one that comes to it late would keep the other waiting. As
 /// subdomains share no grain, the order among them changes no bit.
 ///
-/// Where subdomains have turns, those of the first have their border, then those of each later one what is
-/// early, tell, chunks inside, take, the late border and publish, then those of the first their chunks
-/// inside: each hides the messages of the others. A rank alone has none to hide, and stays with each
-/// subdomain.
+/// Where subdomains have turns, those of the first have their border and publish, the others what of theirs
+/// is early and tell, then those of each later turn chunks inside, take, the late border and publish, at last
+/// those of the first their chunks inside: each hides the messages of the others. A rank alone has none to
+/// hide, and stays with each subdomain.
+///
+/// Nobody waits for ever: a tell waits for no message, what goes up the tree of ranks for tells, a take of
+/// turn t for publishes of turns before t, and all these stand before what waits for more: up before take,
+/// take of turn t before that of t + 1, and down behind every publish.
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "runtime/graph/tree.hpp"
 
 namespace talus::graph {
 
@@ -36,11 +42,11 @@ struct LoopColours {
   std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border
   std::vector<std::uint32_t> take;     ///< per subdomain, before its border; means nothing in the first turn
   std::vector<std::uint32_t> tell;     ///< per subdomain: when it tells the centre; publish in the first turn
-  std::uint32_t last_tell = 0;
-  std::uint32_t glue = 0;  ///< behind everything, or before all insides without overlap
+  std::uint32_t glue = 0;              ///< behind everything, or before all insides without overlap
+  tree::Colours tree;                  ///< of what the rank does for the tree of ranks
 };
-/// `turn_of`: per subdomain of the rank.
+/// `turn_of`: per subdomain of the rank, one of `ranks`.
 LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool overlap,
-                         int threads, int ranks);
+                         int threads, int rank, int ranks);
 
 }  // namespace talus::graph

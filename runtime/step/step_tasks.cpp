@@ -351,9 +351,8 @@ void StepGraph::plan_epochs() {
                                              : graph::ChunkTurn::early,
                      static_cast<std::uint32_t>(chunks.subdomain[c]),
                      static_cast<std::uint32_t>(chunks.colour[c])});
-  const graph::LoopColours colours =
-      graph::loop_colours(turns, turn, decomposition_.overlap, executor_.threads(), ranks_.ranks());
-  const auto in_tree = graph::tree::colours(ranks_.rank(), ranks_.ranks(), colours.last_tell, colours.glue);
+  const graph::LoopColours colours = graph::loop_colours(turns, turn, decomposition_.overlap,
+                                                         executor_.threads(), ranks_.rank(), ranks_.ranks());
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
@@ -391,11 +390,11 @@ void StepGraph::plan_epochs() {
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
     if (of_rank > 1) {
-      colour[count + here] = in_tree.up;
+      colour[count + here] = colours.tree.up;
       from_subdomains();
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
-    colour[centre] = in_tree.down;
+    colour[centre] = colours.tree.down;
     from_subdomains();
     for (std::size_t e = 0; e < here; ++e) neighbour.push_back(glue(e));
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));

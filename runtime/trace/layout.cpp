@@ -120,7 +120,8 @@ class Builder {
       turns.push_back({side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
     graph::LoopColours colours =
-        graph::loop_colours(turns, turn_of, overlap_, machine_.threads, machine_.ranks);
+        graph::loop_colours(turns, turn_of, overlap_, machine_.threads,
+                            static_cast<int>(out_.rank_begin.size()) - 1, machine_.ranks);
     for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
   }
@@ -179,14 +180,13 @@ class Builder {
     collect_.push_back(none);
     if (!glued) return;
     const int own = static_cast<int>(rank);
-    const auto in_tree = graph::tree::colours(own, machine_.ranks, colours.last_tell, colours.glue);
     const auto add = [&](std::uint32_t colour) {
       out_.nodes.push_back(centre_node(rank, colour));
       out_.nodes.back().worker = worker(0);
       return static_cast<std::uint32_t>(out_.nodes.size() - 1);
     };
-    if (graph::tree::relays(own, machine_.ranks)) collect_.back() = add(in_tree.up);
-    centre_.back() = add(in_tree.down);
+    if (graph::tree::relays(own, machine_.ranks)) collect_.back() = add(colours.tree.up);
+    centre_.back() = add(colours.tree.down);
     for (std::size_t g : mine) {
       if (group_[g].glue == none) continue;
       group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);

@@ -65,7 +65,7 @@ using enum ChunkTurn::Side;
 TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
   const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 2}, {inside, 0, 2},
                                         {early, 1, 0}, {inside, 1, 2}, {inside, 1, 3}};
-  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(3, 0), true, 1, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(3, 0), true, 1, 0, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
   EXPECT_EQ(colours.glue, 18U);
@@ -73,7 +73,7 @@ TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
 
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
   const std::vector<ChunkTurn> turns = {{early, 0, 0}, {inside, 0, 2}, {early, 1, 0}, {inside, 1, 2}};
-  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, 1, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, 1, 0, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 4, 12}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(colours.glue, 8U);
@@ -83,25 +83,28 @@ TEST(LoopColours, OfLaterTurnsTellFirstAndPutTakeAndBorderBehindTheInside) {
   const std::vector<ChunkTurn> turns = {
       {early, 0, 0}, {inside, 0, 3}, {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
   const std::vector<char> turn_of = {0, 1};
-  const graph::LoopColours two = loop_colours(turns, turn_of, true, 1, 2);
+  const graph::LoopColours two = loop_colours(turns, turn_of, true, 1, 0, 2);
   // Border and publish of the first; early, tell, inside, take, border, publish of the second; inside of the
   // first.
   EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 16, 4, 8, 12}));
   EXPECT_EQ(two.publish, (std::vector<std::uint32_t>{2, 14}));
   EXPECT_EQ(two.tell, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(two.take[1], 10U);
-  EXPECT_EQ(two.last_tell, 6U);
   EXPECT_EQ(two.glue, 18U);
+  EXPECT_LT(two.tell[1], two.tree.up);  // what goes up waits for tells only, and nothing that waits for more
+  EXPECT_LT(two.tree.up, two.take[1]);  // comes before it
+  EXPECT_LT(two.publish[1], two.tree.down);
   // A rank alone stays with each.
-  EXPECT_EQ(loop_colours(turns, turn_of, true, 1, 1).chunk, (std::vector<std::uint32_t>{0, 4, 6, 10, 14}));
+  EXPECT_EQ(loop_colours(turns, turn_of, true, 1, 0, 1).chunk, (std::vector<std::uint32_t>{0, 4, 6, 10, 14}));
   // Without overlap nothing is between a publish and who waits for it.
-  EXPECT_EQ(loop_colours(turns, turn_of, false, 1, 2).chunk, (std::vector<std::uint32_t>{6, 18, 0, 4, 12}));
+  EXPECT_EQ(loop_colours(turns, turn_of, false, 1, 0, 2).chunk,
+            (std::vector<std::uint32_t>{6, 18, 0, 4, 12}));
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
   const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 7},
                                         {early, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
-  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), true, 2, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), true, 2, 0, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
   EXPECT_EQ(colours.glue, 10U);
@@ -112,15 +115,15 @@ TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
                                       {inside, 1, 3}, {inside, 1, 5}, {inside, 2, 3}};
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
-      const graph::LoopColours among = loop_colours(all, std::vector<char>(3, 0), true, threads_then, 2);
+      const graph::LoopColours among = loop_colours(all, std::vector<char>(3, 0), true, threads_then, 0, 2);
       std::vector<ChunkTurn> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
           alone.push_back({all[k].side, 0, all[k].colour});
           again.push_back({among.publish[1] < among.chunk[k] ? inside : early, 0, among.chunk[k]});
         }
-      const graph::LoopColours here = loop_colours(alone, std::vector<char>(1, 0), true, threads, 2),
-                               replayed = loop_colours(again, std::vector<char>(1, 0), true, threads, 2);
+      const graph::LoopColours here = loop_colours(alone, std::vector<char>(1, 0), true, threads, 0, 2),
+                               replayed = loop_colours(again, std::vector<char>(1, 0), true, threads, 0, 2);
       EXPECT_EQ(here.chunk, replayed.chunk);
       EXPECT_EQ(here.glue, replayed.glue);
     }
