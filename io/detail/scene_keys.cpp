@@ -378,10 +378,11 @@ Section<DecompositionSettings> decomposition_keys() {
               .blank_when_zero(),
           choice<D>(
               "coupling", {"nscdd", "alternating", "schwarz"},
-              "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but half of "
-              "the subdomains sweep their borders when they know what the others did: few more sweeps than "
-              "one subdomain takes, and messages are harder to hide; `schwarz`: copies have its mass and "
-              "exchange what they gain.",
+              "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "
+              "turns: "
+              "half of the subdomains sweep their borders when they know what the others did, and it takes "
+              "as many sweeps as with one subdomain; `schwarz`: copies have the whole mass and exchange what "
+              "they gain.",
               &D::coupling),
           choice<D>("exchange", {"dcs", "ccs"},
                     "`dcs`: between the subdomains that share a body; `ccs`: through one rank.",

@@ -112,7 +112,7 @@ enum class SubdomainMapping {
 };
 
 struct DecompositionSettings {
-  Coupling coupling = Coupling::nscdd;
+  Coupling coupling = Coupling::alternating;
   ExchangeScheme exchange = ExchangeScheme::dcs;
   PartitionKind partitioner = PartitionKind::automatic;
   int subdomains = 0;                   ///< 0: one per rank
