@@ -105,8 +105,8 @@ void print_table(const Setup& given, const Bodies& bodies, PartitionKind kind) {
     for (const int subdomains : {2, 12, 96})
       rows.push_back({subdomains, sweeps_per_exchange, Coupling::nscdd, ExchangeScheme::dcs});
   rows.push_back({12, 1, Coupling::nscdd, ExchangeScheme::ccs});
-  for (const int subdomains : {2, 12, 96})
-    rows.push_back({subdomains, 1, Coupling::schwarz, ExchangeScheme::dcs});
+  for (const Coupling coupling : {Coupling::alternating, Coupling::schwarz})
+    for (const int subdomains : {2, 12, 96}) rows.push_back({subdomains, 1, coupling, ExchangeScheme::dcs});
   fmt::print("\n{}, error {:g}, {} grains, {}\n", given.stages[0].name, given.solver.tolerance, bodies.size(),
              name_of(kind));
   fmt::print(

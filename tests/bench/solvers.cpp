@@ -1,7 +1,7 @@
 /// Time to an error, by method: one step of a packing of spheres that begins cold. The baseline is plain NLGS
 /// with the scalar kernel, in the same program.
 ///
-///   bench_solvers SPHERES.csv [SUBDOMAINS...]
+///   bench_solvers SPHERES.csv [boxes|rcb|metis] [alternating|nscdd] [SUBDOMAINS...]
 ///
 /// SPHERES.csv as for bench_coupling. Checks of the error are part of the time. Medians of three runs that
 /// alternate.
@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -49,15 +50,22 @@ struct Outcome {
   double error = 0, seconds = 0;
 };
 
-Outcome solve(const bench::Packing& packing, const Case& problem, const Method& method, int subdomains) {
+struct Cut {
+  PartitionKind partitioner = PartitionKind::boxes;
+  Coupling coupling = Coupling::alternating;
+  int subdomains = 1;
+};
+
+Outcome solve(const bench::Packing& packing, const Case& problem, const Method& method, const Cut& cut) {
   Setup setup = bench::packed_scene(packing, problem.pile, problem.tolerance, problem.mu);
   setup.solver.method = method.method;
   setup.solver.simd = method.simd;
   setup.solver.precision = method.precision;
   setup.solver.balance_tolerance = 1e9;
   setup.solver.max_iterations = 20000;
-  setup.decomposition.subdomains = subdomains;
-  setup.decomposition.partitioner = PartitionKind::boxes;
+  setup.decomposition.subdomains = cut.subdomains;
+  setup.decomposition.partitioner = cut.partitioner;
+  setup.decomposition.coupling = cut.coupling;
   graph::Executor executor({.threads = 1});
   Simulation simulation(setup, packing.bodies, executor);
   const StepReport& report = simulation.step();
@@ -68,12 +76,25 @@ Outcome solve(const bench::Packing& packing, const Case& problem, const Method& 
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    fmt::print(stderr, "bench_solvers SPHERES.csv [SUBDOMAINS...]\n");
+    fmt::print(stderr, "bench_solvers SPHERES.csv [boxes|rcb|metis] [alternating|nscdd] [SUBDOMAINS...]\n");
     return 2;
   }
   const bench::Packing packing = bench::read_packing(argv[1]);
   std::vector<int> subdomains;
-  for (int k = 2; k < argc; ++k) subdomains.push_back(std::stoi(argv[k]));
+  Cut cut;
+  const std::map<std::string, PartitionKind> partitioners = {
+      {"boxes", PartitionKind::boxes}, {"rcb", PartitionKind::rcb}, {"metis", PartitionKind::metis}};
+  const std::map<std::string, Coupling> couplings = {{"alternating", Coupling::alternating},
+                                                     {"nscdd", Coupling::nscdd}};
+  for (int k = 2; k < argc; ++k) {
+    const std::string word = argv[k];
+    if (partitioners.contains(word))
+      cut.partitioner = partitioners.at(word);
+    else if (couplings.contains(word))
+      cut.coupling = couplings.at(word);
+    else
+      subdomains.push_back(std::stoi(word));
+  }
   if (subdomains.empty()) subdomains = {1};
   for (const Case& problem : cases) {
     fmt::print("\n{}, mu {}, error {:g}, {} grains\n", problem.name, problem.mu, problem.tolerance,
@@ -85,7 +106,8 @@ int main(int argc, char** argv) {
       for (const Method& method : methods) {
         if (method.simd == InstructionSet::portable && baseline > 0) continue;
         std::vector<Outcome> runs;
-        for (int run = 0; run < 3; ++run) runs.push_back(solve(packing, problem, method, count));
+        for (int run = 0; run < 3; ++run)
+          runs.push_back(solve(packing, problem, method, {cut.partitioner, cut.coupling, count}));
         std::sort(runs.begin(), runs.end(),
                   [](const Outcome& a, const Outcome& b) { return a.seconds < b.seconds; });
         const Outcome& median = runs[1];

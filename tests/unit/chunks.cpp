@@ -146,6 +146,26 @@ TEST(Chunks, EachGrainIsResetOnceByTheFirstChunkThatWritesIt) {
   }
 }
 
+TEST(Chunks, LateOnesComeBehindTheInsideAndResetNoBodyThatIsTaken) {
+  // Bodies 0..9 in a row: pairs 0-2 at the boundary, 3-5 inside, 6-8 at the boundary and late.
+  Candidates row;
+  for (Slot s = 0; s < 9; ++s) row.grain_pairs.push_back({s, s + 1});
+  const std::vector<CandidateGroup> groups = {
+      {0, 3, -1, 0, true, 1}, {3, 6, -1, 0, false, 1}, {6, 9, -1, 0, true, 1, true}};
+  std::vector<char> taken(10, 0);
+  taken[8] = 1;
+  const Chunks chunks = cut_chunks(row, groups, 10, taken);
+  for (std::size_t before = 0; before < 3; ++before)
+    for (std::size_t behind = before + 1; behind < 3; ++behind)
+      for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t b = 0; b < 3; ++b)
+          EXPECT_LT(chunks.colour[3 * before + a], chunks.colour[3 * behind + b]);
+  std::vector<Slot> reset = chunks.owned;
+  std::sort(reset.begin(), reset.end());
+  EXPECT_EQ(reset, (std::vector<Slot>{0, 1, 2, 3, 4, 5, 6, 7, 9}));
+  EXPECT_TRUE(chunks.untouched.empty());
+}
+
 /// Part of the pairs, with impulses that tell where they came from.
 Candidates some_of(const Candidates& all, double share, std::uint64_t seed) {
   Random random(seed);

@@ -129,6 +129,30 @@ TEST(Coupling, TakesHardlyMoreSweepsThanOneSubdomainWhereSubdomainsAlternate) {
   }
 }
 
+TEST(Coupling, LaterTurnsSweepGluedWallsBeforeTheyWait) {
+  talus::Setup setup = pressed_lattice(6, 0.3, 1);
+  setup.decomposition.coupling = Coupling::alternating;
+  setup.decomposition.partitioner = PartitionKind::boxes;
+  setup.decomposition.subdomains = 8;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, test::jittered_lattice(6, 3), executor);
+  simulation.step();
+  const StepState& state = simulation.state();
+  const Chunks& chunks = state.chunks;
+  int late = 0, of_glued_walls = 0;
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    late += chunks.late[c];
+    if (chunks.wall[c] < 0 || state.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass() == 0) continue;
+    ++of_glued_walls;
+    EXPECT_EQ(chunks.late[c], 0);
+    for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1]; ++k)
+      EXPECT_EQ(
+          state.decomposition.taken[static_cast<std::size_t>(chunks.bodies[static_cast<std::size_t>(k)])], 0);
+  }
+  EXPECT_GT(late, 0);
+  EXPECT_GT(of_glued_walls, 8);
+}
+
 /// From the standings of bodies alone: who shares one with whom, and how often a body is told.
 struct Formula {
   std::int64_t messages = 0, bytes = 0;
