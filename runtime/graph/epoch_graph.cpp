@@ -98,6 +98,29 @@ void assign_owners(std::span<const std::uint32_t> weight, int threads, std::span
   }
 }
 
+void assign_owners(std::span<const std::uint32_t> weight, std::span<const std::uint32_t> group, int threads,
+                   std::span<std::uint32_t> owner) {
+  if (group.size() != weight.size())
+    throw std::invalid_argument("assign_owners: " + std::to_string(group.size()) + " groups for " +
+                                std::to_string(weight.size()) + " weights");
+  std::vector<std::uint32_t> of_group;
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    if (i == 0 || group[i] != group[i - 1]) of_group.push_back(0);
+    of_group.back() += weight[i];
+  }
+  std::vector<std::uint32_t> owner_of_group(of_group.size());
+  assign_owners(of_group, threads, owner_of_group);
+  std::vector<std::uint64_t> load(static_cast<std::size_t>(threads), 0);
+  for (std::size_t g = 0; g < of_group.size(); ++g) load[owner_of_group[g]] += of_group[g];
+  const std::uint64_t total = std::accumulate(load.begin(), load.end(), std::uint64_t{0});
+  if (10 * *std::max_element(load.begin(), load.end()) * load.size() > 11 * total)
+    return assign_owners(weight, threads, owner);
+  for (std::size_t i = 0, g = 0; i < weight.size(); ++i) {
+    if (i > 0 && group[i] != group[i - 1]) ++g;
+    owner[i] = owner_of_group[g];
+  }
+}
+
 void EpochGraph::build(const Conflicts& conflicts, std::span<const std::uint32_t> owner, int threads) {
   clear();
   check_shape(conflicts, owner, threads);

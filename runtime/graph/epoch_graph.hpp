@@ -45,6 +45,11 @@ struct Conflicts {
 /// All weights 0 count as all 1. threads >= 1; the sum of weights times 2 * threads must fit 64 bits.
 void assign_owners(std::span<const std::uint32_t> weight, int threads, std::span<std::uint32_t> owner);
 
+/// The same where consecutive nodes of one group (a subdomain; n numbers, equal ones side by side) had better
+/// stay with one thread: whole groups, if that leaves no thread a tenth above the mean.
+void assign_owners(std::span<const std::uint32_t> weight, std::span<const std::uint32_t> group, int threads,
+                   std::span<std::uint32_t> owner);
+
 class EpochGraph;
 template <class Program>
 bool run_epochs(EpochGraph& graph, Worker& me, Program& program);  // epoch_loop.hpp

@@ -431,16 +431,19 @@ void StepGraph::plan_epochs() {
   // Bodies stand in Morton order, subdomain after subdomain, so the first body of a chunk says where it lies;
   // walls' chunks go to whoever sweeps the grains beside them, and a subdomain's gluing to who has its first
   // chunk.
-  std::vector<std::uint32_t> order(count), weight(count), owner_in_order(count), owner(nodes, 0);
+  std::vector<std::uint32_t> order(count), weight(count), subdomain(count), owner_in_order(count),
+      owner(nodes, 0);
   std::iota(order.begin(), order.end(), 0u);
   const auto place = [&](std::uint32_t c) {
     return chunks.bodies[static_cast<std::size_t>(chunks.body_begin[c])];
   };
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
-  for (std::size_t k = 0; k < count; ++k)
+  for (std::size_t k = 0; k < count; ++k) {
     weight[k] = 1 + static_cast<std::uint32_t>(state_.contacts.count[order[k]]);
-  graph::assign_owners(weight, executor_.threads(), owner_in_order);
+    subdomain[k] = static_cast<std::uint32_t>(chunks.subdomain[order[k]]);
+  }
+  graph::assign_owners(weight, subdomain, executor_.threads(), owner_in_order);
   for (std::size_t k = count; k-- > 0;) {
     owner[order[k]] = owner_in_order[k];
     if (!gluing.needed() || (ranks_.ranks() > 1 && !ranks_.any_thread())) continue;

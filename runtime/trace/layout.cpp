@@ -147,9 +147,12 @@ class Builder {
     std::stable_sort(chunks.begin(), chunks.end(), [](const Chunk& a, const Chunk& b) {
       return a.group != b.group ? a.group < b.group : a.place < b.place;
     });
-    std::vector<std::uint32_t> weight, owner(chunks.size());
-    for (const Chunk& chunk : chunks) weight.push_back(chunk.weight);
-    graph::assign_owners(weight, machine_.threads, owner);
+    std::vector<std::uint32_t> weight, group_of, owner(chunks.size());
+    for (const Chunk& chunk : chunks) {
+      weight.push_back(chunk.weight);
+      group_of.push_back(static_cast<std::uint32_t>(chunk.group));
+    }
+    graph::assign_owners(weight, group_of, machine_.threads, owner);
     const auto worker = [&](std::uint32_t thread) {
       return rank * static_cast<std::uint32_t>(machine_.threads) + thread;
     };

@@ -320,5 +320,19 @@ TEST(Owners, ExistForNodesWithoutWeight) {
   assign_owners({}, 3, {});
 }
 
+TEST(Owners, KeepAGroupWithOneThreadWhereThatIsFair) {
+  // Four groups of equal work on two threads: the cut falls between groups, not in the heavy node's middle.
+  const std::vector<std::uint32_t> weight = {9, 1, 5, 5, 2, 8, 10}, group = {0, 0, 1, 1, 2, 2, 3};
+  std::vector<std::uint32_t> owner(weight.size());
+  assign_owners(weight, group, 2, owner);
+  EXPECT_EQ(owner, (std::vector<std::uint32_t>{0, 0, 0, 0, 1, 1, 1}));
+  // Three threads cannot have equal parts of four groups: nodes are dealt out one by one.
+  std::vector<std::uint32_t> alone(weight.size());
+  assign_owners(weight, 3, alone);
+  assign_owners(weight, group, 3, owner);
+  EXPECT_EQ(owner, alone);
+  EXPECT_THROW(assign_owners(weight, std::vector<std::uint32_t>{0}, 2, owner), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace talus::graph
