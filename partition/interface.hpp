@@ -42,9 +42,10 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 
 /// Grains of these candidates, which are in `subdomain` (grain pairs first, then wall pairs). The answer is
 /// complete for a grain when all its candidates are given, whichever subdomain they are in; a subdomain is a
-/// function of the point alone, so a rank can give those of other ranks' subdomains too.
-/// With `home` (one per grain, or empty) a grain without candidates stands in its home, the subdomain of its
-/// centre: every grain then stands somewhere, and somebody moves it.
+/// function of the point alone, so a rank can give those of other ranks' subdomains too. (Contacts at glued
+/// walls go by the turns of the subdomains that their grain is known to stand in: never to one where it does
+/// not.) With `home` (one per grain, or empty) a grain without candidates stands in its home, the subdomain
+/// of its centre: every grain then stands somewhere, and somebody moves it.
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
                                 std::span<const WallPair> wall_pairs, std::span<const std::int32_t> subdomain,
                                 std::span<const std::int32_t> home = {});

@@ -35,8 +35,8 @@ struct ChunkTurn {
   std::uint32_t colour;  ///< counts within its side of the border of its subdomain, whatever it begins with
 };
 
-/// Even ones, without gaps; odd ones are left to what the tree of ranks does between the last publish and
-/// glue (tree.hpp).
+/// Even ones, without gaps; odd ones are left to what the tree of ranks does: between the last publish and
+/// glue (tree.hpp), but what goes up before the first take where there is one.
 struct LoopColours {
   std::vector<std::uint32_t> chunk;    ///< as the turns that were given
   std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border
@@ -45,8 +45,9 @@ struct LoopColours {
   std::uint32_t glue = 0;              ///< behind everything, or before all insides without overlap
   tree::Colours tree;                  ///< of what the rank does for the tree of ranks
 };
-/// `turn_of`: per subdomain of the rank, one of `ranks`.
-LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool overlap,
-                         int threads, int rank, int ranks);
+/// `turn_of`: per subdomain of the rank. `in_turns`: some subdomain of any rank has a later turn than the
+/// first.
+LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool in_turns,
+                         bool overlap, int threads, int rank, int ranks);
 
 }  // namespace talus::graph

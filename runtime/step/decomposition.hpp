@@ -2,6 +2,7 @@
 
 /// The sample of one rank: copies of bodies by subdomain, and how they got there.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -45,6 +46,9 @@ struct Decomposition {
   bool blind = false;         ///< space was cut when no candidate was known
 
   bool several() const { return partition.subdomains > 1; }
+  bool in_turns() const {
+    return std::ranges::any_of(turn, [](char t) { return t > 0; });
+  }
   int turn_of(std::int32_t subdomain) const {
     return turn.empty() ? 0 : turn[static_cast<std::size_t>(subdomain)];
   }

@@ -309,8 +309,10 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     const std::int32_t hubs = hubs_from(settings);
     if (settings.coupling == Coupling::alternating) {
       settle_turns(decomposition, ranks, standings, hubs);
-      move_wall_contacts(decomposition, ranks, standings, around, glued, found, subdomain);
-      standings = stand();
+      if (decomposition.in_turns() && std::ranges::find(glued, 1) != glued.end()) {
+        move_wall_contacts(decomposition, ranks, standings, around, glued, found, subdomain);
+        standings = stand();
+      }
     }
     decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
     list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);

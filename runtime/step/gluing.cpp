@@ -187,10 +187,11 @@ void Gluing::plan_copies(std::size_t e) {
       }
       return latest;
     };
-    if (const std::vector<CopySource> earlier = latest_before(mine.turn); !earlier.empty()) {
+    if (!all.taken.empty() && all.taken[at(slot)] != 0) {
+      const std::vector<CopySource> earlier = latest_before(mine.turn);
       mine.taken.push_back(slot);
       if (earlier.size() > 1)
-        mine.led.push_back(static_cast<std::int32_t>(s));
+        mine.taken_corners.push_back(static_cast<std::int32_t>(s));
       else
         mine.sides[at(earlier[0].neighbour)].taken.push_back({slot, earlier[0].place});
     }
@@ -300,7 +301,6 @@ void Gluing::publish(std::size_t e, Mode mode, bool single) {
 }
 
 void Gluing::tell(std::size_t e, Mode mode) {
-  if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
@@ -337,8 +337,7 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
   ask_for_messages(e, of_glue);
 }
 
-void Gluing::take(std::size_t e, Mode mode, bool single) {
-  if (mode == Mode::local) return;
+void Gluing::take(std::size_t e, bool single) {
   const auto of_take = [mine = turn(e)](const Side& side) { return side.turn < mine; };
   await_messages(e, of_take);
   with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
@@ -403,7 +402,7 @@ void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
   const Subdomain& mine = subdomains_[e];
   for (const Side& side : mine.sides)
     take_over<Width>(velocity, std::span<const detail::Pair>(side.taken), side.source);
-  for (const std::int32_t s : mine.led) {
+  for (const std::int32_t s : mine.taken_corners) {
     auto mean = add_copies<Width, Record>(e, at(s), mine.turn, velocity);
     for (auto& number : mean.sum) number /= mean.count;
     assign<Width>(mean.sum, velocity[at(mine.shared[at(s)])]);

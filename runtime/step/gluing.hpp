@@ -27,11 +27,12 @@ struct JumpSums {
   double velocity2 = 0;
 };
 
-/// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in three kinds of tasks:
+/// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in tasks:
 ///
 ///   publish[e]   after the boundary chunks of subdomain e: its interface velocities leave
 ///   collect      on ranks between rank 0 and the leaves of the tree: what came from below goes up
-///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >= 9
+///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >=
+///   9, or 33 with turns,
 ///                always, so that k copies cost O(k) messages)
 ///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
 ///                what all have gained (Schwarz); summed in order of subdomain
@@ -99,7 +100,7 @@ class Gluing {
   void tell(std::size_t e, Mode mode);
   void collect(Mode mode);
   void centre(Mode mode);
-  void take(std::size_t e, Mode mode, bool single = false);
+  void take(std::size_t e, bool single);
   void glue(std::size_t e, Mode mode, bool single = false);
 
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here

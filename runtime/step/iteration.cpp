@@ -225,17 +225,17 @@ void Iteration::node(std::uint32_t node, int epoch) {
   else if (task < 2 * here + of_rank)
     gluing_.glue(task - here - of_rank, mode, single(epoch));
   else if (const auto followers = gluing_.followers(); task < 2 * here + of_rank + followers.size())
-    take(followers[task - 2 * here - of_rank], mode, epoch);
+    take(followers[task - 2 * here - of_rank], epoch);
   else
     gluing_.tell(followers[task - 2 * here - of_rank - followers.size()], mode);
 }
 
 /// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
 /// look for it with the first of them.
-void Iteration::take(std::size_t e, Gluing::Mode mode, int epoch) {
+void Iteration::take(std::size_t e, int epoch) {
   const bool now = single(epoch), before = number(epoch) > 0 && course(epoch - 1).single;
   if (now && !before) narrow_bodies(gluing_.taken(e), state_.bodies.velocity, state_.single);
-  gluing_.take(e, mode, now);
+  gluing_.take(e, now);
 }
 
 std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {

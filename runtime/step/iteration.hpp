@@ -54,7 +54,7 @@ InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
 /// centre, and glue of every subdomain follow, and take of every one whose turn is not the first. Publish
 /// comes after the boundary chunks and before the inner ones, which hide the messages; in such a subdomain
-/// the order is inner chunks, take, boundary chunks, publish.
+/// the order is boundary chunks at glued walls, tell, inner chunks, take, the other boundary chunks, publish.
 class Iteration {
  public:
   /// References are kept. `state.contacts` holds the narrow phase's contacts.
@@ -116,7 +116,7 @@ class Iteration {
   void sweep(std::size_t c, ContactRange range, double mu, int epoch);
   std::span<const Slot> owned(std::size_t c) const;
   void carry_on(std::size_t c, ContactRange range, int epoch);
-  void take(std::size_t e, Gluing::Mode mode, int epoch);
+  void take(std::size_t e, int epoch);
   bool single(int epoch) const { return work(epoch) == Work::sweep && course(epoch).single; }
   void change_precision(std::size_t c, ContactRange range, int epoch);
   /// How sweeps are carried on; sweeps are counted from 0.

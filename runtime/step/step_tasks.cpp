@@ -317,8 +317,8 @@ void StepGraph::plan_iteration() {
 }
 
 /// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the
-/// centre and, where the tree has one, collect behind them, glue[e] last, and take[e] before the boundary
-/// chunks of those e whose turn is not the first (iteration.hpp).
+/// centre and, where the tree has one, collect behind them, glue[e] last; of those e whose turn is not the
+/// first tell[e] behind the early chunks at the boundary, and take[e] before the late ones (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
@@ -342,8 +342,8 @@ void StepGraph::plan_epochs() {
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here);
-  // The tree of ranks has its part half-way through the inner chunks, so that the way there and the way back
-  // are both hidden. Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
+  // The tree of ranks has its part among the inner chunks, so that the way there and the way back are both
+  // hidden. Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
   std::vector<graph::ChunkTurn> turns;
   for (std::size_t c = 0; c < count; ++c)
     turns.push_back({chunks.boundary[c] == 0 ? graph::ChunkTurn::inside
@@ -351,8 +351,9 @@ void StepGraph::plan_epochs() {
                                              : graph::ChunkTurn::early,
                      static_cast<std::uint32_t>(chunks.subdomain[c]),
                      static_cast<std::uint32_t>(chunks.colour[c])});
-  const graph::LoopColours colours = graph::loop_colours(turns, turn, decomposition_.overlap,
-                                                         executor_.threads(), ranks_.rank(), ranks_.ranks());
+  const graph::LoopColours colours =
+      graph::loop_colours(turns, turn, state_.decomposition.in_turns(), decomposition_.overlap,
+                          executor_.threads(), ranks_.rank(), ranks_.ranks());
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);

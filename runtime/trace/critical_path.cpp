@@ -156,10 +156,10 @@ class Walker {
       if (from == centre_group ? &rank != speaks : !has(rank, from)) continue;
       for (std::size_t n = 0; n < rank.nodes; ++n) {
         const Role role = static_cast<Role>(rank.plan->role[n]);
-        const bool sends = from == centre_group || (to == centre_group && role == Role::centre)
-                               ? role == Role::centre
-                           : to == centre_group ? role == Role::publish || role == Role::tell
-                                                : role == Role::publish && rank.plan->group[n] == from;
+        const bool sends =
+            from == centre_group || (to == centre_group && role == Role::centre) ? role == Role::centre
+            : to == centre_group ? role == Role::tell || (role == Role::publish && rank.plan->place[n] == 0)
+                                 : role == Role::publish && rank.plan->group[n] == from;
         if (sends) keep_later(best, rank.at(epoch, n), received.end());
       }
     }

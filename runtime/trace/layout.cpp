@@ -81,6 +81,7 @@ class Builder {
         if (role == Role::take) {
           group.take = n;
           group.turn = plan.place[n];
+          in_turns_ = in_turns_ || group.turn > 0;
         }
         if (role == Role::tell) group.tell = n;
       }
@@ -120,7 +121,7 @@ class Builder {
       turns.push_back({side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
     graph::LoopColours colours =
-        graph::loop_colours(turns, turn_of, overlap_, machine_.threads,
+        graph::loop_colours(turns, turn_of, in_turns_, overlap_, machine_.threads,
                             static_cast<int>(out_.rank_begin.size()) - 1, machine_.ranks);
     for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
@@ -394,6 +395,7 @@ class Builder {
   const Machine& machine_;
   const double faces_;
   std::vector<Group> group_;            ///< like groups_
+  bool in_turns_ = false;               ///< some group has a later turn than the first
   bool overlap_ = true;                 ///< glue comes behind the chunks inside
   std::vector<std::uint32_t> centre_;   ///< per rank
   std::vector<std::uint32_t> collect_;  ///< per rank; none unless it is between rank 0 and the leaves

@@ -114,10 +114,12 @@ struct Plan {
   std::vector<std::uint32_t> group;   ///< n: subdomain among all; of the centre 0xffff
   std::vector<std::uint8_t> role;     ///< n: of Role
   std::vector<std::uint32_t> weight;  ///< n: expected work, in contacts; 0 for what no work is planned for
-  std::vector<std::uint32_t> place;   ///< n: order in space within the rank, for owners; of publish, take and
-                                      ///< glue the turn of their group
-  std::vector<std::uint32_t> owner;   ///< n: thread
-  std::vector<std::uint32_t> offset;  ///< n + 1, into neighbour
+  std::vector<std::uint32_t>
+      place;  ///< n: order in space within the rank, for owners; of publish, take, tell
+              ///< and
+              ///< glue the turn of their group
+  std::vector<std::uint32_t> owner;      ///< n: thread
+  std::vector<std::uint32_t> offset;     ///< n + 1, into neighbour
   std::vector<std::uint32_t> neighbour;  ///< conflicting nodes
   std::vector<Message> messages;         ///< that leave a group of this rank, and those from the centre
 

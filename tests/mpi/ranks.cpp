@@ -116,6 +116,11 @@ TEST_F(Ranks, MayHaveAnySubdomainsOfAllCouplings) {
         EXPECT_EQ(file("dealt", "walls.csv"), file("one", "walls.csv")) << coupling << " " << exchange;
       }
     }
+  // Turns with nothing between a publish and who waits for it.
+  const std::string eager = "run scene.toml --force --threads 1 --set decomposition.overlap=false";
+  ASSERT_EQ(run(1, eager + " --out one").code, 3);
+  ASSERT_EQ(run(3, eager + " --out dealt --set decomposition.mapping=cyclic").code, 3);
+  EXPECT_EQ(digest_of("dealt"), digest_of("one"));
 }
 
 TEST_F(Ranks, SendOneMessagePerNeighbourOrToTheCentreAndBack) {

@@ -158,7 +158,8 @@ struct Formula {
   std::int64_t messages = 0, bytes = 0;
 };
 
-Formula formula(const StepState& state, std::size_t numbers, std::int64_t glued_walls, bool central) {
+Formula formula(const StepState& state, std::size_t numbers, std::int64_t glued_walls,
+                std::size_t hubs_from) {
   const Decomposition& all = state.decomposition;
   std::map<BodyId, std::vector<std::size_t>> standings;
   for (std::size_t e = 0; e + 1 < all.slot_begin.size(); ++e)
@@ -170,7 +171,7 @@ Formula formula(const StepState& state, std::size_t numbers, std::int64_t glued_
   for (const auto& [id, in] : standings) {
     const std::size_t m = in.size();
     if (m < 2) continue;
-    if (central || m > 8) {
+    if (m >= hubs_from) {
       gathered += static_cast<std::int64_t>(m);
       to_the_centre.insert(in.begin(), in.end());
       continue;
@@ -207,7 +208,9 @@ TEST(Coupling, SendsWhatTheClosedFormulasSay) {
             Simulation simulation(setup, bodies, executor);
             simulation.step();
             const Formula expected = formula(simulation.state(), friction > 0 ? 6 : 3, pressed ? 3 : 0,
-                                             exchange == ExchangeScheme::ccs);
+                                             exchange == ExchangeScheme::ccs     ? 2
+                                             : coupling == Coupling::alternating ? 33
+                                                                                 : 9);
             const std::string what = label(setup.decomposition) + (pressed ? " pressed" : "");
             EXPECT_EQ(simulation.messages().messages, expected.messages) << what;
             EXPECT_EQ(simulation.messages().bytes, expected.bytes) << what;

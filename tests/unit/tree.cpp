@@ -65,7 +65,7 @@ using enum ChunkTurn::Side;
 TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
   const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 2}, {inside, 0, 2},
                                         {early, 1, 0}, {inside, 1, 2}, {inside, 1, 3}};
-  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(3, 0), true, 1, 0, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(3, 0), false, true, 1, 0, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
   EXPECT_EQ(colours.glue, 18U);
@@ -73,7 +73,7 @@ TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
 
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
   const std::vector<ChunkTurn> turns = {{early, 0, 0}, {inside, 0, 2}, {early, 1, 0}, {inside, 1, 2}};
-  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, 1, 0, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, false, 1, 0, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 4, 12}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(colours.glue, 8U);
@@ -83,7 +83,7 @@ TEST(LoopColours, OfLaterTurnsTellFirstAndPutTakeAndBorderBehindTheInside) {
   const std::vector<ChunkTurn> turns = {
       {early, 0, 0}, {inside, 0, 3}, {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
   const std::vector<char> turn_of = {0, 1};
-  const graph::LoopColours two = loop_colours(turns, turn_of, true, 1, 0, 2);
+  const graph::LoopColours two = loop_colours(turns, turn_of, true, true, 1, 0, 2);
   // Border and publish of the first; early, tell, inside, take, border, publish of the second; inside of the
   // first.
   EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 16, 4, 8, 12}));
@@ -95,16 +95,47 @@ TEST(LoopColours, OfLaterTurnsTellFirstAndPutTakeAndBorderBehindTheInside) {
   EXPECT_LT(two.tree.up, two.take[1]);  // comes before it
   EXPECT_LT(two.publish[1], two.tree.down);
   // A rank alone stays with each.
-  EXPECT_EQ(loop_colours(turns, turn_of, true, 1, 0, 1).chunk, (std::vector<std::uint32_t>{0, 4, 6, 10, 14}));
+  EXPECT_EQ(loop_colours(turns, turn_of, true, true, 1, 0, 1).chunk,
+            (std::vector<std::uint32_t>{0, 4, 6, 10, 14}));
   // Without overlap nothing is between a publish and who waits for it.
-  EXPECT_EQ(loop_colours(turns, turn_of, false, 1, 0, 2).chunk,
+  EXPECT_EQ(loop_colours(turns, turn_of, true, false, 1, 0, 2).chunk,
             (std::vector<std::uint32_t>{6, 18, 0, 4, 12}));
+}
+
+TEST(LoopColours, OfTheFirstTurnPutNoInsideBeforeAPublishThatOthersWaitFor) {
+  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {inside, 0, 3}, {early, 1, 0}, {inside, 1, 2}};
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), true, true, 1, 1, 2);
+  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 8, 4, 10}));
+  EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
+}
+
+TEST(LoopColours, OfARelayLetNobodyWaitForEver) {
+  // Rank 1 of 40 has children, and subdomains of three turns.
+  std::vector<ChunkTurn> turns;
+  for (std::uint32_t e = 0; e < 3; ++e)
+    for (const auto side : {early, inside, late})
+      if (e > 0 || side != late) turns.push_back({side, e, static_cast<std::uint32_t>(side)});
+  const std::vector<char> turn_of = {1, 2, 0};
+  turns[0] = {early, 0, 0};
+  for (const bool overlap : {true, false})
+    for (const int threads : {1, 3}) {
+      const graph::LoopColours colours = loop_colours(turns, turn_of, true, overlap, threads, 1, 40);
+      for (const std::size_t later : {0U, 1U}) {
+        EXPECT_LT(colours.tell[later], colours.tree.up);
+        EXPECT_LT(colours.tree.up, colours.take[later]);
+        EXPECT_LT(colours.take[later], colours.publish[later]);
+        EXPECT_LT(colours.publish[later], colours.tree.down);
+      }
+      EXPECT_LT(colours.publish[2], colours.take[0]);
+      EXPECT_LT(colours.publish[0], colours.take[1]);
+      EXPECT_LT(colours.tree.down, colours.glue);
+    }
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
   const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 7},
                                         {early, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
-  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), true, 2, 0, 2);
+  const graph::LoopColours colours = loop_colours(turns, std::vector<char>(2, 0), false, true, 2, 0, 2);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
   EXPECT_EQ(colours.glue, 10U);
@@ -115,15 +146,18 @@ TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
                                       {inside, 1, 3}, {inside, 1, 5}, {inside, 2, 3}};
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
-      const graph::LoopColours among = loop_colours(all, std::vector<char>(3, 0), true, threads_then, 0, 2);
+      const graph::LoopColours among =
+          loop_colours(all, std::vector<char>(3, 0), false, true, threads_then, 0, 2);
       std::vector<ChunkTurn> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
           alone.push_back({all[k].side, 0, all[k].colour});
           again.push_back({among.publish[1] < among.chunk[k] ? inside : early, 0, among.chunk[k]});
         }
-      const graph::LoopColours here = loop_colours(alone, std::vector<char>(1, 0), true, threads, 0, 2),
-                               replayed = loop_colours(again, std::vector<char>(1, 0), true, threads, 0, 2);
+      const graph::LoopColours here =
+                                   loop_colours(alone, std::vector<char>(1, 0), false, true, threads, 0, 2),
+                               replayed =
+                                   loop_colours(again, std::vector<char>(1, 0), false, true, threads, 0, 2);
       EXPECT_EQ(here.chunk, replayed.chunk);
       EXPECT_EQ(here.glue, replayed.glue);
     }

@@ -81,9 +81,9 @@ struct Gluing::Subdomain {
   std::vector<Slot> taken;   ///< those of `shared` that are
   int turn = 0;
   std::vector<std::int32_t>
-      corners;                    ///< indices into `shared`, without hubs: of the last turn are more copies
-  std::vector<std::int32_t> led;  ///< likewise of the turn before this one's
-  std::vector<double> base;       ///< Schwarz: velocities after the last gluing, per shared body
+      corners;  ///< indices into `shared`, without hubs: of the last turn are more copies
+  std::vector<std::int32_t> taken_corners;  ///< likewise of the turn before this one's
+  std::vector<double> base;                 ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
   std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
   std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
