@@ -77,10 +77,19 @@ class EnergyLedger {
  private:
   double energy() const {
     const Bodies& bodies = simulation_.state().bodies;
-    const KineticEnergy kinetic = kinetic_energy(bodies.velocity);
-    double sum = kinetic.translation + kinetic.rotation;
-    for (std::size_t s = 0; s < bodies.size(); ++s)
-      sum -= bodies.mass(s) * simulation_.stage().gravity.dot(bodies.x[s]);
+    const Decomposition& all = simulation_.state().decomposition;
+    double sum = 0;
+    for (std::size_t s = 0; s < bodies.size(); ++s) {
+      Velocity body = bodies.velocity[s];
+      if (!all.counts.empty()) {  // each body once, with its whole mass
+        if (all.counts[s] == 0) continue;
+        body.inv_mass = all.whole[s][0];
+        body.spin_mobility = all.whole[s][1];
+      }
+      const KineticEnergy kinetic = kinetic_energy(std::span<const Velocity>(&body, 1));
+      sum += kinetic.translation + kinetic.rotation -
+             simulation_.stage().gravity.dot(bodies.x[s]) / body.inv_mass;
+    }
     for (const Wall& wall : simulation_.state().walls)
       if (wall.inv_mass() > 0) sum += 0.5 * wall.velocity.squaredNorm() / wall.inv_mass();
     return sum;

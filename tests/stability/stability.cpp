@@ -101,6 +101,13 @@ TEST(StabilityScenes, ForcesOfAColumnOfAHundredAreRightAtAnyTimeStepAndFriction)
 }
 
 // The highest asks for more than the time step can give, and is told so.
+TEST(StabilityScenes, EnergyOfBodiesThatStandInSeveralSubdomainsIsCountedOnce) {
+  // A column that falls into its contacts loses what it has; copies whose masses were added up would gain.
+  const Outcome outcome = run_scene(named("column-100-subdomains-8").front(), {});
+  EXPECT_EQ(outcome.verdict, Verdict::right);
+  EXPECT_LT(outcome.energy_gained, 1e-9);
+}
+
 TEST(StabilityScenes, PressureOverTwelveDecadesIsCarriedOrRefused) {
   for (const char* part : {"pressure-1e-", "pressure-1e+00", "pressure-1e+03", "pressure-1e+06"})
     expect_all(part, {Verdict::right});
