@@ -110,14 +110,12 @@ inline std::uint32_t message_name(std::uint32_t from, std::uint32_t to) {
 struct Plan {
   std::int32_t rank = 0;
   std::uint32_t step = 0;
-  std::vector<std::uint32_t> colour;  ///< n
-  std::vector<std::uint32_t> group;   ///< n: subdomain among all; of the centre 0xffff
-  std::vector<std::uint8_t> role;     ///< n: of Role
-  std::vector<std::uint32_t> weight;  ///< n: expected work, in contacts; 0 for what no work is planned for
-  std::vector<std::uint32_t>
-      place;  ///< n: order in space within the rank, for owners; of publish, take, tell
-              ///< and
-              ///< glue the turn of their group
+  std::vector<std::uint32_t> colour;     ///< n
+  std::vector<std::uint32_t> group;      ///< n: subdomain among all; of the centre 0xffff
+  std::vector<std::uint8_t> role;        ///< n: of Role
+  std::vector<std::uint32_t> weight;     ///< n: expected work, in contacts; 0 for what no work is planned for
+  std::vector<std::uint32_t> place;      ///< n: order in space within the rank, for owners; of publish, take,
+                                         ///< tell and glue the turn of their group
   std::vector<std::uint32_t> owner;      ///< n: thread
   std::vector<std::uint32_t> offset;     ///< n + 1, into neighbour
   std::vector<std::uint32_t> neighbour;  ///< conflicting nodes
