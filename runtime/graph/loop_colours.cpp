@@ -38,9 +38,11 @@ void go_abreast(std::vector<Turn>& turns) {
 LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool in_turns,
                          bool overlap, int threads, int rank, int ranks) {
   const auto subdomains = static_cast<std::uint32_t>(turn_of.size());
-  // One after another as a whole where no message between ranks wants to be hidden.
-  const bool alone = ranks == 1;
-  const Phase behind = overlap && threads == 1 && (alone || !in_turns) ? first_turn : inside_of_first;
+  // One after another as a whole, but where others wait for all publishes of a rank that has nothing else to
+  // do in between.
+  const bool alone = ranks == 1, later = std::ranges::any_of(turn_of, [](char turn) { return turn > 0; });
+  const Phase behind =
+      overlap && threads == 1 && (alone || later || !in_turns) ? first_turn : inside_of_first;
   std::vector<Turn> own;
   const auto phase_of = [&](std::uint32_t turn, Part part) -> std::uint32_t {
     if (part == inner_behind) return behind;

@@ -6,10 +6,10 @@
 /// may have parts of one subdomain, and the one that comes to it late would keep the other waiting. As
 /// subdomains share no grain, the order among them changes no bit.
 ///
-/// Where subdomains have turns, those of the first have their border and publish, the others what of theirs
-/// is early and tell, then those of each later turn chunks inside, take, the late border and publish, at last
-/// those of the first their chunks inside: each hides the messages of the others. A rank alone has none to
-/// hide, and stays with each subdomain.
+/// Where subdomains have turns, those of the first come first, then what is early of the others and tell,
+/// then those of each later turn with chunks inside, take, the late border and publish: each hides the
+/// messages of the others. Threads, and a rank that has subdomains of the first turn only, leave their inside
+/// to the end. A rank alone has nothing to hide, and stays with each subdomain.
 ///
 /// Nobody waits for ever: a tell waits for no message, what goes up the tree of ranks for tells, a take of
 /// turn t for publishes of turns before t, and all these stand before what waits for more: up before take,
