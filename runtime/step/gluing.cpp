@@ -55,31 +55,21 @@ void write_velocities(std::span<const Record> velocity, std::span<const Slot> sl
 /// Turns are below the first of these; the second stands for all of them.
 constexpr int no_turn = 1000, any_turn = no_turn + 1;
 
-/// Copies that become what the neighbour's are.
-template <std::size_t Width, class Record>
-void take_over(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message) {
+/// Each copy goes on with rule(own, the neighbour's), number by number.
+template <std::size_t Width, class Record, class Rule>
+void settle_pairs(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message,
+                  const Rule& rule) {
   using Number = typename Numbers<Width, Record>::value_type;
   for (const detail::Pair& pair : pairs) {
     Record& v = velocity[at(pair.slot)];
     const std::byte* const other = message + at(pair.place) * sizeof(Numbers<Width, Record>);
-    for (std::size_t k = 0; k < 3; ++k) v.u[k] = number_at<Number>(other, k);
+    for (std::size_t k = 0; k < 3; ++k) v.u[k] = rule(v.u[k], number_at<Number>(other, k));
     if constexpr (Width == 6)
-      for (std::size_t k = 0; k < 3; ++k) v.w[k] = number_at<Number>(other, k + 3);
+      for (std::size_t k = 0; k < 3; ++k) v.w[k] = rule(v.w[k], number_at<Number>(other, k + 3));
   }
 }
-
-/// Bodies that have one other copy, most of them: each takes the mean.
-template <std::size_t Width, class Record>
-void take_means(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message) {
-  using Number = typename Numbers<Width, Record>::value_type;
-  for (const detail::Pair& pair : pairs) {
-    Record& v = velocity[at(pair.slot)];
-    const std::byte* const other = message + at(pair.place) * sizeof(Numbers<Width, Record>);
-    for (std::size_t k = 0; k < 3; ++k) v.u[k] = (v.u[k] + number_at<Number>(other, k)) / 2;
-    if constexpr (Width == 6)
-      for (std::size_t k = 0; k < 3; ++k) v.w[k] = (v.w[k] + number_at<Number>(other, k + 3)) / 2;
-  }
-}
+constexpr auto mean = [](auto own, auto other) { return (own + other) / 2; };
+constexpr auto taken_over = [](auto, auto other) { return other; };
 
 }  // namespace
 
@@ -401,11 +391,11 @@ template <std::size_t Width, class Record>
 void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
   const Subdomain& mine = subdomains_[e];
   for (const Side& side : mine.sides)
-    take_over<Width>(velocity, std::span<const detail::Pair>(side.taken), side.source);
+    settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.taken), side.source, taken_over);
   for (const std::int32_t s : mine.taken_corners) {
-    auto mean = add_copies<Width, Record>(e, at(s), mine.turn, velocity);
-    for (auto& number : mean.sum) number /= mean.count;
-    assign<Width>(mean.sum, velocity[at(mine.shared[at(s)])]);
+    auto earlier = add_copies<Width, Record>(e, at(s), mine.turn, velocity);
+    for (auto& number : earlier.sum) number /= earlier.count;
+    assign<Width>(earlier.sum, velocity[at(mine.shared[at(s)])]);
   }
 }
 
@@ -449,8 +439,8 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
   };
   if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
     for (const Side& side : mine.sides) {
-      take_means<Width>(velocity, std::span<const detail::Pair>(side.pairs), side.source);
-      take_over<Width>(velocity, std::span<const detail::Pair>(side.given), side.source);
+      settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.pairs), side.source, mean);
+      settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.given), side.source, taken_over);
     }
     for (const std::int32_t s : mine.corners) settle_copies(at(s));
   } else {
