@@ -80,12 +80,8 @@ class EnergyLedger {
     const Decomposition& all = simulation_.state().decomposition;
     double sum = 0;
     for (std::size_t s = 0; s < bodies.size(); ++s) {
-      Velocity body = bodies.velocity[s];
-      if (!all.counts.empty()) {  // each body once, with its whole mass
-        if (all.counts[s] == 0) continue;
-        body.inv_mass = all.whole[s][0];
-        body.spin_mobility = all.whole[s][1];
-      }
+      if (!counts(all, s)) continue;
+      const Velocity body = whole_velocity(all, bodies, s);
       const KineticEnergy kinetic = kinetic_energy(std::span<const Velocity>(&body, 1));
       sum += kinetic.translation + kinetic.rotation -
              simulation_.stage().gravity.dot(bodies.x[s]) / body.inv_mass;

@@ -161,25 +161,34 @@ class Gantt {
     });
     if (!window_.step) return;
     const trace::StepIndex index = timeline_.index(*window_.step);
+    const auto turns = later_turns(index);
     for (const auto& [name, from] : sent) {
-      const trace::Place taken = taker(index, static_cast<std::size_t>(std::get<1>(name)), std::get<2>(name));
+      const trace::Place taken =
+          taker(index, turns, static_cast<std::size_t>(std::get<1>(name)), std::get<2>(name));
       if (!taken.exists() || taken.lane >= rows_) continue;
       const auto found = static_cast<double>(timeline_.record(taken).begin);
       if (found >= from.time) arrow(from, {taken.lane, found}, style::soft_ink);
     }
   }
 
-  static std::uint32_t turn_of(const trace::StepIndex& index, std::uint32_t group) {
+  /// Of the groups that have one other than the first.
+  static std::map<std::uint32_t, std::uint32_t> later_turns(const trace::StepIndex& index) {
+    std::map<std::uint32_t, std::uint32_t> turns;
     for (const trace::StepIndex::Rank& rank : index.ranks)
       for (std::size_t n = 0; rank.plan && n < rank.nodes; ++n)
-        if (rank.plan->role[n] == static_cast<std::uint8_t>(trace::Role::take) &&
-            rank.plan->group[n] == group)
-          return rank.plan->place[n];
-    return 0;
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(trace::Role::take))
+          turns[rank.plan->group[n]] = rank.plan->place[n];
+    return turns;
   }
 
   /// The glue, take or centre that takes a message.
-  static trace::Place taker(const trace::StepIndex& index, std::size_t epoch, std::uint32_t name) {
+  static trace::Place taker(const trace::StepIndex& index,
+                            const std::map<std::uint32_t, std::uint32_t>& turns, std::size_t epoch,
+                            std::uint32_t name) {
+    const auto turn_of = [&](std::uint32_t group) {
+      const auto later = turns.find(group);
+      return later == turns.end() ? 0 : later->second;
+    };
     const std::uint32_t from = name >> 16, to = name & 0xffffU;
     for (const trace::StepIndex::Rank& rank : index.ranks) {
       if (!rank.plan || epoch >= rank.epochs) continue;
@@ -189,9 +198,9 @@ class Gantt {
                             : std::find(groups.begin(), groups.end(), to) != groups.end();
       if (!here) continue;
       const bool by_centre = to == trace::centre_group || from == trace::centre_group;
-      const trace::Role role = by_centre                                   ? trace::Role::centre
-                               : turn_of(index, from) < turn_of(index, to) ? trace::Role::take
-                                                                           : trace::Role::glue;
+      const trace::Role role = by_centre                     ? trace::Role::centre
+                               : turn_of(from) < turn_of(to) ? trace::Role::take
+                                                             : trace::Role::glue;
       for (std::size_t n = 0; n < rank.nodes; ++n)
         if (rank.plan->role[n] == static_cast<std::uint8_t>(role) && (by_centre || groups[n] == to))
           return rank.at(epoch, n);

@@ -47,10 +47,10 @@ inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
 /// neither grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept
-/// first, and what they leave at the interface can travel while the inner chunks are swept; late
-/// ones have the highest, and are swept when something has come. Two chunks conflict
-/// when they share a grain, and then differ in colour: the sweep's result depends on colours alone. Example:
-/// candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
+/// first, and what they leave at the interface can travel while the inner chunks are swept; late ones have
+/// the highest, and are swept when something has come. Two chunks conflict when they share a grain, and then
+/// differ in colour: the sweep's result depends on colours alone. Example: candidates 0..383 are chunk 0,
+/// 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
 struct Chunks {
   std::vector<std::int32_t> begin;      ///< chunks + 1 offsets into the candidates
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1

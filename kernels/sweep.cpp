@@ -71,14 +71,14 @@ void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Vel
 
 template <bool Friction>
 ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                       double mu, Multiplicities multiplicity) {
-  return Portable::error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
+                       double mu, Multiplicities parts) {
+  return Portable::error_grains<Friction>(contacts, range, velocity, mu, parts);
 }
 
 template <bool Friction>
 ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities multiplicity) {
-  return Portable::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, multiplicity);
+                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities parts) {
+  return Portable::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, parts);
 }
 
 void ErrorSums::add(const ErrorSums& other) {

@@ -95,10 +95,10 @@ struct ErrorSums {
 /// = 1/W_nn [m/s] (design.md §4). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
 template <bool Friction>
 ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                       double mu, Multiplicities multiplicity = {});
+                       double mu, Multiplicities parts = {});
 template <bool Friction>
 ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities multiplicity = {});
+                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities parts = {});
 
 /// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies
 /// have equal masses. Summed in order.

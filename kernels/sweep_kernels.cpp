@@ -205,21 +205,21 @@ void SweepKernels::accumulate_wall(const Contacts& contacts, ContactRange range,
 template <bool Friction>
 ErrorSums SweepKernels::error_grains(const Contacts& contacts, ContactRange range,
                                      std::span<const Velocity> velocity, double mu,
-                                     Multiplicities multiplicity) const {
-  if (!lanes_[Friction]) return talus::error_grains<Friction>(contacts, range, velocity, mu, multiplicity);
-  return sums_of(lanes_[Friction]->error_grains(view(contacts, range, velocity), records(velocity), mu,
-                                                multiplicity.data()),
-                 range);
+                                     Multiplicities parts) const {
+  if (!lanes_[Friction]) return talus::error_grains<Friction>(contacts, range, velocity, mu, parts);
+  return sums_of(
+      lanes_[Friction]->error_grains(view(contacts, range, velocity), records(velocity), mu, parts.data()),
+      range);
 }
 
 template <bool Friction>
 ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
                                    std::span<const Velocity> velocity, double mu, const WallCopy& wall,
-                                   double wall_inv_mass, Multiplicities multiplicity) const {
+                                   double wall_inv_mass, Multiplicities parts) const {
   if (!lanes_[Friction])
-    return talus::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, multiplicity);
+    return talus::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, parts);
   return sums_of(lanes_[Friction]->error_wall(view(contacts, range, velocity), records(velocity), mu,
-                                              wall.velocity, wall_inv_mass, multiplicity.data()),
+                                              wall.velocity, wall_inv_mass, parts.data()),
                  range);
 }
 

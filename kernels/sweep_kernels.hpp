@@ -68,11 +68,11 @@ class SweepKernels {
                        WallCopy& wall) const;
   template <bool Friction>
   ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                         double mu, Multiplicities multiplicity = {}) const;
+                         double mu, Multiplicities parts = {}) const;
   template <bool Friction>
   ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                        double mu, const WallCopy& wall, double wall_inv_mass,
-                       Multiplicities multiplicity = {}) const;
+                       Multiplicities parts = {}) const;
 
   /// Momentum of bodies: s goes on to s + beta (s - last), and `last` becomes s. Of whole records at `slots`,
   /// whose masses, equal in both, stay to the bit.

@@ -379,8 +379,8 @@ Section<DecompositionSettings> decomposition_keys() {
           choice<D>(
               "coupling", {"nscdd", "alternating", "schwarz"},
               "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "
-              "turns: "
-              "half of the subdomains sweep their borders when they know what the others did, and it takes "
+              "turns: half "
+              "of the subdomains sweep their borders when they know what the others did, and it takes "
               "as many sweeps as with one subdomain; `schwarz`: copies have the whole mass and exchange what "
               "they gain.",
               &D::coupling),

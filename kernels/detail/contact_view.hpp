@@ -68,7 +68,7 @@ struct ErrorTotals {
 };
 
 /// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
-/// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `multiplicity` may be
+/// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `parts` may be
 /// null.
 struct LaneKernels {
   void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu);
@@ -86,9 +86,9 @@ struct LaneKernels {
   void (*accumulate_grains)(const ContactView&, double* bodies);
   void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,
-                              const std::uint16_t* multiplicity);
+                              const std::uint16_t* parts);
   ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const double* wall,
-                            double wall_inv_mass, const std::uint16_t* multiplicity);
+                            double wall_inv_mass, const std::uint16_t* parts);
   /// Momentum of whole records at `slots`.
   void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
                          double beta);

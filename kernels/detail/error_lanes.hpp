@@ -61,9 +61,9 @@ template <bool Friction, class V, class Only>
 /// 1/M of the bodies whose copies these are, by which the error counts.
 template <class V, class Grains>
 [[gnu::always_inline]] inline V whole(const Grains& a, const std::uint32_t* begin, std::size_t count,
-                                      const std::uint16_t* multiplicity) {
+                                      const std::uint16_t* parts) {
   V inv_mass = V{} + 1.0;
-  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / multiplicity[begin[l] / record];
+  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / parts[begin[l] / record];
   return inv_mass;
 }
 
@@ -93,15 +93,14 @@ template <bool Friction, bool AtWall, int W, class Only, class Grains>
 [[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
                                                Only only, const Grains& a, const Grains& b, double mu,
                                                const double* wall, double wall_inv_mass,
-                                               const std::uint16_t* multiplicity,
-                                               ErrorLanes<Lanes<W>>& sums) {
+                                               const std::uint16_t* parts, ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
   const Slice<double> own = slice(c, k);
   const Space<V> n = load_normal<V>(own, 0, only);
   Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
-  if (multiplicity) {
-    m.w_nn = whole<V>(a, c.first + k, count, multiplicity);
-    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second + k, count, multiplicity);
+  if (parts) {
+    m.w_nn = whole<V>(a, c.first + k, count, parts);
+    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second + k, count, parts);
   }
   if constexpr (AtWall) {
     m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
@@ -115,7 +114,7 @@ template <bool Friction, bool AtWall, int W, class Only, class Grains>
 template <bool Friction, bool AtWall, int W>
 [[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
                                                    const double* wall, double wall_inv_mass,
-                                                   const std::uint16_t* multiplicity) {
+                                                   const std::uint16_t* parts) {
   const ContactView c = view;
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
@@ -126,27 +125,26 @@ template <bool Friction, bool AtWall, int W>
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
     if (!AtWall && (k - c.begin) % group_size == 0) prefetch_group(c, k, bodies);
     error_block<Friction, AtWall, W>(c, k, W, AllLanes{}, first_of(c, k, bodies), second(k), mu, wall,
-                                     wall_inv_mass, multiplicity, sums[lanes]);
+                                     wall_inv_mass, parts, sums[lanes]);
   }
   if (const std::size_t rest = c.end - k; rest > 0) {
     // A lane without a contact sees no motion, and so no error.
     SpareGrains<Lanes<W>> spare(wall);
     const FewRecords<const double, W> a(first_of(c, k, bodies), rest, spare), b(second(k), rest, spare);
-    error_block<Friction, AtWall, W>(c, k, rest, FirstLanes{rest}, a, b, mu, wall, wall_inv_mass,
-                                     multiplicity, sums[lanes]);
+    error_block<Friction, AtWall, W>(c, k, rest, FirstLanes{rest}, a, b, mu, wall, wall_inv_mass, parts,
+                                     sums[lanes]);
   }
   return add_lanes<W>(sums);
 }
 
 template <bool Friction, int W>
-ErrorTotals error_grains(const ContactView& c, const double* bodies, double mu,
-                         const std::uint16_t* multiplicity) {
-  return error_of<Friction, false, W>(c, bodies, mu, nullptr, 0, multiplicity);
+ErrorTotals error_grains(const ContactView& c, const double* bodies, double mu, const std::uint16_t* parts) {
+  return error_of<Friction, false, W>(c, bodies, mu, nullptr, 0, parts);
 }
 template <bool Friction, int W>
 ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, const double* wall,
-                       double wall_inv_mass, const std::uint16_t* multiplicity) {
-  return error_of<Friction, true, W>(c, bodies, mu, wall, wall_inv_mass, multiplicity);
+                       double wall_inv_mass, const std::uint16_t* parts) {
+  return error_of<Friction, true, W>(c, bodies, mu, wall, wall_inv_mass, parts);
 }
 
 template <bool Friction, int W>

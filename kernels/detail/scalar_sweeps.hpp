@@ -305,8 +305,8 @@ class SplitWall {
 };
 
 /// 1/M of the body whose copy this is.
-inline double whole(const Velocity& copy, Slot slot, Multiplicities multiplicity) {
-  return multiplicity.empty() ? copy.inv_mass : copy.inv_mass / multiplicity[static_cast<std::size_t>(slot)];
+inline double whole(const Velocity& copy, Slot slot, Multiplicities parts) {
+  return parts.empty() ? copy.inv_mass : copy.inv_mass / parts[static_cast<std::size_t>(slot)];
 }
 
 /// Sums in 8 lanes, contact k of a range in lane k mod 8, then over the lanes in order: as vectors do it.
@@ -441,14 +441,13 @@ struct Sweeps {
   }
   template <bool Friction>
   static ErrorSums error_grains(const Contacts& contacts, ContactRange range,
-                                std::span<const Velocity> velocity, double mu, Multiplicities multiplicity) {
+                                std::span<const Velocity> velocity, double mu, Multiplicities parts) {
     LaneSums sums;
     for (std::size_t k = range.begin; k < range.end; ++k) {
       const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
       const Velocity& b = velocity[static_cast<std::size_t>(contacts.second[k])];
       const V3<double> n = normal_of(contacts, k);
-      const double w_nn =
-          whole(a, contacts.first[k], multiplicity) + whole(b, contacts.second[k], multiplicity);
+      const double w_nn = whole(a, contacts.first[k], parts) + whole(b, contacts.second[k], parts);
       add_error<R, Friction>(sums.at(k - range.begin), contacts, k, n, relative<R, Friction>(a, b, n), w_nn,
                              mu);
     }
@@ -457,14 +456,14 @@ struct Sweeps {
   template <bool Friction>
   static ErrorSums error_wall(const Contacts& contacts, ContactRange range,
                               std::span<const Velocity> velocity, double mu, const WallCopy& wall,
-                              double wall_inv_mass, Multiplicities multiplicity) {
+                              double wall_inv_mass, Multiplicities parts) {
     LaneSums sums;
     for (std::size_t k = range.begin; k < range.end; ++k) {
       const Velocity& a = velocity[static_cast<std::size_t>(contacts.first[k])];
       const V3<double> n = normal_of(contacts, k);
       ErrorSums& own = sums.at(k - range.begin);
       add_error<R, Friction>(own, contacts, k, n, relative<R, Friction>(a, wall, n),
-                             whole(a, contacts.first[k], multiplicity) + wall_inv_mass, mu);
+                             whole(a, contacts.first[k], parts) + wall_inv_mass, mu);
       store(own.wall_impulse, load(own.wall_impulse) + impulse_of<Friction>(contacts, k, n));
     }
     return sums.total();

@@ -30,20 +30,6 @@ std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-bool counts(const Decomposition& decomposition, std::size_t slot) {
-  return decomposition.counts.empty() || decomposition.counts[slot] != 0;
-}
-
-/// Velocity and whole masses.
-Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies, std::size_t s) {
-  Velocity v = bodies.velocity[s];
-  if (!decomposition.whole.empty()) {
-    v.inv_mass = decomposition.whole[s][0];
-    v.spin_mobility = decomposition.whole[s][1];
-  }
-  return v;
-}
-
 BodyRecord record_of(const Decomposition& decomposition, const Bodies& bodies, std::span<const double> reach,
                      std::size_t s) {
   const Velocity v = whole_velocity(decomposition, bodies, s);
@@ -135,6 +121,19 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
 }
 
 }  // namespace
+
+bool counts(const Decomposition& decomposition, std::size_t slot) {
+  return decomposition.counts.empty() || decomposition.counts[slot] != 0;
+}
+
+Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies, std::size_t s) {
+  Velocity v = bodies.velocity[s];
+  if (!decomposition.whole.empty()) {
+    v.inv_mass = decomposition.whole[s][0];
+    v.spin_mobility = decomposition.whole[s][1];
+  }
+  return v;
+}
 
 int chunk_target(std::size_t candidates) {
   return static_cast<int>(std::clamp<std::size_t>(candidates / 32, 64, 512));

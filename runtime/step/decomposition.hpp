@@ -54,6 +54,11 @@ struct Decomposition {
   }
 };
 
+/// Of the copies of a body this one stands for it.
+bool counts(const Decomposition& decomposition, std::size_t slot);
+/// Velocity of a slot with the masses of the whole body.
+Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies, std::size_t slot);
+
 /// One subdomain per rank unless the settings say more, laid on the ranks by settings.mapping.
 /// Throws std::invalid_argument when there are more ranks than subdomains.
 Decomposition make_decomposition(const DecompositionSettings& settings, const graph::Communicator& ranks);

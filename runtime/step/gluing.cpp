@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <iterator>
 #include <type_traits>
 
 #include "runtime/step/detail/gluing_parts.hpp"
@@ -154,27 +155,38 @@ void Gluing::plan_sides(std::size_t e) {
   }
 }
 
+/// Of interfaces[e].shared[s]; none of a hub.
+std::span<const CopySource> Gluing::copies_of(std::size_t e, std::size_t s) const {
+  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+  return std::span(interface.copies)
+      .subspan(at(interface.copies_begin[s]), at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
+}
+
+int Gluing::turn_of(std::size_t e, const CopySource& copy) const {
+  return copy.neighbour < 0 ? subdomains_[e].turn : subdomains_[e].sides[at(copy.neighbour)].turn;
+}
+
+/// The latest turn below `before` that a copy of interfaces[e].shared[s] has; -1: none.
+int Gluing::latest_turn(std::size_t e, std::size_t s, int before) const {
+  int latest = -1;
+  for (const CopySource& copy : copies_of(e, s))
+    if (const int turn = turn_of(e, copy); turn < before) latest = std::max(latest, turn);
+  return latest;
+}
+
 /// Who reads which copies of a shared body, and when.
 void Gluing::plan_copies(std::size_t e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];
   for (std::size_t s = 0; s < mine.shared.size(); ++s) {
-    const SubdomainInterface& interface = all.interfaces[e];
-    const auto copies = std::span(interface.copies)
-                            .subspan(at(interface.copies_begin[s]),
-                                     at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
+    const auto copies = copies_of(e, s);
     if (copies.empty()) continue;  // a hub
     const Slot slot = mine.shared[s];
-    const auto turn_of = [&](const CopySource& copy) {
-      return copy.neighbour < 0 ? mine.turn : mine.sides[at(copy.neighbour)].turn;
-    };
     const auto latest_before = [&](int turn) {
       std::vector<CopySource> latest;
-      for (const CopySource& copy : copies) {
-        if (turn_of(copy) >= turn || (!latest.empty() && turn_of(copy) < turn_of(latest[0]))) continue;
-        if (!latest.empty() && turn_of(copy) > turn_of(latest[0])) latest.clear();
-        latest.push_back(copy);
-      }
+      std::ranges::copy_if(copies, std::back_inserter(latest), [&](const CopySource& copy) {
+        return turn_of(e, copy) == latest_turn(e, s, turn);
+      });
       return latest;
     };
     if (!all.taken.empty() && all.taken[at(slot)] != 0) {
@@ -186,7 +198,7 @@ void Gluing::plan_copies(std::size_t e) {
         mine.sides[at(earlier[0].neighbour)].taken.push_back({slot, earlier[0].place});
     }
     const std::vector<CopySource> last = latest_before(no_turn);
-    const bool own = turn_of(last[0]) == mine.turn;
+    const bool own = turn_of(e, last[0]) == mine.turn;
     if (last.size() > 2 || (last.size() == 2 && !own)) {
       mine.corners.push_back(static_cast<std::int32_t>(s));
     } else if (last.size() == 2) {
@@ -357,23 +369,14 @@ auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<cons
   using Own = Numbers<Width, Record>;
   using Number = typename Own::value_type;
   const Subdomain& mine = subdomains_[e];
-  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
-  const auto copies = std::span(interface.copies)
-                          .subspan(at(interface.copies_begin[s]),
-                                   at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
-  const auto turn_of = [&](const CopySource& copy) {
-    return copy.neighbour < 0 ? mine.turn : mine.sides[at(copy.neighbour)].turn;
-  };
-  int latest = 0;
-  for (const CopySource& copy : copies)
-    if (turn_of(copy) < before) latest = std::max(latest, turn_of(copy));
+  const int latest = latest_turn(e, s, before);
   struct {
     Own sum{};
     Number count = 0;
     bool own = false;
   } added;
-  for (const CopySource& copy : copies) {
-    if (before != any_turn && turn_of(copy) != latest) continue;
+  for (const CopySource& copy : copies_of(e, s)) {
+    if (before != any_turn && turn_of(e, copy) != latest) continue;
     added.count += 1;
     if (copy.neighbour < 0) {
       const Own own = numbers_of<Width>(velocity[at(mine.shared[s])]);

@@ -117,6 +117,9 @@ class Gluing {
   struct Centre;
   void plan_sides(std::size_t e);
   void plan_copies(std::size_t e);
+  std::span<const CopySource> copies_of(std::size_t e, std::size_t s) const;
+  int turn_of(std::size_t e, const CopySource& copy) const;
+  int latest_turn(std::size_t e, std::size_t s, int before) const;
   void plan_centre();
   void count_messages();
   template <class Which>
