@@ -45,8 +45,8 @@ ContactPairs find_contacts(const io::Scene& scene, const Bodies& bodies, int thr
   graph::Graph detection;
   for (std::size_t lane = 0; lane < lanes; ++lane)
     detection.task("find pairs", {}, [&, lane] {
-      find_pairs(cells, bodies.x, reach, cells.cells.size() * lane / lanes,
-                 cells.cells.size() * (lane + 1) / lanes, parts[lane]);
+      find_pairs(cells, cells.cells.size() * lane / lanes, cells.cells.size() * (lane + 1) / lanes,
+                 parts[lane]);
     });
   executor.run(detection);
   contacts.grains = sort_pairs(parts, bodies.size());

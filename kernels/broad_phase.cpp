@@ -2,99 +2,143 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-
-#include "kernels/morton.hpp"
+#include <numeric>
 
 namespace talus {
 
 namespace {
 
-constexpr int level_shift = 58;               // above 3 x 19 bits of Morton key
-constexpr std::int32_t half_cells = 1 << 18;  // cells on each side of the origin, per axis
-/// Cells are wider than the widest pair by more than the rounding of a quotient up to half_cells, so that a
-/// pair is never two cells apart.
+constexpr int x_shift = 38, y_shift = 19, level_shift = 57;
+constexpr std::int32_t cells_an_axis = 1 << 19;
+/// Where the origin stands: a sample around it varies in the low bits of its coordinates only, and what does
+/// not vary takes no pass of the sort.
+constexpr std::int32_t middle_cell = cells_an_axis / 2 + 512;
+/// Cells are wider than the widest pair by more than the rounding of a quotient up to cells_an_axis, so that
+/// a pair is never two cells apart.
 constexpr double rounding_margin = 1 + 1e-9;
 
-using Coordinates = std::array<std::int32_t, 3>;
-
-/// Cell of a point in a level, in 0 .. 2 half_cells - 1. Far coordinates are clamped into the outermost cell,
-/// which keeps neighbours neighbours.
-Coordinates cell_of(const Vec3& x, const Vec3& origin, double size) {
-  Coordinates c;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto axis = static_cast<Eigen::Index>(k);
+/// Key of the cell of a point in a level. Far coordinates are clamped, which keeps neighbours neighbours, to
+/// the outermost cells but one: every cell has neighbours whose keys are near its own.
+std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, double size) {
+  std::uint64_t key = std::uint64_t{level} << level_shift;
+  constexpr int shift[3] = {x_shift, y_shift, 0};
+  for (int axis = 0; axis < 3; ++axis) {
     const double cell = std::floor((x[axis] - origin[axis]) / size);
-    c[k] = half_cells + static_cast<std::int32_t>(std::clamp<double>(cell, -half_cells, half_cells - 1));
+    const auto at =
+        static_cast<std::int32_t>(std::clamp<double>(cell, 1 - middle_cell, cells_an_axis - 2 - middle_cell));
+    key |= static_cast<std::uint64_t>(middle_cell + at) << shift[axis];
   }
-  return c;
+  return key;
 }
 
-/// Medians of the coordinates: a few bodies that fly far away must not push all others into one clamped cell.
-Vec3 median(std::span<const Vec3> x) {
-  std::vector<double> values(x.size());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(x.size() / 2);
+/// Medians of the coordinates, of a thousand bodies at most: a few that fly far away must not push all others
+/// into one clamped cell.
+Vec3 middle_of(std::span<const Vec3> x) {
+  const std::size_t stride = std::max<std::size_t>(1, x.size() / 1000);
+  std::vector<double> values;
   Vec3 result;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    std::transform(x.begin(), x.end(), values.begin(), [axis](const Vec3& p) { return p[axis]; });
+    values.clear();
+    for (std::size_t k = 0; k < x.size(); k += stride) values.push_back(x[k][axis]);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
     result[axis] = *middle;
   }
   return result;
 }
 
-std::uint64_t cell_key(std::uint64_t level, const Coordinates& c) {
-  return level << level_shift | morton_key(static_cast<std::uint32_t>(c[0]), static_cast<std::uint32_t>(c[1]),
-                                           static_cast<std::uint32_t>(c[2]));
-}
+struct Entry {
+  std::uint64_t key;
+  Slot slot;
+};
 
-std::size_t hash(std::uint64_t key, std::size_t mask) {
-  return static_cast<std::size_t>((key * 0x9e3779b97f4a7c15ULL) >> 32) & mask;
-}
-
-const CellGrid::Cell* find_cell(const CellGrid& grid, std::uint64_t key) {
-  const std::size_t mask = grid.table.size() - 1;
-  for (std::size_t h = hash(key, mask);; h = (h + 1) & mask) {
-    const std::int32_t index = grid.table[h];
-    if (index < 0) return nullptr;
-    const CellGrid::Cell& cell = grid.cells[static_cast<std::size_t>(index)];
-    if (cell.key == key) return &cell;
+/// By key, equals in the order in which they stand: by counting digits, from the lowest that varies on.
+void sort_by_key(std::vector<Entry>& entries) {
+  constexpr int digit = 11;
+  constexpr std::size_t values = std::size_t{1} << digit;
+  std::uint64_t varies = 0;
+  for (const Entry& entry : entries) varies |= entry.key ^ entries[0].key;
+  std::vector<Entry> sorted(entries.size());
+  for (int shift = 0; shift < 64; shift += digit) {
+    if ((varies >> shift) % values == 0) continue;
+    std::array<std::size_t, values + 1> next{};
+    for (const Entry& entry : entries) ++next[(entry.key >> shift) % values + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (const Entry& entry : entries) sorted[next[(entry.key >> shift) % values]++] = entry;
+    entries.swap(sorted);
   }
 }
 
-bool inside(const Coordinates& c) {
-  for (std::int32_t k : c)
-    if (k < 0 || k >= 2 * half_cells) return false;
-  return true;
+/// Appends pairs to a list whose length is known at the end only: testing takes no jump.
+class PairList {
+ public:
+  explicit PairList(std::vector<GrainPair>& pairs) : pairs_(pairs), size_(pairs.size()) {}
+  ~PairList() { pairs_.resize(size_); }
+  PairList(const PairList&) = delete;
+  PairList& operator=(const PairList&) = delete;
+
+  /// Those of body a of `grid` with its bodies [begin, end) that are near enough.
+  void add(const CellGrid& grid, std::size_t a, std::size_t begin, std::size_t end) {
+    if (size_ + (end - begin) > pairs_.size()) pairs_.resize(2 * (size_ + end - begin));
+    const CellGrid::Member one = grid.members[a];
+    const Slot slot = grid.slots[a];
+    GrainPair* next = pairs_.data() + size_;
+    for (std::size_t b = begin; b < end; ++b) {
+      const CellGrid::Member& other = grid.members[b];
+      const double dx = one.x[0] - other.x[0], dy = one.x[1] - other.x[1], dz = one.x[2] - other.x[2];
+      const double distance = one.reach + other.reach;
+      *next = {std::min(slot, grid.slots[b]), std::max(slot, grid.slots[b])};
+      next += dx * dx + dy * dy + dz * dz < distance * distance ? 1 : 0;
+    }
+    size_ = static_cast<std::size_t>(next - pairs_.data());
+  }
+
+ private:
+  std::vector<GrainPair>& pairs_;
+  std::size_t size_;
+};
+
+/// The bodies of the cells whose keys are within 1 of `key`; they stand side by side. `cell` is the first of
+/// them, or one before it, and becomes the first.
+struct Row {
+  std::size_t begin = 0, end = 0;
+};
+Row row_at(const CellGrid& grid, std::uint64_t key, std::size_t& cell) {
+  while (cell < grid.cells.size() && grid.cells[cell].key + 1 < key) ++cell;
+  std::size_t last = cell;
+  while (last < grid.cells.size() && grid.cells[last].key <= key + 1) ++last;
+  if (last == cell) return {};
+  return {static_cast<std::size_t>(grid.cells[cell].begin),
+          static_cast<std::size_t>(grid.cells[last - 1].end)};
 }
 
-/// The 13 neighbours that stand after the centre in lexicographic order.
-constexpr std::array<std::array<int, 3>, 13> half_neighbours = {{{0, 0, 1},
-                                                                 {0, 1, -1},
-                                                                 {0, 1, 0},
-                                                                 {0, 1, 1},
-                                                                 {1, -1, -1},
-                                                                 {1, -1, 0},
-                                                                 {1, -1, 1},
-                                                                 {1, 0, -1},
-                                                                 {1, 0, 0},
-                                                                 {1, 0, 1},
-                                                                 {1, 1, -1},
-                                                                 {1, 1, 0},
-                                                                 {1, 1, 1}}};
+std::size_t first_cell(const CellGrid& grid, std::uint64_t key) {
+  const auto at = std::lower_bound(grid.cells.begin(), grid.cells.end(), key,
+                                   [](const CellGrid::Cell& cell, std::uint64_t k) { return cell.key < k; });
+  return static_cast<std::size_t>(at - grid.cells.begin());
+}
+
+constexpr std::uint64_t one_x = std::uint64_t{1} << x_shift, one_y = std::uint64_t{1} << y_shift;
+/// Of the 9 rows of 3 cells around a cell, the 4 behind its own.
+constexpr std::array<std::uint64_t, 4> rows_behind = {one_y, one_x - one_y, one_x, one_x + one_y};
+constexpr std::array<std::uint64_t, 9> rows_around = {
+    0 - one_x - one_y, 0 - one_x, one_y - one_x, 0 - one_y, 0, one_y, one_x - one_y, one_x, one_x + one_y};
+
+/// The rows around the cell of a level in which the last body asked for lies: neighbours often share it.
+struct Around {
+  std::uint64_t key = 0;  ///< of no cell
+  std::array<Row, rows_around.size()> rows;
+};
 
 }  // namespace
 
 CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   CellGrid grid;
   const std::size_t n = x.size();
-  if (n == 0) {
-    grid.table.assign(1, -1);
-    return grid;
-  }
+  if (n == 0) return grid;
   double smallest = reach[0], largest = reach[0];
-  grid.origin = median(x);
+  grid.origin = middle_of(x);
   for (double r : reach) {
     smallest = std::min(smallest, r);
     largest = std::max(largest, r);
@@ -108,77 +152,60 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
     grid.cell_size[static_cast<std::size_t>(level)] =
         2 * largest * std::exp2(level - levels + 1) * rounding_margin;
 
-  struct Entry {
-    std::uint64_t key;
-    Slot slot;
-  };
   std::vector<Entry> entries(n);
   for (std::size_t k = 0; k < n; ++k) {
     std::size_t level = 0;
     while (grid.cell_size[level] < 2 * reach[k]) ++level;
-    entries[k] = {cell_key(level, cell_of(x[k], grid.origin, grid.cell_size[level])), static_cast<Slot>(k)};
+    entries[k] = {key_of(x[k].data(), grid.origin, level, grid.cell_size[level]), static_cast<Slot>(k)};
   }
-  std::sort(entries.begin(), entries.end(),
-            [](const Entry& a, const Entry& b) { return a.key != b.key ? a.key < b.key : a.slot < b.slot; });
+  sort_by_key(entries);
 
   grid.slots.resize(n);
+  grid.members.resize(n);
   for (std::size_t k = 0; k < n; ++k) {
-    grid.slots[k] = entries[k].slot;
+    const Slot slot = entries[k].slot;
+    const auto s = static_cast<std::size_t>(slot);
+    grid.slots[k] = slot;
+    grid.members[k] = {{x[s][0], x[s][1], x[s][2]}, reach[s]};
     const auto at = static_cast<std::int32_t>(k);
     if (k == 0 || entries[k].key != entries[k - 1].key) grid.cells.push_back({entries[k].key, at, at});
     grid.cells.back().end = at + 1;
   }
-  grid.table.assign(std::bit_ceil(2 * grid.cells.size() + 1), -1);
-  const std::size_t mask = grid.table.size() - 1;
-  for (std::size_t k = 0; k < grid.cells.size(); ++k) {
-    std::size_t h = hash(grid.cells[k].key, mask);
-    while (grid.table[h] >= 0) h = (h + 1) & mask;
-    grid.table[h] = static_cast<std::int32_t>(k);
-  }
   return grid;
 }
 
-void find_pairs(const CellGrid& grid, std::span<const Vec3> x, std::span<const double> reach,
-                std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs) {
-  const auto test = [&](Slot a, Slot b) {
-    const auto i = static_cast<std::size_t>(a), j = static_cast<std::size_t>(b);
-    const double distance = reach[i] + reach[j];
-    if ((x[i] - x[j]).squaredNorm() < distance * distance)
-      pairs.push_back(a < b ? GrainPair{a, b} : GrainPair{b, a});
-  };
-  const auto slots_of = [&](const CellGrid::Cell& cell) {
-    return std::span(grid.slots)
-        .subspan(static_cast<std::size_t>(cell.begin), static_cast<std::size_t>(cell.end - cell.begin));
-  };
+void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs) {
+  if (begin == end) return;
+  PairList list(pairs);
+  // Keys ascend, and so do those of the rows: each is followed from where it was.
+  std::array<std::size_t, rows_behind.size()> cell;
+  for (std::size_t r = 0; r < cell.size(); ++r)
+    cell[r] = first_cell(grid, grid.cells[begin].key + rows_behind[r] - 1);
+  std::vector<Around> around(grid.cell_size.size());
   for (std::size_t c = begin; c < end; ++c) {
-    const auto here = slots_of(grid.cells[c]);
-    const std::uint64_t level = grid.cells[c].key >> level_shift;
-    const Vec3& any = x[static_cast<std::size_t>(here[0])];
-    const Coordinates at = cell_of(any, grid.origin, grid.cell_size[level]);
-    for (std::size_t a = 0; a < here.size(); ++a)
-      for (std::size_t b = a + 1; b < here.size(); ++b) test(here[a], here[b]);
-    for (const auto& offset : half_neighbours) {
-      const Coordinates near = {at[0] + offset[0], at[1] + offset[1], at[2] + offset[2]};
-      if (!inside(near)) continue;
-      const CellGrid::Cell* cell = find_cell(grid, cell_key(level, near));
-      if (cell == nullptr) continue;
-      for (Slot a : here)
-        for (Slot b : slots_of(*cell)) test(a, b);
+    const std::uint64_t key = grid.cells[c].key;
+    const auto from = static_cast<std::size_t>(grid.cells[c].begin),
+               to = static_cast<std::size_t>(grid.cells[c].end);
+    const bool next = c + 1 < grid.cells.size() && grid.cells[c + 1].key == key + 1;
+    const std::size_t own = next ? static_cast<std::size_t>(grid.cells[c + 1].end) : to;
+    for (std::size_t a = from; a < to; ++a) list.add(grid, a, a + 1, own);
+    for (std::size_t r = 0; r < cell.size(); ++r) {
+      const Row row = row_at(grid, key + rows_behind[r], cell[r]);
+      for (std::size_t a = from; a < to && row.begin < row.end; ++a) list.add(grid, a, row.begin, row.end);
     }
-    for (std::uint64_t coarse = level + 1; coarse < grid.cell_size.size(); ++coarse) {
-      for (Slot a : here) {
-        const Coordinates centre =
-            cell_of(x[static_cast<std::size_t>(a)], grid.origin, grid.cell_size[coarse]);
-        for (int code = 0; code < 27; ++code) {
-          const Coordinates near = {centre[0] + code / 9 - 1, centre[1] + code / 3 % 3 - 1,
-                                    centre[2] + code % 3 - 1};
-          if (!inside(near)) continue;
-          const CellGrid::Cell* cell = find_cell(grid, cell_key(coarse, near));
-          if (cell == nullptr) continue;
-          for (Slot b : slots_of(*cell)) test(a, b);
+    for (std::size_t level = (key >> level_shift) + 1; level < grid.cell_size.size(); ++level)
+      for (std::size_t a = from; a < to; ++a) {
+        Around& there = around[level];
+        const std::uint64_t centre = key_of(grid.members[a].x, grid.origin, level, grid.cell_size[level]);
+        if (there.key != centre) {
+          there.key = centre;
+          for (std::size_t r = 0; r < rows_around.size(); ++r) {
+            std::size_t first = first_cell(grid, centre + rows_around[r] - 1);
+            there.rows[r] = row_at(grid, centre + rows_around[r], first);
+          }
         }
+        for (const Row& row : there.rows) list.add(grid, a, row.begin, row.end);
       }
-    }
   }
 }
 

@@ -225,9 +225,7 @@ void StepGraph::find_lane_pairs(std::uint32_t lane) {
   if (!sums_.broad_phase) return;
   pairs_[lane].clear();
   const SlotRange range = share(cells_.cells.size(), lane);
-  const bool several = state_.decomposition.several();
-  find_pairs(cells_, several ? around_.bodies.x : state_.x_then, several ? around_.reach : state_.reach_then,
-             range.begin, range.end, pairs_[lane]);
+  find_pairs(cells_, range.begin, range.end, pairs_[lane]);
 }
 
 void StepGraph::make_chunks() {

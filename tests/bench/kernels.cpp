@@ -61,7 +61,7 @@ Sample make_sample(const bench::Packing& packing, std::size_t grains, bool frict
   for (double& r : reach) r += 0.11;
   const CellGrid grid = build_cells(bodies.x, reach);
   std::vector<std::vector<GrainPair>> parts(1);
-  find_pairs(grid, bodies.x, reach, 0, grid.cells.size(), parts[0]);
+  find_pairs(grid, 0, grid.cells.size(), parts[0]);
   Candidates& candidates = sample.candidates;
   candidates.components = friction ? 3 : 1;
   candidates.grain_pairs = sort_pairs(parts, bodies.size());

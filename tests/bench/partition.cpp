@@ -40,7 +40,7 @@ void find_contacts(Dense& sample, double margin, const Vec3& low, const Vec3& hi
   for (double& r : reach) r += margin / 2;
   const CellGrid grid = build_cells(sample.x, reach);
   std::vector<std::vector<GrainPair>> parts(1);
-  find_pairs(grid, sample.x, reach, 0, grid.cells.size(), parts[0]);
+  find_pairs(grid, 0, grid.cells.size(), parts[0]);
   sample.grain_pairs = sort_pairs(parts, sample.x.size());
   for (std::int32_t wall = 0; wall < 6; ++wall)
     for (std::size_t k = 0; k < sample.x.size(); ++k) {

@@ -122,7 +122,7 @@ void time_kernels(const StepState& state, Times& times, int repeats) {
     std::vector<std::vector<GrainPair>> parts(1);
     const double detection = cpu_time([&] {
       const CellGrid grid = build_cells(state.bodies.x, reach);
-      find_pairs(grid, state.bodies.x, reach, 0, grid.cells.size(), parts[0]);
+      find_pairs(grid, 0, grid.cells.size(), parts[0]);
       sort_pairs(parts, reach.size());
     });
     const double cut = cpu_time(

@@ -22,9 +22,9 @@ std::vector<GrainPair> pairs_from_cells(std::span<const Vec3> x, std::span<const
   const CellGrid grid = build_cells(x, reach);
   const std::size_t n = grid.cells.size();
   std::vector<std::vector<GrainPair>> parts(3);
-  find_pairs(grid, x, reach, 0, n / 7, parts[1]);
-  find_pairs(grid, x, reach, n / 7, n / 2, parts[2]);
-  find_pairs(grid, x, reach, n / 2, n, parts[0]);
+  find_pairs(grid, 0, n / 7, parts[1]);
+  find_pairs(grid, n / 7, n / 2, parts[2]);
+  find_pairs(grid, n / 2, n, parts[0]);
   return sort_pairs(parts, x.size());
 }
 

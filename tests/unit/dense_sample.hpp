@@ -113,7 +113,7 @@ inline Candidates find_candidates(const Bodies& bodies, const std::vector<Wall>&
   for (double& r : reach) r += margin;
   const CellGrid grid = build_cells(bodies.x, reach);
   std::vector<std::vector<GrainPair>> parts(1);
-  find_pairs(grid, bodies.x, reach, 0, grid.cells.size(), parts[0]);
+  find_pairs(grid, 0, grid.cells.size(), parts[0]);
   Candidates candidates;
   candidates.components = friction ? 3 : 1;
   candidates.grain_pairs = sort_pairs(parts, bodies.size());
