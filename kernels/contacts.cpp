@@ -27,6 +27,10 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   for (auto* values : {&contacts.first_record, &contacts.second_record}) values->resize(n);
   contacts.candidate.resize(n);
   std::iota(contacts.candidate.begin(), contacts.candidate.end(), 0);
+  for (std::size_t k = 0; k < candidates.grain_pairs.size(); ++k) {
+    contacts.first[k] = candidates.grain_pairs[k].first;
+    contacts.second[k] = candidates.grain_pairs[k].second;
+  }
   contacts.group.resize(n);
   contacts.count.assign(chunks.size(), 0);
   contacts.passed.assign(chunks.size(), 0);

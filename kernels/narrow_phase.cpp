@@ -13,8 +13,6 @@ namespace {
 
 constexpr std::size_t group_size = 16;
 constexpr std::size_t groups_open = 64;
-constexpr std::size_t row = 8;  ///< of PairView
-constexpr std::size_t ahead = 12;
 
 std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
@@ -34,17 +32,16 @@ bool constrain(const GapRule& in, double gap, double v_n, double v_n_free, doubl
   return true;
 }
 
-/// Two grains seen from their rows in a PairView.
 struct Pairing {
   Vec3 d;  ///< x_i - x_j
   Vec3 v;  ///< u_i - u_j
   double radius_i, radius_j;
 };
 Pairing meet(const PairView& pairs, std::size_t k) {
-  const std::uint16_t* local = pairs.local + 2 * index(pairs.candidate[k]);
-  const double *a = pairs.first + row * local[0], *b = pairs.second + row * local[1];
+  const std::size_t i = index(pairs.first[k]), j = index(pairs.second[k]);
   using Map = Eigen::Map<const Vec3>;
-  return {Map(a) + Map(b), Map(a + 4) + Map(b + 4), a[3], b[7]};
+  return {Map(pairs.x + 3 * i) - Map(pairs.x + 3 * j),
+          Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
 }
 
 /// Whether two bodies came so far on their way `way` here that they may have passed.
@@ -88,33 +85,6 @@ bool find_gaps(const PairView& pairs, const GapRule& rule, const GapTarget& out)
     far |= came_far(0.5 * rule.time_step * pair.v, std::min(pair.radius_i, pair.radius_j));
   }
   return far;
-}
-
-/// Rows of the grains of a chunk: side by side they stay in the first cache, and each is looked at by about
-/// five pairs.
-struct Rows {
-  std::vector<double> first, second;
-};
-Rows rows_of(const NarrowPhase& in, const Chunks& chunks, std::size_t chunk) {
-  const std::size_t begin = index(chunks.body_begin[chunk]), end = index(chunks.body_begin[chunk + 1]);
-  Rows rows{std::vector<double>(row * (end - begin)), std::vector<double>(row * (end - begin))};
-  double *a = rows.first.data(), *b = rows.second.data();
-  for (std::size_t k = begin; k < end; ++k, a += row, b += row) {
-    // What the sweeps do not touch is not in the cache, and its reading was half of the narrow phase.
-    const std::size_t next = index(chunks.bodies[std::min(k + ahead, end - 1)]);
-    __builtin_prefetch(&in.x[next]);
-    __builtin_prefetch(&in.radius[next]);
-    __builtin_prefetch(&in.velocity[next]);
-    const std::size_t s = index(chunks.bodies[k]);
-    for (std::size_t c = 0; c < 3; ++c) {
-      a[c] = in.x[s][static_cast<Eigen::Index>(c)];
-      a[4 + c] = in.velocity[s].u[c];
-      b[c] = -a[c];
-      b[4 + c] = -a[4 + c];
-    }
-    a[3] = b[7] = in.radius[s];
-  }
-  return rows;
 }
 
 /// Deals the pairs of a chunk that are contacts to groups of 16 without a common grain, first fit, with one
@@ -174,13 +144,14 @@ void rearrange(std::span<const std::uint16_t> from, T* values, std::vector<T>& r
   for (std::size_t k = 0; k < from.size(); ++k) values[k] = room[from[k]];
 }
 
-void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
-                   const Chunks& chunks, std::size_t chunk, const SweepKernels& kernels, Contacts& contacts) {
+void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chunks, std::size_t chunk,
+                   const SweepKernels& kernels, Contacts& contacts) {
   const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
   const std::span candidate(contacts.candidate.data() + begin, count);
-  const Rows rows = rows_of(in, chunks, chunk);
+  Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
-  const PairView pairs{rows.first.data(), rows.second.data(), chunks.local.data(), candidate.data(), count};
+  static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
+  const PairView pairs{in.x[0].data(), in.radius.data(), in.velocity[0].u, first, second, count};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
   const bool far =
@@ -189,23 +160,19 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Candidates&
 
   const auto last = contact.begin() + contacts.count[chunk];
   const auto is = [](std::int64_t c) { return c != 0; };
-  if (!std::all_of(contact.begin(), last, is) || std::any_of(last, contact.end(), is)) {
-    std::vector<std::uint16_t> from;
-    from.reserve(count);
-    contacts.count[chunk] = static_cast<std::int32_t>(
-        deal_to_groups(chunks, chunk, candidate, contact, from, contacts.group.data() + begin));
-    std::vector<double> room;
-    for (double* values : {target.nx, target.ny, target.nz, target.bias})
-      rearrange<double>(from, values, room);
-    std::vector<std::int32_t> indices;
-    rearrange<std::int32_t>(from, candidate.data(), indices);
-    for (std::size_t at = begin; at < begin + count; ++at) {
-      const GrainPair& pair = candidates.grain_pairs[index(contacts.candidate[at])];
-      contacts.first[at] = pair.first;
-      contacts.second[at] = pair.second;
-      contacts.first_record[at] = record_of(pair.first);
-      contacts.second_record[at] = record_of(pair.second);
-    }
+  if (std::all_of(contact.begin(), last, is) && std::none_of(last, contact.end(), is)) return;
+  std::vector<std::uint16_t> from;
+  from.reserve(count);
+  contacts.count[chunk] = static_cast<std::int32_t>(
+      deal_to_groups(chunks, chunk, candidate, contact, from, contacts.group.data() + begin));
+  std::vector<double> room;
+  for (double* values : {target.nx, target.ny, target.nz, target.bias}) rearrange<double>(from, values, room);
+  std::vector<std::int32_t> indices;
+  for (std::int32_t* values : {candidate.data(), first, second})
+    rearrange<std::int32_t>(from, values, indices);
+  for (std::size_t at = begin; at < begin + count; ++at) {
+    contacts.first_record[at] = record_of(contacts.first[at]);
+    contacts.second_record[at] = record_of(contacts.second[at]);
   }
 }
 
@@ -246,7 +213,7 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
   const GapRule rule{in.time_step, in.alert, in.restitution, in.overlap_correction,
                      2 * in.time_step * in.gravity.norm()};
   if (chunks.wall[chunk] < 0)
-    narrow_grains(in, rule, candidates, chunks, chunk, kernels, contacts);
+    narrow_grains(in, rule, chunks, chunk, kernels, contacts);
   else
     narrow_wall(in, rule, candidates, chunks, chunk, contacts);
   restore_impulses(candidates, chunks, chunk, contacts);

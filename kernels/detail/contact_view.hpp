@@ -32,13 +32,13 @@ struct ImpulseViewOf {
 using ImpulseView = ImpulseViewOf<double>;
 using SingleImpulseView = ImpulseViewOf<float>;
 
-/// Pairs of grains of one chunk, whose gaps are asked for.
+/// Pairs of grains whose gaps are asked for.
 struct PairView {
-  const double* first;         ///< 8 per grain of the chunk: centre, radius, velocity, 0
-  const double* second;        ///< likewise -centre, 0, -velocity, radius: so a pair is the sum of two rows
-  const std::uint16_t* local;  ///< 2 per candidate: its grains in the chunk
-  const std::int32_t* candidate;  ///< per pair
-  std::size_t count;              ///< of pairs
+  const double* x;                     ///< 3 per body: its centre
+  const double* radius;                ///< 1 per body
+  const double* velocity;              ///< 8 per body: its record
+  const std::int32_t *first, *second;  ///< per pair: slots of its bodies
+  std::size_t count;                   ///< of pairs
 };
 
 /// When a pair is a contact, and its bias: `NarrowPhase`.
