@@ -14,7 +14,7 @@ constexpr std::int32_t cells_an_axis = 1 << 19;
 /// Where the origin stands: a sample around it varies in the low bits of its coordinates only, and what does
 /// not vary takes no pass of the sort.
 constexpr std::int32_t middle_cell = cells_an_axis / 2 + 512;
-/// Cells are wider than the widest pair by more than the rounding of a quotient up to cells_an_axis, so that
+/// Cells are wider than the widest pair by more than the rounding of a place up to cells_an_axis, so that
 /// a pair is never two cells apart.
 constexpr double rounding_margin = 1 + 1e-9;
 
@@ -24,10 +24,9 @@ std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, dou
   std::uint64_t key = std::uint64_t{level} << level_shift;
   constexpr int shift[3] = {x_shift, y_shift, 0};
   for (int axis = 0; axis < 3; ++axis) {
-    const double cell = std::floor((x[axis] - origin[axis]) / size);
-    const auto at =
-        static_cast<std::int32_t>(std::clamp<double>(cell, 1 - middle_cell, cells_an_axis - 2 - middle_cell));
-    key |= static_cast<std::uint64_t>(middle_cell + at) << shift[axis];
+    const double at = (x[axis] - origin[axis]) / size + middle_cell;
+    // Above 0, where to cut off digits is to round down.
+    key |= static_cast<std::uint64_t>(std::clamp<double>(at, 1, cells_an_axis - 2)) << shift[axis];
   }
   return key;
 }

@@ -50,7 +50,8 @@ void find_leavers(SlotRange range, const Bodies& bodies, const Margins& margins,
 
 /// Appends to `needed` the contacts of a leaver with a grain here or a wall, and to `known` the candidates
 /// here of the leavers. Over all ranks, which are to have the same leavers, the candidates hold if
-/// all_known(needed, known). `leavers` are in order of id, each once; cost: bodies x leavers.
+/// all_known(needed, known). `leavers` are in order of id, each once; cheap where slots that follow one
+/// another are near in space.
 void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, const Candidates& candidates,
                      const Margins& margins, std::vector<Encounter>& needed, std::vector<Encounter>& known);
 
