@@ -20,19 +20,21 @@ struct Pairing {
 };
 
 /// x_i - x_j in the first three lanes; no number behind the three of a centre is read.
-[[gnu::always_inline]] inline Quad apart(const PairView& pairs, std::size_t i, std::size_t j) {
-  return load<Quad>(pairs.x + 3 * i, 0, FirstLanes{3}) - load<Quad>(pairs.x + 3 * j, 0, FirstLanes{3});
+template <std::same_as<Quad> V>
+[[gnu::always_inline]] inline V apart(const PairView& pairs, std::size_t i, std::size_t j) {
+  return load<V>(pairs.x + 3 * i, 0, FirstLanes{3}) - load<V>(pairs.x + 3 * j, 0, FirstLanes{3});
 }
 [[gnu::always_inline]] inline Quad relative(const PairView& pairs, std::size_t i, std::size_t j) {
   return load<Quad>(pairs.velocity + 8 * i) - load<Quad>(pairs.velocity + 8 * j);
 }
 
-[[gnu::always_inline]] inline Pairing<Quad> meet(const PairView& pairs, const std::size_t* i,
-                                                 const std::size_t* j, Quad) {
+template <std::same_as<Quad> V>
+[[gnu::always_inline]] inline Pairing<V> meet(const PairView& pairs, const std::size_t* i,
+                                              const std::size_t* j, V) {
   Quad d[4], v[4];
 #pragma GCC unroll 4
   for (int l = 0; l < 4; ++l) {
-    d[l] = apart(pairs, i[l], j[l]);
+    d[l] = apart<V>(pairs, i[l], j[l]);
     v[l] = relative(pairs, i[l], j[l]);
   }
   swap_rows_and_columns(d[0], d[1], d[2], d[3]);
@@ -42,13 +44,15 @@ struct Pairing {
   return {{d[0], d[1], d[2]}, {v[0], v[1], v[2]}, radius_i, radius_j};
 }
 
-[[gnu::always_inline]] inline Pairing<Octet> meet(const PairView& pairs, const std::size_t* i,
-                                                  const std::size_t* j, Octet) {
+template <std::same_as<Octet> V>
+[[gnu::always_inline]] inline Pairing<V> meet(const PairView& pairs, const std::size_t* i,
+                                              const std::size_t* j, V) {
+  using Half = std::conditional_t<std::same_as<V, Octet>, Quad, V>;  // of V, as masks are known later
   Octet c[8];
 #pragma GCC unroll 8
   for (int l = 0; l < 8; ++l)
-    c[l] = __builtin_shufflevector(apart(pairs, i[l], j[l]), relative(pairs, i[l], j[l]), 0, 1, 2, 3, 4, 5, 6,
-                                   7);
+    c[l] = __builtin_shufflevector(apart<Half>(pairs, i[l], j[l]), relative(pairs, i[l], j[l]), 0, 1, 2, 3, 4,
+                                   5, 6, 7);
   transpose(c);
   const double* r = pairs.radius;
   const Octet radius_i = {r[i[0]], r[i[1]], r[i[2]], r[i[3]], r[i[4]], r[i[5]], r[i[6]], r[i[7]]},
