@@ -28,7 +28,8 @@ enum class TaskKind : std::uint8_t {
   glue,
   take,
   tell,
-  whole  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
+  whole,  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
+  sums    ///< within a check: a rank adds up what its chunks have measured
 };
 
 inline trace::Kind kind_of(TaskKind kind) {

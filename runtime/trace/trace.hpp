@@ -38,7 +38,8 @@ struct KindInfo {
   std::string name;
   Phase phase = Phase::outside;
   bool blocked = false;  ///< waits for messages and does no work of its own
-  bool shared = false;   ///< a task that a rank does once, and whose work grows with the rank's part
+  bool shared = false;  ///< a task that a rank does once, and whose work grows with the rank's part; within a
+                        ///< check a span of one thread, where else all ranks and threads work together
   bool operator==(const KindInfo&) const = default;
 };
 

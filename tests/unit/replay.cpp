@@ -270,17 +270,17 @@ TEST(Replay, ACheckThatSettlesIsReadAtOnce) {
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180) << "no sweep more, nothing to undo";
 }
 
-/// A task that all ranks share in the last check of two subdomains, which takes 10 ns more: two gathers and
-/// three exchanges.
-Trace with_a_look(std::int64_t length = 80) {
+/// A task in the last check of two subdomains, which takes 10 ns more: two gathers and three exchanges. Of
+/// kind sweep all ranks and threads do it together, of kind task each rank its part.
+Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.lanes[0].records;
   const auto check = std::ranges::find(records, kind_check, &Record::kind);
   check->duration = static_cast<float>(length + 10);
   check->node = check_settles;
   std::prev(records.end())->begin += length + 10;
-  records.insert(std::next(check), {check->begin + 10, static_cast<float>(length), Meetings{2, 3}.packed(),
-                                    -1, pack(1, test::task)});
+  records.insert(std::next(check),
+                 {check->begin + 10, static_cast<float>(length), Meetings{2, 3}.packed(), -1, pack(1, kind)});
   return trace;
 }
 
@@ -294,6 +294,18 @@ TEST(Replay, WhatAllRanksDoInACheckIsShared) {
   const Replay played = replay(Timeline(trace), machine, true);
   EXPECT_NO_THROW(validate(played.trace));
   EXPECT_NEAR(analyse(played.trace).exposed, 2 * 6 * 30, 1e-3);
+}
+
+// What one rank added up for both subdomains, two ranks add up for one each; a second thread of it waits.
+TEST(Replay, WhatARankAddsUpInACheckGoesWithItsPart) {
+  const Trace trace = with_a_look(80, test::task);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(2, 1)), 2 * 180 + 10 + 40);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 2)), makespan(test::two_subdomains(1), bare(1, 2)) + 90);
+  EXPECT_DOUBLE_EQ(makespan(with_a_look(), bare(1, 2)), makespan(test::two_subdomains(1), bare(1, 2)) + 50);
+  Machine machine = bare(2, 1);
+  machine.schedule = Schedule::list;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40);
 }
 
 TEST(Replay, KeepsNodesApartThatMeetBetweenNanoseconds) {

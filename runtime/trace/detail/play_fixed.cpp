@@ -238,7 +238,7 @@ class FixedLoop {
     Rank& rank = ranks_[r];
     const std::uint32_t e = workers_[r * threads_].epoch;
     const SimEpoch& epoch = epochs_[e];
-    rank.ready = now + check_work(stage_, index_, epoch);
+    rank.ready = now + check_work(stage_, index_, epoch) + epoch.own[r];
     rank.time = now;
     if (epoch.posts) {
       rounds_.post(epoch.posts_before, rank.ready);

@@ -174,7 +174,7 @@ class ListLoop {
     Rank& rank = ranks_[r];
     const SimEpoch& epoch = epochs_[rank.allowed];
     rank.time = now;
-    rank.decided = now + check_work(stage_, index_, epoch);
+    rank.decided = now + check_work(stage_, index_, epoch) + epoch.own[r];
     if (epoch.posts) {
       rounds_.post(epoch.posts_before, rank.decided);
       rank.decided += stage_.network.overhead();

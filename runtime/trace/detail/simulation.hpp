@@ -91,7 +91,8 @@ struct SimEpoch {
   };
   double whole = 0, meetings = 0;
   std::vector<Span> spans{};
-  bool exchange = false;  ///< copies are glued
+  std::vector<double> own{};  ///< [ns] per rank: what each does alone before that, beside check_work
+  bool exchange = false;      ///< copies are glued
   std::size_t exchanges_before = 0;
   std::size_t reads_before = 0, posts_before = 0;
 };
