@@ -25,8 +25,9 @@ std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, dou
   constexpr int shift[3] = {x_shift, y_shift, 0};
   for (int axis = 0; axis < 3; ++axis) {
     const double at = (x[axis] - origin[axis]) / size + middle_cell;
-    // Above 0, where to cut off digits is to round down.
-    key |= static_cast<std::uint64_t>(std::clamp<double>(at, 1, cells_an_axis - 2)) << shift[axis];
+    // Above 0, where to cut off digits is to round down. A NaN goes to 1.
+    const double inside = std::min<double>(cells_an_axis - 2, std::max<double>(1, at));
+    key |= static_cast<std::uint64_t>(static_cast<std::int32_t>(inside)) << shift[axis];
   }
   return key;
 }
@@ -34,7 +35,7 @@ std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, dou
 /// Medians of the coordinates, of a thousand bodies at most: a few that fly far away must not push all others
 /// into one clamped cell.
 Vec3 middle_of(std::span<const Vec3> x) {
-  const std::size_t stride = std::max<std::size_t>(1, x.size() / 1000);
+  const std::size_t stride = (x.size() + 999) / 1000;
   std::vector<double> values;
   Vec3 result;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
@@ -98,11 +99,12 @@ class PairList {
   std::size_t size_;
 };
 
-/// The bodies of the cells whose keys are within 1 of `key`; they stand side by side. `cell` is the first of
-/// them, or one before it, and becomes the first.
+/// Bodies side by side.
 struct Row {
   std::size_t begin = 0, end = 0;
 };
+/// Those of the cells whose keys are within 1 of `key`. `cell` is the first of these cells, or any before it,
+/// and becomes the first.
 Row row_at(const CellGrid& grid, std::uint64_t key, std::size_t& cell) {
   while (cell < grid.cells.size() && grid.cells[cell].key + 1 < key) ++cell;
   std::size_t last = cell;
@@ -154,7 +156,7 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   std::vector<Entry> entries(n);
   for (std::size_t k = 0; k < n; ++k) {
     std::size_t level = 0;
-    while (grid.cell_size[level] < 2 * reach[k]) ++level;
+    while (grid.cell_size[level] < 2 * reach[k] * rounding_margin) ++level;
     entries[k] = {key_of(x[k].data(), grid.origin, level, grid.cell_size[level]), static_cast<Slot>(k)};
   }
   sort_by_key(entries);

@@ -46,7 +46,8 @@ struct SingleContacts {
   std::vector<float> rn;          ///< normal impulse over `unit` [m/s]; empty with friction
 };
 
-/// Room for the contacts of `chunks`, of which there are none yet; `friction` decides which impulses exist.
+/// Room for the contacts of `chunks`, of which there are none yet: the candidates stand in their order, with
+/// their bodies between grains. `friction` decides which impulses exist.
 void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
 
 /// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.

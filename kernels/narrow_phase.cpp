@@ -151,7 +151,7 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
   Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
-  const PairView pairs{in.x[0].data(), in.radius.data(), in.velocity[0].u, first, second, count};
+  const PairView pairs{in.x.data()->data(), in.radius.data(), in.velocity.data()->u, first, second, count};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
   const bool far =

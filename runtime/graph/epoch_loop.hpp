@@ -12,7 +12,8 @@
 ///     step.team("iterate", accesses, [&](Worker& me) { run_epochs(graph, me, sweep); });
 ///
 /// A program may also have `void assist()`: threads that wait for a decision call it again and again, so that
-/// decide() can share out work (crew.hpp).
+/// decide() can share out work (crew.hpp); and `void about_to_wait()`, called before nodes that may have to
+/// wait for other threads.
 ///
 /// Epochs count from 0 in every call. The loop ends only in decide(), so some gate must be true sooner or
 /// later. gate(epoch) is asked by every thread at the beginning of its epoch and must be the same on all: it
@@ -105,6 +106,8 @@ bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
     std::int64_t finished = now * stride;
     const EpochGraph::Wait* wait = first_wait;
     for (const EpochGraph::Step& step : steps) {
+      if constexpr (requires { program.about_to_wait(); })
+        if (step.waits > 0) program.about_to_wait();
       for (const EpochGraph::Wait* const end = wait + step.waits; wait != end; ++wait) {
         Peer& peer = peers[wait->thread];
         if (!reached(peer, now * peer.stride + wait->place)) return false;

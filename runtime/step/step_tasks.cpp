@@ -148,7 +148,7 @@ bool StepGraph::needs_broad_phase() {
 /// Whether the grains that left their margins, few of them, meet none but their candidates. Collective; the
 /// same for any ranks, since the grains and their candidates are put together from all of them.
 bool StepGraph::candidates_hold() const {
-  constexpr std::size_t few = 32;  // comparing them with all grains costs less than a tenth of a broad phase
+  constexpr std::size_t few = 32;  // comparing them costs little beside a broad phase
   std::vector<Leaver> leavers;
   for (const auto& lane : left_) leavers.insert(leavers.end(), lane.begin(), lane.end());
   leavers = ranks_.gather_records(std::span<const Leaver>(leavers));

@@ -86,6 +86,15 @@ class Walker {
     return best;
   }
 
+  /// When a task that waits for all ranks had done its own work.
+  double came(Place at) const {
+    const Record& task = record(at);
+    double own = timeline_.self(at);
+    if (task.kind() == kind_check)
+      own += timeline_.self(index_.ranks[rank_of(at)].alone[static_cast<std::size_t>(task.epoch)]);
+    return static_cast<double>(task.begin) + own;
+  }
+
   Cause cause_of(Place at) const {
     const auto begin = static_cast<double>(record(at).begin);
     if (const Place wait = longest_wait(at);
@@ -93,9 +102,7 @@ class Walker {
       const bool message = record(wait).kind() == kind_receive;
       const Place cause = message ? sender_of(wait) : last_to_come(at);
       if (cause.exists() && !(cause.lane == at.lane && cause.record == at.record)) {
-        const double left =
-            message ? record(cause).end() : static_cast<double>(record(cause).begin) + timeline_.self(cause);
-        return {cause, left, record(wait).end()};
+        return {cause, message ? record(cause).end() : came(cause), record(wait).end()};
       }
     }
     Place best = previous(at);
@@ -185,9 +192,8 @@ class Walker {
           if (tasks[i].kind == task.kind()) there = rank.task[i];
       }
       if (!there.exists()) continue;
-      const double came = static_cast<double>(record(there).begin) + timeline_.self(there);
-      if (came <= latest) continue;
-      latest = came;
+      if (came(there) <= latest) continue;
+      latest = came(there);
       best = there;
     }
     return best;

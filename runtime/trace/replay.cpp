@@ -276,7 +276,6 @@ class Player {
       SimEpoch sweep = epochs[last >= 2 ? last - 2 : 0], undo = epochs[last >= 1 ? last - 1 : 0];
       for (SimEpoch* added : {&sweep, &undo}) {
         added->posts = added->reads = false;
-        std::fill(added->own.begin(), added->own.end(), 0.0);
         added->gate = true;
       }
       read_here(last, sweep);
@@ -298,13 +297,13 @@ class Player {
   /// Adds what a rank does by one thread within the check of recorded epoch e: its share.
   void do_alone(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
     epoch.own.assign(static_cast<std::size_t>(machine_.ranks), 0.0);
-    for (std::size_t s = 0; s < index.ranks.size(); ++s)
-      for (const Place place : index.ranks[s].whole[e]) {
-        const Kind kind = stage_.timeline.record(place).kind();
-        if (!trace_.info(kind).shared) continue;
-        const double work = stage_.timeline.self(place) * machine_.contacts / stage_.speed_of(kind);
-        for (std::size_t r = 0; r < epoch.own.size(); ++r) epoch.own[r] += share(r, s) * work;
-      }
+    for (std::size_t s = 0; s < index.ranks.size(); ++s) {
+      const Place place = index.ranks[s].alone[e];
+      if (!place.exists()) continue;
+      epoch.own_kind = stage_.timeline.record(place).kind();
+      const double work = detail::alone_work(stage_, index, s, e);
+      for (std::size_t r = 0; r < epoch.own.size(); ++r) epoch.own[r] += share(r, s) * work;
+    }
   }
 
   /// Adds what all ranks did together within the check of recorded epoch e. As long as the rank with the
@@ -312,7 +311,6 @@ class Player {
   void do_together(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
     for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
       const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
-      if (trace_.info(record.kind()).shared) continue;
       const double part =
           machine_.contacts / stage_.speed_of(record.kind()) * trace_.threads / machine_.threads;
       double most = 0;

@@ -43,6 +43,7 @@ TaskTimes::TaskTimes(const Trace& recorded, int ranks, int rank) {
       for (std::size_t n = 0; n < of.nodes; ++n)
         if (of.at(e, n).exists()) nodes[n] = 1e-9 * (played.self(of.at(e, n)) + replayed.dispatch);
       double decision = of.check[e].exists() ? 1e-9 * played.self(of.check[e]) : absent;
+      decision += 1e-9 * played.self(of.alone[e]);
       for (const Place whole : of.whole[e]) decision += 1e-9 * played.self(whole);
       step.decision.push_back(decision);
     }

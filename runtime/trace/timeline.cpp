@@ -20,6 +20,7 @@ void resize_checks(StepIndex::Rank& rank, std::size_t epochs) {
   rank.awaited.resize(epochs, 0);
   rank.settled.resize(epochs, 0);
   rank.whole.resize(epochs);
+  rank.alone.resize(epochs);
 }
 
 }  // namespace
@@ -106,7 +107,11 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
     } else if (within(*it, last_task)) {
       rank.part[record(last_task).node] = place;
     } else if (within(*it, last_check)) {
-      rank.whole[static_cast<std::size_t>(record(last_check).epoch)].push_back(place);
+      const auto epoch = static_cast<std::size_t>(record(last_check).epoch);
+      if (trace_.info(kind).shared)
+        rank.alone[epoch] = place;
+      else
+        rank.whole[epoch].push_back(place);
     }
   }
 }

@@ -51,6 +51,7 @@ struct StepIndex {
     std::vector<char> awaited;  ///< per epoch: its check waited for other ranks
     std::vector<char> settled;  ///< per epoch: its check reads its own sums on any number of ranks
     std::vector<std::vector<Place>> whole;  ///< per epoch: what all ranks did together within its check
+    std::vector<Place> alone;               ///< per epoch: what the rank did for its own part there
     Place outside;                          ///< before the step; absent for the first of a trace
     Calls calls_outside;                    ///< collective calls within
     std::vector<Place> part;                ///< per task: a span within that is no wait, or absent

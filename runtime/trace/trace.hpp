@@ -38,8 +38,9 @@ struct KindInfo {
   std::string name;
   Phase phase = Phase::outside;
   bool blocked = false;  ///< waits for messages and does no work of its own
-  bool shared = false;  ///< a task that a rank does once, and whose work grows with the rank's part; within a
-                        ///< check a span of one thread, where else all ranks and threads work together
+  /// What a rank does once, by one thread, and whose work grows with the rank's part: a task, or a span
+  /// within a check, where others are work of all ranks and threads.
+  bool shared = false;
   bool operator==(const KindInfo&) const = default;
 };
 

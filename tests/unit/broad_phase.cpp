@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/leavers.hpp"
 #include "kernels/motion.hpp"
+#include "kernels/narrow_phase.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace talus {
@@ -28,12 +30,17 @@ std::vector<GrainPair> pairs_from_cells(std::span<const Vec3> x, std::span<const
   return sort_pairs(parts, x.size());
 }
 
-/// Equal lists: none is missing, none comes twice, the order is that of (first, second).
+/// Equal lists: none is missing, none comes twice, the order is that of (first, second); and the same when
+/// every cell is a part of its own, so that every search begins anew.
 void expect_all_pairs(const std::vector<Vec3>& x, const std::vector<double>& reach) {
   const std::vector<GrainPair> expected = pairs_by_brute_force(x, reach);
   const std::vector<GrainPair> found = pairs_from_cells(x, reach);
   EXPECT_EQ(found.size(), expected.size());
   EXPECT_TRUE(found == expected);
+  const CellGrid grid = build_cells(x, reach);
+  std::vector<std::vector<GrainPair>> parts(1);
+  for (std::size_t c = 0; c < grid.cells.size(); ++c) find_pairs(grid, c, c + 1, parts[0]);
+  EXPECT_TRUE(sort_pairs(parts, x.size()) == expected);
 }
 
 struct Cloud {
@@ -127,10 +134,84 @@ TEST(BroadPhase, BodiesThatFlewABillionMetresAwayDisturbNobody) {
   EXPECT_GE(build_cells(bodies.x, reach).cells.size(), before.cells.size() / 2);
 }
 
+// Cells are counted up to 2^18 on each side; what is farther away stands in the outermost of them. A chain on
+// each axis goes from within to there, with smaller bodies beside it.
+TEST(BroadPhase, FindsPairsAcrossTheOutermostCells) {
+  std::vector<Vec3> x;
+  std::vector<double> reach;
+  for (int k = 0; k < 3000; ++k) {  // whose medians are the origin, and whose reach the size of cells, 1
+    x.push_back(Vec3(k % 2 ? 1 : -1, k % 3 - 1, k % 5 - 2));
+    reach.push_back(0.5);
+  }
+  constexpr double edge = 1 << 18;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-1.0, 1.0})
+      for (int k = -1200; k < 600; k += k < -900 || k > -100 ? 1 : 100) {
+        x.push_back(0.9 * k * side * Vec3::Unit(axis) + edge * side * Vec3::Unit(axis));
+        reach.push_back(0.5);
+        x.push_back(x.back() + 0.6 * Vec3::Unit((axis + 1) % 3));
+        reach.push_back(0.24);
+      }
+  expect_all_pairs(x, reach);
+}
+
+TEST(BroadPhase, OneInfiniteReachMeetsAll) {
+  Random random(2);
+  Cloud cloud;
+  for (int k = 0; k < 300; ++k) {
+    cloud.x.push_back(uniform_vector(random, -5, 5));
+    cloud.reach.push_back(k == 7 ? std::numeric_limits<double>::infinity() : 0.4);
+  }
+  expect_all_pairs(cloud.x, cloud.reach);
+}
+
 TEST(BroadPhase, NoPairMeansMoreThanCellsCanCount) {
   std::vector<Vec3> x;
   for (int k = 0; k < 40; ++k) x.push_back(std::pow(10.0, k % 20) * Vec3(k % 2 ? 1 : -1, 0.5, -0.1));
   expect_all_pairs(x, std::vector<double>(x.size(), 1.0));
+}
+
+// By blocks of bodies, wherever these lie: the same contacts as one by one.
+TEST(Leavers, MeetWhomTheyTouch) {
+  for (const int n : {1, 2, 63, 64, 65, 1000}) {
+    Random random(static_cast<std::uint64_t>(n));
+    Bodies bodies;
+    std::vector<double> reach;
+    const double edge = 1.5 * std::cbrt(static_cast<double>(n));
+    for (int k = 0; k < n; ++k) {
+      add_sphere(bodies, BodyId{1000 - k}, uniform_vector(random, 0, edge),
+                 k % 40 == 3 ? 4 : uniform(random, 0.2, 0.6), 1);
+      const Vec3 u = uniform_vector(random, -1, 1);
+      std::copy_n(u.data(), 3, bodies.velocity.back().u);
+      // Every seventh has left.
+      reach.push_back(k % 7 == 0 ? 0 : bodies.radius.back() + 0.1);
+    }
+    const std::vector<Vec3> x_then = bodies.x;
+    const Margins margins{x_then, reach, 0.02, 0.03};
+    std::vector<Leaver> leavers;
+    find_leavers({0, bodies.size()}, bodies, margins, leavers);
+    std::sort(leavers.begin(), leavers.end());
+    ASSERT_EQ(leavers.size(), static_cast<std::size_t>((n + 6) / 7));
+    std::vector<Encounter> needed, known, expected;
+    compare_leavers(leavers, bodies, {}, margins, needed, known);
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (std::size_t j = 0; j < bodies.size(); ++j) {
+        if (i == j || i % 7 != 0) continue;
+        const Vec3 d = bodies.x[i] - bodies.x[j];
+        using Map = Eigen::Map<const Vec3>;
+        const double v_n = d.normalized().dot(Map(bodies.velocity[i].u) - Map(bodies.velocity[j].u));
+        if (may_touch(d.norm() - bodies.radius[i] - bodies.radius[j], v_n, 0.02, 0.03))
+          expected.push_back(
+              {std::min(static_cast<std::int64_t>(bodies.id[i]), static_cast<std::int64_t>(bodies.id[j])),
+               std::max(static_cast<std::int64_t>(bodies.id[i]), static_cast<std::int64_t>(bodies.id[j]))});
+      }
+    for (auto* list : {&needed, &expected}) {
+      std::sort(list->begin(), list->end());
+      list->erase(std::unique(list->begin(), list->end()), list->end());
+    }
+    EXPECT_EQ(needed, expected) << n << " bodies";
+    EXPECT_TRUE(n < 100 || expected.size() > 50);
+  }
 }
 
 /// Grains that jostle at random: what the step does, in small. At each step every pair that the narrow phase

@@ -308,6 +308,30 @@ TEST(Replay, WhatARankAddsUpInACheckGoesWithItsPart) {
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40);
 }
 
+TEST(Replay, SumsOfAPredictedCheckArePlayedAgain) {
+  const Replay played = replay(Timeline(with_a_look(80, test::task)), bare(2, 1), true);
+  EXPECT_NO_THROW(validate(played.trace));
+  EXPECT_DOUBLE_EQ(makespan(played.trace, bare(2, 1)), 2 * 180 + 10 + 40);
+}
+
+// The sweep that hides the sums of a check, and its undoing, have none of their own.
+TEST(Replay, ALateCheckAddsUpOnce) {
+  Trace trace = with_a_look(80, test::task);
+  std::ranges::find(trace.lanes[0].records, kind_check, &Record::kind)->node = 0;
+  const Trace without = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.late_check = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), makespan(without, machine) + 10 + 40);
+}
+
+// More contacts make chunks longer, not more of them.
+TEST(Replay, LongerChunksAreAddedUpAsFast) {
+  Machine machine = bare(1, 1);
+  machine.contacts = 2;
+  EXPECT_DOUBLE_EQ(makespan(with_a_look(80, test::task), machine),
+                   makespan(test::two_subdomains(1), machine) + 90);
+}
+
 TEST(Replay, KeepsNodesApartThatMeetBetweenNanoseconds) {
   Machine machine = bare(2, 1);
   machine.bandwidth = 12e9;  // 83 1/3 ns a message: every second glue ends within a nanosecond

@@ -256,7 +256,8 @@ class FixedLoop {
   void open_gate(std::uint32_t r, double now) {
     Rank& rank = ranks_[r];
     const std::uint32_t first = r * threads_, e = workers_[first].epoch;
-    log_check(stage_, first, static_cast<std::int32_t>(e), epochs_[e], rank.time, rank.ready, now);
+    log_check(stage_, first, static_cast<std::int32_t>(e), epochs_[e], epochs_[e].own[r], rank.time,
+              rank.ready, now);
     rank.at_gate = 0;
     rank.time = now;
     if (e + 1 == epochs_.size()) {

@@ -192,7 +192,7 @@ class ListLoop {
     Rank& rank = ranks_[r];
     if (!first) {
       log_check(stage_, stage_.log.worker(r, 0), static_cast<std::int32_t>(rank.allowed),
-                epochs_[rank.allowed], rank.time, rank.decided, now);
+                epochs_[rank.allowed], epochs_[rank.allowed].own[r], rank.time, rank.decided, now);
       rank.time = now;
       rank.ended = 0;
       if (rank.allowed + 1 == epochs_.size()) {

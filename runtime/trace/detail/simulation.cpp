@@ -120,27 +120,44 @@ ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::ui
           sent * overhead};
 }
 
-double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch) {
-  double work = 0;
-  for (const StepIndex::Rank& rank : index.ranks)
-    work = std::max(work, stage.timeline.self(rank.check[epoch.source]));
-  if (stage.machine.typical || stage.machine.quantile > 0) {
-    std::vector<float> all;  // of the step: there are few
-    for (const StepIndex::Rank& rank : index.ranks)
-      for (const Place check : rank.check)
-        if (check.exists()) all.push_back(static_cast<float>(stage.timeline.self(check)));
-    if (!all.empty() && stage.machine.quantile > 0)
-      work = static_cast<double>(quantile_of(all, stage.machine.quantile));
-    else if (!all.empty())
-      work = std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
-  }
-  return work / stage.speed_of(kind_check);
+namespace {
+
+/// `work`, or what the machine takes instead of a noisy recording, of all like it in the step: there are few.
+double usual(const Stage& stage, double work, std::span<const std::vector<Place>* const> alike) {
+  if (!stage.machine.typical && stage.machine.quantile == 0) return work;
+  std::vector<float> all;
+  for (const std::vector<Place>* places : alike)
+    for (const Place place : *places)
+      if (place.exists()) all.push_back(static_cast<float>(stage.timeline.self(place)));
+  if (all.empty()) return work;
+  if (stage.machine.quantile > 0) return static_cast<double>(quantile_of(all, stage.machine.quantile));
+  return std::min(work, 3 * static_cast<double>(quantile_of(all, 0.5)));
 }
 
-void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double begin,
-               double decided, double end) {
+}  // namespace
+
+double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch) {
+  double work = 0;
+  std::vector<const std::vector<Place>*> checks;
+  for (const StepIndex::Rank& rank : index.ranks) {
+    work = std::max(work, stage.timeline.self(rank.check[epoch.source]));
+    checks.push_back(&rank.check);
+  }
+  return usual(stage, work, checks) / stage.speed_of(kind_check);
+}
+
+double alone_work(const Stage& stage, const StepIndex& index, std::size_t source, std::size_t e) {
+  const std::vector<Place>& alone = index.ranks[source].alone;
+  const std::vector<Place>* const alike[] = {&alone};
+  return usual(stage, stage.timeline.self(alone[e]), alike) /
+         stage.speed_of(stage.timeline.record(alone[e]).kind());
+}
+
+void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double own,
+               double begin, double decided, double end) {
   const double waited = end - decided - epoch.whole, from = end - epoch.whole;
   stage.log.task(worker, begin, end, waited, epoch.settles ? check_settles : 0, number, kind_check);
+  if (own > 0) stage.log.span(worker, begin, begin + own, 0, -1, epoch.own_kind);
   if (waited > 0) stage.log.span(worker, decided, from, 0, number, kind_collective);
   for (const SimEpoch::Span& span : epoch.spans)
     stage.log.span(worker, from + span.begin, from + span.end, span.meetings, -1, span.kind);

@@ -91,8 +91,9 @@ struct SimEpoch {
   };
   double whole = 0, meetings = 0;
   std::vector<Span> spans{};
-  std::vector<double> own{};  ///< [ns] per rank: what each does alone before that, beside check_work
-  bool exchange = false;      ///< copies are glued
+  std::vector<double> own{};  ///< [ns] per rank: what each does for its own part before that
+  Kind own_kind{};
+  bool exchange = false;  ///< copies are glued
   std::size_t exchanges_before = 0;
   std::size_t reads_before = 0, posts_before = 0;
 };
@@ -136,9 +137,12 @@ struct ExchangeWork {
 ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node);
 /// Work of the decision behind an epoch. [ns]
 double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch);
-/// The decision of a worker's rank: it began, had done its own part, and was known, with all that follows.
-void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double begin,
-               double decided, double end);
+/// What recorded rank `source` did for its own part in the check of recorded epoch `e`. [ns]
+double alone_work(const Stage& stage, const StepIndex& index, std::size_t source, std::size_t e);
+/// The decision of a worker's rank: it began, had done its own part, `own` of it first, and was known, with
+/// all that follows.
+void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double own,
+               double begin, double decided, double end);
 
 /// Things that happen, in order of time, then of their making.
 struct Event {
