@@ -144,6 +144,26 @@ TEST_F(TraceCommand, OfOneRankHoldsTheCallsThatSeveralMake) {
   EXPECT_GE(cutting.size(), 1u);
 }
 
+// What a rank adds up in a check grows with its chunks: replay must be able to tell it from the rest.
+TEST_F(TraceCommand, HoldsWhatEachCheckAddsUp) {
+  for (const int threads : {1, 2}) {
+    const trace::Trace trace = io::read_trace(folder_ / recorded("sums" + std::to_string(threads), threads));
+    const trace::Timeline timeline(trace);
+    int checks = 0;
+    for (const std::uint32_t step : timeline.steps()) {
+      const trace::StepIndex::Rank rank = timeline.index(step).ranks[0];
+      for (std::size_t e = 0; e < rank.epochs; ++e) {
+        if (!rank.check[e].exists()) continue;
+        ++checks;
+        ASSERT_TRUE(rank.alone[e].exists()) << "step " << step << ", epoch " << e;
+        EXPECT_EQ(trace.info(timeline.record(rank.alone[e]).kind()).name, "sums");
+        EXPECT_LE(timeline.record(rank.alone[e]).end(), timeline.record(rank.check[e]).end());
+      }
+    }
+    EXPECT_GT(checks, 5);
+  }
+}
+
 TEST_F(TraceCommand, HoldsTheStepsAskedFor) {
   const std::string trace = recorded("some", 1, "--trace-steps 2:3");
   EXPECT_NE(talus("trace show " + trace).output.find("1 threads, 2 steps"), std::string::npos);
