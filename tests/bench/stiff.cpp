@@ -254,7 +254,7 @@ void run_plate(const Packing& packing, int subdomains, int steps, SolverMethod m
 }
 
 /// One step of the whole program with a column, cut in slices.
-void run_column(int grains, double top, int subdomains) {
+void run_column(int grains, double top, int subdomains, const SolverSettings& solver) {
   const Scene scene = column_scene(grains, top);
   Setup setup;
   setup.walls = scene.sample.walls;
@@ -265,7 +265,7 @@ void run_column(int grains, double top, int subdomains) {
   stage.law = {mu, mu, 0};
   stage.end.steps = 1;
   setup.stages = {stage};
-  setup.solver.max_iterations = 2000;
+  setup.solver = solver;
   setup.decomposition.subdomains = subdomains;
   graph::Executor executor({.threads = 1});
   Bodies bodies = scene.sample.bodies;
@@ -291,10 +291,11 @@ void run_column(int grains, double top, int subdomains) {
   }
   const double due = gravity * std::accumulate(mass.begin(), mass.end(), 0.0);
   fmt::print(
-      "column of {}, top {:g}, one step, {:>2} subdomains: {:>5} sweeps, unbalance {:.1e}, admm {} x ({} it, "
-      "{} cg), {:.2f} s{}, force error {:.1e}\n",
-      grains, top, subdomains, report.iterations, r.unbalance, r.stiff_calls, r.stiff.iterations,
-      r.stiff.linear_iterations, seconds, report.converged ? "" : " MISSED", error / due);
+      "column of {}, top {:g}, one step to {:.0e}, {:>2} subdomains: {:>5} sweeps, unbalance {:.1e}, admm {} "
+      "x "
+      "({} it, {} cg), {:.3f} s{}, force error {:.1e}\n",
+      grains, top, solver.tolerance, subdomains, report.iterations, r.unbalance, r.stiff_calls,
+      r.stiff.iterations, r.stiff.linear_iterations, seconds, report.converged ? "" : " MISSED", error / due);
 }
 
 void compare(const std::string& name, const Scene& scene, int sweeps,
@@ -346,8 +347,13 @@ int main(int argc, char** argv) {
     compare(fmt::format("column of {}, top {:g}", grains, top), scene, sweeps > 0 ? sweeps : 10000, chains,
             force);
   }
-  for (const double top : {1.0, 1e6})
-    for (const int subdomains : {1, 12, 96}) run_column(1000, top, subdomains);
+  SolverSettings by_default, strict;
+  by_default.max_iterations = strict.max_iterations = 2000;
+  strict.tolerance = 1e-8;
+  strict.balance_tolerance = 1e-5;
+  for (const SolverSettings& solver : {by_default, strict})
+    for (const double top : {1.0, 1e6})
+      for (const int subdomains : {1, 12, 96}) run_column(1000, top, subdomains, solver);
   if (argc < 2) return 0;
   const Packing packing = bench::read_packing(argv[1]);
   for (bool closed : {true, false}) {
