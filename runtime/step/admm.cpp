@@ -95,27 +95,19 @@ Admm::Admm(StepState& state, const StepParameters& parameters, const Decompositi
       ranks_(ranks),
       link_(std::make_unique<StepLink>(state, gluing, ranks, crew_, rounds_)) {}
 
-/// Outside of the loop's epochs, as parts of the step's tasks are: it is no node's.
 class Admm::Whole {
  public:
-  explicit Whole(const Admm& admm) : admm_(admm) {
-    trace::Recorder* const trace = admm.ranks_.trace();
-    if (!trace || !trace->active()) return;
-    trace_ = trace;
+  explicit Whole(const Admm& admm)
+      : admm_(admm), span_(admm.ranks_.trace(), kind_of(TaskKind::whole), 0, trace::Span::in_check) {
     admm.rounds_ = {};
-    begin_ = trace->now();
   }
-  ~Whole() {
-    if (trace_)
-      trace_->lane().add(begin_, trace_->now(), admm_.rounds_.packed(), -1, kind_of(TaskKind::whole));
-  }
+  ~Whole() { span_.set_node(admm_.rounds_.packed()); }
   Whole(const Whole&) = delete;
   Whole& operator=(const Whole&) = delete;
 
  private:
   const Admm& admm_;
-  trace::Recorder* trace_ = nullptr;
-  std::int64_t begin_ = 0;
+  trace::Span span_;
 };
 
 template <class Gathered, class Gather>

@@ -389,10 +389,9 @@ bool Iteration::measured(int epoch) {
   result_.iterations = sweeps_;
   measured_ = graph::seconds_now();
   const Decomposition& all = state_.decomposition;
-  trace::Recorder* const trace = ranks_.trace() && ranks_.trace()->active() ? ranks_.trace() : nullptr;
-  const std::int64_t from = trace ? trace->now() : 0;
+  trace::Span span(ranks_.trace(), kind_of(TaskKind::sums), 0, trace::Span::in_check);
   std::vector<double> rows = rows_of_subdomains();
-  if (trace) trace->lane().add(from, trace->now(), 0, -1, kind_of(TaskKind::sums));
+  span.end();
   std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
   for (std::int32_t rank : all.rank_of)
     lengths[static_cast<std::size_t>(rank)] += row_head + 3 * state_.walls.size();

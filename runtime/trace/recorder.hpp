@@ -119,22 +119,33 @@ class Recorder {
 /// Records the time from here to the end of the block; nothing without a recorder or when it does not record.
 class Span {
  public:
-  Span(Recorder* recorder, Kind kind, std::uint32_t node = 0)
-      : recorder_(recorder && recorder->active() ? recorder : nullptr), kind_(kind), node_(node) {
+  /// Parts of a check, like those of the step's tasks, are of no epoch: they are no node's.
+  enum Where { here, in_check };
+  Span(Recorder* recorder, Kind kind, std::uint32_t node = 0, Where where = here)
+      : recorder_(recorder && recorder->active() ? recorder : nullptr),
+        kind_(kind),
+        where_(where),
+        node_(node) {
     if (recorder_) begin_ = recorder_->now();
   }
   Span(const Span&) = delete;
   Span& operator=(const Span&) = delete;
   ~Span() { end(); }
+  /// What is known at its end only.
+  void set_node(std::uint32_t node) { node_ = node; }
   /// Ends it here.
   void end() {
-    if (recorder_) recorder_->lane().add_span(begin_, recorder_->now(), node_, kind_);
+    if (recorder_ && where_ == in_check)
+      recorder_->lane().add(begin_, recorder_->now(), node_, -1, kind_);
+    else if (recorder_)
+      recorder_->lane().add_span(begin_, recorder_->now(), node_, kind_);
     recorder_ = nullptr;
   }
 
  private:
   Recorder* recorder_;
   Kind kind_;
+  Where where_;
   std::uint32_t node_;
   std::int64_t begin_ = 0;
 };
