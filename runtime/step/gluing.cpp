@@ -184,9 +184,9 @@ void Gluing::plan_copies(std::size_t e) {
     const Slot slot = mine.shared[s];
     const auto latest_before = [&](int turn) {
       std::vector<CopySource> latest;
-      std::ranges::copy_if(copies, std::back_inserter(latest), [&](const CopySource& copy) {
-        return turn_of(e, copy) == latest_turn(e, s, turn);
-      });
+      const int before = latest_turn(e, s, turn);
+      std::ranges::copy_if(copies, std::back_inserter(latest),
+                           [&](const CopySource& copy) { return turn_of(e, copy) == before; });
       return latest;
     };
     if (!all.taken.empty() && all.taken[at(slot)] != 0) {

@@ -235,6 +235,33 @@ TEST(Recording, OfALoopHasEachNodeThatDoesSomethingOnce) {
   EXPECT_EQ(records[4].kind(), kind_check);
 }
 
+// One look at the clock a node, but for nodes that waited: waiting is no work.
+TEST(Recording, ANodeBeginsWhereTheLastOneEndedUnlessItWaited) {
+  std::vector<Record> records;
+  Recorder recorder({.sink = [&](Block&& block) { records = std::move(block.records); }});
+  Program program;
+  recorder.begin_step(1);
+  Traced traced(program, recorder, 0);
+  const auto let_time_pass = [&] {
+    for (const std::int64_t from = recorder.now(); recorder.now() < from + 2000;) continue;
+  };
+  traced.gate(0);
+  traced.node(0, 0);
+  let_time_pass();
+  traced.node(1, 0);
+  let_time_pass();
+  traced.about_to_wait();
+  traced.node(0, 0);
+  let_time_pass();
+  traced.gate(1);
+  traced.node(0, 1);
+  recorder.finish();
+  ASSERT_EQ(records.size(), 4u);
+  EXPECT_EQ(static_cast<double>(records[1].begin), records[0].end());
+  EXPECT_GE(static_cast<double>(records[2].begin), records[1].end() + 2000);
+  EXPECT_GE(static_cast<double>(records[3].begin), records[2].end() + 2000);
+}
+
 /// Beginnings of nodes, as they come.
 struct Beginnings {
   std::atomic<int> count{0};
