@@ -36,11 +36,12 @@ void go_abreast(std::vector<Turn>& turns) {
 }  // namespace
 
 LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool in_turns,
-                         bool overlap, int threads, int rank, int ranks) {
+                         bool overlap, int threads, int rank, const Tree& tree) {
   const auto subdomains = static_cast<std::uint32_t>(turn_of.size());
   // One after another as a whole, but where others wait for all publishes of a rank that has nothing else to
   // do in between.
-  const bool alone = ranks == 1, later = std::ranges::any_of(turn_of, [](char turn) { return turn > 0; });
+  const bool alone = tree.order.size() == 1,
+             later = std::ranges::any_of(turn_of, [](char turn) { return turn > 0; });
   const Phase behind =
       overlap && threads == 1 && (alone || later || !in_turns) ? first_turn : inside_of_first;
   std::vector<Turn> own;
@@ -74,7 +75,7 @@ LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char>
   LoopColours result{
       {colours.begin(), publishes}, {publishes, takes}, {takes, tells}, {tells, end}, colours.back(), {}};
   const std::uint32_t last_publish = subdomains > 0 ? *std::max_element(publishes, takes) : 0;
-  result.tree = tree::colours(rank, ranks, last_publish, result.glue);
+  result.tree = tree_colours(tree, rank, last_publish, result.glue);
   for (std::uint32_t e = 0; e < subdomains; ++e)
     if (turn_of[e] > 0) result.tree.up = std::min(result.tree.up, result.take[e] - 1);
   return result;

@@ -43,11 +43,11 @@ struct LoopColours {
   std::vector<std::uint32_t> take;     ///< per subdomain, before its border; means nothing in the first turn
   std::vector<std::uint32_t> tell;     ///< per subdomain: when it tells the centre; publish in the first turn
   std::uint32_t glue = 0;              ///< behind everything, or before all insides without overlap
-  tree::Colours tree;                  ///< of what the rank does for the tree of ranks
+  TreeColours tree;                    ///< of what the rank does for the tree of ranks
 };
 /// `turn_of`: per subdomain of the rank. `in_turns`: some subdomain of any rank has a later turn than the
 /// first.
 LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool in_turns,
-                         bool overlap, int threads, int rank, int ranks);
+                         bool overlap, int threads, int rank, const Tree& tree);
 
 }  // namespace talus::graph

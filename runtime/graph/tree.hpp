@@ -1,58 +1,43 @@
 #pragma once
 
-/// Ranks as a tree, for what all tell rank 0 in every iteration and hear back from it. With a message that
-/// costs a rank 0.3 us and takes 1.5 us (LogP: Culler et al. 1993), six children a rank bring 96 ranks
-/// together in 11 us, where rank 0 alone would spend 29 us on taking 95 messages.
+/// Ranks as a tree, for what all tell one of them, the top, in every iteration and hear back from it.
 
-#include <algorithm>
 #include <cstdint>
+#include <span>
+#include <vector>
 
-namespace talus::graph::tree {
+namespace talus::graph {
 
-inline constexpr int children_of_a_rank = 6;
+struct Tree {
+  std::vector<int> parent;                 ///< per rank; -1 of the top
+  std::vector<std::vector<int>> children;  ///< per rank, in the order in which they are told
+  std::vector<int> told;                   ///< per rank: when what goes down reaches it, in messages' costs
+  std::vector<int> order;                  ///< of all ranks, parents before their children
 
-/// Of a rank above 0.
-constexpr int parent(int rank) {
-  return (rank - 1) / children_of_a_rank;
-}
-/// Children are first_child(rank) ... end_of_children(rank, ranks) - 1.
-constexpr int first_child(int rank) {
-  return children_of_a_rank * rank + 1;
-}
-constexpr int end_of_children(int rank, int ranks) {
-  return std::min(first_child(rank) + children_of_a_rank, ranks);
-}
-/// Has both a parent and children.
-constexpr bool relays(int rank, int ranks) {
-  return rank > 0 && first_child(rank) < ranks;
-}
-constexpr int depth(int rank) {
-  int depth = 0;
-  for (; rank > 0; rank = parent(rank)) ++depth;
-  return depth;
-}
-/// The child of `top` that `rank` is or hangs on; -1 when it does not hang on `top`.
-constexpr int branch(int rank, int top) {
-  while (rank > top && parent(rank) != top) rank = parent(rank);
-  return rank > top ? rank : -1;
-}
+  int top() const { return order.front(); }
+  int last() const { return told[static_cast<std::size_t>(order.back())]; }
+  bool leaf(int rank) const { return children[static_cast<std::size_t>(rank)].empty(); }
+  /// Has both a parent and children.
+  bool relays(int rank) const { return rank != top() && !leaf(rank); }
+};
+
+/// What a neighbour costs a rank beside its contacts, in contacts of 6 ns: a message there and one back, and
+/// the gluing of what they hold.
+inline constexpr std::uint64_t load_of_neighbour = 200;
+
+/// `load`: work of each rank in an iteration, in contacts; at least one rank. Each rank in turn, the one with
+/// the least work first, hangs on the one that can tell it soonest, where a message costs a rank 0.3 us and
+/// takes 1.5 us (LogP: Culler et al. 1993; Karp et al. 1993, their best broadcast): 96 ranks are told within
+/// 8 us, where one rank would spend 29 us on 95 messages. So those that hand on are those that have time for
+/// it.
+Tree grow_tree(std::span<const std::uint64_t> load);
 
 /// Colours of a rank's two parts in the loop, between those of publish and of glue: the way up is spread over
 /// the first half of the inner chunks (relays near the leaves first), the way down over the second, so that
 /// both are hidden. Chunks have even colours, these odd ones. `up` is of relays.
-struct Colours {
+struct TreeColours {
   std::uint32_t up = 0, down = 0;
 };
-constexpr Colours colours(int rank, int ranks, std::uint32_t publish, std::uint32_t glue) {
-  const std::uint32_t inner = (glue - publish) / 2 - 1;
-  const auto at = [&](int part, int whole) {
-    return std::min(
-        publish + 2 * (inner * static_cast<std::uint32_t>(part) / static_cast<std::uint32_t>(whole)) + 3,
-        glue - 1);
-  };
-  const int levels = std::max(1, depth(ranks - 1)), level = depth(rank);
-  const bool leaf = rank > 0 && !relays(rank, ranks);
-  return {at(std::max(0, levels - level), 2 * levels), leaf ? glue - 1 : at(levels + level, 2 * levels)};
-}
+TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t publish, std::uint32_t glue);
 
-}  // namespace talus::graph::tree
+}  // namespace talus::graph

@@ -107,8 +107,6 @@ void Gluing::plan(bool rotation) {
       for (const Side& back : subdomains_[at(side.local)].sides)
         if (back.local == e) side.source = detail::bytes_of(back.link.out);
     }
-  plan_centre();
-  count_messages();
 }
 
 int Gluing::turn(std::size_t e) const {

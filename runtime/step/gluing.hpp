@@ -9,6 +9,7 @@
 
 #include "kernels/body_problem.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/graph/tree.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/trace/trace.hpp"
 
@@ -30,7 +31,7 @@ struct JumpSums {
 /// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in tasks:
 ///
 ///   publish[e]   after the boundary chunks of subdomain e: its interface velocities leave
-///   collect      on ranks between rank 0 and the leaves of the tree: what came from below goes up
+///   collect      on ranks between the top and the leaves of the tree of ranks: what came from below goes up
 ///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >=
 ///   9, or 33 with turns,
 ///                always, so that k copies cost O(k) messages)
@@ -61,6 +62,10 @@ class Gluing {
 
   /// Collective, after the candidates were distributed: buffers and channels for these interfaces.
   void plan(bool rotation);
+  /// Collective, behind plan(), when the contacts are known: the tree of ranks, and its channels. `load`: of
+  /// this rank's chunks, in contacts.
+  void plan_tree(std::uint64_t load);
+  const graph::Tree& tree() const { return tree_; }
   /// Collective, in every step before its sweeps: the copies of the walls.
   void begin();
 
@@ -120,7 +125,6 @@ class Gluing {
   std::span<const CopySource> copies_of(std::size_t e, std::size_t s) const;
   int turn_of(std::size_t e, const CopySource& copy) const;
   int latest_turn(std::size_t e, std::size_t s, int before) const;
-  void plan_centre();
   void count_messages();
   template <class Which>
   void await_messages(std::size_t e, const Which& which);
@@ -147,6 +151,7 @@ class Gluing {
   std::vector<std::int32_t> walls_;
   std::vector<Subdomain> subdomains_;  ///< per subdomain here
   std::vector<std::uint32_t> followers_;
+  graph::Tree tree_;
   std::unique_ptr<Centre> centre_;
   std::vector<JumpSums> jumps_;
   MessageCount messages_;

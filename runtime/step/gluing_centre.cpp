@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "runtime/graph/tree.hpp"
 #include "runtime/step/detail/gluing_parts.hpp"
 
 namespace talus {
@@ -14,8 +13,11 @@ using detail::centre_tag;
 using detail::Link;
 using detail::start;
 
-void Gluing::plan_centre() {
+void Gluing::plan_tree(std::uint64_t load) {
   const Decomposition& all = state_.decomposition;
+  for (const Subdomain& subdomain : subdomains_) load += graph::load_of_neighbour * subdomain.sides.size();
+  tree_ = graph::grow_tree(ranks_.gather_records(std::span<const std::uint64_t>(&load, 1)));
+  if (!needed_) return;
   /// A body that goes through the centre, as a subdomain names it.
   struct HubRecord {
     std::int64_t subdomain;
@@ -45,8 +47,19 @@ void Gluing::plan_centre() {
     return static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
   };
   const int me = ranks_.rank(), ranks = ranks_.ranks();
-  const std::vector<std::int64_t> items =
-      items_of([&](std::int32_t rank) { return rank == me || graph::tree::branch(rank, me) >= 0; });
+  const std::vector<int>& children = tree_.children[at(me)];
+  /// Ranks that hang on `top`, itself among them: 1.
+  const auto branch_of = [&](int top) {
+    std::vector<char> branch(static_cast<std::size_t>(ranks), 0);
+    for (const int rank : tree_.order)
+      branch[at(rank)] = rank == top || (rank != tree_.top() && branch[at(tree_.parent[at(rank)])] != 0);
+    return branch;
+  };
+  const auto items_below = [&](int top) {
+    const std::vector<char> branch = branch_of(top);
+    return items_of([&](std::int32_t rank) { return branch[at(rank)] != 0; });
+  };
+  const std::vector<std::int64_t> items = items_below(me);
   const std::size_t at_walls = 3 * walls_.size();
   centre_ = std::make_unique<Centre>();
   Centre& centre = *centre_;
@@ -64,55 +77,55 @@ void Gluing::plan_centre() {
   if (ranks > 1 && (at_walls > 0 || !everywhere.empty())) {
     const auto length_of_branch = [&](int top) {
       std::size_t sum = 0;
-      for (int rank = top; rank < ranks; ++rank)
-        if (rank == top || graph::tree::branch(rank, top) >= 0) sum += length_of_rank[at(rank)];
+      const std::vector<char> branch = branch_of(top);
+      for (int rank = 0; rank < ranks; ++rank)
+        if (branch[at(rank)] != 0) sum += length_of_rank[at(rank)];
       return sum;
     };
-    // A message is named after the first subdomain of the lower rank; the upper one speaks for the centre.
-    const auto open = [&](int other, std::size_t out, std::size_t in) {
+    // A message is named after the first subdomain of the child; its parent speaks for the centre.
+    const auto open = [&](int other, int child, std::size_t out, std::size_t in) {
       auto link = std::make_unique<Link>();
       link->out.resize(out + 1);
       link->in.resize(in + 1);
       link->sender = ranks_.open_send(other, centre_tag, link->out);
       link->receiver = ranks_.open_receive(other, centre_tag, link->in);
-      const auto first = static_cast<std::uint32_t>(
-          std::find(all.rank_of.begin(), all.rank_of.end(), std::max(me, other)) - all.rank_of.begin());
+      const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), child) -
+                                                    all.rank_of.begin());
       link->out_name = trace::message_name(first, trace::centre_group);
       link->in_name = trace::message_name(trace::centre_group, first);
-      if (other > me) std::swap(link->out_name, link->in_name);
+      if (me != child) std::swap(link->out_name, link->in_name);
       link->receiver->start();
       return link;
     };
-    for (int child = graph::tree::first_child(me); child < graph::tree::end_of_children(me, ranks); ++child) {
+    for (const int child : children) {
       std::vector<std::size_t>& wanted = centre.items_of_child.emplace_back();
-      for (std::int64_t id : items_of(
-               [&](std::int32_t rank) { return rank == child || graph::tree::branch(rank, child) >= 0; }))
-        wanted.push_back(place(items, id));
-      centre.links.push_back(open(child, at_walls + wanted.size() * width_, length_of_branch(child)));
+      for (std::int64_t id : items_below(child)) wanted.push_back(place(items, id));
+      centre.links.push_back(open(child, child, at_walls + wanted.size() * width_, length_of_branch(child)));
     }
-    if (me > 0) centre.up = open(graph::tree::parent(me), length_of_branch(me), centre.sums.size());
+    if (me != tree_.top())
+      centre.up = open(tree_.parent[at(me)], me, length_of_branch(me), centre.sums.size());
   }
-  if (me > 0) return;
-  // Where the parts of each rank begin in the message of its branch.
-  std::vector<std::size_t> begin(static_cast<std::size_t>(ranks), 0);
-  const auto lay_out = [&](const auto& self, int rank, std::size_t from) -> std::size_t {
-    begin[at(rank)] = from;
+  count_messages();
+  if (me != tree_.top()) return;
+  // Where the parts of each rank come: the message of its branch, and where in it.
+  std::vector<const double*> parts(static_cast<std::size_t>(ranks), nullptr);
+  const auto lay_out = [&](const auto& self, int rank, const double* from) -> const double* {
+    parts[at(rank)] = from;
     from += length_of_rank[at(rank)];
-    for (int child = graph::tree::first_child(rank); child < graph::tree::end_of_children(rank, ranks);
-         ++child)
-      from = self(self, child, from);
+    for (const int child : tree_.children[at(rank)]) from = self(self, child, from);
     return from;
   };
-  for (int child = 1; child < graph::tree::end_of_children(0, ranks); ++child) lay_out(lay_out, child, 0);
+  for (std::size_t child = 0; child < centre.links.size(); ++child)
+    lay_out(lay_out, children[child], centre.links[child]->in.data());
   for (std::size_t e = 0; e < length.size(); ++e) {
     Centre::Contribution contribution;
     const std::int32_t rank = all.rank_of[e];
-    if (rank == 0) {
+    if (rank == me) {
       const auto local = std::lower_bound(all.here.begin(), all.here.end(), static_cast<std::int32_t>(e));
       contribution.partial = subdomains_[static_cast<std::size_t>(local - all.here.begin())].partial.data();
-    } else if (!centre.links.empty()) {
-      contribution.partial = centre.links[at(graph::tree::branch(rank, 0) - 1)]->in.data() + begin[at(rank)];
-      begin[at(rank)] += length[e];
+    } else if (const double*& from = parts[at(rank)]) {
+      contribution.partial = from;
+      from += length[e];
     }
     for (const HubRecord& record : everywhere)
       if (record.subdomain == static_cast<std::int64_t>(e))

@@ -65,6 +65,13 @@ void Iteration::plan() {
   busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);
 }
 
+void Iteration::plan_tree() {
+  std::uint64_t load = 0;
+  for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+    load += 1 + static_cast<std::uint64_t>(state_.contacts.count[c]);
+  gluing_.plan_tree(load);
+}
+
 void Iteration::begin() {
   const Chunks& chunks = state_.chunks;
   for (WallState& wall : state_.wall_states) {

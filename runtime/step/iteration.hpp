@@ -81,6 +81,8 @@ class Iteration {
 
   /// Collective, after the candidates were distributed.
   void plan();
+  /// Collective, behind plan() and the first narrow phase, before begin().
+  void plan_tree();
 
   const Gluing& gluing() const { return gluing_; }
   const SweepKernels& kernels() const { return kernels_; }

@@ -308,6 +308,7 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
 
 void StepGraph::plan_iteration() {
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
+  if (!planned_) iteration_.plan_tree();
   iteration_.begin();
   if (!planned_) plan_epochs();
   followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));
@@ -351,7 +352,7 @@ void StepGraph::plan_epochs() {
                      static_cast<std::uint32_t>(chunks.colour[c])});
   const graph::LoopColours colours =
       graph::loop_colours(turns, turn, state_.decomposition.in_turns(), decomposition_.overlap,
-                          executor_.threads(), ranks_.rank(), ranks_.ranks());
+                          executor_.threads(), ranks_.rank(), gluing.tree());
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);

@@ -12,7 +12,14 @@ constexpr double no_wait = 300;
 
 class Walker {
  public:
-  Walker(const Timeline& timeline, const StepIndex& index) : timeline_(timeline), index_(index) {}
+  Walker(const Timeline& timeline, const StepIndex& index) : timeline_(timeline), index_(index) {
+    std::vector<std::uint64_t> load(index.ranks.size(), 0);
+    for (std::size_t r = 0; r < index.ranks.size(); ++r)
+      if (index.ranks[r].plan)
+        add_load(
+            *index.ranks[r].plan, [&](std::uint32_t) { return r; }, load);
+    tree_ = graph::grow_tree(load);
+  }
 
   std::vector<PathHop> walk() {
     std::vector<PathHop> path;
@@ -149,15 +156,15 @@ class Walker {
     const std::uint32_t from = received.node >> 16, to = received.node & 0xffffU;
     const auto epoch = static_cast<std::size_t>(received.epoch);
     Place best;
-    // What goes down the tree is named after the lower rank, and its parent sends it.
+    // What goes down the tree is named after the rank that takes it, and its parent sends it.
     const auto has = [](const StepIndex::Rank& rank, std::uint32_t group) {
       return rank.plan &&
              std::find(rank.plan->group.begin(), rank.plan->group.end(), group) != rank.plan->group.end();
     };
     const StepIndex::Rank* speaks = nullptr;
-    for (std::size_t r = 1; r < index_.ranks.size() && from == centre_group; ++r)
-      if (has(index_.ranks[r], to))
-        speaks = &index_.ranks[static_cast<std::size_t>(graph::tree::parent(static_cast<int>(r)))];
+    for (std::size_t r = 0; r < index_.ranks.size() && from == centre_group; ++r)
+      if (tree_.parent[r] >= 0 && has(index_.ranks[r], to))
+        speaks = &index_.ranks[static_cast<std::size_t>(tree_.parent[r])];
     for (const StepIndex::Rank& rank : index_.ranks) {
       if (!rank.plan || epoch >= rank.epochs) continue;
       if (from == centre_group ? &rank != speaks : !has(rank, from)) continue;
@@ -201,6 +208,7 @@ class Walker {
 
   const Timeline& timeline_;
   const StepIndex& index_;
+  graph::Tree tree_;  ///< of the ranks
 };
 
 }  // namespace

@@ -35,6 +35,7 @@ class Builder {
 
   LoopLayout build() {
     find_group_nodes();
+    grow_tree();
     for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) add_rank(r);
     out_.rank_begin.push_back(static_cast<std::uint32_t>(out_.nodes.size()));
     connect();
@@ -64,6 +65,22 @@ class Builder {
     if (at == groups_.end() || *at != group)
       throw TraceError(fmt::format("no plan has a subdomain {}", group));
     return static_cast<std::size_t>(at - groups_.begin());
+  }
+
+  void grow_tree() {
+    std::vector<std::uint64_t> load(static_cast<std::size_t>(machine_.ranks), 0);
+    for (const Plan* plan : plans_) {
+      for (const Message& message : plan->messages) has_centre_ = has_centre_ || message.to == centre_group;
+      add_load(
+          *plan, [&](std::uint32_t group) { return rank_of_[place_of(group)]; }, load);
+    }
+    out_.tree = graph::grow_tree(load);
+    std::fill(load.begin(), load.end(), 0);
+    load.resize(plans_.size());
+    for (std::size_t s = 0; s < plans_.size(); ++s)
+      add_load(
+          *plans_[s], [&](std::uint32_t) { return s; }, load);
+    recorded_top_ = static_cast<std::size_t>(graph::grow_tree(load).top());
   }
 
   void find_group_nodes() {
@@ -120,9 +137,8 @@ class Builder {
       while (groups_[mine[at]] != node.group) ++at;
       turns.push_back({side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
-    graph::LoopColours colours =
-        graph::loop_colours(turns, turn_of, in_turns_, overlap_, machine_.threads,
-                            static_cast<int>(out_.rank_begin.size()) - 1, machine_.ranks);
+    graph::LoopColours colours = graph::loop_colours(turns, turn_of, in_turns_, overlap_, machine_.threads,
+                                                     static_cast<int>(out_.rank_begin.size()) - 1, out_.tree);
     for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
   }
@@ -183,13 +199,12 @@ class Builder {
     centre_.push_back(none);
     collect_.push_back(none);
     if (!glued) return;
-    const int own = static_cast<int>(rank);
     const auto add = [&](std::uint32_t colour) {
       out_.nodes.push_back(centre_node(rank, colour));
       out_.nodes.back().worker = worker(0);
       return static_cast<std::uint32_t>(out_.nodes.size() - 1);
     };
-    if (graph::tree::relays(own, machine_.ranks)) collect_.back() = add(colours.tree.up);
+    if (has_centre_ && out_.tree.relays(static_cast<int>(rank))) collect_.back() = add(colours.tree.up);
     centre_.back() = add(colours.tree.down);
     for (std::size_t g : mine) {
       if (group_[g].glue == none) continue;
@@ -214,11 +229,12 @@ class Builder {
     }
   }
 
-  /// Rank 0 is the centre; the others hand on what goes up and down, and work no more than that.
+  /// The top is the centre; the others hand on what goes up and down, and work no more than that.
   SimNode centre_node(std::uint32_t rank, std::uint32_t colour) const {
-    const std::size_t recorded = rank > 0 && plans_.size() > 1 ? 1 : 0;
+    const bool top = static_cast<int>(rank) == out_.tree.top();
+    const std::size_t recorded = top || plans_.size() == 1 ? recorded_top_ : recorded_top_ == 0 ? 1 : 0;
     SimNode node{-1, 0, Role::centre, centre_group, rank, 0, colour};
-    node.waits_only = rank > 0 && recorded == 0;
+    node.waits_only = !top && recorded == recorded_top_;
     const Plan& plan = *plans_[recorded];
     for (std::uint32_t n = 0; n < plan.size(); ++n)
       if (static_cast<Role>(plan.role[n]) == Role::centre) {
@@ -318,9 +334,10 @@ class Builder {
         }
       }
     out_.to_centre.resize(ranks);
-    // A message of the tree holds those of the whole branch. Children have higher numbers than their parents.
-    for (std::size_t r = ranks; r-- > 1;) {
-      const auto parent = static_cast<std::size_t>(graph::tree::parent(static_cast<int>(r)));
+    // A message of the tree holds those of the whole branch.
+    for (std::size_t k = ranks; k-- > 1;) {
+      const auto r = static_cast<std::size_t>(out_.tree.order[k]),
+                 parent = static_cast<std::size_t>(out_.tree.parent[r]);
       up[parent] += up[r];
       down[parent] += down[r];
       if (up[r] == 0 || centre_[r] == none || centre_[parent] == none) continue;
@@ -330,7 +347,7 @@ class Builder {
         return static_cast<std::uint32_t>(std::min<std::uint64_t>(bytes, none));
       };
       const SimMessage message{collect_[r] == none ? centre_[r] : collect_[r],
-                               parent == 0 ? centre_[0] : collect_[parent], named(up[r]),
+                               collect_[parent] == none ? centre_[parent] : collect_[parent], named(up[r]),
                                message_name(groups_[first], centre_group)};
       if (collect_[r] == none)
         out_.to_centre[r] = message;
@@ -397,8 +414,10 @@ class Builder {
   std::vector<Group> group_;            ///< like groups_
   bool in_turns_ = false;               ///< some group has a later turn than the first
   bool overlap_ = true;                 ///< glue comes behind the chunks inside
+  bool has_centre_ = false;             ///< something goes through it
+  std::size_t recorded_top_ = 0;        ///< the rank that was the centre
   std::vector<std::uint32_t> centre_;   ///< per rank
-  std::vector<std::uint32_t> collect_;  ///< per rank; none unless it is between rank 0 and the leaves
+  std::vector<std::uint32_t> collect_;  ///< per rank; none unless it is between the top and the leaves
   LoopLayout out_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "runtime/graph/tree.hpp"
 #include "runtime/trace/replay.hpp"
 
 namespace talus::trace {
@@ -32,6 +33,7 @@ struct SimMessage {
 /// The loop of one plan on all ranks. n nodes, rank by rank.
 struct LoopLayout {
   std::vector<SimNode> nodes;
+  graph::Tree tree;                              ///< of the ranks
   std::vector<std::uint32_t> rank_begin;         ///< ranks + 1
   std::vector<std::uint32_t> offset, neighbour;  ///< n + 1; conflicting nodes, of the same rank
   std::vector<std::uint32_t> walk_begin, walk;   ///< per worker: its nodes by (colour, index)

@@ -6,7 +6,6 @@
 #include <map>
 #include <numeric>
 
-#include "runtime/graph/tree.hpp"
 #include "runtime/trace/detail/simulation.hpp"
 
 namespace talus::trace {
@@ -340,11 +339,16 @@ class Player {
       if (node.role != Role::centre) messages[node.rank] += count;
       tree = tree || (node.role == Role::centre && count > 0);
     }
-    const double overhead = stage_.network.overhead(), most = *std::ranges::max_element(messages);
-    const int children = std::min(graph::tree::children_of_a_rank, machine_.ranks - 1),
-              levels = tree ? 2 * graph::tree::depth(machine_.ranks - 1) : 0;
-    return most * overhead + std::max(1, levels) * stage_.network.latency() +
-           levels * (children + 1) * overhead;
+    const double overhead = stage_.network.overhead(), latency = stage_.network.latency(),
+                 most = *std::ranges::max_element(messages);
+    std::vector<double> told(ranks, 0);
+    for (const int rank : layout_.tree.order) {
+      double at = told[static_cast<std::size_t>(rank)];
+      for (const int child : layout_.tree.children[static_cast<std::size_t>(rank)])
+        told[static_cast<std::size_t>(child)] = (at += overhead) + latency + overhead;
+    }
+    const double there_and_back = tree ? 2 * *std::ranges::max_element(told) : 0;
+    return most * overhead + std::max(latency, there_and_back);
   }
 
   static bool next_reads(const StepIndex::Rank& recorded, std::size_t epoch) {

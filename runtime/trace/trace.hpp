@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/tree.hpp"
+
 namespace talus::trace {
 
 /// Place of a kind in Trace::kinds.
@@ -88,7 +90,7 @@ inline std::uint32_t pack(std::uint32_t step, Kind kind) {
 enum class Role : std::uint8_t {
   compute,  ///< nothing
   publish,  ///< sends what its group shows to others
-  centre,   ///< of a rank: what goes through rank 0; before it, on ranks between, what goes up to it
+  centre,   ///< of a rank: what goes through one rank; before it, on ranks between, what goes up to it
   glue,     ///< takes what others have published
   take,  ///< of a group whose turn is not 0, before its border: takes what those of earlier turns published
   tell,  ///< of such a group: its part for the centre leaves, that of others with their publish
@@ -128,6 +130,17 @@ struct Plan {
     return std::span(neighbour).subspan(offset[node], offset[node + 1] - offset[node]);
   }
 };
+
+/// Adds what the plan's groups have to do in an iteration, as graph::grow_tree() wants it, to the load of the
+/// rank that each is on: rank_of(group).
+template <class RankOf>
+void add_load(const Plan& plan, const RankOf& rank_of, std::span<std::uint64_t> load) {
+  for (std::size_t n = 0; n < plan.size(); ++n)
+    if (plan.group[n] != centre_group) load[rank_of(plan.group[n])] += plan.weight[n];
+  for (const Message& message : plan.messages)
+    if (message.from != centre_group && message.to != centre_group)
+      load[rank_of(message.from)] += graph::load_of_neighbour;
+}
 
 /// A task of every step of one rank.
 struct Task {

@@ -90,20 +90,20 @@ struct Gluing::Subdomain {
   double waited = 0;
 };
 
-/// The one rank through which some velocities go is rank 0; messages to and from it go over a tree of ranks
-/// (runtime/graph/tree.hpp). A message up holds the parts of a rank's own subdomains, then its children's
-/// messages: nothing is added up on the way, so that the sums on rank 0 are the same on any ranks.
+/// The one rank through which some velocities go is the top of a tree of ranks (runtime/graph/tree.hpp). A
+/// message up holds the parts of a rank's own subdomains, then its children's messages: nothing is added up
+/// on the way, so that the sums on the top are the same on any ranks.
 struct Gluing::Centre {
   struct Contribution {
     const double* partial = nullptr;
     std::vector<std::size_t> item;  ///< per hub of the subdomain
   };
-  std::vector<Contribution> contributions;  ///< rank 0: of every subdomain, in order
+  std::vector<Contribution> contributions;  ///< the top: of every subdomain, in order
   std::vector<double> sums;  ///< 3 per wall, then width per item that this rank or one below it asks for
   std::vector<std::unique_ptr<detail::Link>> links;      ///< per child
   std::vector<std::vector<std::size_t>> items_of_child;  ///< per child: what its branch asks for
   std::atomic<std::size_t> published{0};                 ///< leaves: subdomains whose part is ready
-  std::unique_ptr<detail::Link> up;                      ///< to the parent; null on rank 0
+  std::unique_ptr<detail::Link> up;                      ///< to the parent; null on the top
   double waited = 0;
 };
 

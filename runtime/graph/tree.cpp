@@ -1,0 +1,60 @@
+#include "runtime/graph/tree.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <queue>
+#include <stdexcept>
+#include <utility>
+
+namespace talus::graph {
+
+namespace {
+
+/// From when a message is begun until it can be handed on, in what a message costs a rank.
+constexpr int under_way = 7;
+/// 16 messages there and back are what the ranks with the least work have time for.
+constexpr std::size_t most_children = 8;
+
+}  // namespace
+
+Tree grow_tree(std::span<const std::uint64_t> load) {
+  if (load.empty()) throw std::invalid_argument("a tree of no ranks");
+  const std::size_t ranks = load.size();
+  Tree tree{std::vector<int>(ranks, -1), std::vector<std::vector<int>>(ranks), std::vector<int>(ranks, 0),
+            std::vector<int>(ranks)};
+  std::iota(tree.order.begin(), tree.order.end(), 0);
+  std::ranges::stable_sort(tree.order, {}, [&](int rank) { return load[static_cast<std::size_t>(rank)]; });
+  /// When a rank can begin its next message, and its place in the order.
+  using Next = std::pair<int, std::size_t>;
+  std::priority_queue<Next, std::vector<Next>, std::greater<>> next;
+  next.push({0, 0});
+  for (std::size_t k = 1; k < ranks; ++k) {
+    const auto [free, place] = next.top();
+    next.pop();
+    const auto above = static_cast<std::size_t>(tree.order[place]),
+               own = static_cast<std::size_t>(tree.order[k]);
+    tree.parent[own] = static_cast<int>(above);
+    tree.children[above].push_back(static_cast<int>(own));
+    tree.told[own] = free + under_way;
+    if (tree.children[above].size() < most_children) next.push({free + 1, place});
+    next.push({free + under_way, k});
+  }
+  return tree;
+}
+
+TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t publish, std::uint32_t glue) {
+  const std::uint32_t inner = (glue - publish) / 2 - 1;
+  const int whole = std::max(1, tree.last()), at = tree.told[static_cast<std::size_t>(rank)];
+  const auto colour = [&](int part) {
+    return std::min(
+        publish +
+            2 * static_cast<std::uint32_t>(std::uint64_t{inner} * static_cast<std::uint64_t>(part) /
+                                           (2 * static_cast<std::uint64_t>(whole))) +
+            3,
+        glue - 1);
+  };
+  const bool last = rank != tree.top() && tree.leaf(rank);
+  return {colour(whole - at), last ? glue - 1 : colour(whole + at)};
+}
+
+}  // namespace talus::graph
