@@ -23,8 +23,7 @@ void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
       chunks.begin.push_back(group.begin + static_cast<std::int32_t>(part));
       chunks.wall.push_back(group.wall);
       chunks.subdomain.push_back(group.subdomain);
-      chunks.boundary.push_back(group.boundary ? 1 : 0);
-      chunks.late.push_back(group.boundary && group.late ? 1 : 0);
+      chunks.side.push_back(group.side);
     }
   }
   chunks.begin.push_back(groups.empty() ? 0 : groups.back().end);
@@ -122,19 +121,16 @@ void find_conflicts(const Incidence& incidence, Chunks& chunks) {
   }
 }
 
-/// Greedily: those at the boundary, those inside above them, and the late ones above all.
+/// Greedily, one side above the other.
 void colour_chunks(Chunks& chunks) {
   const std::size_t count = chunks.wall.size();
   chunks.colour.assign(count, -1);
   std::vector<std::uint32_t> taken_by(count + 1, ~0u);  // colour -> last chunk that found it taken
-  enum Turn { boundary, inside, late };
-  const auto turn_of = [&](std::size_t c) {
-    return chunks.boundary[c] == 0 ? inside : chunks.late[c] != 0 ? late : boundary;
-  };
-  for (const Turn turn : {boundary, inside, late}) {
+  using enum ChunkSide;
+  for (const ChunkSide side : {wall, border, inside, late}) {
     const std::int32_t lowest = chunks.colours;
     for (std::size_t c = 0; c < count; ++c) {
-      if (turn_of(c) != turn) continue;
+      if (chunks.side[c] != side) continue;
       for (auto k = chunks.conflict_begin[c]; k < chunks.conflict_begin[c + 1]; ++k) {
         const std::int32_t colour = chunks.colour[chunks.conflicts[index(k)]];
         if (colour >= 0) taken_by[index(colour)] = static_cast<std::uint32_t>(c);
@@ -197,12 +193,13 @@ std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates
   const auto grains = static_cast<std::int32_t>(candidates.grain_pairs.size());
   const auto all = static_cast<std::int32_t>(candidates.size());
   std::vector<CandidateGroup> groups;
-  if (grains > 0) groups.push_back({0, grains, -1, 0, false, target});
+  if (grains > 0) groups.push_back({0, grains, -1, 0, ChunkSide::inside, target});
   for (std::int32_t from = grains; from < all;) {
     const std::int32_t wall = candidates.wall_pairs[index(from - grains)].wall;
     std::int32_t to = from;
     while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall) ++to;
-    groups.push_back({from, to, wall, 0, !glued.empty() && glued[index(wall)] != 0, target});
+    const bool at_glued = !glued.empty() && glued[index(wall)] != 0;
+    groups.push_back({from, to, wall, 0, at_glued ? ChunkSide::wall : ChunkSide::inside, target});
     from = to;
   }
   return groups;
@@ -300,8 +297,7 @@ std::size_t memory_used(const Chunks& chunks) {
           chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
           chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
              4 +
-         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.boundary.capacity() +
-         chunks.late.capacity();
+         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.side.capacity();
 }
 
 }  // namespace talus

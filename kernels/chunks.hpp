@@ -30,34 +30,40 @@ struct Candidates {
   std::size_t size() const { return grain_pairs.size() + wall_pairs.size(); }
 };
 
-/// Candidates [begin, end) that may share a chunk: of one subdomain, of one wall or of none, and all at the
-/// interface or all inside. Groups follow one another, and together hold all candidates.
+/// When a chunk is swept, the first of these first: what it leaves at the interface can travel while others
+/// are swept, and what it waits for can come.
+enum class ChunkSide : std::uint8_t {
+  wall,    ///< its wall is glued
+  border,  ///< a body of each of its candidates stands in several subdomains
+  inside,
+  late,  ///< at a border that waits for others
+};
+
+/// Candidates [begin, end) that may share a chunk: of one subdomain, of one wall or of none, and of one side.
+/// Groups follow one another, and together hold all candidates.
 struct CandidateGroup {
   std::int32_t begin;
   std::int32_t end;
   std::int32_t wall;       ///< index of the wall, or -1
   std::int32_t subdomain;  ///< index among those of this process
-  bool boundary;           ///< a body of each stands in several subdomains, or its wall is glued
-  int target;              ///< candidates in a chunk at most, a few hundred, < 32768
-  bool late = false;       ///< at the boundary, and swept behind what is inside
+  ChunkSide side;
+  int target;  ///< candidates in a chunk at most, a few hundred, < 32768
 };
 
 /// So that 32 bits tell where the record of a body begins (record_of).
 inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
-/// neither grains and walls nor two walls. Chunks at the boundary have the lower colours: they are swept
-/// first, and what they leave at the interface can travel while the inner chunks are swept; late ones have
-/// the highest, and are swept when something has come. Two chunks conflict when they share a grain, and then
-/// differ in colour: the sweep's result depends on colours alone. Example: candidates 0..383 are chunk 0,
-/// 384..767 chunk 1, ...; those of wall 0 begin a chunk of their own.
+/// neither grains and walls nor two walls. Those of a side have colours above those of the sides before it.
+/// Two chunks conflict when they share a grain, and then differ in colour: the sweep's result depends on
+/// colours alone. Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a
+/// chunk of their own.
 struct Chunks {
   std::vector<std::int32_t> begin;      ///< chunks + 1 offsets into the candidates
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
   std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
-  std::vector<char> boundary;           ///< per chunk: that of its group
-  std::vector<char> late;               ///< likewise
-  std::vector<std::int32_t> colour;     ///< per chunk; at the boundary the lowest, or, late, the highest
+  std::vector<ChunkSide> side;          ///< per chunk: that of its group
+  std::vector<std::int32_t> colour;     ///< per chunk
   int colours = 0;
   std::vector<std::int32_t> body_begin;  ///< chunks + 1 offsets into `bodies`
   std::vector<Slot> bodies;              ///< the grains that a chunk touches, in order of first use
@@ -85,7 +91,7 @@ Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> 
 Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target);
 
 /// The groups of candidates that are all of one subdomain, in the order of `Candidates`; the wall pairs of
-/// walls with `glued[wall]` are at the boundary (none when empty).
+/// walls with `glued[wall]` are of that side (none when empty).
 std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates, std::span<const char> glued,
                                                     int target);
 

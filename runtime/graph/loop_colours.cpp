@@ -7,11 +7,11 @@ namespace talus::graph {
 
 namespace {
 
-/// What a rank goes through one after the other. Turn t > 0 is phase telling + t.
-enum Phase : std::uint32_t { early_of_later, first_turn, telling, early_glue = 1000, inside_of_first, glue };
+/// What a rank goes through one after the other. Turn t > 0 is phase first_turn + t.
+enum Phase : std::uint32_t { telling, inside_of_later, first_turn, early_glue = 1000, inside_of_first, glue };
 
 /// Of a subdomain, within a phase.
-enum Part : std::uint32_t { walls, tell, inner, take, border, publish, inner_behind };
+enum Part : std::uint32_t { early, tell, inner, take, border, publish, inner_behind };
 
 /// What comes first, by its numbers from the left: phase, subdomain, part, colour.
 using Turn = std::array<std::uint32_t, 4>;
@@ -35,8 +35,9 @@ void go_abreast(std::vector<Turn>& turns) {
 
 }  // namespace
 
-LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool in_turns,
-                         bool overlap, int threads, int rank, const Tree& tree) {
+LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of,
+                         std::span<const char> tells, bool in_turns, bool overlap, int threads, int rank,
+                         const Tree& tree) {
   const auto subdomains = static_cast<std::uint32_t>(turn_of.size());
   // One after another as a whole, but where others wait for all publishes of a rank that has nothing else to
   // do in between.
@@ -47,35 +48,38 @@ LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char>
   std::vector<Turn> own;
   const auto phase_of = [&](std::uint32_t turn, Part part) -> std::uint32_t {
     if (part == inner_behind) return behind;
-    if (turn == 0) return first_turn;
-    if (part <= inner && !overlap) return early_of_later;
-    return part <= tell && !alone ? telling : telling + turn;
+    if (part <= tell && !alone) return telling;
+    return turn > 0 && part <= inner && !overlap ? inside_of_later : first_turn + turn;
   };
   const auto add = [&](std::uint32_t e, Part part, std::uint32_t colour) {
     own.push_back({phase_of(static_cast<std::uint32_t>(turn_of[e]), part), e, part, colour});
   };
   for (const ChunkTurn& chunk : turns) {
-    const bool first = turn_of[chunk.subdomain] == 0;
     add(chunk.subdomain,
-        chunk.side == ChunkTurn::inside          ? (first ? inner_behind : inner)
-        : first || chunk.side == ChunkTurn::late ? border
-                                                 : walls,
+        chunk.side == ChunkTurn::inside  ? (turn_of[chunk.subdomain] == 0 ? inner_behind : inner)
+        : chunk.side == ChunkTurn::early ? early
+                                         : border,
         chunk.colour);
   }
-  // In the first turn publish is take and tell: nothing more begins.
-  for (const Part part : {publish, take, tell})
-    for (std::uint32_t e = 0; e < subdomains; ++e) add(e, turn_of[e] > 0 ? part : publish, 0);
+  // What is not there begins nothing more.
+  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, publish, 0);
+  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, turn_of[e] > 0 ? take : publish, 0);
+  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, tells[e] != 0 ? tell : publish, 0);
   if (threads > 1) go_abreast(own);
   own.push_back({overlap ? glue : early_glue, 0, 0, 0});
   const std::vector<Turn> order = sorted(own);
   std::vector<std::uint32_t> colours;
   for (const Turn& turn : own) colours.push_back(2 * place_in(order, turn));
-  const auto publishes = colours.begin() + static_cast<std::ptrdiff_t>(turns.size()),
-             takes = publishes + subdomains, tells = takes + subdomains, end = tells + subdomains;
-  LoopColours result{
-      {colours.begin(), publishes}, {publishes, takes}, {takes, tells}, {tells, end}, colours.back(), {}};
-  const std::uint32_t last_publish = subdomains > 0 ? *std::max_element(publishes, takes) : 0;
-  result.tree = tree_colours(tree, rank, last_publish, result.glue);
+  const auto publish_at = colours.begin() + static_cast<std::ptrdiff_t>(turns.size()),
+             take_at = publish_at + subdomains, tell_at = take_at + subdomains, end = tell_at + subdomains;
+  LoopColours result{{colours.begin(), publish_at},
+                     {publish_at, take_at},
+                     {take_at, tell_at},
+                     {tell_at, end},
+                     colours.back(),
+                     {}};
+  const std::uint32_t last_tell = subdomains > 0 ? std::ranges::max(result.tell) : 0;
+  result.tree = tree_colours(tree, rank, last_tell, result.glue);
   for (std::uint32_t e = 0; e < subdomains; ++e)
     if (turn_of[e] > 0) result.tree.up = std::min(result.tree.up, result.take[e] - 1);
   return result;

@@ -1,19 +1,19 @@
 #pragma once
 
-/// The colours of the nodes of one rank's iteration: chunks at the border of each subdomain, its publish,
-/// chunks inside, glue. A rank of one thread does all this but the gluing for one subdomain after another, so
-/// that it stays with one while that is in the cache. Threads go through all of them colour by colour: two
-/// may have parts of one subdomain, and the one that comes to it late would keep the other waiting. As
-/// subdomains share no grain, the order among them changes no bit.
+/// The colours of the nodes of one rank's iteration: of each subdomain early chunks, tell, chunks at the
+/// border, publish, chunks inside; glue. A rank of one thread does all this but the gluing for one subdomain
+/// after another, so that it stays with one while that is in the cache. Threads go through all of them colour
+/// by colour: two may have parts of one subdomain, and the one that comes to it late would keep the other
+/// waiting. As subdomains share no grain, the order among them changes no bit.
 ///
-/// Where subdomains have turns, those of the first come first, then what is early of the others and tell,
-/// then those of each later turn with chunks inside, take, the late border and publish: each hides the
-/// messages of the others. Threads, and a rank that has subdomains of the first turn only, leave their inside
-/// to the end. A rank alone has nothing to hide, and stays with each subdomain.
+/// Where there are other ranks, what is early of all and tell come first. Where subdomains have turns, those
+/// of the first come next, then those of each later turn with chunks inside, take, the late border and
+/// publish: each hides the messages of the others. Threads, and a rank that has subdomains of the first turn
+/// only, leave their inside to the end. A rank alone has nothing to hide, and stays with each subdomain.
 ///
-/// Nobody waits for ever: a tell waits for no message, what goes up the tree of ranks for tells, a take of
-/// turn t for publishes of turns before t, and all these stand before what waits for more: up before take,
-/// take of turn t before that of t + 1, and down behind every publish.
+/// Nobody waits for ever: a tell waits for no message, what goes up the tree of ranks for tells, what goes
+/// down for that, and a take of turn t for publishes of turns before t; and all these stand before what waits
+/// for more: up before down and take, take of turn t before that of t + 1.
 
 #include <cstddef>
 #include <cstdint>
@@ -27,27 +27,29 @@ namespace talus::graph {
 /// A chunk by what decides when its turn comes.
 struct ChunkTurn {
   enum Side {
-    early,   ///< the border, or in a later turn what of it waits for nobody
+    early,   ///< before tell
+    border,  ///< of the first turn
     inside,  ///< no grain of it stands in another subdomain
     late,    ///< the border of a later turn
   } side;
   std::uint32_t subdomain;  ///< or its place among those of the rank
-  std::uint32_t colour;  ///< counts within its side of the border of its subdomain, whatever it begins with
+  std::uint32_t colour;     ///< counts within its side of its subdomain, whatever it begins with
 };
 
-/// Even ones, without gaps; odd ones are left to what the tree of ranks does: between the last publish and
-/// glue (tree.hpp), but what goes up before the first take where there is one.
+/// Even ones, without gaps; odd ones are left to what the tree of ranks does: between the last tell and glue
+/// (tree.hpp), but what goes up before the first take where there is one.
 struct LoopColours {
   std::vector<std::uint32_t> chunk;    ///< as the turns that were given
   std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border
   std::vector<std::uint32_t> take;     ///< per subdomain, before its border; means nothing in the first turn
-  std::vector<std::uint32_t> tell;     ///< per subdomain: when it tells the centre; publish in the first turn
+  std::vector<std::uint32_t> tell;     ///< per subdomain: when it tells the centre
   std::uint32_t glue = 0;              ///< behind everything, or before all insides without overlap
   TreeColours tree;                    ///< of what the rank does for the tree of ranks
 };
-/// `turn_of`: per subdomain of the rank. `in_turns`: some subdomain of any rank has a later turn than the
-/// first.
-LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of, bool in_turns,
-                         bool overlap, int threads, int rank, const Tree& tree);
+/// `turn_of`: per subdomain of the rank. `tells`: likewise, whether it has a tell; else publish does that.
+/// `in_turns`: some subdomain of any rank has a later turn than the first.
+LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char> turn_of,
+                         std::span<const char> tells, bool in_turns, bool overlap, int threads, int rank,
+                         const Tree& tree);
 
 }  // namespace talus::graph

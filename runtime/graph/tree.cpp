@@ -17,13 +17,16 @@ constexpr std::size_t most_children = 8;
 
 }  // namespace
 
-Tree grow_tree(std::span<const std::uint64_t> load) {
+Tree grow_tree(std::span<const RankLoad> load) {
   if (load.empty()) throw std::invalid_argument("a tree of no ranks");
   const std::size_t ranks = load.size();
   Tree tree{std::vector<int>(ranks, -1), std::vector<std::vector<int>>(ranks), std::vector<int>(ranks, 0),
             std::vector<int>(ranks)};
   std::iota(tree.order.begin(), tree.order.end(), 0);
-  std::ranges::stable_sort(tree.order, {}, [&](int rank) { return load[static_cast<std::size_t>(rank)]; });
+  std::ranges::stable_sort(tree.order, {}, [&](int rank) {
+    const RankLoad& own = load[static_cast<std::size_t>(rank)];
+    return std::pair(own.waits, own.work);
+  });
   /// When a rank can begin its next message, and its place in the order.
   using Next = std::pair<int, std::size_t>;
   std::priority_queue<Next, std::vector<Next>, std::greater<>> next;
@@ -42,12 +45,12 @@ Tree grow_tree(std::span<const std::uint64_t> load) {
   return tree;
 }
 
-TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t publish, std::uint32_t glue) {
-  const std::uint32_t inner = (glue - publish) / 2 - 1;
+TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t tell, std::uint32_t glue) {
+  const std::uint32_t inner = (glue - tell) / 2 - 1;
   const int whole = std::max(1, tree.last()), at = tree.told[static_cast<std::size_t>(rank)];
   const auto colour = [&](int part) {
     return std::min(
-        publish +
+        tell +
             2 * static_cast<std::uint32_t>(std::uint64_t{inner} * static_cast<std::uint64_t>(part) /
                                            (2 * static_cast<std::uint64_t>(whole))) +
             3,

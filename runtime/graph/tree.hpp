@@ -25,19 +25,25 @@ struct Tree {
 /// the gluing of what they hold.
 inline constexpr std::uint64_t load_of_neighbour = 200;
 
-/// `load`: work of each rank in an iteration, in contacts; at least one rank. Each rank in turn, the one with
-/// the least work first, hangs on the one that can tell it soonest, where a message costs a rank 0.3 us and
-/// takes 1.5 us (LogP: Culler et al. 1993; Karp et al. 1993, their best broadcast): 96 ranks are told within
-/// 8 us, where one rank would spend 29 us on 95 messages. So those that hand on are those that have time for
-/// it.
-Tree grow_tree(std::span<const std::uint64_t> load);
+/// What a rank has to do in an iteration.
+struct RankLoad {
+  std::uint64_t work = 0;  ///< in contacts
+  bool waits = false;      ///< on the way for others: it has subdomains of a later turn
+};
 
-/// Colours of a rank's two parts in the loop, between those of publish and of glue: the way up is spread over
-/// the first half of the inner chunks (relays near the leaves first), the way down over the second, so that
-/// both are hidden. Chunks have even colours, these odd ones. `up` is of relays.
+/// `load`: of each rank, of at least one. Each rank in turn, first those that do not wait, of them the one
+/// with the least work first, hangs on the one that can tell it soonest, where a message costs a rank 0.3 us
+/// and takes 1.5 us (LogP: Culler et al. 1993; Karp et al. 1993, their best broadcast): 96 ranks are told
+/// within 8 us, where one rank would spend 29 us on 95 messages. So those that hand on are those that have
+/// time for it.
+Tree grow_tree(std::span<const RankLoad> load);
+
+/// Colours of a rank's two parts in the loop, between those of its last tell and of glue: the way up is
+/// spread over the first half of what comes between (relays near the leaves first), the way down over the
+/// second, so that both are hidden. Chunks have even colours, these odd ones. `up` is of relays.
 struct TreeColours {
   std::uint32_t up = 0, down = 0;
 };
-TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t publish, std::uint32_t glue);
+TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t tell, std::uint32_t glue);
 
 }  // namespace talus::graph

@@ -338,9 +338,11 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     if (begin == end) continue;
     const std::size_t local = group / 2 % decomposition.here.size();
     const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
-    groups.push_back(
-        {begin, end, wall, static_cast<std::int32_t>(local), group % 2 == 0, target,
-         decomposition.turn_of(decomposition.here[local]) > 0 && (wall < 0 || glued[at(wall)] == 0)});
+    const ChunkSide side = group % 2 == 1                                         ? ChunkSide::inside
+                           : wall >= 0 && glued[at(wall)] != 0                    ? ChunkSide::wall
+                           : decomposition.turn_of(decomposition.here[local]) > 0 ? ChunkSide::late
+                                                                                  : ChunkSide::border;
+    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
     auto next = static_cast<Slot>(decomposition.slot_begin[local]);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
     for (std::int32_t place = begin; place < end; ++place) {

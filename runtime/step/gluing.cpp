@@ -91,6 +91,7 @@ void Gluing::plan(bool rotation) {
   centre_.reset();
   subdomains_.resize(all.here.size());
   followers_.clear();
+  tellers_.clear();
   jumps_.assign(all.here.size(), {});
   messages_ = {};
   if (!needed_) return;
@@ -98,6 +99,8 @@ void Gluing::plan(bool rotation) {
     plan_sides(e);
     plan_copies(e);
     if (turn(e) > 0) followers_.push_back(static_cast<std::uint32_t>(e));
+    subdomains_[e].tells = all.several() && !walls_.empty() && all.interfaces[e].hubs.empty();
+    if (subdomains_[e].tells) tellers_.push_back(static_cast<std::uint32_t>(e));
   }
   for (Subdomain& subdomain : subdomains_)
     for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
@@ -297,10 +300,11 @@ void Gluing::publish(std::size_t e, Mode mode, bool single) {
   });
   for (Side& side : mine.sides)
     if (side.link.sender) start(*side.link.sender, ranks_.trace(), side.link.out_name);
-  if (mine.turn == 0 || mode == Mode::sum) tell(e, mode);
+  if (!mine.tells || mode == Mode::sum) tell(e, mode);
 }
 
 void Gluing::tell(std::size_t e, Mode mode) {
+  if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];

@@ -30,7 +30,9 @@ struct JumpSums {
 
 /// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in tasks:
 ///
-///   publish[e]   after the boundary chunks of subdomain e: its interface velocities leave
+///   tell[e]      after the chunks of subdomain e at glued walls: its part for the centre leaves; of one with
+///                bodies that go through the centre this is done by publish
+///   publish[e]   after the border chunks of subdomain e: its interface velocities leave
 ///   collect      on ranks between the top and the leaves of the tree of ranks: what came from below goes up
 ///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >=
 ///   9, or 33 with turns,
@@ -45,12 +47,9 @@ struct JumpSums {
 ///   of
 ///                those
 ///
-/// Contacts at glued walls that it has wait for nobody (distribute.cpp); behind them
-///
-///   tell[e]      its part for the centre leaves, which in the first turn is done by publish
-///
-/// In the end all copies of a body get the mean of those of its last turn. Each message is sent once, as
-/// without turns: a take reads those of earlier turns, glue the others.
+/// Contacts at glued walls that it has wait for nobody (distribute.cpp). In the end all copies of a body get
+/// the mean of those of its last turn. Each message is sent once, as without turns: a take reads those of
+/// earlier turns, glue the others.
 ///
 /// Between subdomains of one rank the messages are memory. A body sends its velocity, 6 numbers or 3 without
 /// rotation.
@@ -62,9 +61,9 @@ class Gluing {
 
   /// Collective, after the candidates were distributed: buffers and channels for these interfaces.
   void plan(bool rotation);
-  /// Collective, behind plan(), when the contacts are known: the tree of ranks, and its channels. `load`: of
-  /// this rank's chunks, in contacts.
-  void plan_tree(std::uint64_t load);
+  /// Collective, behind plan(), when the contacts are known: the tree of ranks, and its channels. `contacts`:
+  /// of this rank, and one for each of its chunks.
+  void plan_tree(std::uint64_t contacts);
   const graph::Tree& tree() const { return tree_; }
   /// Collective, in every step before its sweeps: the copies of the walls.
   void begin();
@@ -82,8 +81,9 @@ class Gluing {
   /// Subdomains here whose turn is not the first, ascending: those that have a take.
   std::span<const std::uint32_t> followers() const { return followers_; }
 
-  /// Subdomains of later turns tell the centre something: there are glued walls.
-  bool tells() const { return !walls_.empty(); }
+  /// Subdomains here with something for the centre that need not wait for publish, ascending: they have a
+  /// tell.
+  std::span<const std::uint32_t> tellers() const { return tellers_; }
   /// Tasks between publish and glue: the centre, behind collect where there is one.
   std::size_t tasks_of_rank() const;
 
@@ -150,7 +150,7 @@ class Gluing {
   std::size_t width_ = 6;  ///< numbers per body
   std::vector<std::int32_t> walls_;
   std::vector<Subdomain> subdomains_;  ///< per subdomain here
-  std::vector<std::uint32_t> followers_;
+  std::vector<std::uint32_t> followers_, tellers_;
   graph::Tree tree_;
   std::unique_ptr<Centre> centre_;
   std::vector<JumpSums> jumps_;

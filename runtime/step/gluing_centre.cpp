@@ -13,10 +13,12 @@ using detail::centre_tag;
 using detail::Link;
 using detail::start;
 
-void Gluing::plan_tree(std::uint64_t load) {
+void Gluing::plan_tree(std::uint64_t contacts) {
   const Decomposition& all = state_.decomposition;
-  for (const Subdomain& subdomain : subdomains_) load += graph::load_of_neighbour * subdomain.sides.size();
-  tree_ = graph::grow_tree(ranks_.gather_records(std::span<const std::uint64_t>(&load, 1)));
+  graph::RankLoad load{contacts, !followers_.empty()};
+  for (const Subdomain& subdomain : subdomains_)
+    load.work += graph::load_of_neighbour * subdomain.sides.size();
+  tree_ = graph::grow_tree(ranks_.gather_records(std::span<const graph::RankLoad>(&load, 1)));
   if (!needed_) return;
   /// A body that goes through the centre, as a subdomain names it.
   struct HubRecord {

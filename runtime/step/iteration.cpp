@@ -66,10 +66,10 @@ void Iteration::plan() {
 }
 
 void Iteration::plan_tree() {
-  std::uint64_t load = 0;
+  std::uint64_t contacts = 0;
   for (std::size_t c = 0; c < state_.chunks.size(); ++c)
-    load += 1 + static_cast<std::uint64_t>(state_.contacts.count[c]);
-  gluing_.plan_tree(load);
+    contacts += 1 + static_cast<std::uint64_t>(state_.contacts.count[c]);
+  gluing_.plan_tree(contacts);
 }
 
 void Iteration::begin() {
@@ -114,7 +114,7 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu, int epoch) {
   const Chunks& chunks = state_.chunks;
   std::span<Velocity> velocity = state_.bodies.velocity;
   const bool at_wall = chunks.wall[c] >= 0;
-  const bool damped = !before_.empty() && chunks.boundary[c] != 0;
+  const bool damped = !before_.empty() && chunks.side[c] != ChunkSide::inside;
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
   if (course(epoch).method == SolverMethod::momentum) {
     const SweepMomentum momentum{beta(epoch), omega(epoch), trail_.steps};
@@ -149,7 +149,7 @@ void Iteration::chunk(std::size_t c, int epoch) {
   const bool at_wall = chunks.wall[c] >= 0;
   const double mu = at_wall ? parameters_.law.mu_walls : parameters_.law.mu_grains;
   const Multiplicities parts =
-      chunks.boundary[c] != 0 ? Multiplicities(state_.decomposition.parts) : Multiplicities();
+      chunks.side[c] != ChunkSide::inside ? Multiplicities(state_.decomposition.parts) : Multiplicities();
   WallCopy& copy = state_.copies[c];
   switch (work) {
     case Work::restore:
@@ -235,7 +235,7 @@ void Iteration::node(std::uint32_t node, int epoch) {
   else if (const auto followers = gluing_.followers(); task < 2 * here + of_rank + followers.size())
     take(followers[task - 2 * here - of_rank], epoch);
   else
-    gluing_.tell(followers[task - 2 * here - of_rank - followers.size()], mode);
+    gluing_.tell(gluing_.tellers()[task - 2 * here - of_rank - followers.size()], mode);
 }
 
 /// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps

@@ -52,9 +52,9 @@ InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
 /// next epoch is `accumulate`.
 ///
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
-/// centre, and glue of every subdomain follow, and take of every one whose turn is not the first. Publish
-/// comes after the boundary chunks and before the inner ones, which hide the messages; in such a subdomain
-/// the order is boundary chunks at glued walls, tell, inner chunks, take, the other boundary chunks, publish.
+/// centre, and glue of every subdomain follow, take of every one whose turn is not the first, and tell. The
+/// order in a subdomain is chunks at glued walls, tell, those at the border, publish, those inside, which
+/// hide the messages; in a later turn the inside comes before take, the border and publish.
 class Iteration {
  public:
   /// References are kept. `state.contacts` holds the narrow phase's contacts.

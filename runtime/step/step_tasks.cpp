@@ -32,6 +32,22 @@ std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, const std::vector
   return pairs;
 }
 
+/// Where nothing is told, chunks at glued walls are of the border.
+graph::ChunkTurn::Side side_of(ChunkSide side, bool tells) {
+  using enum graph::ChunkTurn::Side;
+  switch (side) {
+    case ChunkSide::wall:
+      return tells ? early : border;
+    case ChunkSide::border:
+      return border;
+    case ChunkSide::inside:
+      return inside;
+    case ChunkSide::late:
+      break;
+  }
+  return late;
+}
+
 }  // namespace
 
 SlotRange StepGraph::share(std::size_t count, std::uint32_t lane) const {
@@ -315,56 +331,60 @@ void StepGraph::plan_iteration() {
   iterating_ = graph::seconds_now();
 }
 
-/// Chunks as they conflict; and, where copies are glued, publish[e] behind the boundary chunks of e, the
-/// centre and, where the tree has one, collect behind them, glue[e] last; of those e whose turn is not the
-/// first tell[e] behind the early chunks at the boundary, and take[e] before the late ones (iteration.hpp).
+/// Chunks as they conflict; and, where copies are glued, tell[e] behind the chunks of e at glued walls,
+/// publish[e] behind those at its border, too, the centre and, where the tree has one, collect behind tells,
+/// glue[e] last; of those e whose turn is not the first take[e] before the border (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
   const std::size_t count = chunks.size(), here = state_.decomposition.here.size();
   const std::size_t of_rank = gluing.tasks_of_rank(), followers = gluing.followers().size(),
                     nodes = count +
-                            (gluing.needed() ? 2 * here + of_rank + (gluing.tells() ? 2 : 1) * followers : 0);
+                            (gluing.needed() ? 2 * here + of_rank + followers + gluing.tellers().size() : 0);
   const auto publish = [&](std::size_t e) { return static_cast<std::uint32_t>(count + e); };
   const auto centre = static_cast<std::uint32_t>(count + here + of_rank - 1);
   const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + of_rank + e); };
   std::vector<char> turn;
   for (std::size_t e = 0; e < here; ++e) turn.push_back(static_cast<char>(gluing.turn(e)));
-  std::vector<std::uint32_t> take(here, 0);
-  for (std::uint32_t next = static_cast<std::uint32_t>(count + 2 * here + of_rank);
-       const std::uint32_t e : gluing.followers())
-    take[e] = next++;
-  const auto tell = [&](std::size_t e) { return take[e] + static_cast<std::uint32_t>(followers); };
+  std::vector<std::uint32_t> take(here, 0), tell(here, 0);
+  std::vector<char> tells(here, 0);
+  auto next = static_cast<std::uint32_t>(count + 2 * here + of_rank);
+  for (const std::uint32_t e : gluing.followers()) take[e] = next++;
+  for (const std::uint32_t e : gluing.tellers()) {
+    tell[e] = next++;
+    tells[e] = 1;
+  }
   const auto reading = [&](std::size_t reader, std::size_t from) {
     return gluing.reads_early(reader, from) ? take[reader] : glue(reader);
   };
 
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
-  std::vector<std::vector<std::uint32_t>> boundary(here);
+  std::vector<std::vector<std::uint32_t>> boundary(here), at_walls(here);
   // The tree of ranks has its part among the inner chunks, so that the way there and the way back are both
   // hidden. Inner chunks share nothing with the gluing: before or behind it, the bits are the same.
   std::vector<graph::ChunkTurn> turns;
   for (std::size_t c = 0; c < count; ++c)
-    turns.push_back({chunks.boundary[c] == 0 ? graph::ChunkTurn::inside
-                     : chunks.late[c] != 0   ? graph::ChunkTurn::late
-                                             : graph::ChunkTurn::early,
+    turns.push_back({side_of(chunks.side[c], tells[static_cast<std::size_t>(chunks.subdomain[c])] != 0),
                      static_cast<std::uint32_t>(chunks.subdomain[c]),
                      static_cast<std::uint32_t>(chunks.colour[c])});
   const graph::LoopColours colours =
-      graph::loop_colours(turns, turn, state_.decomposition.in_turns(), decomposition_.overlap,
+      graph::loop_colours(turns, turn, tells, state_.decomposition.in_turns(), decomposition_.overlap,
                           executor_.threads(), ranks_.rank(), gluing.tree());
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
-    const bool at_interface = gluing.needed() && chunks.boundary[c] != 0;
+    const bool at_interface = gluing.needed() && chunks.side[c] != ChunkSide::inside;
     neighbour.insert(neighbour.end(), chunks.conflicts.begin() + chunks.conflict_begin[c],
                      chunks.conflicts.begin() + chunks.conflict_begin[c + 1]);
     if (at_interface) {
       neighbour.push_back(publish(e));
       neighbour.push_back(glue(e));
       if (turn[e] > 0) neighbour.push_back(take[e]);
-      if (turn[e] > 0 && gluing.tells()) neighbour.push_back(tell(e));
       boundary[e].push_back(static_cast<std::uint32_t>(c));
+      if (tells[e] != 0 && chunks.side[c] == ChunkSide::wall) {
+        neighbour.push_back(tell[e]);
+        at_walls[e].push_back(static_cast<std::uint32_t>(c));
+      }
     }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
   }
@@ -374,16 +394,16 @@ void StepGraph::plan_epochs() {
   };
   const auto from_subdomains = [&] {
     for (std::size_t e = 0; e < here; ++e)
-      if (turn[e] == 0)
+      if (tells[e] != 0)
+        neighbour.push_back(tell[e]);
+      else if (turn[e] == 0)
         neighbour.push_back(publish(e));
-      else if (gluing.tells())
-        neighbour.push_back(tell(e));
   };
   if (gluing.needed()) {
     for (std::size_t e = 0; e < here; ++e) {
       colour[publish(e)] = colours.publish[e];
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
-      if (turn[e] == 0) to_centre();
+      if (tells[e] == 0 && turn[e] == 0) to_centre();
       neighbour.push_back(glue(e));
       if (turn[e] > 0) neighbour.push_back(take[e]);
       for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(reading(reader, e));
@@ -404,7 +424,7 @@ void StepGraph::plan_epochs() {
       neighbour.push_back(centre);
       neighbour.push_back(publish(e));
       if (turn[e] > 0) neighbour.push_back(take[e]);
-      if (turn[e] > 0 && gluing.tells()) neighbour.push_back(tell(e));
+      if (tells[e] != 0) neighbour.push_back(tell[e]);
       for (std::uint32_t writer : gluing.readers_here(e))
         if (!gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
@@ -418,10 +438,9 @@ void StepGraph::plan_epochs() {
         if (gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
-    for (const std::uint32_t e : gluing.followers()) {
-      if (!gluing.tells()) break;
-      colour[tell(e)] = colours.tell[e];
-      neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
+    for (const std::uint32_t e : gluing.tellers()) {
+      colour[tell[e]] = colours.tell[e];
+      neighbour.insert(neighbour.end(), at_walls[e].begin(), at_walls[e].end());
       to_centre();
       neighbour.push_back(glue(e));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
@@ -450,7 +469,7 @@ void StepGraph::plan_epochs() {
     const auto e = static_cast<std::size_t>(chunks.subdomain[order[k]]);
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
     if (turn[e] > 0) owner[take[e]] = owner_in_order[k];
-    if (turn[e] > 0 && gluing.tells()) owner[tell(e)] = owner_in_order[k];
+    if (tells[e] != 0) owner[tell[e]] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());
   if (executor_.trace() || executor_.times() || order_) note_plan({colour, offset, neighbour}, owner);

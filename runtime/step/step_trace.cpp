@@ -87,7 +87,7 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
     else if (const auto followers = iteration_.gluing().followers(); task < takes + followers.size())
       name(trace::Role::take, followers[task - takes]);
     else
-      name(trace::Role::tell, followers[task - takes - followers.size()]);
+      name(trace::Role::tell, iteration_.gluing().tellers()[task - takes - followers.size()]);
     plan.weight.push_back(0);
   }
   plan.messages = iteration_.gluing().message_plan();

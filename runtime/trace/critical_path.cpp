@@ -13,7 +13,7 @@ constexpr double no_wait = 300;
 class Walker {
  public:
   Walker(const Timeline& timeline, const StepIndex& index) : timeline_(timeline), index_(index) {
-    std::vector<std::uint64_t> load(index.ranks.size(), 0);
+    std::vector<graph::RankLoad> load(index.ranks.size());
     for (std::size_t r = 0; r < index.ranks.size(); ++r)
       if (index.ranks[r].plan)
         add_load(
@@ -168,12 +168,14 @@ class Walker {
     for (const StepIndex::Rank& rank : index_.ranks) {
       if (!rank.plan || epoch >= rank.epochs) continue;
       if (from == centre_group ? &rank != speaks : !has(rank, from)) continue;
+      const bool tells =
+          std::ranges::find(rank.plan->role, static_cast<std::uint8_t>(Role::tell)) != rank.plan->role.end();
       for (std::size_t n = 0; n < rank.nodes; ++n) {
         const Role role = static_cast<Role>(rank.plan->role[n]);
-        const bool sends =
-            from == centre_group || (to == centre_group && role == Role::centre) ? role == Role::centre
-            : to == centre_group ? role == Role::tell || (role == Role::publish && rank.plan->place[n] == 0)
-                                 : role == Role::publish && rank.plan->group[n] == from;
+        const bool sends = from == centre_group || (to == centre_group && role == Role::centre)
+                               ? role == Role::centre
+                           : to == centre_group ? role == (tells ? Role::tell : Role::publish)
+                                                : role == Role::publish && rank.plan->group[n] == from;
         if (sends) keep_later(best, rank.at(epoch, n), received.end());
       }
     }

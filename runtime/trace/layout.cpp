@@ -51,7 +51,8 @@ class Builder {
     std::vector<std::uint32_t> chunks;  ///< recorded nodes
     std::uint32_t publish = none, glue = none, take = none, tell = none;
     std::uint32_t new_publish = none, new_glue = none, new_take = none, new_tell = none;
-    std::uint32_t teller() const { return turn == 0 ? new_publish : new_tell; }
+    bool publish_tells() const { return turn == 0 && tell == none; }
+    std::uint32_t teller() const { return publish_tells() ? new_publish : new_tell; }
     std::uint32_t turn = 0;
   };
 
@@ -68,15 +69,14 @@ class Builder {
   }
 
   void grow_tree() {
-    std::vector<std::uint64_t> load(static_cast<std::size_t>(machine_.ranks), 0);
+    std::vector<graph::RankLoad> load(static_cast<std::size_t>(machine_.ranks));
     for (const Plan* plan : plans_) {
       for (const Message& message : plan->messages) has_centre_ = has_centre_ || message.to == centre_group;
       add_load(
           *plan, [&](std::uint32_t group) { return rank_of_[place_of(group)]; }, load);
     }
     out_.tree = graph::grow_tree(load);
-    std::fill(load.begin(), load.end(), 0);
-    load.resize(plans_.size());
+    load.assign(plans_.size(), {});
     for (std::size_t s = 0; s < plans_.size(); ++s)
       add_load(
           *plans_[s], [&](std::uint32_t) { return s; }, load);
@@ -113,10 +113,9 @@ class Builder {
   graph::ChunkTurn::Side side_of(const Group& group, const SimNode& node) const {
     const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
     using enum graph::ChunkTurn::Side;
-    if (group.turn == 0)
-      return group.publish == none || plan.colour[group.publish] < node.colour ? inside : early;
-    if (plan.colour[group.take] < node.colour) return late;
-    return group.tell != none && node.colour < plan.colour[group.tell] ? early : inside;
+    if (group.tell != none && node.colour < plan.colour[group.tell]) return early;
+    if (group.turn > 0) return plan.colour[group.take] < node.colour ? late : inside;
+    return group.publish == none || plan.colour[group.publish] < node.colour ? inside : border;
   }
 
   std::uint32_t add_node(std::uint32_t rank, std::int32_t source, std::uint32_t n) {
@@ -130,15 +129,19 @@ class Builder {
   /// of which get theirs.
   graph::LoopColours colours_of(std::uint32_t first, std::span<const std::size_t> mine) {
     std::vector<graph::ChunkTurn> turns;
-    std::vector<char> turn_of;
-    for (std::size_t g : mine) turn_of.push_back(static_cast<char>(group_[g].turn));
+    std::vector<char> turn_of, tells;
+    for (std::size_t g : mine) {
+      turn_of.push_back(static_cast<char>(group_[g].turn));
+      tells.push_back(group_[g].tell != none ? 1 : 0);
+    }
     for (std::size_t n = first, at = 0; n < out_.nodes.size(); ++n) {
       const SimNode& node = out_.nodes[n];
       while (groups_[mine[at]] != node.group) ++at;
       turns.push_back({side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
-    graph::LoopColours colours = graph::loop_colours(turns, turn_of, in_turns_, overlap_, machine_.threads,
-                                                     static_cast<int>(out_.rank_begin.size()) - 1, out_.tree);
+    graph::LoopColours colours =
+        graph::loop_colours(turns, turn_of, tells, in_turns_, overlap_, machine_.threads,
+                            static_cast<int>(out_.rank_begin.size()) - 1, out_.tree);
     for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
   }
@@ -191,8 +194,8 @@ class Builder {
       group_[g].new_publish = add_node(rank, group_[g].source, group_[g].publish);
       out_.nodes.back().worker = owner_of(g);
       out_.nodes.back().colour = colours.publish[at];
-      out_.nodes.back().tells = group_[g].turn == 0;
-      tellers += group_[g].turn == 0 || group_[g].tell != none ? 1 : 0;
+      out_.nodes.back().tells = group_[g].publish_tells();
+      tellers += group_[g].publish_tells() || group_[g].tell != none ? 1 : 0;
       glued = true;
     }
     out_.tellers.push_back(tellers);
@@ -262,8 +265,8 @@ class Builder {
       if (group.turn > 0) {
         join(group.new_publish, group.new_take);
         join(group.new_glue, group.new_take);
-        if (group.new_tell != none) join(group.new_glue, group.new_tell);
       }
+      if (group.new_tell != none) join(group.new_glue, group.new_tell);
       const std::uint32_t centre = centre_[out_.nodes[group.new_publish].rank];
       join(group.new_glue, centre);
       if (group.teller() == none) continue;

@@ -93,7 +93,7 @@ enum class Role : std::uint8_t {
   centre,   ///< of a rank: what goes through one rank; before it, on ranks between, what goes up to it
   glue,     ///< takes what others have published
   take,  ///< of a group whose turn is not 0, before its border: takes what those of earlier turns published
-  tell,  ///< of such a group: its part for the centre leaves, that of others with their publish
+  tell,  ///< its group's part for the centre leaves, which without one its publish sends
 };
 
 /// Names the centre as the end of a message.
@@ -134,12 +134,16 @@ struct Plan {
 /// Adds what the plan's groups have to do in an iteration, as graph::grow_tree() wants it, to the load of the
 /// rank that each is on: rank_of(group).
 template <class RankOf>
-void add_load(const Plan& plan, const RankOf& rank_of, std::span<std::uint64_t> load) {
-  for (std::size_t n = 0; n < plan.size(); ++n)
-    if (plan.group[n] != centre_group) load[rank_of(plan.group[n])] += plan.weight[n];
+void add_load(const Plan& plan, const RankOf& rank_of, std::span<graph::RankLoad> load) {
+  for (std::size_t n = 0; n < plan.size(); ++n) {
+    if (plan.group[n] == centre_group) continue;
+    graph::RankLoad& rank = load[rank_of(plan.group[n])];
+    rank.work += plan.weight[n];
+    rank.waits = rank.waits || static_cast<Role>(plan.role[n]) == Role::take;
+  }
   for (const Message& message : plan.messages)
     if (message.from != centre_group && message.to != centre_group)
-      load[rank_of(message.from)] += graph::load_of_neighbour;
+      load[rank_of(message.from)].work += graph::load_of_neighbour;
 }
 
 /// A task of every step of one rank.

@@ -142,7 +142,8 @@ TEST_F(Ranks, SendOneMessagePerNeighbourOrToTheCentreAndBack) {
     const Sent cyclic = sent(run(ranks, sliced + "dcs --set decomposition.mapping=cyclic"));
     EXPECT_EQ(cyclic.bytes, alone.bytes) << ranks;
     EXPECT_EQ(cyclic.between_ranks, 2 * borders + 2 * (ranks - 1)) << "every border lies between ranks";
-    const long elsewhere = subdomains - 1;  // than on the top, the rank with the least work
+    // Than on the top: a rank with the outer slices alone, whose turn is the first.
+    const long elsewhere = subdomains - (subdomains + ranks - 1) / ranks;
     EXPECT_EQ(cyclic.bytes_between_ranks, alone.bytes - 2 * subdomains * lid + (elsewhere + ranks - 1) * lid)
         << "the borders; the lid: a part from each subdomain elsewhere, one answer a rank";
     const Sent centre = sent(run(ranks, sliced + "ccs"));

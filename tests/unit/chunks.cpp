@@ -147,11 +147,12 @@ TEST(Chunks, EachGrainIsResetOnceByTheFirstChunkThatWritesIt) {
 }
 
 TEST(Chunks, LateOnesComeBehindTheInsideAndResetNoBodyThatIsTaken) {
-  // Bodies 0..9 in a row: pairs 0-2 at the boundary, 3-5 inside, 6-8 at the boundary and late.
+  // Bodies 0..9 in a row: pairs 0-2 at the border, 3-5 inside, 6-8 at the border and late.
   Candidates row;
   for (Slot s = 0; s < 9; ++s) row.grain_pairs.push_back({s, s + 1});
-  const std::vector<CandidateGroup> groups = {
-      {0, 3, -1, 0, true, 1}, {3, 6, -1, 0, false, 1}, {6, 9, -1, 0, true, 1, true}};
+  const std::vector<CandidateGroup> groups = {{0, 3, -1, 0, ChunkSide::border, 1},
+                                              {3, 6, -1, 0, ChunkSide::inside, 1},
+                                              {6, 9, -1, 0, ChunkSide::late, 1}};
   std::vector<char> taken(10, 0);
   taken[8] = 1;
   const Chunks chunks = cut_chunks(row, groups, 10, taken);

@@ -129,28 +129,40 @@ TEST(Coupling, TakesHardlyMoreSweepsThanOneSubdomainWhereSubdomainsAlternate) {
   }
 }
 
-TEST(Coupling, LaterTurnsSweepGluedWallsBeforeTheyWait) {
-  talus::Setup setup = pressed_lattice(6, 0.3, 1);
-  setup.decomposition.coupling = Coupling::alternating;
-  setup.decomposition.partitioner = PartitionKind::boxes;
-  setup.decomposition.subdomains = 8;
-  graph::Executor executor({.threads = 1});
-  Simulation simulation(setup, test::jittered_lattice(6, 3), executor);
-  simulation.step();
-  const StepState& state = simulation.state();
-  const Chunks& chunks = state.chunks;
-  int late = 0, of_glued_walls = 0;
-  for (std::size_t c = 0; c < chunks.size(); ++c) {
-    late += chunks.late[c];
-    if (chunks.wall[c] < 0 || state.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass() == 0) continue;
-    ++of_glued_walls;
-    EXPECT_EQ(chunks.late[c], 0);
-    for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1]; ++k)
-      EXPECT_EQ(
-          state.decomposition.taken[static_cast<std::size_t>(chunks.bodies[static_cast<std::size_t>(k)])], 0);
+TEST(Coupling, SubdomainsSweepGluedWallsFirstAndWaitForNobodyThere) {
+  for (const Coupling coupling : {Coupling::alternating, Coupling::nscdd}) {
+    talus::Setup setup = pressed_lattice(6, 0.3, 1);
+    setup.decomposition.coupling = coupling;
+    setup.decomposition.partitioner = PartitionKind::boxes;
+    setup.decomposition.subdomains = 8;
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(setup, test::jittered_lattice(6, 3), executor);
+    simulation.step();
+    const StepState& state = simulation.state();
+    const Chunks& chunks = state.chunks;
+    std::array<int, 4> of_side{};
+    std::int32_t last_of_walls = -1, first_of_others = chunks.colours;
+    for (std::size_t c = 0; c < chunks.size(); ++c) {
+      ++of_side[static_cast<std::size_t>(chunks.side[c])];
+      const bool glued =
+          chunks.wall[c] >= 0 && state.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass() > 0;
+      EXPECT_EQ(chunks.side[c] == ChunkSide::wall, glued);
+      if (!glued) {
+        first_of_others = std::min(first_of_others, chunks.colour[c]);
+        continue;
+      }
+      last_of_walls = std::max(last_of_walls, chunks.colour[c]);
+      for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1] && !state.decomposition.taken.empty();
+           ++k)
+        EXPECT_EQ(
+            state.decomposition.taken[static_cast<std::size_t>(chunks.bodies[static_cast<std::size_t>(k)])],
+            0);
+    }
+    EXPECT_LT(last_of_walls, first_of_others);
+    EXPECT_GT(of_side[static_cast<std::size_t>(ChunkSide::wall)], 8);
+    EXPECT_GT(of_side[static_cast<std::size_t>(ChunkSide::border)], 0);
+    EXPECT_EQ(of_side[static_cast<std::size_t>(ChunkSide::late)] > 0, coupling == Coupling::alternating);
   }
-  EXPECT_GT(late, 0);
-  EXPECT_GT(of_glued_walls, 8);
 }
 
 /// From the standings of bodies alone: who shares one with whom, and how often a body is told.

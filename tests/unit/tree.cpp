@@ -7,14 +7,15 @@
 
 #include <algorithm>
 #include <set>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
 namespace talus::graph {
 namespace {
 
-std::vector<std::uint64_t> equal_loads(int ranks) {
-  return std::vector<std::uint64_t>(static_cast<std::size_t>(ranks), 5);
+std::vector<RankLoad> equal_loads(int ranks) {
+  return std::vector<RankLoad>(static_cast<std::size_t>(ranks), RankLoad{5, false});
 }
 
 TEST(Tree, BringsEveryRankToTheTopOnce) {
@@ -33,19 +34,20 @@ TEST(Tree, BringsEveryRankToTheTopOnce) {
   }
 }
 
-TEST(Tree, IsHandedOnByTheRanksWithTheLeastWork) {
-  std::vector<std::uint64_t> load;
-  for (std::uint64_t rank = 0; rank < 96; ++rank) load.push_back(1000 + rank * 37 % 96);
+TEST(Tree, IsHandedOnByTheRanksWithTheLeastWorkOfThoseThatDoNotWait) {
+  std::vector<RankLoad> load;
+  for (std::uint64_t rank = 0; rank < 96; ++rank) load.push_back({1000 + rank * 37 % 96, rank % 2 == 0});
   const Tree tree = grow_tree(load);
   std::uint64_t most = 0, least = 2000;
   for (int rank = 0; rank < 96; ++rank) {
-    const std::uint64_t own = load[static_cast<std::size_t>(rank)];
-    if (tree.leaf(rank))
-      least = std::min(least, own);
-    else
-      most = std::max(most, own);
+    const RankLoad& own = load[static_cast<std::size_t>(rank)];
+    if (!tree.leaf(rank)) {
+      EXPECT_FALSE(own.waits) << rank;
+      most = std::max(most, own.work);
+    } else if (!own.waits) {
+      least = std::min(least, own.work);
+    }
   }
-  EXPECT_EQ(load[static_cast<std::size_t>(tree.top())], 1000U);
   EXPECT_LT(most, least);
 }
 
@@ -86,102 +88,115 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
 
 using enum ChunkTurn::Side;
 
+struct Machine {
+  int threads = 1, rank = 0, ranks = 2;
+  bool overlap = true;
+};
+/// Of subdomains with these turns; in_turns, also elsewhere.
+LoopColours colours_of(std::span<const ChunkTurn> turns, const std::vector<char>& turn_of,
+                       const std::vector<char>& tells, bool in_turns, Machine machine = {}) {
+  return loop_colours(turns, turn_of, tells, in_turns, machine.overlap, machine.threads, machine.rank,
+                      grow_tree(equal_loads(machine.ranks)));
+}
+
 TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
-  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 2}, {inside, 0, 2},
-                                        {early, 1, 0}, {inside, 1, 2}, {inside, 1, 3}};
-  const LoopColours colours =
-      loop_colours(turns, std::vector<char>(3, 0), false, true, 1, 0, grow_tree(equal_loads(2)));
+  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {border, 0, 1}, {inside, 0, 2}, {inside, 0, 2},
+                                        {border, 1, 0}, {inside, 1, 2}, {inside, 1, 3}};
+  const LoopColours colours = colours_of(turns, {0, 0, 0}, {0, 0, 0}, false);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
+  EXPECT_EQ(colours.tell, colours.publish) << "which does that";
   EXPECT_EQ(colours.glue, 18U);
 }
 
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
-  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {inside, 0, 2}, {early, 1, 0}, {inside, 1, 2}};
-  const LoopColours colours =
-      loop_colours(turns, std::vector<char>(2, 0), false, false, 1, 0, grow_tree(equal_loads(2)));
+  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {inside, 0, 2}, {border, 1, 0}, {inside, 1, 2}};
+  const LoopColours colours = colours_of(turns, {0, 0}, {0, 0}, false, {.overlap = false});
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 4, 12}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(colours.glue, 8U);
 }
 
-TEST(LoopColours, OfLaterTurnsTellFirstAndPutTakeAndBorderBehindTheInside) {
-  const std::vector<ChunkTurn> turns = {
-      {early, 0, 0}, {inside, 0, 3}, {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
-  const std::vector<char> turn_of = {0, 1};
-  const LoopColours two = loop_colours(turns, turn_of, true, true, 1, 0, grow_tree(equal_loads(2)));
-  // Border, publish and inside of the first; early, tell, inside, take, border, publish of the second.
-  EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 4, 6, 10, 14}));
-  EXPECT_EQ(two.publish, (std::vector<std::uint32_t>{2, 16}));
-  EXPECT_EQ(two.tell, (std::vector<std::uint32_t>{2, 8}));
-  EXPECT_EQ(two.take[1], 12U);
-  EXPECT_EQ(two.glue, 18U);
+const std::vector<ChunkTurn> at_walls = {{early, 0, 0}, {border, 0, 1}, {inside, 0, 3},
+                                         {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
+
+TEST(LoopColours, TellFirstAndInLaterTurnsPutTakeAndBorderBehindTheInside) {
+  const LoopColours two = colours_of(at_walls, {0, 1}, {1, 1}, true);
+  // Early and tell of both; border, publish, inside of the first; inside, take, border, publish of the
+  // second.
+  EXPECT_EQ(two.chunk, (std::vector<std::uint32_t>{0, 8, 12, 4, 14, 18}));
+  EXPECT_EQ(two.publish, (std::vector<std::uint32_t>{10, 20}));
+  EXPECT_EQ(two.tell, (std::vector<std::uint32_t>{2, 6}));
+  EXPECT_EQ(two.take[1], 16U);
+  EXPECT_EQ(two.glue, 22U);
   EXPECT_LT(two.tell[1], two.tree.up);  // what goes up waits for tells only, and nothing that waits for more
   EXPECT_LT(two.tree.up, two.take[1]);  // comes before it
-  EXPECT_LT(two.publish[1], two.tree.down);
   // Without overlap nothing is between a publish and who waits for it.
-  EXPECT_EQ(loop_colours(turns, turn_of, true, false, 1, 0, grow_tree(equal_loads(2))).chunk,
-            (std::vector<std::uint32_t>{6, 18, 0, 4, 12}));
+  EXPECT_EQ(colours_of(at_walls, {0, 1}, {1, 1}, true, {.overlap = false}).chunk,
+            (std::vector<std::uint32_t>{0, 10, 22, 4, 8, 16}));
+}
+
+TEST(LoopColours, OfARankAloneTellWithTheirSubdomain) {
+  const LoopColours colours = colours_of(at_walls, {0, 1}, {1, 1}, true, {.ranks = 1});
+  EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 4, 8, 10, 14, 18}));
+  EXPECT_EQ(colours.tell, (std::vector<std::uint32_t>{2, 12}));
 }
 
 TEST(LoopColours, OfTheFirstTurnPutNoInsideBeforeAPublishThatOthersWaitFor) {
-  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {inside, 0, 3}, {early, 1, 0}, {inside, 1, 2}};
-  const LoopColours colours =
-      loop_colours(turns, std::vector<char>(2, 0), true, true, 1, 1, grow_tree(equal_loads(2)));
+  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {inside, 0, 3}, {border, 1, 0}, {inside, 1, 2}};
+  const LoopColours colours = colours_of(turns, {0, 0}, {0, 0}, true, {.rank = 1});
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 8, 4, 10}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
 }
 
 TEST(LoopColours, OfARelayLetNobodyWaitForEver) {
   // Rank 1 of 40 alike has children, and subdomains of three turns.
-  const Tree tree = grow_tree(equal_loads(40));
-  ASSERT_TRUE(tree.relays(1));
-  std::vector<ChunkTurn> turns;
-  for (std::uint32_t e = 0; e < 3; ++e)
-    for (const auto side : {early, inside, late})
-      if (e > 0 || side != late) turns.push_back({side, e, static_cast<std::uint32_t>(side)});
+  ASSERT_TRUE(grow_tree(equal_loads(40)).relays(1));
   const std::vector<char> turn_of = {1, 2, 0};
-  turns[0] = {early, 0, 0};
+  std::vector<ChunkTurn> turns;
+  for (std::uint32_t e = 0; e < 3; ++e) {
+    turns.push_back({early, e, 0});
+    turns.push_back({turn_of[e] == 0 ? border : inside, e, 1});
+    turns.push_back({turn_of[e] == 0 ? inside : late, e, 2});
+  }
   for (const bool overlap : {true, false})
     for (const int threads : {1, 3}) {
-      const LoopColours colours = loop_colours(turns, turn_of, true, overlap, threads, 1, tree);
+      const LoopColours colours = colours_of(turns, turn_of, {1, 1, 1}, true, {threads, 1, 40, overlap});
+      for (const std::size_t e : {0U, 1U, 2U}) EXPECT_LT(colours.tell[e], colours.tree.up);
       for (const std::size_t later : {0U, 1U}) {
-        EXPECT_LT(colours.tell[later], colours.tree.up);
         EXPECT_LT(colours.tree.up, colours.take[later]);
         EXPECT_LT(colours.take[later], colours.publish[later]);
-        EXPECT_LT(colours.publish[later], colours.tree.down);
       }
       EXPECT_LT(colours.publish[2], colours.take[0]);
       EXPECT_LT(colours.publish[0], colours.take[1]);
+      EXPECT_LE(colours.tree.up, colours.tree.down);
       EXPECT_LT(colours.tree.down, colours.glue);
     }
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
-  const std::vector<ChunkTurn> turns = {{early, 0, 0}, {early, 0, 1},  {inside, 0, 7},
-                                        {early, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
-  const LoopColours colours =
-      loop_colours(turns, std::vector<char>(2, 0), false, true, 2, 0, grow_tree(equal_loads(2)));
+  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {border, 0, 1}, {inside, 0, 7},
+                                        {border, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
+  const LoopColours colours = colours_of(turns, {0, 0}, {0, 0}, false, {.threads = 2});
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
   EXPECT_EQ(colours.glue, 10U);
 }
 
 TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
-  const std::vector<ChunkTurn> all = {{early, 0, 0},  {inside, 0, 3}, {early, 1, 0}, {early, 1, 2},
+  const std::vector<ChunkTurn> all = {{border, 0, 0}, {inside, 0, 3}, {border, 1, 0}, {border, 1, 2},
                                       {inside, 1, 3}, {inside, 1, 5}, {inside, 2, 3}};
-  const Tree two = grow_tree(equal_loads(2));
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
-      const LoopColours among = loop_colours(all, std::vector<char>(3, 0), false, true, threads_then, 0, two);
+      const LoopColours among = colours_of(all, {0, 0, 0}, {0, 0, 0}, false, {.threads = threads_then});
       std::vector<ChunkTurn> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
           alone.push_back({all[k].side, 0, all[k].colour});
-          again.push_back({among.publish[1] < among.chunk[k] ? inside : early, 0, among.chunk[k]});
+          again.push_back({among.publish[1] < among.chunk[k] ? inside : border, 0, among.chunk[k]});
         }
-      const LoopColours here = loop_colours(alone, std::vector<char>(1, 0), false, true, threads, 0, two),
-                        replayed = loop_colours(again, std::vector<char>(1, 0), false, true, threads, 0, two);
+      const LoopColours here = colours_of(alone, {0}, {0}, false, {.threads = threads}),
+                        replayed = colours_of(again, {0}, {0}, false, {.threads = threads});
       EXPECT_EQ(here.chunk, replayed.chunk);
       EXPECT_EQ(here.glue, replayed.glue);
     }

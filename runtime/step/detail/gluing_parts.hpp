@@ -80,6 +80,7 @@ struct Gluing::Subdomain {
   std::vector<Slot> shared;  ///< slots of `interface.shared`
   std::vector<Slot> taken;   ///< those of `shared` that are
   int turn = 0;
+  bool tells = false;  ///< before it publishes
   std::vector<std::int32_t>
       corners;  ///< indices into `shared`, without hubs: of the last turn are more copies
   std::vector<std::int32_t> taken_corners;  ///< likewise of the turn before this one's
