@@ -162,9 +162,10 @@ class Gantt {
     if (!window_.step) return;
     const trace::StepIndex index = timeline_.index(*window_.step);
     const auto turns = later_turns(index);
+    const graph::Tree tree = trace::tree_of(index);
     for (const auto& [name, from] : sent) {
       const trace::Place taken =
-          taker(index, turns, static_cast<std::size_t>(std::get<1>(name)), std::get<2>(name));
+          taker(index, tree, turns, static_cast<std::size_t>(std::get<1>(name)), std::get<2>(name));
       if (!taken.exists() || taken.lane >= rows_) continue;
       const auto found = static_cast<double>(timeline_.record(taken).begin);
       if (found >= from.time) arrow(from, {taken.lane, found}, style::soft_ink);
@@ -181,8 +182,9 @@ class Gantt {
     return turns;
   }
 
-  /// The glue, take or centre that takes a message.
-  static trace::Place taker(const trace::StepIndex& index,
+  /// The glue, take or centre that takes a message. What goes up the tree of ranks is taken by the first
+  /// centre node of the parent of who sends it, what goes down by the last of the rank it is named after.
+  static trace::Place taker(const trace::StepIndex& index, const graph::Tree& tree,
                             const std::map<std::uint32_t, std::uint32_t>& turns, std::size_t epoch,
                             std::uint32_t name) {
     const auto turn_of = [&](std::uint32_t group) {
@@ -190,20 +192,21 @@ class Gantt {
       return later == turns.end() ? 0 : later->second;
     };
     const std::uint32_t from = name >> 16, to = name & 0xffffU;
-    for (const trace::StepIndex::Rank& rank : index.ranks) {
+    const bool up = to == trace::centre_group, by_centre = up || from == trace::centre_group;
+    for (std::size_t r = 0; r < index.ranks.size(); ++r) {
+      const trace::Plan* const plan = index.ranks[r].plan;
+      if (!plan || std::ranges::find(plan->group, up ? from : to) == plan->group.end()) continue;
+      if (up && tree.parent[r] < 0) continue;
+      const trace::StepIndex::Rank& rank = index.ranks[up ? static_cast<std::size_t>(tree.parent[r]) : r];
       if (!rank.plan || epoch >= rank.epochs) continue;
-      const auto& groups = rank.plan->group;
-      const bool here = to == trace::centre_group
-                            ? &rank == &index.ranks.front()
-                            : std::find(groups.begin(), groups.end(), to) != groups.end();
-      if (!here) continue;
-      const bool by_centre = to == trace::centre_group || from == trace::centre_group;
       const trace::Role role = by_centre                     ? trace::Role::centre
                                : turn_of(from) < turn_of(to) ? trace::Role::take
                                                              : trace::Role::glue;
-      for (std::size_t n = 0; n < rank.nodes; ++n)
-        if (rank.plan->role[n] == static_cast<std::uint8_t>(role) && (by_centre || groups[n] == to))
-          return rank.at(epoch, n);
+      trace::Place place;
+      for (std::size_t n = 0; n < rank.nodes && !(up && place.exists()); ++n)
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(role) && (by_centre || rank.plan->group[n] == to))
+          place = rank.at(epoch, n);
+      return place;
     }
     return {};
   }

@@ -23,7 +23,7 @@ using detail::read_integer;
 using detail::write_array;
 using detail::write_attribute;
 
-constexpr std::int64_t format_version = 3;         // 2: without the sums within a check
+constexpr std::int64_t format_version = 4;         // 3: ranks of another tree, walls told with publish
 constexpr std::size_t largest_machine = 1U << 24;  ///< lanes; more is a damaged number
 
 Hdf5Object record_type(const std::string& file) {

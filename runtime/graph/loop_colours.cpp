@@ -80,8 +80,10 @@ LoopColours loop_colours(std::span<const ChunkTurn> turns, std::span<const char>
                      {}};
   const std::uint32_t last_tell = subdomains > 0 ? std::ranges::max(result.tell) : 0;
   result.tree = tree_colours(tree, rank, last_tell, result.glue);
-  for (std::uint32_t e = 0; e < subdomains; ++e)
+  for (std::uint32_t e = 0; e < subdomains; ++e) {
     if (turn_of[e] > 0) result.tree.up = std::min(result.tree.up, result.take[e] - 1);
+    if (in_turns) result.tree.down = std::max(result.tree.down, result.publish[e] + 1);
+  }
   return result;
 }
 

@@ -11,9 +11,10 @@
 /// publish: each hides the messages of the others. Threads, and a rank that has subdomains of the first turn
 /// only, leave their inside to the end. A rank alone has nothing to hide, and stays with each subdomain.
 ///
-/// Nobody waits for ever: a tell waits for no message, what goes up the tree of ranks for tells, what goes
-/// down for that, and a take of turn t for publishes of turns before t; and all these stand before what waits
-/// for more: up before down and take, take of turn t before that of t + 1.
+/// Nobody waits for ever: a tell waits for no message, what goes up the tree of ranks for tells, a take of
+/// turn t for publishes of turns before t, and all these stand before what waits for more: up before take,
+/// take of turn t before that of t + 1, and down, which above may stand behind takes, behind every publish. A
+/// publish where nothing has turns waits for nobody, nor down but for ups.
 
 #include <cstddef>
 #include <cstdint>
@@ -37,7 +38,8 @@ struct ChunkTurn {
 };
 
 /// Even ones, without gaps; odd ones are left to what the tree of ranks does: between the last tell and glue
-/// (tree.hpp), but what goes up before the first take where there is one.
+/// (tree.hpp), but what goes up before the first take, and what goes down behind every publish, where there
+/// are turns.
 struct LoopColours {
   std::vector<std::uint32_t> chunk;    ///< as the turns that were given
   std::vector<std::uint32_t> publish;  ///< per subdomain of the rank, behind its border

@@ -45,6 +45,15 @@ Tree grow_tree(std::span<const RankLoad> load) {
   return tree;
 }
 
+std::vector<int> Tree::branch(int from) const {
+  std::vector<int> ranks = {from};
+  for (const int child : children[static_cast<std::size_t>(from)]) {
+    const std::vector<int> below = branch(child);
+    ranks.insert(ranks.end(), below.begin(), below.end());
+  }
+  return ranks;
+}
+
 TreeColours tree_colours(const Tree& tree, int rank, std::uint32_t tell, std::uint32_t glue) {
   const std::uint32_t inner = (glue - tell) / 2 - 1;
   const int whole = std::max(1, tree.last()), at = tree.told[static_cast<std::size_t>(rank)];

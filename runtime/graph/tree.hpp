@@ -19,6 +19,8 @@ struct Tree {
   bool leaf(int rank) const { return children[static_cast<std::size_t>(rank)].empty(); }
   /// Has both a parent and children.
   bool relays(int rank) const { return rank != top() && !leaf(rank); }
+  /// The ranks that hang on `from`, itself first, then the branch of each child: the order of what goes up.
+  std::vector<int> branch(int from) const;
 };
 
 /// What a neighbour costs a rank beside its contacts, in contacts of 6 ns: a message there and one back, and

@@ -37,29 +37,20 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   std::vector<HubRecord> everywhere = ranks_.gather_records(std::span<const HubRecord>(mine));
   std::stable_sort(everywhere.begin(), everywhere.end(),
                    [](const HubRecord& a, const HubRecord& b) { return a.subdomain < b.subdomain; });
-  const auto items_of = [&](auto wanted) {
-    std::vector<std::int64_t> ids;
-    for (const HubRecord& record : everywhere)
-      if (wanted(all.rank_of[static_cast<std::size_t>(record.subdomain)])) ids.push_back(record.id);
-    std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-    return ids;
-  };
   const auto place = [](const std::vector<std::int64_t>& ids, std::int64_t id) {
     return static_cast<std::size_t>(std::lower_bound(ids.begin(), ids.end(), id) - ids.begin());
   };
   const int me = ranks_.rank(), ranks = ranks_.ranks();
   const std::vector<int>& children = tree_.children[at(me)];
-  /// Ranks that hang on `top`, itself among them: 1.
-  const auto branch_of = [&](int top) {
-    std::vector<char> branch(static_cast<std::size_t>(ranks), 0);
-    for (const int rank : tree_.order)
-      branch[at(rank)] = rank == top || (rank != tree_.top() && branch[at(tree_.parent[at(rank)])] != 0);
-    return branch;
-  };
   const auto items_below = [&](int top) {
-    const std::vector<char> branch = branch_of(top);
-    return items_of([&](std::int32_t rank) { return branch[at(rank)] != 0; });
+    const std::vector<int> branch = tree_.branch(top);
+    std::vector<std::int64_t> ids;
+    for (const HubRecord& record : everywhere)
+      if (std::ranges::find(branch, all.rank_of[static_cast<std::size_t>(record.subdomain)]) != branch.end())
+        ids.push_back(record.id);
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
   };
   const std::vector<std::int64_t> items = items_below(me);
   const std::size_t at_walls = 3 * walls_.size();
@@ -79,9 +70,7 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   if (ranks > 1 && (at_walls > 0 || !everywhere.empty())) {
     const auto length_of_branch = [&](int top) {
       std::size_t sum = 0;
-      const std::vector<char> branch = branch_of(top);
-      for (int rank = 0; rank < ranks; ++rank)
-        if (branch[at(rank)] != 0) sum += length_of_rank[at(rank)];
+      for (const int rank : tree_.branch(top)) sum += length_of_rank[at(rank)];
       return sum;
     };
     // A message is named after the first subdomain of the child; its parent speaks for the centre.
@@ -111,14 +100,13 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   if (me != tree_.top()) return;
   // Where the parts of each rank come: the message of its branch, and where in it.
   std::vector<const double*> parts(static_cast<std::size_t>(ranks), nullptr);
-  const auto lay_out = [&](const auto& self, int rank, const double* from) -> const double* {
-    parts[at(rank)] = from;
-    from += length_of_rank[at(rank)];
-    for (const int child : tree_.children[at(rank)]) from = self(self, child, from);
-    return from;
-  };
-  for (std::size_t child = 0; child < centre.links.size(); ++child)
-    lay_out(lay_out, children[child], centre.links[child]->in.data());
+  for (std::size_t child = 0; child < centre.links.size(); ++child) {
+    const double* from = centre.links[child]->in.data();
+    for (const int rank : tree_.branch(children[child])) {
+      parts[at(rank)] = from;
+      from += length_of_rank[at(rank)];
+    }
+  }
   for (std::size_t e = 0; e < length.size(); ++e) {
     Centre::Contribution contribution;
     const std::int32_t rank = all.rank_of[e];

@@ -324,7 +324,11 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
 
 void StepGraph::plan_iteration() {
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
-  if (!planned_) iteration_.plan_tree();
+  if (!planned_) {
+    const double planning = graph::seconds_now();
+    iteration_.plan_tree();
+    if (state_.decomposition.several()) sums_.times.dealing += graph::seconds_now() - planning;
+  }
   iteration_.begin();
   if (!planned_) plan_epochs();
   followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/graph/tree.hpp"
 #include "runtime/trace/analysis.hpp"
 
 namespace talus::trace {
@@ -150,6 +149,17 @@ class Walker {
     return list;
   }
 
+  /// A tell, or the publish of a group that has none.
+  static bool tells(const Plan& plan, std::size_t n) {
+    const auto is_tell = [&](std::size_t k) {
+      return static_cast<Role>(plan.role[k]) == Role::tell && plan.group[k] == plan.group[n];
+    };
+    if (static_cast<Role>(plan.role[n]) != Role::publish) return is_tell(n);
+    for (std::size_t k = 0; k < plan.size(); ++k)
+      if (is_tell(k)) return false;
+    return true;
+  }
+
   /// The task that sent what was waited for.
   Place sender_of(Place wait) const {
     const Record& received = record(wait);
@@ -168,13 +178,11 @@ class Walker {
     for (const StepIndex::Rank& rank : index_.ranks) {
       if (!rank.plan || epoch >= rank.epochs) continue;
       if (from == centre_group ? &rank != speaks : !has(rank, from)) continue;
-      const bool tells =
-          std::ranges::find(rank.plan->role, static_cast<std::uint8_t>(Role::tell)) != rank.plan->role.end();
       for (std::size_t n = 0; n < rank.nodes; ++n) {
         const Role role = static_cast<Role>(rank.plan->role[n]);
         const bool sends = from == centre_group || (to == centre_group && role == Role::centre)
                                ? role == Role::centre
-                           : to == centre_group ? role == (tells ? Role::tell : Role::publish)
+                           : to == centre_group ? tells(*rank.plan, n)
                                                 : role == Role::publish && rank.plan->group[n] == from;
         if (sends) keep_later(best, rank.at(epoch, n), received.end());
       }

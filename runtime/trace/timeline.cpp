@@ -149,4 +149,13 @@ StepIndex Timeline::index(std::uint32_t step) const {
   return index;
 }
 
+graph::Tree tree_of(const StepIndex& index) {
+  std::vector<graph::RankLoad> load(index.ranks.size());
+  for (std::size_t r = 0; r < index.ranks.size(); ++r)
+    if (index.ranks[r].plan)
+      add_load(
+          *index.ranks[r].plan, [&](std::uint32_t) { return r; }, load);
+  return graph::grow_tree(load);
+}
+
 }  // namespace talus::trace

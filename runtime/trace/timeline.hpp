@@ -62,6 +62,9 @@ struct StepIndex {
   std::vector<Rank> ranks;
 };
 
+/// The tree of ranks over which the step's loop glued walls.
+graph::Tree tree_of(const StepIndex& index);
+
 /// For all steps, one after the other; keeps what is common.
 class Timeline {
  public:

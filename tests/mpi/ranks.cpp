@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "io/results.hpp"
+#include "runtime/graph/tree.hpp"
 #include "tests/mpi/launcher.hpp"
 
 namespace talus::test {
@@ -65,18 +66,21 @@ TEST_F(Ranks, ChangeNoBitOfAnyResult) {
   }
 }
 
-// With more than seven ranks some hand on what others tell rank 0 (runtime/graph/tree.hpp).
+// With more than nine ranks some hand on what others tell the top (runtime/graph/tree.hpp).
 TEST_F(Ranks, HandOnWhatOthersSayToTheBit) {
-  for (const std::string exchange : {"dcs", "ccs"}) {
-    const std::string nine =
-        "run scene.toml --force --steps 4 --threads 1 --set decomposition.subdomains=9 --set "
-        "decomposition.exchange=" +
-        exchange;
-    const Outcome one = run(1, nine + " --out one"), other = run(9, nine + " --out other");
-    ASSERT_EQ(one.code, 3) << exchange << ": " << one.messages;
-    ASSERT_EQ(other.code, 3) << exchange << ": " << other.messages;
-    EXPECT_EQ(digest_of("other"), digest_of("one")) << exchange;
-    EXPECT_EQ(file("other", "walls.csv"), file("one", "walls.csv")) << exchange;
+  constexpr int ranks = 12;
+  const std::vector<graph::RankLoad> alike(ranks);
+  const graph::Tree tree = graph::grow_tree(alike);
+  ASSERT_GT(std::ranges::count_if(tree.order, [&](int rank) { return tree.relays(rank); }), 0);
+  for (const std::string keys : {"subdomains=12", "subdomains=12 --set decomposition.exchange=ccs",
+                                 "subdomains=36 --set decomposition.mapping=cyclic",
+                                 "subdomains=36 --set decomposition.coupling=nscdd"}) {
+    const std::string twelve = "run scene.toml --force --steps 3 --threads 1 --set decomposition." + keys;
+    const Outcome one = run(1, twelve + " --out one"), other = run(ranks, twelve + " --out other");
+    ASSERT_EQ(one.code, 3) << keys << ": " << one.messages;
+    ASSERT_EQ(other.code, 3) << keys << ": " << other.messages;
+    EXPECT_EQ(digest_of("other"), digest_of("one")) << keys;
+    EXPECT_EQ(file("other", "walls.csv"), file("one", "walls.csv")) << keys;
   }
 }
 

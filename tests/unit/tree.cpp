@@ -51,6 +51,17 @@ TEST(Tree, IsHandedOnByTheRanksWithTheLeastWorkOfThoseThatDoNotWait) {
   EXPECT_LT(most, least);
 }
 
+TEST(Tree, NamesTheRanksOfABranchParentsFirstAndChildByChild) {
+  const Tree tree = grow_tree(equal_loads(96));
+  EXPECT_EQ(tree.branch(tree.top()).size(), 96U);
+  for (int rank = 0; rank < 96; ++rank) {
+    std::vector<int> expected = {rank};
+    for (const int child : tree.children[static_cast<std::size_t>(rank)])
+      for (const int below : tree.branch(child)) expected.push_back(below);
+    EXPECT_EQ(tree.branch(rank), expected);
+  }
+}
+
 // Six children a rank would take 36 messages' time to the last of 96 ranks, one rank alone 101.
 TEST(Tree, ReachesItsLastRankSoon) {
   const Tree tree = grow_tree(equal_loads(96));
@@ -131,6 +142,7 @@ TEST(LoopColours, TellFirstAndInLaterTurnsPutTakeAndBorderBehindTheInside) {
   EXPECT_EQ(two.glue, 22U);
   EXPECT_LT(two.tell[1], two.tree.up);  // what goes up waits for tells only, and nothing that waits for more
   EXPECT_LT(two.tree.up, two.take[1]);  // comes before it
+  EXPECT_LT(two.publish[1], two.tree.down);
   // Without overlap nothing is between a publish and who waits for it.
   EXPECT_EQ(colours_of(at_walls, {0, 1}, {1, 1}, true, {.overlap = false}).chunk,
             (std::vector<std::uint32_t>{0, 10, 22, 4, 8, 16}));
@@ -166,6 +178,7 @@ TEST(LoopColours, OfARelayLetNobodyWaitForEver) {
       for (const std::size_t later : {0U, 1U}) {
         EXPECT_LT(colours.tree.up, colours.take[later]);
         EXPECT_LT(colours.take[later], colours.publish[later]);
+        EXPECT_LT(colours.publish[later], colours.tree.down);
       }
       EXPECT_LT(colours.publish[2], colours.take[0]);
       EXPECT_LT(colours.publish[0], colours.take[1]);

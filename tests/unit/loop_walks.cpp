@@ -1,0 +1,224 @@
+/// The loops of all ranks, played to their end on made-up subdomains: nobody waits for ever.
+
+#include "runtime/graph/loop_colours.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <utility>
+#include <vector>
+
+#include "partition/turns.hpp"
+#include "tests/unit/dense_sample.hpp"
+
+namespace talus::graph {
+namespace {
+
+using test::Random;
+using test::uniform;
+
+/// n_x x n_y x n_z boxes with made-up numbers of chunks, each on one rank.
+struct Machine {
+  std::vector<std::vector<std::size_t>> neighbours;
+  std::vector<char> turn;
+  std::vector<std::size_t> rank_of;
+  std::vector<int> border, inside;  ///< chunks per subdomain
+  std::size_t ranks = 0;
+  int threads = 1;
+  bool overlap = true;
+};
+
+/// What waits or is waited for. Chunks do neither.
+struct Node {
+  enum Role { publish, collect, centre, glue, take, tell } role;
+  std::uint32_t colour;
+  std::size_t subdomain;  ///< of collect and centre none
+};
+
+/// What a thread goes through, in order.
+struct Walk {
+  std::size_t rank;
+  std::vector<Node> nodes;
+};
+
+class Play {
+ public:
+  explicit Play(const Machine& machine) : machine_(machine), tells_left_(machine.ranks, 0) {
+    std::vector<RankLoad> load(machine.ranks);
+    for (std::size_t e = 0; e < machine.turn.size(); ++e) {
+      RankLoad& rank = load[machine.rank_of[e]];
+      rank.work += static_cast<std::uint64_t>(10 + machine.border[e] + machine.inside[e]);
+      rank.waits = rank.waits || machine.turn[e] > 0;
+      ++tells_left_[machine.rank_of[e]];
+    }
+    tree_ = grow_tree(load);
+    for (std::size_t r = 0; r < machine.ranks; ++r) add_walks(r);
+    published_.assign(machine.turn.size(), 0);
+    up_.assign(machine.ranks, 0);
+    down_.assign(machine.ranks, 0);
+  }
+
+  bool has_relays() const {
+    return std::ranges::any_of(tree_.order, [&](int rank) { return tree_.relays(rank); });
+  }
+
+  /// True when all walks come to their ends.
+  bool ends() {
+    std::vector<std::size_t> at(walks_.size(), 0);
+    for (bool moved = true; moved;) {
+      moved = false;
+      for (std::size_t w = 0; w < walks_.size(); ++w)
+        for (; at[w] < walks_[w].nodes.size() && may_run(walks_[w], walks_[w].nodes[at[w]]); ++at[w]) {
+          run(walks_[w].rank, walks_[w].nodes[at[w]]);
+          moved = true;
+        }
+    }
+    for (std::size_t w = 0; w < walks_.size(); ++w)
+      if (at[w] < walks_[w].nodes.size()) return false;
+    return true;
+  }
+
+ private:
+  void add_walks(std::size_t rank) {
+    std::vector<std::size_t> mine;
+    for (std::size_t e = 0; e < machine_.turn.size(); ++e)
+      if (machine_.rank_of[e] == rank) mine.push_back(e);
+    std::vector<ChunkTurn> chunks;
+    std::vector<char> turn_of;
+    using enum ChunkTurn::Side;
+    for (std::uint32_t k = 0; k < mine.size(); ++k) {
+      const char turn = machine_.turn[mine[k]];
+      turn_of.push_back(turn);
+      std::uint32_t colour = 0;
+      const auto add = [&](ChunkTurn::Side side, int count) {
+        for (int i = 0; i < count; ++i) chunks.push_back({side, k, colour++});
+      };
+      add(early, 2);
+      if (turn == 0) add(border, machine_.border[mine[k]]);
+      add(inside, machine_.inside[mine[k]]);
+      if (turn > 0) add(late, machine_.border[mine[k]]);
+    }
+    const bool in_turns = std::ranges::any_of(machine_.turn, [](char turn) { return turn > 0; });
+    const LoopColours colours =
+        loop_colours(chunks, turn_of, std::vector<char>(mine.size(), 1), in_turns, machine_.overlap,
+                     machine_.threads, static_cast<int>(rank), tree_);
+    const auto threads = static_cast<std::size_t>(machine_.threads);
+    std::vector<Walk> walks(threads, Walk{rank, {}});
+    for (std::size_t k = 0; k < mine.size(); ++k) {
+      std::vector<Node>& own = walks[k * threads / mine.size()].nodes;
+      own.push_back({Node::publish, colours.publish[k], mine[k]});
+      own.push_back({Node::glue, colours.glue, mine[k]});
+      own.push_back({Node::tell, colours.tell[k], mine[k]});
+      if (turn_of[k] > 0) own.push_back({Node::take, colours.take[k], mine[k]});
+    }
+    if (tree_.relays(static_cast<int>(rank))) walks[0].nodes.push_back({Node::collect, colours.tree.up, 0});
+    walks[0].nodes.push_back({Node::centre, colours.tree.down, 0});
+    for (Walk& walk : walks) {
+      std::ranges::stable_sort(walk.nodes, {}, [](const Node& n) { return std::pair(n.colour, n.role); });
+      walks_.push_back(std::move(walk));
+    }
+  }
+
+  bool may_run(const Walk& walk, const Node& node) const {
+    const auto all_of = [&](auto wanted) {
+      return std::ranges::all_of(machine_.neighbours[node.subdomain],
+                                 [&](std::size_t other) { return !wanted(other) || published_[other] != 0; });
+    };
+    const bool top = static_cast<int>(walk.rank) == tree_.top();
+    switch (node.role) {
+      case Node::take:
+        return all_of([&](std::size_t e) { return machine_.turn[e] < machine_.turn[node.subdomain]; });
+      case Node::glue:
+        return down_[walk.rank] != 0 && all_of([](std::size_t) { return true; });
+      case Node::centre:
+        if (!top)
+          return tells_left_[walk.rank] == 0 && down_[static_cast<std::size_t>(tree_.parent[walk.rank])] != 0;
+        [[fallthrough]];
+      case Node::collect:
+        return tells_left_[walk.rank] == 0 && std::ranges::all_of(tree_.children[walk.rank], [&](int child) {
+                 return up_[static_cast<std::size_t>(child)] != 0;
+               });
+      case Node::publish:
+      case Node::tell:
+        break;
+    }
+    return true;
+  }
+
+  void run(std::size_t rank, const Node& node) {
+    if (node.role == Node::publish) published_[node.subdomain] = 1;
+    if (node.role == Node::collect) up_[rank] = 1;
+    if (node.role == Node::centre) down_[rank] = 1;
+    if (node.role == Node::tell && --tells_left_[rank] == 0 && tree_.leaf(static_cast<int>(rank)))
+      up_[rank] = 1;
+  }
+
+  const Machine& machine_;
+  Tree tree_;
+  std::vector<Walk> walks_;
+  std::vector<char> published_, up_,
+      down_;  ///< per subdomain; per rank: its part has left; it has the answer
+  std::vector<int> tells_left_;
+};
+
+/// With turns as the partition chooses them, or none.
+Machine made_up(Random& random, bool in_turns) {
+  const auto any = [&](int from, int to) {
+    return std::min(to, from + static_cast<int>(uniform(random, 0, to - from + 1)));
+  };
+  const std::array<int, 3> boxes = {any(2, 6), any(2, 6), any(1, 4)};
+  const auto count = static_cast<std::size_t>(boxes[0] * boxes[1] * boxes[2]);
+  Machine machine;
+  machine.neighbours.resize(count);
+  std::vector<Tie> ties;
+  const auto place = [&](std::size_t e) {
+    const int n = static_cast<int>(e);
+    return std::array{n % boxes[0], n / boxes[0] % boxes[1], n / boxes[0] / boxes[1]};
+  };
+  for (std::size_t a = 0; a < count; ++a)
+    for (std::size_t b = 0; b < count; ++b) {
+      int apart = 0, farthest = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int d = std::abs(place(a)[k] - place(b)[k]);
+        apart += d;
+        farthest = std::max(farthest, d);
+      }
+      if (farthest != 1) continue;
+      machine.neighbours[a].push_back(b);
+      ties.push_back({static_cast<std::int32_t>(a), static_cast<std::int32_t>(b),
+                      apart == 1   ? 100
+                      : apart == 2 ? 10
+                                   : 1});
+    }
+  machine.turn =
+      in_turns ? choose_turns(static_cast<std::int32_t>(count), ties) : std::vector<char>(count, 0);
+  machine.ranks = std::max<std::size_t>(1, count / static_cast<std::size_t>(any(1, 8)));
+  const bool cyclic = any(0, 1) == 1;
+  for (std::size_t e = 0; e < count; ++e) {
+    machine.rank_of.push_back(cyclic ? e % machine.ranks : e * machine.ranks / count);
+    machine.border.push_back(any(1, 14));
+    machine.inside.push_back(any(0, 14));
+  }
+  machine.threads = any(1, 3);
+  machine.overlap = any(0, 3) > 0;
+  return machine;
+}
+
+TEST(LoopWalks, OfAnyRanksThreadsAndTurnsComeToTheirEnds) {
+  Random random(1);
+  int with_relays = 0;
+  for (int trial = 0; trial < 4000; ++trial) {
+    const Machine machine = made_up(random, trial % 4 != 0);
+    Play play(machine);
+    with_relays += play.has_relays() ? 1 : 0;
+    ASSERT_TRUE(play.ends()) << "trial " << trial << ": " << machine.turn.size() << " subdomains, "
+                             << machine.ranks << " ranks, " << machine.threads << " threads, overlap "
+                             << machine.overlap;
+  }
+  EXPECT_GT(with_relays, 100);
+}
+
+}  // namespace
+}  // namespace talus::graph
