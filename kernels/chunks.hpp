@@ -35,8 +35,8 @@ struct Candidates {
 enum class ChunkSide : std::uint8_t {
   wall,    ///< its wall is glued
   border,  ///< a body of each of its candidates stands in several subdomains
-  inside,
-  late,  ///< at a border that waits for others
+  inside,  ///< no body of it stands in another subdomain
+  late,    ///< at a border that waits for others
 };
 
 /// Candidates [begin, end) that may share a chunk: of one subdomain, of one wall or of none, and of one side.

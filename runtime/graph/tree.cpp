@@ -1,6 +1,7 @@
 #include "runtime/graph/tree.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 #include <queue>
 #include <stdexcept>

@@ -34,18 +34,16 @@ struct JumpSums {
 ///                bodies that go through the centre this is done by publish
 ///   publish[e]   after the border chunks of subdomain e: its interface velocities leave
 ///   collect      on ranks between the top and the leaves of the tree of ranks: what came from below goes up
-///   centre       once a rank: what goes through one rank (CCS; walls of finite mass and bodies with m_i >=
-///   9, or 33 with turns,
-///                always, so that k copies cost O(k) messages)
+///   centre       once a rank: what goes through one rank (CCS; always walls of finite mass and bodies with
+///                m_i >= 9, or 33 with turns, so that k copies cost O(k) messages)
 ///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
 ///                what all have gained (Schwarz); summed in order of subdomain
 ///
 /// Alternating, subdomains have turns (partition/turns.hpp). One whose turn is not the first begins its
 /// boundary with
 ///
-///   take[e]      copies of bodies that stand in subdomains of earlier turns, too, get the mean of the latest
-///   of
-///                those
+///   take[e]      copies of bodies that stand in subdomains of earlier turns, too, get the mean of the
+///                latest of those
 ///
 /// Contacts at glued walls that it has wait for nobody (distribute.cpp). In the end all copies of a body get
 /// the mean of those of its last turn. Each message is sent once, as without turns: a take reads those of

@@ -74,7 +74,8 @@ void Gluing::plan_tree(std::uint64_t contacts) {
       return sum;
     };
     // A message is named after the first subdomain of the child; its parent speaks for the centre.
-    const auto open = [&](int other, int child, std::size_t out, std::size_t in) {
+    const auto open = [&](int child, std::size_t out, std::size_t in) {
+      const int other = child == me ? tree_.parent[at(me)] : child;
       auto link = std::make_unique<Link>();
       link->out.resize(out + 1);
       link->in.resize(in + 1);
@@ -91,10 +92,9 @@ void Gluing::plan_tree(std::uint64_t contacts) {
     for (const int child : children) {
       std::vector<std::size_t>& wanted = centre.items_of_child.emplace_back();
       for (std::int64_t id : items_below(child)) wanted.push_back(place(items, id));
-      centre.links.push_back(open(child, child, at_walls + wanted.size() * width_, length_of_branch(child)));
+      centre.links.push_back(open(child, at_walls + wanted.size() * width_, length_of_branch(child)));
     }
-    if (me != tree_.top())
-      centre.up = open(tree_.parent[at(me)], me, length_of_branch(me), centre.sums.size());
+    if (me != tree_.top()) centre.up = open(me, length_of_branch(me), centre.sums.size());
   }
   count_messages();
   if (me != tree_.top()) return;

@@ -365,7 +365,8 @@ void StepGraph::plan_epochs() {
   std::vector<std::uint32_t> colour(nodes), offset(1, 0), neighbour;
   std::vector<std::vector<std::uint32_t>> boundary(here), at_walls(here);
   // The tree of ranks has its part among chunks, so that the way there and the way back are both hidden. It
-  // touches what walls' chunks have written and glue will read: before or behind others the bits are the same.
+  // touches what walls' chunks have written and glue will read: before or behind others the bits are the
+  // same.
   std::vector<graph::ChunkTurn> turns;
   for (std::size_t c = 0; c < count; ++c)
     turns.push_back({side_of(chunks.side[c], tells[static_cast<std::size_t>(chunks.subdomain[c])] != 0),
