@@ -131,6 +131,7 @@ class Gluing {
   template <std::size_t Width, class Record>
   auto add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const;
   void send_up();
+  void await_children();
   void answer();
   template <class Work>
   void with_bodies(bool single, const Work& work);

@@ -1,6 +1,7 @@
 /// The centre of the gluing, and the tree of ranks that leads to it and back.
 
 #include <algorithm>
+#include <ranges>
 #include <utility>
 
 #include "runtime/step/detail/gluing_parts.hpp"
@@ -139,10 +140,15 @@ void Gluing::send_up() {
   start(*link.sender, ranks_.trace(), link.out_name);
 }
 
+/// The last to be told comes first: it has least below it.
+void Gluing::await_children() {
+  for (const auto& link : centre_->links | std::views::reverse)
+    await(*link->receiver, centre_->waited, ranks_.trace(), link->in_name);
+}
+
 void Gluing::collect(Mode mode) {
   if (mode == Mode::local) return;
-  for (const auto& link : centre_->links)
-    await(*link->receiver, centre_->waited, ranks_.trace(), link->in_name);
+  await_children();
   send_up();
   for (const auto& link : centre_->links) link->receiver->start();
 }
@@ -158,7 +164,7 @@ void Gluing::centre(Mode mode) {
     answer();
     return;
   }
-  for (const auto& link : centre.links) await(*link->receiver, centre.waited, ranks_.trace(), link->in_name);
+  await_children();
   std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
   const std::size_t at_walls = 3 * walls_.size();
   for (const Centre::Contribution& contribution : centre.contributions) {
