@@ -11,14 +11,8 @@ constexpr double no_wait = 300;
 
 class Walker {
  public:
-  Walker(const Timeline& timeline, const StepIndex& index) : timeline_(timeline), index_(index) {
-    std::vector<graph::RankLoad> load(index.ranks.size());
-    for (std::size_t r = 0; r < index.ranks.size(); ++r)
-      if (index.ranks[r].plan)
-        add_load(
-            *index.ranks[r].plan, [&](std::uint32_t) { return r; }, load);
-    tree_ = graph::grow_tree(load);
-  }
+  Walker(const Timeline& timeline, const StepIndex& index)
+      : timeline_(timeline), index_(index), tree_(tree_of(index)) {}
 
   std::vector<PathHop> walk() {
     std::vector<PathHop> path;
