@@ -13,7 +13,7 @@ Recorder::Recorder(RecorderOptions options) : options_(std::move(options)) {
   for (std::size_t t = 0; t < lanes_.size(); ++t) {
     lanes_[t].owner_ = this;
     lanes_[t].thread_ = static_cast<std::int32_t>(t);
-    lanes_[t].records_.reserve(options_.block);
+    lanes_[t].records_.reserve(options_.block + Lane::records_ahead);
   }
 }
 
@@ -51,7 +51,7 @@ void Recorder::finish() {
 void Recorder::hand_over(Lane& lane) {
   if (lane.records_.empty()) return;
   std::vector<Record> full;
-  full.reserve(options_.block);
+  full.reserve(options_.block + Lane::records_ahead);
   std::swap(full, lane.records_);
   options_.sink({options_.rank, lane.thread_, std::move(full), std::nullopt});
 }

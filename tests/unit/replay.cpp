@@ -110,6 +110,25 @@ TEST(Replay, OfTwoRecordedRanksOnOneAddsThemUp) {
   EXPECT_DOUBLE_EQ(makespan(two, bare(2, 1)), 2 * 180);
 }
 
+TEST(CriticalPath, GoesFromTakerToSenderUpAndDownTheTreeOfRanks) {
+  const Trace recorded = test::all_neighbours(40, 1, true);
+  Machine machine = bare(40, 1);
+  machine.latency = 1e-5;
+  const Trace played = replay(Timeline(recorded), machine, true).trace;
+  const Timeline timeline(played);
+  const std::vector<PathHop> path = critical_path(timeline, timeline.index(1));
+  int crossings = 0;
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    const Record &later = timeline.record(path[k - 1].place), &before = timeline.record(path[k].place);
+    if (later.kind() == kind_check || before.epoch < 0) continue;  // sums; tasks of no length
+    const bool crosses = played.lanes[path[k].place.lane].rank != played.lanes[path[k - 1].place.lane].rank;
+    crossings += crosses;
+    EXPECT_NEAR(path[k - 1].from - path[k].until, crosses ? 1e4 : 0, 1) << "hop " << k;
+  }
+  // In each of two epochs to the centre and back, over ranks between.
+  EXPECT_GE(crossings, 8);
+}
+
 TEST(Replay, WaitsAreRecordedAsWaits) {
   const Trace trace = test::two_subdomains(1);
   Machine machine = bare(2, 1);

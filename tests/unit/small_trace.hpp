@@ -87,8 +87,9 @@ inline Lane run_once(const Plan& plan, const std::vector<float>& duration, const
 }
 
 /// Subdomains that all share copies: in each epoch a sweep of 100 ns, publish of 10 ns, an inner sweep of 50
-/// ns, glue of 20 ns, on one rank or one on each; two epochs, messages of 1000 bytes.
-inline Trace all_neighbours(int subdomains, int ranks) {
+/// ns, glue of 20 ns, on one rank or one on each; two epochs, messages of 1000 bytes. With a wall that all of
+/// them touch, 100 bytes each go to the centre and back besides.
+inline Trace all_neighbours(int subdomains, int ranks, bool wall = false) {
   Trace trace;
   trace.ranks = ranks;
   trace.kinds = kinds();
@@ -117,6 +118,9 @@ inline Trace all_neighbours(int subdomains, int ranks) {
       for (int other = 0; other < subdomains; ++other)
         if (other != e)
           messages.push_back({static_cast<std::uint16_t>(e), static_cast<std::uint16_t>(other), 1000});
+      if (!wall) continue;
+      messages.push_back({static_cast<std::uint16_t>(e), centre_group, 100});
+      messages.push_back({centre_group, static_cast<std::uint16_t>(e), 100});
     }
     for (std::size_t k = 0; k < publishes.size(); ++k) {
       builder.join(publishes[k], outer[k]);
