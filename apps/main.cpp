@@ -159,7 +159,7 @@ int main(int argc, char** argv) {
   partition_app->add_option("--subdomains", partition.subdomains, "number of subdomains")
       ->type_name("N")
       ->required()
-      ->check(CLI::Range(1, 65536));
+      ->check(CLI::Range(1, most_subdomains));
   partition_app
       ->add_option("--partitioner", partition.partitioners,
                    "boxes, fitted, rcb, metis or auto, may be repeated [all but auto]")

@@ -97,6 +97,8 @@ void report(const ReplayOptions& options, const trace::Timeline& timeline, const
 
 int replay_command(ReplayOptions options) {
   try {
+    for (const std::string& out : {options.out, options.smpi_platform})
+      if (!out.empty()) io::check_output_file(options.file, out);
     const trace::Trace recorded = io::read_trace(options.file);
     trace::Machine machine = options.machine;
     machine.ranks = options.ranks.value_or(recorded.ranks);

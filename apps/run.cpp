@@ -268,12 +268,16 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   } catch (const std::exception& error) {
     failed(error);
   }
-  if (summary.status == "failed") {
-    // The other ranks may wait for what will not come: the caller ends them when the files are whole.
-    summary.steps = simulation.report().step;
-    summary.wall_s = watch.seconds();
-    return summary;
-  }
+  summary.steps = simulation.report().step;
+  summary.time = simulation.report().time;
+  summary.iterations = tally.iterations;
+  summary.unconverged_steps = tally.unconverged;
+  summary.converged_steps = summary.steps - tally.unconverged;
+  summary.worst_error_rms = tally.worst_error;
+  summary.worst_balance = tally.worst_balance;
+  summary.wall_s = watch.seconds();
+  // The other ranks may wait for what will not come: the caller ends them when the files are whole.
+  if (summary.status == "failed") return summary;
   if (trace) trace->finish(executor);
   const MessageCount& messages = simulation.messages();
   if (ranks.rank() == 0 && messages.messages > 0)
@@ -296,14 +300,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
                tally.stagnated, tally.floor);
   if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
     summary.exit_code = exit_tolerance_missed;
-  summary.steps = simulation.report().step;
-  summary.time = simulation.report().time;
   summary.digest = simulation.digest();
-  summary.iterations = tally.iterations;
-  summary.unconverged_steps = tally.unconverged;
-  summary.converged_steps = summary.steps - tally.unconverged;
-  summary.worst_error_rms = tally.worst_error;
-  summary.worst_balance = tally.worst_balance;
   summary.wall_s = watch.seconds();
   return summary;
 }
@@ -311,9 +308,10 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
 void print_end(const io::Summary& summary, const SolverSettings& solver, const std::string& directory) {
   if (!summary.message.empty())
     fmt::print(stderr, "talus: {}: {}\n", summary.status == "failed" ? "error" : "stopped", summary.message);
-  fmt::print(stderr, "talus: {}, {:.6g} s simulated in {:.1f} s, {} sweeps, digest {:016x}\n",
+  const std::string digest = summary.digest ? fmt::format(", digest {:016x}", *summary.digest) : "";
+  fmt::print(stderr, "talus: {}, {:.6g} s simulated in {:.1f} s, {} sweeps{}\n",
              counted(static_cast<std::size_t>(summary.steps), "step"), summary.time, summary.wall_s,
-             summary.iterations, summary.digest);
+             summary.iterations, digest);
   if (summary.unconverged_steps > 0)
     fmt::print(
         stderr,

@@ -21,22 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Removes a folder that a run has made, whatever becomes of the run.
-class Scratch {
- public:
-  explicit Scratch(fs::path folder) : folder_(std::move(folder)) { fs::create_directories(folder_); }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  const fs::path& folder() const { return folder_; }
-
- private:
-  fs::path folder_;
-};
-
 RunTimes start(const ScalingLauncher& launcher, const std::vector<std::string>& words,
                const fs::path& folder) {
   const fs::path log = folder / "log";
@@ -46,10 +30,20 @@ RunTimes start(const ScalingLauncher& launcher, const std::vector<std::string>& 
   return read_times(folder / "out" / "steps.csv", launcher.first, launcher.last);
 }
 
+/// Of a line that io::CsvTable wrote: names with commas or quotes are between quotes, quotes within twice.
 std::vector<std::string> cells_of(const std::string& line) {
-  std::vector<std::string> cells;
-  std::istringstream in(line);
-  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+  std::vector<std::string> cells(1);
+  bool within = false;
+  for (const char c : line) {
+    if (c == '"') {
+      within = !within;
+      if (within && !cells.back().empty()) cells.back() += c;  // the second of two
+    } else if (c == ',' && !within) {
+      cells.emplace_back();
+    } else {
+      cells.back() += c;
+    }
+  }
   return cells;
 }
 
@@ -111,28 +105,28 @@ RunTimes read_times(const fs::path& steps_csv, std::int64_t first, std::int64_t 
 
 RunTimes run_once(const ScalingLauncher& launcher, const ScalingSubject& subject,
                   const ScalingMachine& machine) {
-  const Scratch scratch(launcher.work);
-  return start(launcher, run_words(launcher, subject, machine, (scratch.folder() / "out").string()),
-               scratch.folder());
+  const io::ScratchFolder scratch(launcher.work);
+  return start(launcher, run_words(launcher, subject, machine, (scratch.path() / "out").string()),
+               scratch.path());
 }
 
 RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subject, int subdomains,
                      const fs::path& trace) {
-  const Scratch scratch(launcher.work);
+  const io::ScratchFolder scratch(launcher.work);
   std::vector<std::string> words =
-      run_words(launcher, subject, {subdomains, 1, 1}, (scratch.folder() / "out").string());
+      run_words(launcher, subject, {subdomains, 1, 1}, (scratch.path() / "out").string());
   words.insert(words.end(),
                {"--trace", "--trace-steps", fmt::format("{}:{}", launcher.first, launcher.last)});
-  const RunTimes times = start(launcher, words, scratch.folder());
+  const RunTimes times = start(launcher, words, scratch.path());
   fs::create_directories(trace.parent_path());
-  fs::rename(scratch.folder() / "out" / "trace.h5", trace);
+  fs::rename(scratch.path() / "out" / "trace.h5", trace);
   return times;
 }
 
 RunTimes simulate_once(const ScalingLauncher& launcher, const SimulatedLauncher& simulated,
                        const ScalingSubject& subject, const trace::Machine& machine) {
-  const Scratch scratch(launcher.work);
-  const fs::path platform = scratch.folder() / "platform.xml", hosts = scratch.folder() / "hosts";
+  const io::ScratchFolder scratch(launcher.work);
+  const fs::path platform = scratch.path() / "platform.xml", hosts = scratch.path() / "hosts";
   io::write_whole(platform, io::smpi_platform(machine));
   io::write_whole(hosts, io::smpi_hosts(machine));
   std::vector<std::string> words{
@@ -140,9 +134,9 @@ RunTimes simulate_once(const ScalingLauncher& launcher, const SimulatedLauncher&
   ScalingLauncher inside = launcher;
   inside.talus = fs::absolute(simulated.talus);
   const std::vector<std::string> run =
-      run_words(inside, subject, {machine.ranks, 1, 1}, (scratch.folder() / "out").string());
+      run_words(inside, subject, {machine.ranks, 1, 1}, (scratch.path() / "out").string());
   words.insert(words.end(), run.begin(), run.end());
-  return start(launcher, words, scratch.folder());
+  return start(launcher, words, scratch.path());
 }
 
 std::vector<RecordedTrace> read_recordings(const fs::path& times_csv) {

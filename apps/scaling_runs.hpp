@@ -28,9 +28,9 @@ struct ScalingSubject {
 
 /// How programs are started.
 struct ScalingLauncher {
-  std::string talus;                 ///< the program
-  std::vector<std::string> mpirun;   ///< words before -n RANKS; empty: mpirun, a rank's threads on own cores
-  std::filesystem::path work;        ///< folder for what runs write, removed after each
+  std::string talus;                ///< the program
+  std::vector<std::string> mpirun;  ///< words before -n RANKS; empty: mpirun, a rank's threads on own cores
+  std::filesystem::path work;  ///< beginning of the names of folders for what runs write, removed after each
   std::int64_t first = 1, last = 1;  ///< steps that count
 };
 

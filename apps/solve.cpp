@@ -30,24 +30,11 @@ double processor_seconds() {
 }
 
 struct Plan {
-  std::vector<std::filesystem::path> files;
+  std::vector<io::FclibFile> files;
   std::vector<DelassusMethod> methods;
   ErrorMeasure measure = ErrorMeasure::larger;
   bool table = false;  ///< several solves
 };
-
-std::vector<std::filesystem::path> problems_at(const std::filesystem::path& path) {
-  if (!std::filesystem::is_directory(path)) return {path};
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(path)) {
-    const auto extension = entry.path().extension();
-    if (extension == ".hdf5" || extension == ".h5") files.push_back(entry.path());
-  }
-  if (files.empty())
-    throw io::FileError(path.string(), "holds no .hdf5 or .h5 file; give a problem or a folder of problems");
-  std::sort(files.begin(), files.end());
-  return files;
-}
 
 /// Checks the options and finds the files; throws std::invalid_argument or io::FileError.
 Plan plan_of(const SolveOptions& options) {
@@ -76,12 +63,13 @@ Plan plan_of(const SolveOptions& options) {
     throw std::invalid_argument(
         fmt::format("--measure is \"{}\", but there are larger, siconos and scaled", options.measure));
   }
-  plan.files = problems_at(options.path);
+  plan.files = io::fclib_files(options.path);
   plan.table = plan.methods.size() > 1 || std::filesystem::is_directory(options.path);
-  if (!options.out.empty()) {
-    if (plan.table) throw std::invalid_argument("--out wants one problem and one method");
-    io::check_fclib_output(options.path, options.out);
-  }
+  if (!options.out.empty() && plan.table)
+    throw std::invalid_argument("--out wants one problem and one method");
+  for (const std::filesystem::path& out : {options.out, options.csv, options.profile})
+    for (const io::FclibFile& file : plan.files)
+      if (!out.empty()) io::check_output_file(file.path, out);
   return plan;
 }
 
@@ -141,7 +129,7 @@ int solve(const SolveOptions& options) {
   for (const auto& file : plan.files) {
     io::FclibProblem problem;
     try {
-      problem = io::read_fclib_problem(file);
+      problem = io::read_fclib_problem(file.path);
     } catch (const io::FileError& error) {
       if (!plan.table) throw;
       fmt::print(stderr, "talus solve: {}\n", error.what());
@@ -149,14 +137,14 @@ int solve(const SolveOptions& options) {
       continue;
     }
     for (const DelassusMethod method : plan.methods) {
-      Solved solved = solve_one(problem.contact, file.stem().string(), method, plan, options);
+      Solved solved = solve_one(problem.contact, file.name, method, plan, options);
       if (!plan.table) print_line(solved.row);
       if (!options.out.empty())
-        io::write_fclib_solution(file, options.out, io::fclib_solution(problem, solved.r));
+        io::write_fclib_solution(file.path, options.out, io::fclib_solution(problem, solved.r));
       if (solved.failed_contacts > 0)
         fmt::print(stderr,
                    "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
-                   file.string(), solved.failed_contacts);
+                   file.path.string(), solved.failed_contacts);
       rows.push_back(std::move(solved.row));
     }
   }

@@ -16,6 +16,7 @@
 #include "apps/study_report.hpp"
 #include "apps/study_runs.hpp"
 #include "apps/study_variants.hpp"
+#include "io/fclib.hpp"
 #include "io/output_directory.hpp"
 #include "io/run_json.hpp"
 #include "io/version.hpp"
@@ -143,11 +144,13 @@ int study_folder(const StudyErrorOptions& options) {
   report_profile(rows, report);
   write_report(directory, report);
   say(fmt::format("tables, picture and report.html in {}", directory));
-  std::set<std::string> solved, problems;
+  std::set<std::string> solved, problems, names;
   for (const ProfileRow& row : rows) {
+    names.insert(row.problem);
     problems.insert(fmt::format("{} {}", row.problem, row.tolerance));
     if (row.solved) solved.insert(fmt::format("{} {}", row.problem, row.tolerance));
   }
+  if (names.size() < io::fclib_files(folder).size()) return exit_bad_input;  // some could not be read
   return solved == problems ? exit_done : exit_tolerance_missed;
 }
 
@@ -176,7 +179,7 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
   app->add_option("--subdomains", options.subdomains, "numbers of subdomains [1]")
       ->type_name("N,..")
       ->delimiter(',')
-      ->check(CLI::Range(1, 65536));
+      ->check(CLI::Range(1, most_subdomains));
   app->add_option("--threads", options.threads, "numbers of threads [one per core]")
       ->type_name("N,..")
       ->delimiter(',')

@@ -20,18 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> problems_in(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && (entry.path().extension() == ".hdf5" || entry.path().extension() == ".h5"))
-      files.push_back(entry.path());
-  if (files.empty())
-    throw io::FileError(folder.string(),
-                        "holds no FCLIB problem (*.hdf5 or *.h5); give a scene or another folder");
-  std::ranges::sort(files);
-  return files;
-}
-
 std::vector<DelassusMethod> methods_named(std::span<const std::string> names) {
   std::vector<DelassusMethod> chosen;
   for (const std::string& name : names) {
@@ -72,17 +60,23 @@ std::vector<std::string> profile_methods() {
 
 void check_profile(const fs::path& folder, std::span<const std::string> methods) {
   methods_named(methods);
-  problems_in(folder);
+  io::fclib_files(folder);
 }
 
 std::vector<ProfileRow> study_profile(const fs::path& folder, std::span<const std::string> methods,
                                       std::span<const double> tolerances, double max_seconds,
                                       const std::function<void(const std::string&)>& say) {
   const std::vector<DelassusMethod> chosen = methods_named(methods);
-  const std::vector<fs::path> files = problems_in(folder);
+  const std::vector<io::FclibFile> files = io::fclib_files(folder);
   std::vector<ProfileRow> rows;
   for (std::size_t k = 0; k < files.size(); ++k) {
-    const DelassusProblem problem = io::read_fclib(files[k]);
+    DelassusProblem problem;
+    try {
+      problem = io::read_fclib(files[k].path);
+    } catch (const io::FileError& error) {
+      say(error.what());
+      continue;
+    }
     for (const DelassusMethod method : chosen)
       for (const double tolerance : tolerances) {
         ProfileRow row = solve_once(problem, method, tolerance, max_seconds);
@@ -90,7 +84,7 @@ std::vector<ProfileRow> study_profile(const fs::path& folder, std::span<const st
         while (row.seconds < cheap_solve && seconds.size() < 3)
           seconds.push_back(solve_once(problem, method, tolerance, max_seconds).seconds);
         row.seconds = median(seconds);
-        row.problem = files[k].stem().string();
+        row.problem = files[k].name;
         row.method = name_of(method);
         row.tolerance = tolerance;
         say(fmt::format("{}/{} {}: {}, tolerance {:.1e}: {} in {:.3g} s, error {:.1e}", k + 1, files.size(),
@@ -99,6 +93,7 @@ std::vector<ProfileRow> study_profile(const fs::path& folder, std::span<const st
         rows.push_back(std::move(row));
       }
   }
+  if (rows.empty()) throw io::FileError(folder.string(), "holds no problem that can be read");
   return rows;
 }
 

@@ -27,9 +27,9 @@ std::vector<std::string> profile_methods();
 /// known.
 void check_profile(const std::filesystem::path& folder, std::span<const std::string> methods);
 
-/// Solves every FCLIB file of the folder (names that end in .hdf5 or .h5, in alphabetical order) with every
-/// method and tolerance, in at most `max_seconds` each. Throws io::FileError when there is none or one cannot
-/// be read, std::invalid_argument when a method is not known.
+/// Solves every FCLIB file of the folder (io::fclib_files) with every method and tolerance, in at most
+/// `max_seconds` each. A file that cannot be read is said and left out. Throws io::FileError when none can,
+/// std::invalid_argument when a method is not known.
 std::vector<ProfileRow> study_profile(const std::filesystem::path& folder,
                                       std::span<const std::string> methods,
                                       std::span<const double> tolerances, double max_seconds,

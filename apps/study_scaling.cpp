@@ -129,10 +129,9 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
 
 class Study {
  public:
-  Study(const StudyScalingOptions& options, ScalingPlan plan, fs::path directory)
-      : plan_(std::move(plan)),
-        directory_(std::move(directory)),
-        recordings_(read_recordings(directory_ / "traces" / "times.csv")) {
+  Study(const StudyScalingOptions& options, ScalingPlan plan, fs::path directory,
+        std::vector<RecordedTrace> recordings)
+      : plan_(std::move(plan)), directory_(std::move(directory)), recordings_(std::move(recordings)) {
     simulated_ = {options.smpi, options.smpirun};
     launcher_.talus = own_path();
     launcher_.mpirun = split_words(options.mpirun);
@@ -159,6 +158,12 @@ class Study {
     if (!simulated_.talus.empty())
       for (const int n : plan_.strong)
         for (const ScalingNetwork& network : plan_.networks) simulate(subject, n, network);
+  }
+
+  /// What was recorded of this scene does not hold any more.
+  void forget(const std::string& scene) {
+    std::erase_if(recordings_,
+                  [&](const RecordedTrace& there) { return there.file.starts_with(scene + "-"); });
   }
 
   void weak(const ScalingSubject& subject, int n) {
@@ -284,13 +289,23 @@ class Study {
   std::vector<ScalingRow> rows_;
 };
 
-bool is_study_name_but_trace(const fs::path& relative) {
-  return is_study_name(relative) && *relative.begin() != "traces";
+/// Traces, and the scenes that those of weak scaling are of.
+bool is_study_name_but_recorded(const fs::path& relative) {
+  return is_study_name(relative) && *relative.begin() != "traces" &&
+         !relative.generic_string().starts_with("weak-");
 }
 
 std::string text_of(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// True when the files were there and are still the same.
+bool rewrite_scaling_sample(const ScalingSample& sample, const fs::path& directory, const std::string& stem) {
+  const fs::path scene = directory / (stem + ".toml"), grains = directory / (stem + ".csv");
+  const std::string old_scene = text_of(scene), old_grains = text_of(grains);
+  write_scaling_sample(sample, directory, stem);
+  return text_of(scene) == old_scene && text_of(grains) == old_grains;
 }
 
 /// Writes the scene of strong scaling. Traces that are there must be of the same; throws
@@ -302,12 +317,9 @@ void write_strong(const ScalingSample& sample, const fs::path& directory, bool r
     write_scaling_sample(sample, directory, "strong");
     return;
   }
-  const fs::path draft = directory / "run";
-  fs::create_directories(draft);
-  write_scaling_sample(sample, draft, "strong");
-  const bool same = text_of(draft / "strong.toml") == scene && text_of(draft / "strong.csv") == grains;
-  fs::remove_all(draft);
-  if (!same)
+  const io::ScratchFolder draft(directory / "run");
+  write_scaling_sample(sample, draft.path(), "strong");
+  if (text_of(draft.path() / "strong.toml") != scene || text_of(draft.path() / "strong.csv") != grains)
     refuse(fmt::format("--reuse: the traces in {} are of another scene or sample; --force replaces them",
                        directory.string()));
   prepare();
@@ -317,6 +329,7 @@ void write_strong(const ScalingSample& sample, const fs::path& directory, bool r
 int run_study(const StudyScalingOptions& options) {
   ScalingPlan plan;
   ScalingSample sample;
+  std::vector<RecordedTrace> recordings;
   std::string directory = options.out, no_weak;
   try {
     plan = plan_of(options);
@@ -333,9 +346,10 @@ int run_study(const StudyScalingOptions& options) {
     if (const auto most = static_cast<std::size_t>(plan.strong.back()); most > sample.grains.size())
       refuse(fmt::format("{} subdomains for {} grains", most, sample.grains.size()));
     if (directory.empty()) directory = "out/scaling-" + sample.scene.name;
+    if (options.reuse) recordings = read_recordings(fs::path(directory) / "traces" / "times.csv");
     write_strong(sample, directory, options.reuse, [&] {
       io::prepare_output_directory(directory, options.force || options.reuse,
-                                   options.reuse ? is_study_name_but_trace : is_study_name);
+                                   options.reuse ? is_study_name_but_recorded : is_study_name);
     });
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
@@ -352,7 +366,7 @@ int run_study(const StudyScalingOptions& options) {
   report.record = plan.record;
   report.typical = plan.typical;
   report.quantile = plan.quantile;
-  Study study(options, plan, directory);
+  Study study(options, plan, directory, std::move(recordings));
   const ScalingSubject subject{ScalingKind::strong, directory + "/strong.toml", "", sample.grains.size()};
   say(fmt::format("{}: {} grains, steps {} to {}", report.name, subject.grains, plan.first, plan.last));
   report.commands = scaling_commands(study.launcher(), plan.strong, plan.repeat);
@@ -366,7 +380,7 @@ int run_study(const StudyScalingOptions& options) {
       const double part = static_cast<double>(n) / plan.weak.back();
       const ScalingSample part_sample = scaled_sample(options.scene, options.overrides, options.stage, part);
       const std::string stem = fmt::format("weak-{}", n);
-      write_scaling_sample(part_sample, directory, stem);
+      if (!rewrite_scaling_sample(part_sample, directory, stem)) study.forget(stem);
       study.weak({ScalingKind::weak, directory + "/" + stem + ".toml", "", part_sample.grains.size()}, n);
     }
   } else if (!options.no_weak) {
@@ -395,7 +409,10 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
       ->type_name("FILE");
   app->add_option("--stage", options.stage, "stage to begin with [the first]")->type_name("NAME");
   const auto numbers = [&](const char* name, std::vector<int>& values, const char* text) {
-    app->add_option(name, values, text)->type_name("N,..")->delimiter(',')->check(CLI::Range(1, 65535));
+    app->add_option(name, values, text)
+        ->type_name("N,..")
+        ->delimiter(',')
+        ->check(CLI::Range(1, most_subdomains));
   };
   numbers("--subdomains", options.subdomains, "numbers of subdomains, one a core [1,2,4,8,16]");
   numbers("--weak", options.weak,

@@ -50,6 +50,10 @@ int trace_export_command(const TraceExportOptions& options) {
     if (ending == endings.end())
       throw std::invalid_argument(
           fmt::format("there is no format '{}': perfetto, paje or svg", options.format));
+    const std::string out =
+        options.out.empty() ? std::filesystem::path(options.file).replace_extension(ending->second).string()
+                            : options.out;
+    io::check_output_file(options.file, out);
     const trace::Trace trace = io::read_trace(options.file);
     const trace::Timeline timeline(trace);
     io::TraceWindow window{options.step, options.iteration};
@@ -58,9 +62,6 @@ int trace_export_command(const TraceExportOptions& options) {
     const std::string content = options.format == "perfetto" ? io::to_perfetto(trace, window)
                                 : options.format == "paje"   ? io::to_paje(trace, window)
                                                              : io::draw_gantt(timeline, window);
-    const std::string out =
-        options.out.empty() ? std::filesystem::path(options.file).replace_extension(ending->second).string()
-                            : options.out;
     io::write_whole(out, content);
     fmt::print(stderr, "talus: {} written\n", out);
   } catch (const std::exception& error) {

@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "io/detail/fclib_file.hpp"
 #include "io/error.hpp"
+#include "io/output_directory.hpp"
 
 namespace talus::io {
 namespace {
@@ -129,16 +131,6 @@ void write_by_draft(const std::filesystem::path& out, Write&& write) {
   }
 }
 
-void demand_folder(const std::filesystem::path& out) {
-  std::error_code error;
-  if (std::filesystem::is_directory(out, error))
-    throw FileError(out.string(), "is a folder; give the name of a file");
-  const auto folder = std::filesystem::absolute(out).parent_path();
-  if (!std::filesystem::is_directory(folder, error))
-    throw FileError(out.string(),
-                    fmt::format("cannot be written, there is no folder {}; make it first", folder.string()));
-}
-
 }  // namespace
 
 FclibProblem read_fclib_problem(const std::filesystem::path& path) {
@@ -166,6 +158,24 @@ FclibProblem read_fclib_problem(const std::filesystem::path& path) {
   return problem;
 }
 
+std::vector<FclibFile> fclib_files(const std::filesystem::path& path) {
+  if (!std::filesystem::is_directory(path)) return {{path, path.stem().string()}};
+  std::vector<FclibFile> files;
+  for (const auto& entry : std::filesystem::directory_iterator(path)) {
+    const auto extension = entry.path().extension();
+    if (entry.is_regular_file() && (extension == ".hdf5" || extension == ".h5"))
+      files.push_back({entry.path(), entry.path().filename().string()});
+  }
+  if (files.empty())
+    throw FileError(path.string(), "holds no .hdf5 or .h5 file; give a problem or a folder of problems");
+  std::ranges::sort(files, {}, &FclibFile::path);
+  std::map<std::filesystem::path, int> stems;
+  for (const FclibFile& file : files) ++stems[file.path.stem()];
+  for (FclibFile& file : files)
+    if (stems[file.path.stem()] == 1) file.name = file.path.stem().string();
+  return files;
+}
+
 DelassusProblem read_fclib(const std::filesystem::path& path) {
   return std::move(read_fclib_problem(path).contact);
 }
@@ -185,16 +195,9 @@ FclibSolution fclib_solution(const FclibProblem& problem, std::span<const double
   return solution;
 }
 
-void check_fclib_output(const std::filesystem::path& input, const std::filesystem::path& out) {
-  std::error_code error;
-  if (std::filesystem::equivalent(input, out, error))
-    throw FileError(out.string(), "is the problem itself and would be overwritten; give --out another name");
-  demand_folder(out);
-}
-
 void write_fclib_solution(const std::filesystem::path& input, const std::filesystem::path& out,
                           const FclibSolution& solution) {
-  check_fclib_output(input, out);
+  check_output_file(input, out);
   write_by_draft(out, [&](const std::filesystem::path& draft) {
     std::filesystem::copy_file(input, draft, std::filesystem::copy_options::overwrite_existing);
     // Problems are often read-only, and a copy keeps that.
@@ -211,7 +214,7 @@ void write_fclib_solution(const std::filesystem::path& input, const std::filesys
 
 void write_fclib(const DelassusProblem& problem, const FclibSolution& solution, const FclibInfo& info,
                  const std::filesystem::path& out) {
-  demand_folder(out);
+  check_output_file({}, out);
   const auto size = static_cast<std::size_t>(problem.dimension);
   std::vector<double> q, mu;
   for (std::size_t c = 0; c < problem.contacts(); ++c) {

@@ -27,6 +27,16 @@ FclibProblem read_fclib_problem(const std::filesystem::path& path);
 /// Its contact problem alone.
 DelassusProblem read_fclib(const std::filesystem::path& path);
 
+/// A problem in a folder, by the name that tables give it.
+struct FclibFile {
+  std::filesystem::path path;
+  std::string name;  ///< of the file, without its ending where no other problem has the same
+};
+
+/// The .hdf5 and .h5 files of a folder, sorted; or the file that `path` names. Throws FileError when a folder
+/// holds none.
+std::vector<FclibFile> fclib_files(const std::filesystem::path& path);
+
 /// What a file's /solution holds, in its dimension (2 or 3 values per contact).
 struct FclibSolution {
   std::vector<double> r;  ///< [N s]
@@ -37,10 +47,6 @@ struct FclibSolution {
 
 /// From the impulses (3 per contact) of the contact problem.
 FclibSolution fclib_solution(const FclibProblem& problem, std::span<const double> r);
-
-/// Throws FileError when `out` cannot be meant: it is the input itself (under whatever name), or its folder
-/// is not there. To be asked before a long solve.
-void check_fclib_output(const std::filesystem::path& input, const std::filesystem::path& out);
 
 /// Copies `input` to `out` with the solution as /solution in it, in place of one that was there. `out`
 /// appears complete or not at all: it is written beside its place and renamed. An existing `out` is replaced.

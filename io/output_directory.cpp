@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdlib>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -103,6 +104,31 @@ void prepare_output_directory(const fs::path& directory, bool force, IsOutputNam
   if (::access(directory.c_str(), W_OK | X_OK) != 0) {
     throw FileError(directory.string(), "cannot write into this directory: " + detail::last_error());
   }
+}
+
+ScratchFolder::ScratchFolder(const fs::path& prefix) {
+  std::error_code error;
+  fs::create_directories(prefix.parent_path(), error);
+  std::string name = prefix.string() + "-XXXXXX";
+  if (error || !::mkdtemp(name.data()))
+    throw FileError(name, "cannot make this folder: " + (error ? error.message() : detail::last_error()));
+  path_ = name;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+void check_output_file(const fs::path& input, const fs::path& out) {
+  std::error_code error;
+  if (fs::equivalent(input, out, error))
+    throw FileError(out.string(), "is what is read, and would be overwritten; give another name");
+  if (fs::is_directory(out, error)) throw FileError(out.string(), "is a folder; give the name of a file");
+  const fs::path folder = fs::absolute(out).parent_path();
+  if (!fs::is_directory(folder, error))
+    throw FileError(out.string(),
+                    "cannot be written, there is no folder " + folder.string() + "; make it first");
 }
 
 void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {

@@ -27,6 +27,24 @@ bool is_partition_name(const std::filesystem::path& relative);
 void prepare_output_directory(const std::filesystem::path& directory, bool force,
                               IsOutputName is_ours = is_output_name);
 
+/// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.
+class ScratchFolder {
+ public:
+  /// Makes the folder's parents too. Throws FileError.
+  explicit ScratchFolder(const std::filesystem::path& prefix);
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Throws FileError when `out` cannot be meant as a file to write: it is the input itself (under whatever
+/// name), or a folder, or its folder is not there. To be asked before long work.
+void check_output_file(const std::filesystem::path& input, const std::filesystem::path& out);
+
 /// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
 /// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.
 void write_whole(const std::filesystem::path& path, std::string_view content);

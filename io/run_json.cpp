@@ -77,7 +77,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"scene_file", p.scene_file},
   };
   nlohmann::ordered_json digest;  // null
-  if (s.status != "running") digest = fmt::format("{:016x}", s.digest);
+  if (s.digest) digest = fmt::format("{:016x}", *s.digest);
   root["summary"] = {
       {"status", s.status},
       {"message", s.message},

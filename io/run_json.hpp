@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,8 +42,8 @@ struct Summary {
   std::string message;             ///< why it failed or stopped
   int exit_code = 0;
   std::int64_t steps = 0;
-  double time = 0;           ///< [s] simulated
-  std::uint64_t digest = 0;  ///< talus::digest of the final state; written as 16 hexadecimal digits
+  double time = 0;                      ///< [s] simulated
+  std::optional<std::uint64_t> digest;  ///< talus::digest of the final state, as 16 hexadecimal digits
   std::int64_t converged_steps = 0;
   std::int64_t unconverged_steps = 0;
   double worst_error_rms = 0;   ///< over all steps
@@ -53,7 +54,7 @@ struct Summary {
   std::size_t frames = 0;  ///< output times
 };
 
-/// The text of run.json. The digest of a run that is still running is null.
+/// The text of run.json. Without a digest, as long as it runs and when it failed, that is null.
 std::string run_json(const Provenance& provenance, const Summary& summary);
 
 /// Writes run.json whole (write_whole). Throws FileError.

@@ -25,6 +25,8 @@ class SceneReader {
   SceneReader(const toml::table& root, const std::string& file) : root_(root), folder_(folder_of(file)) {
     scene_.source_file = file;
     scene_.name = std::filesystem::path(file).stem().string();
+    for (char& c : scene_.name)
+      if (!may_be_in_name(c)) c = '_';
   }
 
   Scene read() && {
@@ -63,11 +65,12 @@ class SceneReader {
   static bool required_keys(const std::string& name) { return name == "material" || name == "sample"; }
 
   /// Names of walls and stages stand in columns of CSV files, in paths and in overrides.
+  static bool may_be_in_name(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '+' || c == '-' || c == '_';
+  }
+
   static void check_name(const toml::table& table, const std::string& path, const std::string& name) {
-    const bool plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
-      return std::isalnum(c) || c == '+' || c == '-' || c == '_';
-    });
-    if (name.empty() || !plain)
+    if (name.empty() || !std::all_of(name.begin(), name.end(), may_be_in_name))
       fail_at(*table.get("name"), joined(path, "name"),
               fmt::format("must be made of letters, digits, +, - and _, got '{}'", name));
   }
@@ -100,6 +103,11 @@ class SceneReader {
     if (sample.kind == SampleSpec::Kind::lattice &&
         (by_cells ? sample.count > 0 || sample.base[0] > 0 : !on_base))
       fail_at(table, "sample", "a lattice needs either cells, or count and base");
+    if (const double grains = static_cast<double>(sample.cells[0]) * static_cast<double>(sample.cells[1]) *
+                              static_cast<double>(sample.cells[2]);
+        grains > countable.high)
+      fail_at(*table.get("cells"), "sample.cells",
+              fmt::format("makes {:.3g} grains, more than {:.0f}", grains, countable.high));
     SizeDistribution& radii = sample.radii;
     if (radii.kind == SizeDistribution::Kind::constant) radii.min = radii.max;
     if (radii.min > radii.max)

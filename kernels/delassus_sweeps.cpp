@@ -183,7 +183,7 @@ DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& go
     double squared = 0;
     for (std::size_t k = 0; k < r.size(); ++k)
       squared += weight[k / 3] * (start[k] - r[k]) * (start[k] - r[k]);
-    const bool anew = squared > last;
+    const bool anew = !(last > 0) || squared > last;  // a sweep that changed nothing has no direction
     const double beta = anew ? 0 : squared / last;
     last = squared;
     for (std::size_t k = 0; k < r.size(); ++k) {

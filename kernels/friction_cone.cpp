@@ -143,8 +143,8 @@ Vec3 best_of_all_roots(const SlidingEquation& e, const Mat3& W, const Vec3& q, d
 
 Vec3 project_on_cone(const Vec3& z, double mu) {
   const double zt = z.tail<2>().norm();
+  if (mu * zt <= -z[0]) return Vec3::Zero();  // first: with mu = 0 = zt the other one would hold, too
   if (zt <= mu * z[0]) return z;
-  if (mu * zt <= -z[0]) return Vec3::Zero();
   // Unit generatrix (c, s): c = 1/sqrt(1 + mu^2), written so that a large mu does not overflow; std::hypot
   // would cost more than all the rest.
   const double c = mu < 1e8 ? 1 / std::sqrt(1 + mu * mu) : 1 / mu, s = mu * c;

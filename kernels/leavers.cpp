@@ -90,7 +90,7 @@ void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, cons
     for (std::size_t w = 0; w < margins.walls.size(); ++w) {
       const Wall& wall = margins.walls[w];
       const double distance = wall.normal.dot(Map(leaver.x) - wall.point);
-      const double v_n = wall.normal.dot(Map(leaver.u) - wall.velocity + h * margins.gravity);
+      const double v_n = wall.normal.dot(Map(leaver.u) - wall.velocity - wall.gain + h * margins.gravity);
       if (may_touch(distance - leaver.radius - rounding * std::abs(distance), v_n, h, margins.alert))
         needed.push_back({-1 - static_cast<std::int64_t>(w), leaver.id});
     }

@@ -63,7 +63,7 @@ void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t b
     impulses.z.resize(contacts.rz.size());
     impulses.n.resize(contacts.rn.size());
   };
-  trail.last_v.resize(bodies);
+  if (bodies > 0) trail.last_v.resize(bodies);  // else a sweep that is on its way may still read it
   trail.last_wall_v.resize(chunks);
   if (carry == Carry::momentum) return like(trail.steps);
   like(trail.last);

@@ -51,6 +51,7 @@ bool came_far(const Vec3& way, double small) {
 
 /// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
 /// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
+/// From the middle of one step to that of the next it moves by h V-, V- being what the first has ended with.
 bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
   if (!came_far(way, small)) return false;
   const Vec3 start = d - way;
@@ -59,11 +60,11 @@ bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
   return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
 }
 
-std::int32_t count_passed(const PairView& pairs, double half_step) {
+std::int32_t count_passed(const PairView& pairs, double time_step) {
   std::int32_t through = 0;
   for (std::size_t k = 0; k < pairs.count; ++k) {
     const Pairing pair = meet(pairs, k);
-    through += passed(pair.d, half_step * pair.v, pair.radius_i + pair.radius_j,
+    through += passed(pair.d, time_step * pair.v, pair.radius_i + pair.radius_j,
                       std::min(pair.radius_i, pair.radius_j));
   }
   return through;
@@ -82,7 +83,7 @@ bool find_gaps(const PairView& pairs, const GapRule& rule, const GapTarget& out)
     out.nz[k] = normal[2];
     out.contact[k] =
         constrain(rule, distance - pair.radius_i - pair.radius_j, v_n, v_n, out.bias[k]) ? -1 : 0;
-    far |= came_far(0.5 * rule.time_step * pair.v, std::min(pair.radius_i, pair.radius_j));
+    far |= came_far(rule.time_step * pair.v, std::min(pair.radius_i, pair.radius_j));
   }
   return far;
 }
@@ -156,7 +157,7 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
                          contacts.bias.data() + begin, contact.data()};
   const bool far =
       kernels.lanes() ? kernels.lanes()->find_gaps(pairs, rule, target) : find_gaps(pairs, rule, target);
-  contacts.passed[chunk] = far ? count_passed(pairs, 0.5 * in.time_step) : 0;
+  contacts.passed[chunk] = far ? count_passed(pairs, in.time_step) : 0;
 
   const auto last = contact.begin() + contacts.count[chunk];
   const auto is = [](std::int64_t c) { return c != 0; };
@@ -181,7 +182,7 @@ void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& c
                  const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
   const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
   const Wall& wall = in.walls[index(chunks.wall[chunk])];
-  const double fall = in.time_step * wall.normal.dot(in.gravity), half_step = 0.5 * in.time_step;
+  const double fall = wall.normal.dot(in.time_step * in.gravity - wall.gain);
   std::int32_t through = 0;
   std::size_t at = begin;
   for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
@@ -189,7 +190,7 @@ void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& c
     const std::size_t i = index(body);
     const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
-    through += std::min(0.0, gap - half_step * v_n) - gap > 0.5 * in.radius[i];
+    through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
     if (!constrain(rule, gap, v_n, v_n + fall, contacts.bias[at])) continue;
     contacts.nx[at] = wall.normal[0];
     contacts.ny[at] = wall.normal[1];

@@ -1,5 +1,8 @@
 #include "kernels/stiffness.hpp"
 
+#include <algorithm>
+#include <utility>
+
 namespace talus {
 
 namespace {
@@ -63,7 +66,9 @@ bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
   graph.link.sum_copies(mark);
   return total_of(graph.link, graph.parts.size(), 1, [&](std::size_t p, std::span<double> row) {
            Layers& here = graph.parts[p];
-           std::vector<std::int32_t>& layer = here.layer.emplace_back();
+           if (here.layer.size() <= at(depth)) here.layer.resize(at(depth) + 1);
+           std::vector<std::int32_t>& layer = here.layer[at(depth)];
+           const std::size_t before = layer.size();
            const auto take = [&](std::int32_t b) {
              if (mark[p][at(b)].u[0] > 0 && here.depth[at(b)] < 0) {
                here.depth[at(b)] = depth;
@@ -74,7 +79,7 @@ bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
            for (std::int32_t b : here.met) take(b);
            for (std::int32_t b : here.graph.shared) take(b);
            here.met.clear();
-           row[0] = static_cast<double>(layer.size());
+           row[0] = static_cast<double>(layer.size() - before);
          })[0] > 0;
 }
 
@@ -100,26 +105,44 @@ void mark_heaviest(Graph& graph, PartField& mark) {
     }
 }
 
-/// Returns the largest depth.
-std::int32_t find_layers(Graph& graph) {
-  PartField mark = graph.field();
-  graph.each([&](std::size_t p) {
-    Layers& here = graph.parts[p];
-    here.layer.emplace_back();  // depth 0
-    for (const auto& [first, second] : here.graph.pairs)
-      if (second < 0) {
-        mark[p][at(first)].u[0] = 1;
-        here.met.push_back(first);
+/// In what no walk has come to, the heaviest body of the largest cluster that a part has. False when all of
+/// them are small: what few sweeps solve.
+bool mark_unreached(Graph& graph, PartField& mark) {
+  constexpr double small = 8;
+  std::vector<std::int32_t> root(graph.parts.size(), -1);
+  const auto find = [&](std::size_t p, std::span<double> row) {
+    const Layers& here = graph.parts[p];
+    std::vector<char> seen(here.depth.size(), 0);
+    std::vector<std::int32_t> cluster;
+    for (std::size_t b = 0; b < seen.size(); ++b) {
+      if (here.depth[b] >= 0 || seen[b]) continue;
+      cluster.assign(1, static_cast<std::int32_t>(b));
+      seen[b] = 1;
+      std::int32_t heaviest = cluster.front();
+      for (std::size_t k = 0; k < cluster.size(); ++k) {
+        if (here.graph.mass[at(cluster[k])] > here.graph.mass[at(heaviest)]) heaviest = cluster[k];
+        for (const std::int32_t other : here.neighbours(cluster[k]))
+          if (here.depth[at(other)] < 0 && !std::exchange(seen[at(other)], char{1})) cluster.push_back(other);
       }
-  });
-  std::int32_t depth = 1;
-  if (!take_layer(graph, mark, depth)) {
-    for (Layers& here : graph.parts) here.layer.clear();
-    mark_heaviest(graph, mark);
-    depth = 0;
-    if (!take_layer(graph, mark, depth)) return 0;
-  }
-  for (;;) {
+      if (static_cast<double>(cluster.size()) <= row[0]) continue;
+      row[0] = static_cast<double>(cluster.size());
+      root[p] = heaviest;
+    }
+  };
+  const std::vector<double> sizes = rows_of(graph.link, graph.parts.size(), 1, find);
+  const auto most = static_cast<std::size_t>(std::ranges::max_element(sizes) - sizes.begin());
+  if (sizes.empty() || sizes[most] <= small) return false;
+  for (std::size_t p = 0; p < graph.parts.size(); ++p)
+    if (at(graph.parts[p].graph.subdomain) == most) {
+      mark[p][at(root[p])].u[0] = 1;
+      graph.parts[p].met.push_back(root[p]);
+    }
+  return true;
+}
+
+/// From the bodies of the layer `depth` on; returns the largest depth that it comes to.
+std::int32_t walk(Graph& graph, PartField& mark, std::int32_t depth) {
+  for (;; ++depth) {
     graph.each([&](std::size_t p) {
       Layers& here = graph.parts[p];
       for (std::int32_t b : here.layer[at(depth)])
@@ -130,8 +153,34 @@ std::int32_t find_layers(Graph& graph) {
           }
     });
     if (!take_layer(graph, mark, depth + 1)) return depth;
-    ++depth;
   }
+}
+
+/// Returns the largest depth. Driven walls are at 0, and the heaviest body where there is none; so is one
+/// body of each larger cluster that hangs on neither, of the few largest.
+std::int32_t find_layers(Graph& graph) {
+  constexpr int most_clusters = 8;
+  PartField mark = graph.field();
+  graph.each([&](std::size_t p) {
+    Layers& here = graph.parts[p];
+    for (const auto& [first, second] : here.graph.pairs)
+      if (second < 0) {
+        mark[p][at(first)].u[0] = 1;
+        here.met.push_back(first);
+      }
+  });
+  std::int32_t from = 1;
+  if (!take_layer(graph, mark, from)) {
+    mark_heaviest(graph, mark);
+    from = 0;
+    if (!take_layer(graph, mark, from)) return 0;
+  }
+  std::int32_t deepest = walk(graph, mark, from);
+  for (int clusters = 0; clusters < most_clusters && mark_unreached(graph, mark); ++clusters) {
+    take_layer(graph, mark, 0);
+    deepest = std::max(deepest, walk(graph, mark, 0));
+  }
+  return deepest;
 }
 
 /// Inwards, each body hands what it carries to its contacts of the layer below, in equal parts.

@@ -33,6 +33,7 @@ struct Wall {
   double area = 0;               ///< [m^2] the pressure acts on; 0: the current face of the box of walls
   WallLoad load;                 ///< in force now
   Vec3 velocity = Vec3::Zero();  ///< [m/s] now
+  Vec3 gain = Vec3::Zero();      ///< what the load adds to it within the step, without contacts [m/s]
   /// 1/M [1/kg] of a pushed wall; 0 for one that is fixed or driven, whatever mass its load names.
   double inv_mass() const {
     const bool pushed = load.drive == WallDrive::pressure || load.drive == WallDrive::force;

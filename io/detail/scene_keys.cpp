@@ -365,8 +365,8 @@ Section<DecompositionSettings> decomposition_keys() {
       "[decomposition]",
       "How the sample is cut into subdomains, and how these act on one another.",
       {
-          key<D>("subdomains", "", at_least_one, "Number of subdomains, at least one per rank.",
-                 &D::subdomains)
+          key<D>("subdomains", "", {.low = 1, .high = most_subdomains},
+                 "Number of subdomains, at least one per rank.", &D::subdomains)
               .blank_when_zero()
               .or_else("one per rank"),
           choice<D>(

@@ -121,6 +121,7 @@ void apply(toml::table& root, const Override& override) {
   for (std::size_t k = 0; k + 1 < override.path.size(); ++k) at = &descend(*at, override.path[k], override);
   std::optional<toml::table> parsed = parse_value(override.value, override.source);
   if (!parsed) parsed = parse_value(quoted(override.value), override.source);
+  if (!parsed) override.fail("the value is not UTF-8");
   const std::string& last = override.path.back();
   if (toml::array* array = at->as_array()) {
     element_of(*array, last, override);

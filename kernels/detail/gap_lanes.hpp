@@ -87,7 +87,7 @@ template <class V>
   store(out.bias + at, bias);
   const BitsOf<V> contact = ~none;
   __builtin_memcpy(out.contact + at, &contact, sizeof(contact));
-  const Space<V> way = (V{} + 0.5 * rule.time_step) * pair.v;
+  const Space<V> way = (V{} + rule.time_step) * pair.v;
   const V small = pair.radius_j < pair.radius_i ? pair.radius_j : pair.radius_i;
   return ~(dot(way, way) < 0.25 * small * small);
 }

@@ -21,21 +21,27 @@ std::size_t at(std::int64_t k) {
 }
 
 CellTable empty_table(const IntegerFrame& frame, double cells) {
-  // Edge of a cube of which `cells` fill the box; flat axes get one cell.
-  double volume = 1;
-  int axes = 0;
-  for (double length : frame.lengths)
-    if (length > 0) {
-      volume *= length;
-      ++axes;
+  // Edge of a cube of which `cells` fill the box. Axes shorter than it get one cell, and the others all.
+  std::array<bool, 3> flat{};
+  for (;;) {
+    double volume = 1;
+    int axes = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (!flat[k] && frame.lengths[static_cast<Eigen::Index>(k)] > 0) {
+        volume *= frame.lengths[static_cast<Eigen::Index>(k)];
+        ++axes;
+      }
+    const double edge = axes > 0 ? std::pow(volume / cells, 1.0 / axes) : 1;
+    CellTable table;
+    bool flatter = false;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double across = flat[k] ? 0 : frame.lengths[static_cast<Eigen::Index>(k)] / edge;
+      flatter = flatter || (across > 0 && across < 1);
+      flat[k] = across < 1;
+      table.cells[k] = static_cast<std::int32_t>(std::clamp(std::floor(across), 1.0, 4096.0));
     }
-  const double edge = axes > 0 ? std::pow(volume / cells, 1.0 / axes) : 1;
-  CellTable table;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double across = frame.lengths[static_cast<Eigen::Index>(k)] / edge;
-    table.cells[k] = static_cast<std::int32_t>(std::clamp(std::floor(across), 1.0, 4096.0));
+    if (!flatter) return table;
   }
-  return table;
 }
 
 std::int64_t size_of(const CellTable& table) {

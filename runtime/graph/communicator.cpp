@@ -47,6 +47,11 @@ Communicator::Communicator(const MpiSession& session, CommunicatorOptions option
   int level = 0;
   check(MPI_Query_thread(&level), "MPI_Query_thread");
   any_thread_ = level == MPI_THREAD_MULTIPLE;
+  int* largest = nullptr;
+  int given = 0;
+  check(MPI_Comm_get_attr(MPI_COMM_WORLD, MPI_TAG_UB, static_cast<void*>(&largest), &given),
+        "MPI_Comm_get_attr");
+  if (given != 0) largest_tag_ = *largest;
   MPI_Comm node;
   check(MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &node),
         "MPI_Comm_split_type");

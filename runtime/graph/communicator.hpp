@@ -58,6 +58,8 @@ class Communicator {
   std::string thread_level() const;
   /// Any thread may use channels; else thread 0 only.
   bool any_thread() const noexcept { return any_thread_; }
+  /// Of a channel; MPI promises 32,767, Open MPI has 2^31 - 1.
+  int largest_tag() const noexcept { return largest_tag_; }
   /// Ranks on this machine.
   int ranks_on_node() const noexcept { return ranks_on_node_; }
   /// Collective calls and channels leave spans in `trace` from now on; null: no more. It must outlive them.
@@ -116,6 +118,7 @@ class Communicator {
   void note_calls(int count, std::uint32_t bytes = 0) const;
   int rank_ = 0, ranks_ = 1, ranks_on_node_ = 1;
   bool any_thread_ = true;
+  int largest_tag_ = 32767;
   mutable trace::Recorder* trace_ = nullptr;  ///< watches; changes nothing of what is sent
   CommunicatorOptions options_;
 };

@@ -76,7 +76,8 @@ void Iteration::begin_course(SolverMethod method, double most) {
   course_before_ = course_;
   const int from = result_.iterations + 1;
   course_ = {method, from, from, most, single_will_do(method)};
-  conjugate_beta_ = change2_ = 0;
+  // A sweep that is on its way, with several ranks, belongs to the course before and keeps its beta.
+  if (method == SolverMethod::nncg) conjugate_beta_ = change2_ = 0;
   if (method == SolverMethod::nlgs) return;
   if (course_.single) allocate(state_.single, state_.contacts, state_.bodies.size());
   allocate(trail_, carry_of(method), state_.contacts, course_.single ? 0 : state_.bodies.size(),

@@ -69,10 +69,12 @@ PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& 
   PartitionPoints points;
   if (all_candidates > 0) {
     points = candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs);
-    // A weight counts in 64ths, so that 2^31 of them are enough for many candidates.
+    // A weight counts in 64ths of the mean, or coarser: all together stay below 2^31.
+    const double unit =
+        std::clamp(std::floor(std::ldexp(1.0, 30) / static_cast<double>(all_candidates)), 1.0, 64.0);
     for (const Vec3& x : decomposition.cost.empty() ? std::vector<Vec3>() : points.x)
       points.weight.push_back(static_cast<std::int32_t>(std::lround(
-          64 * std::clamp(decomposition.cost[at(decomposition.partition.subdomain_of(x))], 0.1, 10.0))));
+          unit * std::clamp(decomposition.cost[at(decomposition.partition.subdomain_of(x))], 0.1, 10.0))));
     return points;
   }
   for (std::size_t s = 0; s < bodies.size(); ++s)

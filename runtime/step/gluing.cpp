@@ -1,9 +1,12 @@
 #include "runtime/step/gluing.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
 #include <iterator>
+#include <stdexcept>
 #include <type_traits>
 
 #include "runtime/step/detail/gluing_parts.hpp"
@@ -86,6 +89,12 @@ void Gluing::plan(bool rotation) {
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     if (state_.walls[w].inv_mass() > 0) walls_.push_back(static_cast<std::int32_t>(w));
   needed_ = all.several() || !walls_.empty();
+  if (const std::int64_t subdomains = all.partition.subdomains;
+      ranks_.ranks() > 1 && subdomains * subdomains + detail::centre_tag > ranks_.largest_tag())
+    throw std::invalid_argument(fmt::format(
+        "{} subdomains on several ranks need message tags up to {}, and this MPI has {}: take fewer "
+        "subdomains",
+        subdomains, subdomains * subdomains + detail::centre_tag, ranks_.largest_tag()));
   // Channels of the plan before must be closed on all ranks before new ones of the same tag are used.
   subdomains_.clear();
   centre_.reset();

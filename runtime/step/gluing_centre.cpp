@@ -154,8 +154,9 @@ void Gluing::collect(Mode mode) {
 }
 
 void Gluing::centre(Mode mode) {
-  if (mode == Mode::local || centre_->sums.empty()) return;
   Centre& centre = *centre_;
+  // A rank whose subdomains have nothing to sum takes what its parent sends all the same, and passes it on.
+  if (mode == Mode::local || (centre.sums.empty() && !centre.up && centre.links.empty())) return;
   if (centre.up) {
     Link& link = *centre.up;
     await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);

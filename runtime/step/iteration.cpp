@@ -217,7 +217,7 @@ void Iteration::node(std::uint32_t node, int epoch) {
       chunk<false>(node, epoch);
     if (!busy_.empty()) busy_[node] += graph::seconds_now() - start;
     // Long messages advance only while somebody calls MPI.
-    if (ranks_.ranks() > 1 && node % 4 == 0) ranks_.progress();
+    if (ranks_.ranks() > 1 && node % 4 == 0 && ranks_.any_thread()) ranks_.progress();
     return;
   }
   if (now == Work::measure) return;

@@ -81,6 +81,9 @@ struct SolverSettings {
   InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps
 };
 
+/// Messages name them by 16 bits, of which one value is the centre (runtime/trace/trace.hpp).
+inline constexpr int most_subdomains = 65535;
+
 /// How subdomains act on one another.
 enum class Coupling {
   nscdd,  ///< copies carry M/m and are glued to the mean of their velocities (Visseq et al. 2013, (7)-(15))
@@ -115,7 +118,7 @@ struct DecompositionSettings {
   Coupling coupling = Coupling::alternating;
   ExchangeScheme exchange = ExchangeScheme::dcs;
   PartitionKind partitioner = PartitionKind::automatic;
-  int subdomains = 0;                   ///< 0: one per rank
+  int subdomains = 0;                   ///< 0: one per rank; at most most_subdomains
   std::array<std::int64_t, 3> boxes{};  ///< per axis, for the partitioners that cut boxes; zeros: chosen
   SubdomainMapping mapping = SubdomainMapping::block;
   int sweeps_per_exchange = 1;  ///< n_GS >= 1

@@ -141,13 +141,13 @@ struct Simulation::Implementation {
   /// Loads of the walls for the step: applied forces and free velocities.
   void load_walls() {
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
-      const Wall& wall = state.walls[w];
+      Wall& wall = state.walls[w];
       WallState& wall_state = state.wall_states[w];
       wall_state.applied = wall.load.drive == WallDrive::pressure ? wall.load.pressure * pressed_area(w)
                            : wall.load.drive == WallDrive::force  ? wall.load.force
                                                                   : 0;
-      wall_state.free_velocity =
-          wall.velocity + parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
+      wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
+      wall_state.free_velocity = wall.velocity + wall.gain;
     }
   }
 

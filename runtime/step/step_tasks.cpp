@@ -138,10 +138,11 @@ void StepGraph::predict_lane(std::uint32_t lane) {
 }
 
 /// How near a grain can come to a wall for what the grain's own margin does not count: the wall's way, and
-/// what gravity adds to the grain's speed within a step.
+/// what gravity adds to the grain's speed within a step, and the wall's load to its own.
 double StepGraph::margin_of(const Wall& wall) const {
   const double h = parameters_.time_step;
-  return contact_margin(wall.velocity.norm(), h, parameters_.alert) + h * h * parameters_.gravity.norm();
+  return contact_margin(wall.velocity.norm(), h, parameters_.alert) +
+         h * (h * parameters_.gravity.norm() + wall.gain.norm());
 }
 
 bool StepGraph::walls_left_margin() const {

@@ -247,7 +247,8 @@ class Player {
       epoch.source = e;
       epoch.gate = recorded.check[e].exists();
       epoch.settles = recorded.settled[e] != 0;
-      const bool later = late && epoch.gate && !epoch.settles;
+      // What called all ranks within is no check of convergence: sums that the next sweep needs.
+      const bool later = late && epoch.gate && !epoch.settles && recorded.awaited[e] == 0;
       do_alone(index, e, epoch);
       if (!later) do_together(index, e, epoch);
       epoch.exchange = exchanges(index, e);

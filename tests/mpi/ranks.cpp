@@ -215,6 +215,26 @@ TEST_F(Ranks, BearHavingNoGrainAtAll) {
   }
 }
 
+// The right rank shares no grain at first, nor does a wall need the centre; then its grains fly into the
+// others'.
+TEST_F(Ranks, ThatShareNothingHearTheCentreAllTheSame) {
+  write(at("scene.toml"), on_a_floor(3, 60));
+  std::string grains = "id,x,y,z,radius,vx,vy,vz\n";
+  for (int k = 0; k < 96; ++k)
+    grains += fmt::format("{},{},{},{},0.01,{},0,0\n", k, 0.0201 * (k % 8) + (k % 8 < 5 ? 0 : 0.06),
+                          0.0201 * (k / 8 % 4), 0.0101 + 0.0201 * (k / 32), k % 8 < 5 ? 0 : -2);
+  write(at("grains.csv"), grains);
+  const std::string keys =
+      "run scene.toml --force --threads 1 --set allow_unconverged=true --set decomposition.exchange=ccs "
+      "--set "
+      "decomposition.partitioner=boxes --set decomposition.boxes=[3,1,1]";
+  const Outcome one = run(1, keys + " --out one");
+  ASSERT_EQ(one.code, 0) << one.messages;
+  const Outcome several = run(3, keys + " --out several");
+  ASSERT_EQ(several.code, 0) << several.messages;
+  EXPECT_EQ(digest_of("several"), digest_of("one"));
+}
+
 TEST_F(Ranks, BearAPileInOneCornerAndABoulderLargerThanSubdomains) {
   write(at("scene.toml"), on_a_floor(30, 25));
   std::string grains = "id,x,y,z,radius\n";

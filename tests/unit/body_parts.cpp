@@ -165,6 +165,19 @@ TEST(BodyParts, SeeTheStiffnessAndTheHeavyBodiesOfTheWhole) {
   }
 }
 
+TEST(BodyParts, FindALongRowBesideOneGrainOnAFloor) {
+  constexpr std::int32_t row = 200;
+  BodyProblem problem = block(1, row, 0, 0);
+  problem.contacts.front().first = row;  // the floor holds another grain
+  problem.bodies.push_back(problem.bodies.front());
+  ++problem.grains;
+  EXPECT_GT(estimate_stiffness(problem), 0.3 * row * row);
+  std::vector<std::int32_t> part;
+  for (std::int32_t k = 0; k < row; ++k) part.push_back(3 * k / row);
+  const Cut cut(problem, part, 3);
+  EXPECT_GT(estimate_stiffness(BodyParts(cut.parts, cut)), 0.3 * row * row);
+}
+
 TEST(BodyParts, FindTheHeaviestBodyWhereNothingHoldsThem) {
   BodyProblem whole = block(2, 8, 0.35, 0);
   std::erase_if(whole.contacts, [](const ContactEquation& c) { return c.second < 0; });

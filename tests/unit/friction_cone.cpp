@@ -77,6 +77,8 @@ TEST(Cone, ProjectsTheRestOnTheNearestGeneratrix) {
 TEST(Cone, WithoutFrictionIsTheNormalHalfLine) {
   EXPECT_EQ(project_on_cone(Vec3(2, 3, 4), 0), Vec3(2, 0, 0));
   EXPECT_EQ(project_on_cone(Vec3(-2, 3, 4), 0), Vec3::Zero());
+  EXPECT_EQ(project_on_cone(Vec3(-2, 0, 0), 0), Vec3::Zero());
+  EXPECT_EQ(project_on_cone(Vec3(2, 0, 0), 0), Vec3(2, 0, 0));
 }
 
 TEST(Cone, ProjectionIsNearerThanAnyOtherPointOfTheCone) {

@@ -266,6 +266,43 @@ TEST(Certificate, MarksAStepThatMissesItsTolerance) {
   }
 }
 
+// B, struck by A at the end of a step, jumps into C and out on the other side before C is its contact.
+TEST(Certificate, MarksAStepInWhichAGrainThatWasStruckPassesAnother) {
+  graph::Executor executor({});
+  talus::Setup setup = falling(4);
+  setup.stages[0].gravity = Vec3::Zero();
+  setup.stages[0].time_step = 1;
+  setup.stages[0].law.restitution = 1;
+  Bodies bodies;
+  for (const double x : {-3.9, 0.0, 2.2})
+    add_sphere(bodies, BodyId{static_cast<int>(bodies.size())}, Vec3(x, 0, 0), 1, 1);
+  bodies.velocity[0].u[0] = 4;
+  Simulation simulation(setup, bodies, executor);
+  EXPECT_TRUE(simulation.step().converged);
+  EXPECT_FALSE(simulation.step().converged);
+}
+
+// 1.5 mm above the grain, 5 mm further down at the end of the step if there were none.
+TEST(Simulation, ALidThatItsLoadBringsWithinAStepIsAContact) {
+  graph::Executor executor({});
+  talus::Setup setup = falling(2);
+  setup.walls = box(1, 1, 0.0215);
+  WallLoad load;
+  load.drive = WallDrive::force;
+  load.force = 5;
+  load.mass = 1e-3;
+  setup.stages[0].loads = {{"z+", load}};
+  setup.stages[0].gravity = Vec3::Zero();
+  setup.stages[0].time_step = 1e-3;
+  Bodies bodies;
+  add_sphere(bodies, BodyId{0}, Vec3(0.5, 0.5, radius), radius, density);
+  Simulation simulation(setup, bodies, executor);
+  simulation.step();
+  simulation.step();
+  EXPECT_LT(simulation.report().penetration_max, 1e-3);
+  EXPECT_NEAR(simulation.walls()[5].position, -2 * radius, 1e-3 * radius);
+}
+
 TEST(Certificate, OfAStepWithoutContactsIsConverged) {
   graph::Executor executor({});
   Simulation simulation(falling(1), loose_sample(3, 3, 3, 1), executor);

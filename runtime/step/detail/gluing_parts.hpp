@@ -55,6 +55,7 @@ struct Pair {
 };
 
 inline constexpr int centre_tag = graph::Communicator::first_tag;
+/// The largest is subdomains^2 + centre_tag.
 inline int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
   return centre_tag + 1 + from * subdomains + to;
 }
