@@ -62,6 +62,32 @@ Problem weightless() {
   return made;
 }
 
+/// The halves of a row of touching grains run into one another, in free fall; with `lying`, a metre above one
+/// grain at rest on a floor, which is all that the floor's force tells of.
+Problem row_in_flight(int count, bool lying) {
+  Problem made = problem(natural_dt, {0, 0, -earth}, 0);
+  for (int k = 0; k < count; ++k)
+    push(add_grain(made, {2 * radius * k, 0, 1}, radius, sphere_mass(radius)),
+         {2 * k < count ? 1.0 : -1.0, 0, 0});
+  if (lying) {
+    add_wall(made, "floor", Vec3::Zero(), Vec3::UnitZ());
+    add_grain(made, {0, 0, radius}, radius, sphere_mass(radius));
+  }
+  made.steps = 1;
+  // Momentum that is wrong over that which the contacts exchange.
+  made.truth = [count](const StepView& step) -> std::optional<double> {
+    const Vec3 fall = step.time_step() * step.gravity();
+    double error = 0, exchanged = 0;
+    for (std::size_t k = 0; k < step.after.u.size(); ++k) {
+      const Vec3 exact = k < static_cast<std::size_t>(count) ? fall : Vec3(Vec3::Zero());
+      error += (step.after.u[k] - exact).norm();
+      exchanged += (step.before.u[k] + fall - exact).norm();
+    }
+    return error / exchanged;
+  };
+  return made;
+}
+
 /// One grain on the floor z = 0, gravity turned by `slope` about y. Exact in each step: the impulse that
 /// stops the slip, but at most mu times the normal one.
 Problem on_floor(double slope, double mu, const Vec3& u, const Vec3& w, int steps) {
@@ -193,6 +219,11 @@ void add_motion(std::vector<Scene>& table) {
   table.push_back({"no-gravity", "64 touching grains at rest stay there", weightless});
   table.push_back(
       {"rest", "one grain on the floor", [] { return on_floor(0, 0.35, Vec3::Zero(), Vec3::Zero(), 20); }});
+  for (const bool lying : {false, true})
+    table.push_back({lying ? "row-1000-above-a-grain" : "row-1000",
+                     lying ? "the same, above a grain on a floor that feels nothing of it"
+                           : "the halves of a row in free fall run into one another: all stop",
+                     [lying] { return row_in_flight(1000, lying); }});
   for (double spin : {1e1, 1e5})
     table.push_back({fmt::format("spin-{:.0e}", spin), "a grain set down spinning at so many rad/s", [spin] {
                        return on_floor(0, 0.35, Vec3::Zero(), Vec3(0, spin * radius, spin * radius), 50);
