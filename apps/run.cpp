@@ -431,7 +431,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
-    if (ranks.ranks() > 1) make_decomposition(scene.setup.decomposition, ranks);  // refuses idle ranks
+    make_decomposition(scene.setup.decomposition, ranks);  // refuses what does not fit the ranks
     if (ranks.rank() == 0) {
       sample = build_sample(scene);
       io::place_walls(scene, sample);

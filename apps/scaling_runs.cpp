@@ -33,16 +33,19 @@ RunTimes start(const ScalingLauncher& launcher, const std::vector<std::string>& 
 /// Of a line that io::CsvTable wrote: names with commas or quotes are between quotes, quotes within twice.
 std::vector<std::string> cells_of(const std::string& line) {
   std::vector<std::string> cells(1);
-  bool within = false;
+  bool within = false, closed = false;
   for (const char c : line) {
     if (c == '"') {
+      if (closed) cells.back() += c;  // the second of two
       within = !within;
-      if (within && !cells.back().empty()) cells.back() += c;  // the second of two
-    } else if (c == ',' && !within) {
-      cells.emplace_back();
-    } else {
-      cells.back() += c;
+      closed = !within;
+      continue;
     }
+    closed = false;
+    if (c == ',' && !within)
+      cells.emplace_back();
+    else
+      cells.back() += c;
   }
   return cells;
 }

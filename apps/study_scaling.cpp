@@ -4,6 +4,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -160,10 +161,12 @@ class Study {
         for (const ScalingNetwork& network : plan_.networks) simulate(subject, n, network);
   }
 
-  /// What was recorded of this scene does not hold any more.
+  /// What was recorded of this scene does not hold any more. The list says so before anything else happens: a
+  /// study may be killed.
   void forget(const std::string& scene) {
-    std::erase_if(recordings_,
-                  [&](const RecordedTrace& there) { return there.file.starts_with(scene + "-"); });
+    if (std::erase_if(recordings_,
+                      [&](const RecordedTrace& there) { return there.file.starts_with(scene + "-"); }) > 0)
+      write_recordings(directory_ / "traces" / "times.csv", recordings_);
   }
 
   void weak(const ScalingSubject& subject, int n) {
@@ -300,26 +303,19 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// True when the files were there and are still the same.
-bool rewrite_scaling_sample(const ScalingSample& sample, const fs::path& directory, const std::string& stem) {
-  const fs::path scene = directory / (stem + ".toml"), grains = directory / (stem + ".csv");
-  const std::string old_scene = text_of(scene), old_grains = text_of(grains);
-  write_scaling_sample(sample, directory, stem);
-  return text_of(scene) == old_scene && text_of(grains) == old_grains;
+/// True when the folder holds this sample.
+bool holds(const fs::path& directory, const ScalingSample& sample, const std::string& stem) {
+  const io::ScratchFolder draft(directory / "run");
+  write_scaling_sample(sample, draft.path(), stem);
+  return std::ranges::all_of(std::array{".toml", ".csv"}, [&](const char* ending) {
+    return text_of(directory / (stem + ending)) == text_of(draft.path() / (stem + ending));
+  });
 }
 
 /// Writes the scene of strong scaling. Traces that are there must be of the same; throws
 /// std::invalid_argument.
 void write_strong(const ScalingSample& sample, const fs::path& directory, bool reuse, const auto& prepare) {
-  const std::string scene = text_of(directory / "strong.toml"), grains = text_of(directory / "strong.csv");
-  if (!reuse || scene.empty()) {
-    prepare();
-    write_scaling_sample(sample, directory, "strong");
-    return;
-  }
-  const io::ScratchFolder draft(directory / "run");
-  write_scaling_sample(sample, draft.path(), "strong");
-  if (text_of(draft.path() / "strong.toml") != scene || text_of(draft.path() / "strong.csv") != grains)
+  if (reuse && fs::exists(directory / "strong.toml") && !holds(directory, sample, "strong"))
     refuse(fmt::format("--reuse: the traces in {} are of another scene or sample; --force replaces them",
                        directory.string()));
   prepare();
@@ -380,7 +376,8 @@ int run_study(const StudyScalingOptions& options) {
       const double part = static_cast<double>(n) / plan.weak.back();
       const ScalingSample part_sample = scaled_sample(options.scene, options.overrides, options.stage, part);
       const std::string stem = fmt::format("weak-{}", n);
-      if (!rewrite_scaling_sample(part_sample, directory, stem)) study.forget(stem);
+      if (!holds(directory, part_sample, stem)) study.forget(stem);
+      write_scaling_sample(part_sample, directory, stem);
       study.weak({ScalingKind::weak, directory + "/" + stem + ".toml", "", part_sample.grains.size()}, n);
     }
   } else if (!options.no_weak) {

@@ -108,7 +108,7 @@ void prepare_output_directory(const fs::path& directory, bool force, IsOutputNam
 
 ScratchFolder::ScratchFolder(const fs::path& prefix) {
   std::error_code error;
-  fs::create_directories(prefix.parent_path(), error);
+  if (prefix.has_parent_path()) fs::create_directories(prefix.parent_path(), error);
   std::string name = prefix.string() + "-XXXXXX";
   if (error || !::mkdtemp(name.data()))
     throw FileError(name, "cannot make this folder: " + (error ? error.message() : detail::last_error()));

@@ -18,6 +18,7 @@ struct Layers {
   std::vector<std::int32_t> other;               ///< neighbours, in order of contact
   std::vector<std::int32_t> depth;               ///< per unknown; -1: not reached
   std::vector<std::vector<std::int32_t>> layer;  ///< unknowns by depth
+  std::size_t begun = 0;                         ///< where in the last layer taken its new ones begin
   std::vector<std::int32_t> met;                 ///< unknowns whose mark may have been set
   std::vector<double> parts, load;               ///< contacts with the layer below; what is handed on [kg]
 
@@ -68,7 +69,7 @@ bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
            Layers& here = graph.parts[p];
            if (here.layer.size() <= at(depth)) here.layer.resize(at(depth) + 1);
            std::vector<std::int32_t>& layer = here.layer[at(depth)];
-           const std::size_t before = layer.size();
+           here.begun = layer.size();
            const auto take = [&](std::int32_t b) {
              if (mark[p][at(b)].u[0] > 0 && here.depth[at(b)] < 0) {
                here.depth[at(b)] = depth;
@@ -79,7 +80,7 @@ bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
            for (std::int32_t b : here.met) take(b);
            for (std::int32_t b : here.graph.shared) take(b);
            here.met.clear();
-           row[0] = static_cast<double>(layer.size() - before);
+           row[0] = static_cast<double>(layer.size() - here.begun);
          })[0] > 0;
 }
 
@@ -145,7 +146,7 @@ std::int32_t walk(Graph& graph, PartField& mark, std::int32_t depth) {
   for (;; ++depth) {
     graph.each([&](std::size_t p) {
       Layers& here = graph.parts[p];
-      for (std::int32_t b : here.layer[at(depth)])
+      for (std::int32_t b : std::span(here.layer[at(depth)]).subspan(here.begun))
         for (std::int32_t other : here.neighbours(b))
           if (here.depth[at(other)] < 0 && mark[p][at(other)].u[0] == 0) {
             mark[p][at(other)].u[0] = 1;

@@ -170,6 +170,12 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
         "{} ranks for {} subdomains: a rank without a subdomain has nothing to do. Start fewer ranks or "
         "set decomposition.subdomains to {} or more",
         ranks.ranks(), subdomains, ranks.ranks()));
+  const auto& [x, y, z] = settings.boxes;
+  const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
+  if (settings.partitioner != PartitionKind::rcb && settings.partitioner != PartitionKind::metis &&
+      boxes > 0 && boxes != subdomains)
+    throw std::invalid_argument(
+        fmt::format("decomposition.boxes: {} x {} x {} boxes are not {} subdomains", x, y, z, subdomains));
   decomposition.partition.subdomains = subdomains;
   for (std::int32_t e = 0; e < subdomains; ++e) {
     const std::int32_t rank = settings.mapping == SubdomainMapping::cyclic

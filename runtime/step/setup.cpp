@@ -65,12 +65,6 @@ void validate(const Setup& setup) {
       validate_load(fmt::format("stage '{}', wall '{}'", stage.name, name), load);
     }
   }
-  const auto& [x, y, z] = setup.decomposition.boxes;
-  const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
-  const std::int64_t subdomains = setup.decomposition.subdomains;
-  require(boxes == 0 || subdomains == 0 || boxes == static_cast<double>(subdomains),
-          fmt::format("decomposition.boxes: {} x {} x {} boxes are not decomposition.subdomains = {}", x, y,
-                      z, subdomains));
   require(setup.solver.tolerance >= 0 && setup.solver.balance_tolerance >= 0,
           fmt::format("solver.tolerance and balance_tolerance must be >= 0, got {} and {}",
                       setup.solver.tolerance, setup.solver.balance_tolerance));

@@ -174,8 +174,12 @@ bool StepGraph::candidates_hold() const {
                             [](const Leaver& a, const Leaver& b) { return a.id == b.id; }),
                 leavers.end());
   if (leavers.size() > few) return false;
-  for (const Leaver& leaver : leavers)
+  for (const Leaver& leaver : leavers) {
     if (!std::isfinite(leaver.need + leaver.x[0] + leaver.x[1] + leaver.x[2])) return false;  // a runaway
+    // It may have passed a grain that it is beyond by now, and that only a candidate would tell of.
+    const double speed = std::hypot(leaver.u[0], leaver.u[1], leaver.u[2]);
+    if (parameters_.time_step * speed > 0.5 * leaver.radius) return false;
+  }
   std::vector<Encounter> needed, known;
   compare_leavers(leavers, state_.bodies, state_.candidates,
                   {state_.x_then, state_.reach_then, parameters_.time_step, parameters_.alert,
