@@ -151,6 +151,16 @@ TEST_F(Fclib, ReadsTheSameProblemFromAllThreeStorages) {
   }
 }
 
+TEST_F(Fclib, OfOneStemInAFolderHaveNamesOfTheirOwn) {
+  const fs::path folder = path("several");
+  fs::create_directory(folder);
+  for (const char* name : {"a.h5", "a.hdf5", "b.hdf5", "c.txt"}) std::ofstream(folder / name) << "x";
+  std::vector<std::string> names;
+  for (const FclibFile& file : fclib_files(folder)) names.push_back(file.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"a.h5", "a.hdf5", "b"}));
+  EXPECT_EQ(fclib_files(folder / "a.h5").at(0).name, "a");
+}
+
 TEST_F(Fclib, ReadsAProblemWithoutContacts) {
   Contents c;
   c.m = c.n = {0}, c.nz = {-2}, c.nzmax = {0}, c.p = {0};

@@ -65,6 +65,28 @@ TEST(OutputDirectory, ForceRemovesOurFilesAndNeverTheUsers) {
   EXPECT_TRUE(fs::is_symlink(scratch / "triaxial.csv"));
 }
 
+TEST(OutputDirectory, OfScratchGoesWithTheScopeAndNothingElseDoes) {
+  const ScratchDirectory scratch;
+  fs::create_directory(scratch / "run");
+  touch(scratch / "run/thesis.txt");
+  {
+    const ScratchFolder folder(scratch / "run");
+    touch(folder.path() / "log");
+    EXPECT_EQ(folder.path().parent_path(), scratch.path());
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 1);
+  EXPECT_EQ(content_of(scratch / "run/thesis.txt"), "mine");
+}
+
+TEST(OutputFile, MayNotBeWhatIsReadNorAFolder) {
+  const ScratchDirectory scratch;
+  touch(scratch / "trace.h5");
+  fs::create_symlink("trace.h5", scratch / "link.h5");
+  EXPECT_NO_THROW(check_output_file(scratch / "trace.h5", scratch / "other.h5"));
+  for (const char* out : {"trace.h5", "link.h5", ".", "nowhere/other.h5"})
+    EXPECT_THROW(check_output_file(scratch / "trace.h5", scratch / out), FileError) << out;
+}
+
 TEST(OutputDirectory, ThatCannotBeMadeIsNamed) {
   const ScratchDirectory scratch;
   touch(scratch / "file");

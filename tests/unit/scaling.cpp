@@ -24,6 +24,16 @@ ScalingRow row(ScalingKind kind, int ranks, double seconds, double iterations, s
   return out;
 }
 
+TEST(Scaling, RecordingsReadBackWhateverTheirVariantHolds) {
+  const test::ScratchDirectory scratch;
+  const std::string variant = "gravity=[0,0,-1] description=\"a, b\"";
+  write_recordings(scratch / "times.csv", {{"strong-1-1.h5", "1:2", variant, {0.5, 3, 7, 0}}});
+  const std::vector<RecordedTrace> back = read_recordings(scratch / "times.csv");
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].variant, variant);
+  EXPECT_EQ(back[0].times.contacts, 7);
+}
+
 TEST(Scaling, StrongEfficiencyIsIterationsTimesTimeOfAnIteration) {
   std::vector<ScalingRow> rows{row(ScalingKind::strong, 1, 8, 100), row(ScalingKind::strong, 4, 2.5, 125)};
   relate(rows);

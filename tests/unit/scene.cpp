@@ -298,6 +298,18 @@ TEST(Overrides, ReachKeysElementsAndListEntries) {
   EXPECT_EQ(scene.name, "moon");
 }
 
+TEST(Scenes, OfMoreGrainsThanCanBeCountedAreRefused) {
+  const std::string lattice =
+      replaced(replaced(scene_with(), "\"deposition\"", "\"lattice\""), "count = 10\nbase = [0.1, 0.1]",
+               "cells = [2097152, 2097152, 4194304]");
+  EXPECT_EQ(error_of(lattice).key(), "sample.cells");
+}
+
+TEST(Scenes, WithoutANameHaveThatOfTheFileAsOneMayBeWritten) {
+  EXPECT_EQ(parse_scene(replaced(scene_with(), "name = \"small\"", ""), "a b/tri axial.v2.toml", {}).name,
+            "tri_axial_v2");
+}
+
 TEST(Overrides, MistakesNameTheOverride) {
   const auto expect_named = [](const std::string& override, const std::string& said) {
     const SceneError error = error_of(scene_with(), {override});
@@ -309,6 +321,8 @@ TEST(Overrides, MistakesNameTheOverride) {
   expect_named("slover.tolerance=1", "did you mean 'solver'?");
   expect_named("material.friction=-1", "must be >= 0");
   expect_named("material.friction=rough", "got the text 'rough'");
+  expect_named("description=\xff", "not UTF-8");
+  expect_named("decomposition.subdomains=4294967297", "65535");
   expect_named("stage.shear.time_step=1", "no element 'shear'; there are: 0 'press'");
   expect_named("stage[7].time_step=1", "no element '7'");
   expect_named("stage.0.end={ steps = 0 }", "must be >= 1");
