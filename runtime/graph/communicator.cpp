@@ -52,7 +52,8 @@ Communicator::Communicator(const MpiSession& session, CommunicatorOptions option
   int given = 0;
   check(MPI_Comm_get_attr(MPI_COMM_WORLD, MPI_TAG_UB, static_cast<void*>(&largest), &given),
         "MPI_Comm_get_attr");
-  if (given != 0) largest_tag_ = simulated_ranks ? std::numeric_limits<int>::max() : *largest;  // SMPI takes any
+  if (given != 0)
+    largest_tag_ = simulated_ranks ? std::numeric_limits<int>::max() : *largest;  // SMPI takes any
   MPI_Comm node;
   check(MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &node),
         "MPI_Comm_split_type");
