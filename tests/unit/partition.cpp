@@ -129,6 +129,16 @@ TEST(Partition, MetisKeepsContactsWithinTheCellsAndNoRegionWithoutWeight) {
   EXPECT_LT(imbalance(weights), 0.05);
 }
 
+TEST(Partition, OfANearlyFlatSampleByMetisHasNoMoreCellsThanPromised) {
+  PartitionPoints points = random_points(3000, 3);
+  for (Vec3& x : points.x) x[2] *= 1e-9;
+  for (const std::int32_t n : {2, 24}) {
+    const Partition partition = make_partition(points, options_of(PartitionKind::metis, n));
+    EXPECT_LE(partition.table.subdomain.size(), std::size_t{1} << 18);
+    EXPECT_EQ(partition.table.cells[2], 1);
+  }
+}
+
 TEST(Partition, IsTheSameForAnyOrderOfPointsAndAnyNumberOfRanks) {
   for (bool weights : {false, true}) {
     const PartitionPoints points = random_points(4000, 5, weights);

@@ -266,20 +266,25 @@ TEST(Certificate, MarksAStepThatMissesItsTolerance) {
   }
 }
 
-// B, struck by A at the end of a step, jumps into C and out on the other side before C is its contact.
+// B, struck by A at the end of a step, jumps into C, or far beyond it, before C is its contact or candidate.
 TEST(Certificate, MarksAStepInWhichAGrainThatWasStruckPassesAnother) {
-  graph::Executor executor({});
-  talus::Setup setup = falling(4);
-  setup.stages[0].gravity = Vec3::Zero();
-  setup.stages[0].time_step = 1;
-  setup.stages[0].law.restitution = 1;
-  Bodies bodies;
-  for (const double x : {-3.9, 0.0, 2.2})
-    add_sphere(bodies, BodyId{static_cast<int>(bodies.size())}, Vec3(x, 0, 0), 1, 1);
-  bodies.velocity[0].u[0] = 4;
-  Simulation simulation(setup, bodies, executor);
-  EXPECT_TRUE(simulation.step().converged);
-  EXPECT_FALSE(simulation.step().converged);
+  struct Case {
+    double a, speed, c;
+  };
+  for (const auto& [a, speed, c] : {Case{-3.9, 4, 2.2}, {-5.9, 8, 3.0}}) {
+    graph::Executor executor({});
+    talus::Setup setup = falling(4);
+    setup.stages[0].gravity = Vec3::Zero();
+    setup.stages[0].time_step = 1;
+    setup.stages[0].law.restitution = 1;
+    Bodies bodies;
+    for (const double x : {a, 0.0, c})
+      add_sphere(bodies, BodyId{static_cast<int>(bodies.size())}, Vec3(x, 0, 0), 1, 1);
+    bodies.velocity[0].u[0] = speed;
+    Simulation simulation(setup, bodies, executor);
+    EXPECT_TRUE(simulation.step().converged);
+    EXPECT_FALSE(simulation.step().converged) << "C at " << c;
+  }
 }
 
 // 1.5 mm above the grain, 5 mm further down at the end of the step if there were none.
