@@ -47,7 +47,7 @@ struct CandidateGroup {
   std::int32_t wall;       ///< index of the wall, or -1
   std::int32_t subdomain;  ///< index among those of this process
   ChunkSide side;
-  int target;  ///< candidates in a chunk at most, a few hundred, < 32768
+  int target;  ///< candidates in a chunk at most, some hundred, < 32768
 };
 
 /// So that 32 bits tell where the record of a body begins (record_of).

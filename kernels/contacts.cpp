@@ -30,6 +30,8 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   for (std::size_t k = 0; k < candidates.grain_pairs.size(); ++k) {
     contacts.first[k] = candidates.grain_pairs[k].first;
     contacts.second[k] = candidates.grain_pairs[k].second;
+    contacts.first_record[k] = record_of(contacts.first[k]);
+    contacts.second_record[k] = record_of(contacts.second[k]);
   }
   contacts.group.resize(n);
   contacts.count.assign(chunks.size(), 0);

@@ -1,10 +1,9 @@
 #include "kernels/narrow_phase.hpp"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 
+#include "kernels/detail/contact_groups.hpp"
 #include "kernels/detail/contact_view.hpp"
 
 namespace talus {
@@ -12,7 +11,6 @@ namespace talus {
 namespace {
 
 constexpr std::size_t group_size = 16;
-constexpr std::size_t groups_open = 64;
 
 std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
@@ -88,67 +86,9 @@ bool find_gaps(const PairView& pairs, const GapRule& rule, const GapTarget& out)
   return far;
 }
 
-/// Deals the pairs of a chunk that are contacts to groups of 16 without a common grain, first fit, with one
-/// bit per group and grain; what fits in none of 64 open groups (a large grain among small ones) follows,
-/// each a group of its own, and behind them the pairs that are no contacts. `from` gets the place where each
-/// of them stands now, `sizes` those of the groups; returns the number of contacts. The order of the
-/// candidates (cut_chunks), made once per broad phase, is what makes the groups full.
-std::size_t deal_to_groups(const Chunks& chunks, std::size_t chunk, std::span<const std::int32_t> candidate,
-                           std::span<const std::int64_t> contact, std::vector<std::uint16_t>& from,
-                           std::uint8_t* sizes) {
-  const std::size_t begin = index(chunks.begin[chunk]), count = candidate.size();
-  const std::size_t bodies = index(chunks.body_begin[chunk + 1] - chunks.body_begin[chunk]);
-  std::vector<std::uint16_t> place(count);  // of the candidates
-  for (std::size_t k = 0; k < count; ++k) place[index(candidate[k]) - begin] = static_cast<std::uint16_t>(k);
-  std::vector<std::uint64_t> in_group(bodies, 0);
-  std::array<std::array<std::uint16_t, group_size>, groups_open> group;
-  std::array<std::size_t, groups_open> filled{};
-  std::uint64_t open = ~std::uint64_t{0};
-  std::vector<std::uint16_t> late, others;
-  others.reserve(count);
-  for (std::size_t at = begin; at < begin + count; ++at) {
-    const std::size_t k = chunks.order[at];
-    const std::uint16_t p = place[k];
-    if (contact[p] == 0) {
-      others.push_back(p);
-      continue;
-    }
-    std::uint64_t& mask_i = in_group[chunks.local[2 * (begin + k)]];
-    std::uint64_t& mask_j = in_group[chunks.local[2 * (begin + k) + 1]];
-    const std::uint64_t room = open & ~(mask_i | mask_j);
-    if (room == 0) {
-      late.push_back(p);
-      continue;
-    }
-    const auto g = static_cast<std::size_t>(std::countr_zero(room));
-    const std::uint64_t bit = std::uint64_t{1} << g;
-    mask_i |= bit;
-    mask_j |= bit;
-    group[g][filled[g]++] = p;
-    if (filled[g] == group_size) open &= ~bit;
-  }
-  from.clear();
-  for (std::size_t g = 0; g < groups_open && filled[g] > 0; ++g) {
-    from.insert(from.end(), group[g].begin(), group[g].begin() + static_cast<std::ptrdiff_t>(filled[g]));
-    *sizes++ = static_cast<std::uint8_t>(filled[g]);
-  }
-  from.insert(from.end(), late.begin(), late.end());
-  std::fill_n(sizes, late.size(), std::uint8_t{1});
-  from.insert(from.end(), others.begin(), others.end());
-  return count - others.size();
-}
-
-/// values[k] becomes what stood at values[from[k]].
-template <class T>
-void rearrange(std::span<const std::uint16_t> from, T* values, std::vector<T>& room) {
-  room.assign(values, values + from.size());
-  for (std::size_t k = 0; k < from.size(); ++k) values[k] = room[from[k]];
-}
-
 void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chunks, std::size_t chunk,
                    const SweepKernels& kernels, Contacts& contacts) {
   const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
-  const std::span candidate(contacts.candidate.data() + begin, count);
   Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
@@ -162,19 +102,8 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
   const auto last = contact.begin() + contacts.count[chunk];
   const auto is = [](std::int64_t c) { return c != 0; };
   if (std::all_of(contact.begin(), last, is) && std::none_of(last, contact.end(), is)) return;
-  std::vector<std::uint16_t> from;
-  from.reserve(count);
-  contacts.count[chunk] = static_cast<std::int32_t>(
-      deal_to_groups(chunks, chunk, candidate, contact, from, contacts.group.data() + begin));
-  std::vector<double> room;
-  for (double* values : {target.nx, target.ny, target.nz, target.bias}) rearrange<double>(from, values, room);
-  std::vector<std::int32_t> indices;
-  for (std::int32_t* values : {candidate.data(), first, second})
-    rearrange<std::int32_t>(from, values, indices);
-  for (std::size_t at = begin; at < begin + count; ++at) {
-    contacts.first_record[at] = record_of(contacts.first[at]);
-    contacts.second_record[at] = record_of(contacts.second[at]);
-  }
+  const detail::ChunkPlaces places{chunks, chunk, contacts, contact};
+  if (!detail::repair_groups(places)) detail::deal_groups(places);
 }
 
 /// At a wall: a grain meets it once, so that any contacts may share a group.

@@ -137,8 +137,11 @@ Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies
   return v;
 }
 
-int chunk_target(std::size_t candidates) {
-  return static_cast<int>(std::clamp<std::size_t>(candidates / 32, 64, 512));
+int chunk_target(std::int64_t all, std::int64_t fullest) {
+  constexpr std::int64_t enough_chunks = 900;
+  constexpr std::int64_t most = 1000;  // groups that are open at once have room for 1024 (deal_groups)
+  return static_cast<int>(
+      std::max(std::clamp<std::int64_t>(all / 32, 64, 512), std::min(fullest / enough_chunks, most)));
 }
 
 Slot Surroundings::find(std::int64_t id) const {

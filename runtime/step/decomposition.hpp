@@ -99,8 +99,9 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
 
 std::size_t memory_used(const Decomposition& decomposition);
 
-/// A few hundred candidates a chunk; fewer in small samples, where colours would otherwise be too thin for
-/// threads.
-int chunk_target(std::size_t candidates);
+/// Candidates in a chunk, from all there are and those of the fullest subdomain. Few in small samples, where
+/// colours would otherwise be too thin for threads; more in subdomains with enough chunks for many threads,
+/// which leave the cache: what a chunk reads comes in longer runs then (docs/decisions/0008-lanes.md).
+int chunk_target(std::int64_t all, std::int64_t fullest);
 
 }  // namespace talus

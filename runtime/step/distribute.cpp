@@ -322,7 +322,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   ranks.sum(load);
   // As large as without subdomains: small chunks have poor batches, and subdomains run beside one another.
   const int target =
-      chunk_target(static_cast<std::size_t>(std::accumulate(load.begin(), load.end(), std::int64_t{0})));
+      chunk_target(std::accumulate(load.begin(), load.end(), std::int64_t{0}), std::ranges::max(load));
 
   // Of the bodies of the subdomain at hand.
   std::vector<Slot> slot(around.bodies.size());

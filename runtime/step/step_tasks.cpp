@@ -273,7 +273,8 @@ void StepGraph::make_chunks() {
   } else {
     match_impulses(state_.candidates, fresh);
     state_.candidates = std::move(fresh);
-    groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(state_.candidates.size()));
+    const auto all = static_cast<std::int64_t>(state_.candidates.size());
+    groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(all, all));
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);

@@ -66,7 +66,8 @@ Sample make_sample(const bench::Packing& packing, std::size_t grains, bool frict
   candidates.components = friction ? 3 : 1;
   candidates.grain_pairs = sort_pairs(parts, bodies.size());
   candidates.impulse.assign(candidates.size() * (friction ? 3 : 1), 0.0);
-  sample.chunks = cut_chunks(candidates, bodies.size(), chunk_target(candidates.size()));
+  const auto all = static_cast<std::int64_t>(candidates.size());
+  sample.chunks = cut_chunks(candidates, bodies.size(), chunk_target(all, all));
   allocate(sample.contacts, candidates, sample.chunks, friction);
   const NarrowPhase in{bodies.x, bodies.radius, bodies.velocity, {}, 0.01, 0.02, 0, Vec3::Zero()};
   const SweepKernels kernels(best_instruction_set());

@@ -125,8 +125,9 @@ void time_kernels(const StepState& state, Times& times, int repeats) {
       find_pairs(grid, 0, grid.cells.size(), parts[0]);
       sort_pairs(parts, reach.size());
     });
-    const double cut = cpu_time(
-        [&] { cut_chunks(state.candidates, state.bodies.size(), chunk_target(state.candidates.size())); });
+    const auto all = static_cast<std::int64_t>(state.candidates.size());
+    const double cut =
+        cpu_time([&] { cut_chunks(state.candidates, state.bodies.size(), chunk_target(all, all)); });
     const NarrowPhase in{
         state.bodies.x,   state.bodies.radius, state.bodies.velocity, state.walls, 0.005, 0.02, 0,
         Vec3(0, 0, -9.81)};

@@ -2,10 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <numeric>
 
+#include "tests/unit/contact_groups.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace talus {
@@ -97,36 +102,112 @@ TEST(NarrowPhase, FindsTheSameBitsOfPairsThatPassCoincideOrAreNoNumbers) {
   EXPECT_GT(std::accumulate(sample.contacts.passed.begin(), sample.contacts.passed.end(), 0), 0);
 }
 
-// What a step finds must not depend on the step in which the candidates were found: a run that goes on from a
-// saved state has not seen those before it.
-TEST(NarrowPhase, KeepsGroupsThatAreThoseOfAFreshStart) {
+/// By candidate: normal, bias, impulse.
+using Found = std::map<std::int32_t, std::array<double, 7>>;
+Found contacts_of(const Sample& sample, std::size_t chunk) {
+  const Contacts& c = sample.contacts;
+  Found found;
+  for (std::size_t k = sample.range(chunk).begin; k < sample.range(chunk).end; ++k) {
+    std::array<double, 7> values = {c.nx[k], c.ny[k], c.nz[k], c.bias[k]};
+    if (c.rn.empty())
+      values[4] = c.rx[k], values[5] = c.ry[k], values[6] = c.rz[k];
+    else
+      values[4] = c.rn[k];
+    found[c.candidate[k]] = values;
+  }
+  return found;
+}
+
+std::size_t stayed(const Sample& sample, std::size_t chunk, const std::vector<std::int32_t>& before) {
+  std::size_t count = 0;
+  for (std::size_t k = sample.range(chunk).begin; k < sample.range(chunk).end; ++k)
+    count += sample.contacts.candidate[k] == before[k];
+  return count;
+}
+
+// A step finds the contacts that a fresh start finds; where only some came or went, the others stay where
+// they are, in groups that are as full as freshly dealt ones.
+TEST(NarrowPhase, RepairsTheGroupsOfFewContactsThatCameOrWent) {
   for (const bool friction : {false, true}) {
-    Sample sample = fresh_sample(friction, 40, 8);
+    Sample sample = fresh_sample(friction, 300, 8);
     const SweepKernels kernels(best_instruction_set());
+    find(narrow_phase(sample), kernels, sample);
+    Sample other = sample;
     Random random(1);
-    int changed = 0, kept = 0;
-    for (int step = 0; step < 30; ++step) {
-      // Every third step moves few grains, so that some chunks keep their contacts.
-      const double part = step % 3 == 0 ? 0.02 : 0.3;
+    std::size_t kept = 0, repaired = 0, dealt = 0, groups = 0, fresh_groups = 0;
+    for (int step = 0; step < 200; ++step) {
+      // Every sixth step moves many grains, and far.
+      const double part = step % 6 == 0 ? 0.5 : 0.02, way = step % 6 == 0 ? 0.05 : 0.01;
       for (Vec3& x : sample.bodies.x)
-        if (uniform(random, 0, 1) < part) x += test::uniform_vector(random, -0.005, 0.005);
+        if (uniform(random, 0, 1) < part) x += test::uniform_vector(random, -way, way);
       for (double& r : sample.candidates.impulse) r = uniform(random, -1, 1);
-      const std::vector<std::int32_t> before = sample.contacts.candidate;
+      other.bodies.x = sample.bodies.x;
+      other.candidates.impulse = sample.candidates.impulse;
+      const Contacts before = sample.contacts;
       find(narrow_phase(sample), kernels, sample);
+      find(narrow_phase(other), SweepKernels(InstructionSet::portable), other);
       Sample fresh = sample;
       allocate(fresh.contacts, fresh.candidates, fresh.chunks, friction);
       find(narrow_phase(fresh), kernels, fresh);
       for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
-        expect_same_contacts(sample, fresh, c);
+        EXPECT_EQ(contacts_of(sample, c), contacts_of(fresh, c));
+        expect_same_contacts(sample, other, c);
         if (sample.chunks.wall[c] >= 0) continue;
-        const auto from = before.begin() + sample.chunks.begin[c],
-                   to = before.begin() + sample.chunks.begin[c + 1];
-        ++(std::equal(from, to, sample.contacts.candidate.begin() + sample.chunks.begin[c]) ? kept : changed);
+        groups += test::checked_groups(sample, c).size();
+        fresh_groups += test::checked_groups(fresh, c).size();
+        const auto was = static_cast<std::size_t>(before.count[c]),
+                   is = static_cast<std::size_t>(sample.contacts.count[c]);
+        const std::size_t same = stayed(sample, c, before.candidate);
+        ++(same == was && same == is ? kept : 4 * same > 3 * is ? repaired : dealt);
       }
     }
-    EXPECT_GT(kept, 20);
-    EXPECT_GT(changed, 20);
+    EXPECT_GT(kept, 20u);
+    EXPECT_GT(repaired, 20u);
+    EXPECT_GT(dealt, 20u);
+    EXPECT_LE(groups, fresh_groups + fresh_groups / 50);
   }
+}
+
+// 150 small grains on a large one: each contact is a group of its own, and leaves none behind.
+TEST(NarrowPhase, RepairsGroupsOfOne) {
+  Sample sample;
+  add_sphere(sample.bodies, BodyId{0}, Vec3::Zero(), 10, 1000);
+  for (int k = 1; k <= 150; ++k) {
+    const double turn = 0.04 * k;
+    add_sphere(sample.bodies, BodyId{k}, 10.01 * Vec3(std::cos(turn), std::sin(turn), 0), 0.01, 1000);
+    sample.candidates.grain_pairs.push_back({0, static_cast<Slot>(k)});
+  }
+  sample.candidates.impulse.assign(3 * sample.candidates.size(), 0.0);
+  sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
+  test::find_contacts(sample, 0.001);
+  const SweepKernels kernels(best_instruction_set());
+  for (const std::size_t away : {1u, 70u, 150u}) {
+    sample.bodies.x[away] *= 1.1;
+    find(narrow_phase(sample, 0.001), kernels, sample);
+    EXPECT_EQ(test::checked_groups(sample, 0).size(), 149u);
+    sample.bodies.x[away] /= 1.1;
+    find(narrow_phase(sample, 0.001), kernels, sample);
+    EXPECT_EQ(test::checked_groups(sample, 0).size(), 150u);
+    EXPECT_EQ(contacts_of(sample, 0).size(), 150u);
+  }
+}
+
+// The last contact goes, the first one comes.
+TEST(NarrowPhase, FindsContactsInAChunkThatHadNone) {
+  Sample sample = fresh_sample(true, 300, 8);
+  for (Velocity& v : sample.bodies.velocity) std::fill_n(v.u, 3, 0.0);
+  const std::vector<Vec3> near = sample.bodies.x;
+  const SweepKernels kernels(best_instruction_set());
+  std::vector<std::int32_t> counts;
+  for (const double apart : {1.0, 2.0, 1.0}) {
+    for (std::size_t s = 0; s < near.size(); ++s) sample.bodies.x[s] = apart * near[s];
+    find(narrow_phase(sample), kernels, sample);
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c) test::checked_groups(sample, c);
+    counts.push_back(sample.contacts.count.front());
+  }
+  EXPECT_GT(counts[0], 100);
+  EXPECT_EQ(counts[1], 0);
+  EXPECT_EQ(counts[2], counts[0]);
 }
 
 }  // namespace
