@@ -47,8 +47,11 @@ struct CandidateGroup {
   std::int32_t wall;       ///< index of the wall, or -1
   std::int32_t subdomain;  ///< index among those of this process
   ChunkSide side;
-  int target;  ///< candidates in a chunk at most, some hundred, < 32768
+  int target;  ///< candidates in a chunk at most; 64 to longest_chunk make good groups, < 32768 is possible
 };
+
+/// The contacts of longer chunks may not fit the groups that are open at once when they are dealt.
+inline constexpr int longest_chunk = 1000;
 
 /// So that 32 bits tell where the record of a body begins (record_of).
 inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;

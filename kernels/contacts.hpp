@@ -19,7 +19,7 @@ inline std::uint32_t record_of(Slot slot) {
 }
 
 /// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
-/// chunks.begin[c] + count[c]), in groups of 16 and, towards the end, fewer. No grain stands twice in a
+/// chunks.begin[c] + count[c]), in groups of at most 16, most of them full. No grain stands twice in a
 /// group, so that a group can be swept at once. Behind them, between grains, stand the candidates that are
 /// no contacts, so that the next step finds all of them where they were (kernels/narrow_phase.hpp).
 struct Contacts {

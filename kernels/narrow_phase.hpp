@@ -34,9 +34,9 @@ inline bool may_touch(double gap, double v_n, double time_step, double alert) {
 /// A resting overlap is undone at the rate of b = overlap_correction x g/h. Coincident centres get the normal
 /// +z.
 ///
-/// A chunk whose contacts are the candidates that they were keeps their places and groups; else they are
-/// dealt to groups anew. Groups follow from the contacts and from Chunks::order alone, not from what was
-/// before (docs/decisions/0008-lanes.md). The first call behind allocate() deals.
+/// A chunk whose contacts are the candidates that they were keeps their places and groups; where a few came
+/// or went these are repaired, else dealt anew (kernels/detail/contact_groups.hpp). So groups follow from the
+/// steps since allocate(), the first of which deals.
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, const SweepKernels& kernels, Contacts& contacts);
 

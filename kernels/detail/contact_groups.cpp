@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -12,6 +14,7 @@ namespace {
 
 constexpr std::size_t group_size = 16;
 constexpr std::size_t groups_open = 64;
+static_assert(longest_chunk <= groups_open * group_size);
 constexpr std::size_t few = 16;  ///< of so many contacts one may change: repairs cost less than dealing
 
 std::size_t index(std::int32_t k) {
@@ -40,18 +43,19 @@ class Repair {
     for (std::size_t k = 0; k < at_.contact.size(); ++k)
       if ((at_.contact[k] != 0) != (k < count_)) (k < count_ ? holes : came).push_back(k);
     if (few * (holes.size() + came.size()) > count_) return false;
-    std::erase_if(holes, [&](std::size_t hole) {
+    std::vector<std::size_t> left;
+    for (const std::size_t hole : holes) {
       const auto fit = std::ranges::find_if(came, [&](std::size_t k) { return fits(k, group_of(hole)); });
-      if (fit == came.end()) return false;
-      swap(hole, *fit);
-      came.erase(fit);
-      return true;
-    });
-    // From the last one on, so that no hole is left behind the one at hand.
-    while (!holes.empty()) {
-      if (!close(holes.back())) return false;
-      holes.pop_back();
+      if (fit == came.end()) {
+        left.push_back(hole);
+      } else {
+        swap(hole, *fit);
+        came.erase(fit);
+      }
     }
+    // From the last one on, so that no hole is left behind the one at hand.
+    for (; !left.empty(); left.pop_back())
+      if (!close(left.back())) return false;
     for (const std::size_t k : came)
       if (!append(k)) return false;
     write();
@@ -161,9 +165,11 @@ void deal_groups(const ChunkPlaces& at) {
   std::fill_n(sizes, late.size(), std::uint8_t{1});
   from.insert(from.end(), others.begin(), others.end());
   contacts.count[at.chunk] = static_cast<std::int32_t>(count - others.size());
+  std::tuple<std::vector<double>, std::vector<std::int32_t>, std::vector<std::uint32_t>> rooms;
   for_each_array(contacts, [&](auto& values) {
+    auto& before = std::get<std::remove_reference_t<decltype(values)>>(rooms);
     const auto start = values.begin() + static_cast<std::ptrdiff_t>(begin);
-    const std::vector before(start, start + static_cast<std::ptrdiff_t>(count));
+    before.assign(start, start + static_cast<std::ptrdiff_t>(count));
     for (std::size_t k = 0; k < count; ++k) values[begin + k] = before[from[k]];
   });
 }

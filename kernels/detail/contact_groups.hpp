@@ -1,7 +1,7 @@
 #pragma once
 
-/// Which contacts of a chunk between grains stand in one group: dealt once per broad phase, then kept and
-/// repaired (docs/decisions/0008-lanes.md).
+/// Which contacts of a chunk between grains stand in one group: dealt behind a broad phase, then kept and
+/// repaired while that can be done (docs/decisions/0008-lanes.md).
 
 #include <cstddef>
 #include <cstdint>
@@ -25,8 +25,8 @@ void deal_groups(const ChunkPlaces& at);
 
 /// Keeps the groups but for those contacts that came or went: one that came takes the place of one that went
 /// where it shares no grain with the rest of the group; other places are filled from the last group, and what
-/// is left joins it. There is no group more than before unless all were full. False when that does not work
-/// out, or so many changed that dealing is as cheap: then the groups must be dealt.
+/// is left joins it. There is no group more than before unless the last was full. False when that does not
+/// work out, or so many changed that dealing is as cheap: then the groups must be dealt.
 bool repair_groups(const ChunkPlaces& at);
 
 }  // namespace talus::detail

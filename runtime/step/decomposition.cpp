@@ -137,11 +137,10 @@ Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies
   return v;
 }
 
-int chunk_target(std::int64_t all, std::int64_t fullest) {
+int chunk_target(std::int64_t all, std::int64_t own) {
   constexpr std::int64_t enough_chunks = 900;
-  constexpr std::int64_t most = 1000;  // groups that are open at once have room for 1024 (deal_groups)
-  return static_cast<int>(
-      std::max(std::clamp<std::int64_t>(all / 32, 64, 512), std::min(fullest / enough_chunks, most)));
+  return static_cast<int>(std::max(std::clamp<std::int64_t>(all / 32, 64, 512),
+                                   std::min<std::int64_t>(own / enough_chunks, longest_chunk)));
 }
 
 Slot Surroundings::find(std::int64_t id) const {

@@ -99,9 +99,9 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
 
 std::size_t memory_used(const Decomposition& decomposition);
 
-/// Candidates in a chunk, from all there are and those of the fullest subdomain. Few in small samples, where
-/// colours would otherwise be too thin for threads; more in subdomains with enough chunks for many threads,
-/// which leave the cache: what a chunk reads comes in longer runs then (docs/decisions/0008-lanes.md).
-int chunk_target(std::int64_t all, std::int64_t fullest);
+/// Candidates in a chunk of a subdomain, from all there are and its own. Few in small samples, where colours
+/// would otherwise be too thin for threads; more in a subdomain with enough chunks for many threads, which
+/// leaves the cache: what a chunk reads comes in longer runs then (docs/decisions/0008-lanes.md).
+int chunk_target(std::int64_t all, std::int64_t own);
 
 }  // namespace talus

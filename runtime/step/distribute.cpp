@@ -320,9 +320,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     for (std::int32_t k : own.candidate) ++load[at(subdomain[at(k)])];
   }
   ranks.sum(load);
-  // As large as without subdomains: small chunks have poor batches, and subdomains run beside one another.
-  const int target =
-      chunk_target(std::accumulate(load.begin(), load.end(), std::int64_t{0}), std::ranges::max(load));
+  const std::int64_t all = std::accumulate(load.begin(), load.end(), std::int64_t{0});
 
   // Of the bodies of the subdomain at hand.
   std::vector<Slot> slot(around.bodies.size());
@@ -342,6 +340,8 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
                            : wall >= 0 && glued[at(wall)] != 0                    ? ChunkSide::wall
                            : decomposition.turn_of(decomposition.here[local]) > 0 ? ChunkSide::late
                                                                                   : ChunkSide::border;
+    // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
+    const int target = chunk_target(all, load[at(decomposition.here[local])]);
     groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
     auto next = static_cast<Slot>(decomposition.slot_begin[local]);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;

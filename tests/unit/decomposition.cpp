@@ -80,6 +80,15 @@ Outcome run(const talus::Setup& setup, Bodies bodies, graph::ExecutorOptions opt
   return outcome;
 }
 
+TEST(ChunkTarget, IsSmallInSmallSamplesAndGrowsInLargeSubdomains) {
+  EXPECT_EQ(chunk_target(0, 0), 64);
+  EXPECT_EQ(chunk_target(9600, 9600), 300);
+  EXPECT_EQ(chunk_target(16384, 200), 512);
+  EXPECT_EQ(chunk_target(461699, 461699), 512);
+  EXPECT_EQ(chunk_target(10000000, 461700), 513);
+  EXPECT_EQ(chunk_target(10000000, 10000000), longest_chunk);
+}
+
 TEST(Decomposition, HasTheSameBitsWithAnyNumberOfThreads) {
   for (const Variant& variant : variants) {
     talus::Setup setup = pressed_box(0.3, 12);

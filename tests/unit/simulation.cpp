@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <set>
+#include <span>
 
 #include "tests/unit/dense_sample.hpp"
 
@@ -79,16 +82,38 @@ struct Outcome {
   std::uint64_t state = 0;                 ///< of the last step
   std::vector<std::uint64_t> certificate;  ///< error, wall force and iterations of every step
   int broad_phases = 0;
+  int repairs = 0;  ///< chunks whose contacts changed in part
   std::int64_t contacts = 0;
   bool operator==(const Outcome&) const = default;
 };
+
+/// Chunks in which some contacts came or went, and all others but as many stand where they did.
+int repairs(const StepState& state, const Contacts& before) {
+  int count = 0;
+  for (std::size_t c = 0; c < state.chunks.size(); ++c) {
+    const auto contacts = [&](const Contacts& of) {
+      return std::span(of.candidate)
+          .subspan(static_cast<std::size_t>(state.chunks.begin[c]), static_cast<std::size_t>(of.count[c]));
+    };
+    const std::span was = contacts(before), is = contacts(state.contacts);
+    const std::set<std::int32_t> had(was.begin(), was.end()), has(is.begin(), is.end());
+    std::vector<std::int32_t> changed;
+    std::ranges::set_symmetric_difference(had, has, std::back_inserter(changed));
+    std::size_t moved = 0;
+    for (std::size_t k = 0; k < std::min(was.size(), is.size()); ++k) moved += was[k] != is[k];
+    count += state.chunks.wall[c] < 0 && !changed.empty() && moved <= changed.size();
+  }
+  return count;
+}
 
 Outcome run(const Setup& setup, Bodies bodies, graph::ExecutorOptions options) {
   graph::Executor executor(options);
   Simulation simulation(setup, std::move(bodies), executor);
   Outcome outcome;
   while (!simulation.finished()) {
+    const Contacts before = simulation.state().contacts;
     const StepReport& report = simulation.step();
+    if (!simulation.sums().broad_phase) outcome.repairs += repairs(simulation.state(), before);
     for (double value : {report.error_rms, report.error_max, report.balance, report.kinetic_translation,
                          report.kinetic_rotation, report.penetration_mean, report.penetration_max,
                          static_cast<double>(report.iterations), static_cast<double>(report.active)})
@@ -112,6 +137,7 @@ TEST(Simulation, HasTheSameBitsWithAnyNumberOfThreads) {
   const Outcome one = run(setup, loose_sample(8, 8, 9, 1), {.threads = 1});
   EXPECT_GT(one.broad_phases, 4) << "candidates are to change within the run";
   EXPECT_GT(one.contacts, 800) << "the sample is to be dense in the end";
+  EXPECT_GT(one.repairs, 20) << "groups are to be repaired within the run";
   for (int threads : {2, 3, 4, 8})
     EXPECT_TRUE(run(setup, loose_sample(8, 8, 9, 1), {.threads = threads}) == one) << threads << " threads";
 }
