@@ -10,8 +10,6 @@ namespace talus {
 
 namespace {
 
-constexpr std::size_t group_size = 16;
-
 std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }

@@ -8,11 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/detail/contact_view.hpp"
+
 namespace talus::detail {
 
 namespace {
 
-constexpr std::size_t group_size = 16;
 constexpr std::size_t groups_open = 64;
 static_assert(longest_chunk <= groups_open * group_size);
 constexpr std::size_t few = 16;  ///< of so many contacts one may change: repairs cost less than dealing

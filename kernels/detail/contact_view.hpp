@@ -8,6 +8,8 @@
 
 namespace talus {
 
+inline constexpr std::size_t group_size = 16;  ///< contacts of a full group
+
 /// Contacts [begin, end) of one chunk, arrays as in `Contacts`.
 template <class Number>
 struct ContactViewOf {

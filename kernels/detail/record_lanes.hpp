@@ -10,8 +10,7 @@
 namespace talus {
 namespace {
 
-constexpr std::size_t record = 8;       ///< numbers of a body
-constexpr std::size_t group_size = 16;  ///< contacts of a full group
+constexpr std::size_t record = 8;  ///< numbers of a body
 
 /// Contacts in lanes of V.
 template <class V>
