@@ -40,10 +40,13 @@ class Repair {
   }
 
   bool run() {
+    const auto changed = [&](std::size_t k) { return (at_.contact[k] != 0) != (k < count_); };
+    std::size_t changes = 0;
+    for (std::size_t k = 0; k < at_.contact.size(); ++k) changes += changed(k);
+    if (few * changes > count_) return false;
     std::vector<std::size_t> holes, came;
     for (std::size_t k = 0; k < at_.contact.size(); ++k)
-      if ((at_.contact[k] != 0) != (k < count_)) (k < count_ ? holes : came).push_back(k);
-    if (few * (holes.size() + came.size()) > count_) return false;
+      if (changed(k)) (k < count_ ? holes : came).push_back(k);
     std::vector<std::size_t> left;
     for (const std::size_t hole : holes) {
       const auto fit = std::ranges::find_if(came, [&](std::size_t k) { return fits(k, group_of(hole)); });
