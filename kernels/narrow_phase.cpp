@@ -96,10 +96,6 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
   const bool far =
       kernels.lanes() ? kernels.lanes()->find_gaps(pairs, rule, target) : find_gaps(pairs, rule, target);
   contacts.passed[chunk] = far ? count_passed(pairs, in.time_step) : 0;
-
-  const auto last = contact.begin() + contacts.count[chunk];
-  const auto is = [](std::int64_t c) { return c != 0; };
-  if (std::all_of(contact.begin(), last, is) && std::none_of(last, contact.end(), is)) return;
   const detail::ChunkPlaces places{chunks, chunk, contacts, contact};
   if (!detail::repair_groups(places)) detail::deal_groups(places);
 }

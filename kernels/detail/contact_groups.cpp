@@ -40,13 +40,9 @@ class Repair {
   }
 
   bool run() {
-    const auto changed = [&](std::size_t k) { return (at_.contact[k] != 0) != (k < count_); };
-    std::size_t changes = 0;
-    for (std::size_t k = 0; k < at_.contact.size(); ++k) changes += changed(k);
-    if (few * changes > count_) return false;
     std::vector<std::size_t> holes, came;
     for (std::size_t k = 0; k < at_.contact.size(); ++k)
-      if (changed(k)) (k < count_ ? holes : came).push_back(k);
+      if ((at_.contact[k] != 0) != (k < count_)) (k < count_ ? holes : came).push_back(k);
     std::vector<std::size_t> left;
     for (const std::size_t hole : holes) {
       const auto fit = std::ranges::find_if(came, [&](std::size_t k) { return fits(k, group_of(hole)); });
@@ -179,7 +175,12 @@ void deal_groups(const ChunkPlaces& at) {
 }
 
 bool repair_groups(const ChunkPlaces& at) {
-  return Repair(at).run();
+  const std::size_t count = index(at.contacts.count[at.chunk]);
+  const auto were = at.contact.first(count), others = at.contact.subspan(count);
+  const auto changed = static_cast<std::size_t>(std::ranges::count(were, 0) +
+                                                std::ranges::count_if(others, [](auto c) { return c != 0; }));
+  if (changed == 0) return true;
+  return few * changed <= count && Repair(at).run();
 }
 
 }  // namespace talus::detail
