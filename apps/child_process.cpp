@@ -2,11 +2,13 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -18,6 +20,48 @@ extern char** environ;
 
 namespace talus {
 
+namespace {
+
+std::atomic<pid_t> running{0};
+std::atomic<int> stop_signal{0};
+static_assert(std::atomic<pid_t>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+
+/// A terminal interrupts the child too; others end this process only.
+extern "C" void stop_child(int signal) {
+  stop_signal.store(signal);
+  if (const pid_t child = running.load(); child > 0 && signal == SIGTERM) ::kill(child, signal);
+}
+
+/// While a child runs, what ends this process waits for the child to end.
+class Attendance {
+ public:
+  Attendance() {
+    stop_signal.store(0);
+    struct sigaction action {};
+    action.sa_handler = stop_child;
+    ::sigaction(SIGINT, &action, &interrupt_);
+    ::sigaction(SIGTERM, &action, &terminate_);
+  }
+  Attendance(const Attendance&) = delete;
+  Attendance& operator=(const Attendance&) = delete;
+  ~Attendance() {
+    running.store(0);
+    ::sigaction(SIGINT, &interrupt_, nullptr);
+    ::sigaction(SIGTERM, &terminate_, nullptr);
+  }
+  /// One that came before there was a child is passed on too.
+  void of(pid_t child) {
+    running.store(child);
+    if (stop_signal.load() == SIGTERM) ::kill(child, SIGTERM);
+  }
+
+ private:
+  struct sigaction interrupt_ {
+  }, terminate_{};
+};
+
+}  // namespace
+
 int run_child(const std::vector<std::string>& words, const std::filesystem::path& log) {
   std::vector<char*> arguments;
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -26,15 +70,20 @@ int run_child(const std::vector<std::string>& words, const std::filesystem::path
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
+  Attendance attendance;
   pid_t child = 0;
   const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0)
     throw std::runtime_error(fmt::format("cannot start {}: {}", words.front(), std::strerror(error)));
+  attendance.of(child);
   int status = 0;
   while (::waitpid(child, &status, 0) < 0)
     if (errno != EINTR)
       throw std::runtime_error(fmt::format("cannot wait for {}: {}", words.front(), std::strerror(errno)));
+  if (const int signal = stop_signal.load(); signal != 0)
+    throw std::runtime_error(
+        fmt::format("stopped by signal {} ({}) while {} ran", signal, ::strsignal(signal), words.front()));
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 

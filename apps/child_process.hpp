@@ -8,7 +8,8 @@ namespace talus {
 
 /// Starts a program, waits for it, and returns its exit code, or 128 + the signal that ended it. Its output
 /// and messages go to the file `log`. `words`: the program, looked up in PATH, and its arguments; no shell is
-/// asked. Throws std::runtime_error naming the program when it cannot be started.
+/// asked. One at a time. Throws std::runtime_error naming the program when it cannot be started, and when
+/// SIGINT or SIGTERM came while it ran: it has ended by then.
 int run_child(const std::vector<std::string>& words, const std::filesystem::path& log);
 
 /// Whether a program of that name, or at that path, can be started.

@@ -420,6 +420,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (graph::simulated_ranks && options.threads > 1)
       throw std::invalid_argument(
           fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
+    graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads_of(options));
     if (!options.replay_order.empty())
       recordings.order = std::make_unique<trace::Order>(order_of(options, ranks), ranks.rank());
     if (!options.task_times.empty())

@@ -26,6 +26,13 @@ bool launched() {
 
 }  // namespace
 
+void demand_thread_level(const std::string& level, int ranks, int threads) {
+  if (ranks == 1 || threads == 1 || level == "serialized" || level == "multiple") return;
+  throw std::invalid_argument("MPI lets one thread of a rank call it (MPI_Query_thread: " + level +
+                              "), and " + std::to_string(threads) +
+                              " threads would: use --threads 1 and more ranks, or an MPI built for threads");
+}
+
 MpiSession::MpiSession(int* argc, char*** argv, bool always) {
   if (!always && !launched()) return;
   int level = 0;

@@ -21,6 +21,10 @@ class Recorder;
 
 namespace talus::graph {
 
+/// Throws std::invalid_argument where ranks have several threads and MPI lets only one of them call it: with
+/// `level`, as Communicator::thread_level gives it, below "serialized". Tasks that call it run on any thread.
+void demand_thread_level(const std::string& level, int ranks, int threads);
+
 /// Starts MPI for the life of the object when the process was started by mpirun or srun (or `always`), and
 /// ends it. Create one, in main.
 class MpiSession {

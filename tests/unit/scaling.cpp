@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <signal.h>
+
 #include <cmath>
 #include <fstream>
 
@@ -113,6 +115,21 @@ TEST(ChildProcess, TellsHowItEndedAndWhatItSaid) {
   EXPECT_THROW(run_child({"no-such-program"}, log), std::runtime_error);
   EXPECT_TRUE(program_exists("sh"));
   EXPECT_FALSE(program_exists("no-such-program"));
+}
+
+// A study that is stopped must be able to clear its folder, and must leave no run behind.
+TEST(ChildProcess, StopsWithThisProcess) {
+  const test::ScratchDirectory folder;
+  const auto log = folder.path() / "log";
+  EXPECT_THROW(
+      run_child({"sh", "-c", "echo $$ > " + (folder / "pid").string() + "; kill -TERM $PPID; exec sleep 100"},
+                log),
+      std::runtime_error);
+  pid_t child = 0;
+  std::ifstream(folder / "pid") >> child;
+  ASSERT_GT(child, 0);
+  EXPECT_NE(::kill(child, 0), 0) << "it still runs";
+  EXPECT_EQ(run_child({"true"}, log), 0) << "the signal was of the one before";
 }
 
 TEST(ChildProcess, LinesForAShellSurviveIt) {
