@@ -1,0 +1,235 @@
+/// Detection: where bodies are in mid-step, which candidates they have, what touches.
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/narrow_phase.hpp"
+#include "kernels/release.hpp"
+#include "runtime/graph/clock.hpp"
+#include "runtime/step/step_graph.hpp"
+#include "runtime/step/task_kinds.hpp"
+
+namespace talus {
+
+namespace {
+
+double speed(const Velocity& v) {
+  return std::sqrt(v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2]);
+}
+
+std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, const std::vector<Wall>& walls,
+                                      std::span<const double> reach, std::span<const double> margin) {
+  std::vector<WallPair> pairs;
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    for (std::size_t s = 0; s < x.size(); ++s)
+      if (walls[w].normal.dot(x[s] - walls[w].point) < reach[s] + margin[w])
+        pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
+  return pairs;
+}
+
+}  // namespace
+
+void StepGraph::predict_lane(std::uint32_t lane) {
+  Bodies& bodies = state_.bodies;
+  const SlotRange range = slots(lane);
+  const double h = parameters_.time_step;
+  predict(range, bodies.x, bodies.velocity, h);
+  free_velocities(range, bodies.velocity, h, parameters_.gravity, state_.free);
+  if (!bodies.orientation.empty()) turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
+  left_[lane].clear();
+  if (state_.candidates_valid)
+    find_leavers(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[lane]);
+}
+
+/// How near a grain can come to a wall for what the grain's own margin does not count: the wall's way, and
+/// what gravity adds to the grain's speed within a step, and the wall's load to its own.
+double StepGraph::margin_of(const Wall& wall) const {
+  const double h = parameters_.time_step;
+  return contact_margin(wall.velocity.norm(), h, parameters_.alert) +
+         h * (h * parameters_.gravity.norm() + wall.gain.norm());
+}
+
+bool StepGraph::walls_left_margin() const {
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    const Wall& wall = state_.walls[w];
+    const double moved = std::abs(wall.normal.dot(wall.point - state_.wall_then[w]));
+    if (margin_of(wall) + moved > wall_margin_[w]) return true;
+  }
+  return false;
+}
+
+bool StepGraph::needs_broad_phase() {
+  const bool left = std::any_of(left_.begin(), left_.end(), [](const auto& lane) { return !lane.empty(); });
+  double needed[2] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ? 1.0 : 0.0,
+                      left ? 1.0 : 0.0};
+  ranks_.max(needed);
+  return needed[0] > 0 || (needed[1] > 0 && !candidates_hold());
+}
+
+/// Whether the grains that left their margins, few of them, meet none but their candidates. Collective; the
+/// same for any ranks, since the grains and their candidates are put together from all of them.
+bool StepGraph::candidates_hold() const {
+  constexpr std::size_t few = 32;  // comparing them costs little beside a broad phase
+  std::vector<Leaver> leavers;
+  for (const auto& lane : left_) leavers.insert(leavers.end(), lane.begin(), lane.end());
+  leavers = ranks_.gather_records(std::span<const Leaver>(leavers));
+  std::sort(leavers.begin(), leavers.end());  // copies side by side, whichever rank comes first
+  leavers.erase(std::unique(leavers.begin(), leavers.end(),
+                            [](const Leaver& a, const Leaver& b) { return a.id == b.id; }),
+                leavers.end());
+  if (leavers.size() > few) return false;
+  for (const Leaver& leaver : leavers) {
+    if (!std::isfinite(leaver.need + leaver.x[0] + leaver.x[1] + leaver.x[2])) return false;  // a runaway
+    // It may have passed a grain that it is beyond by now, and that only a candidate would tell of.
+    const double speed = std::hypot(leaver.u[0], leaver.u[1], leaver.u[2]);
+    if (parameters_.time_step * speed > 0.5 * leaver.radius) return false;
+  }
+  std::vector<Encounter> needed, known;
+  compare_leavers(leavers, state_.bodies, state_.candidates,
+                  {state_.x_then, state_.reach_then, parameters_.time_step, parameters_.alert,
+                   parameters_.gravity, state_.walls},
+                  needed, known);
+  return all_known(ranks_.gather_records(std::span<const Encounter>(needed)),
+                   ranks_.gather_records(std::span<const Encounter>(known)));
+}
+
+void StepGraph::make_cells() {
+  const double h = parameters_.time_step;
+  for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
+  if (steps_ == partitioned_ + 1 || iteration_.imbalance() < imbalance_then_)
+    imbalance_then_ = iteration_.imbalance();
+  sums_.broad_phase = needs_broad_phase();
+  if (!sums_.broad_phase) return;
+  Bodies& bodies = state_.bodies;
+  std::vector<double> reach(bodies.size());
+  const double half_skin = 0.5 * parameters_.skin;
+  // Grains that fly between others use up half a skin at once: they get one more, or their way
+  // of three steps.
+  for (std::size_t s = 0; s < bodies.size(); ++s) {
+    const double v = speed(bodies.velocity[s]);
+    reach[s] = bodies.radius[s] + half_skin + contact_margin(v, h, parameters_.alert) +
+               std::min(3 * h * v, parameters_.skin);
+  }
+  state_.wall_then.clear();
+  wall_margin_.clear();
+  for (const Wall& wall : state_.walls) {
+    state_.wall_then.push_back(wall.point);
+    wall_margin_.push_back(half_skin + margin_of(wall));
+  }
+  // What the last step found is in the impulses of the candidates; detection works in its room.
+  const auto make_room = [this] {
+    state_.contacts = {};
+    state_.chunks = {};
+  };
+  if (state_.decomposition.several()) {
+    const bool first = state_.decomposition.interfaces.empty();
+    const bool anew = first || partition_due();
+    if (anew) {
+      partitioned_ = steps_;
+      if (!first && decomposition_.balance != BalanceBy::contacts)
+        state_.decomposition.cost =
+            costs(decomposition_.balance == BalanceBy::time ? iteration_.busy() : work());
+    }
+    make_room();
+    const double began = graph::seconds_now();
+    trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
+    around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
+                                   state_.candidates, anew);
+    span.end();
+    sums_.times.dealing = graph::seconds_now() - began;
+    cells_ = build_cells(around_.bodies.x, around_.reach);
+    return;
+  }
+  make_room();
+  state_.x_then = bodies.x;
+  state_.reach_then = std::move(reach);
+  cells_ = build_cells(state_.x_then, state_.reach_then);
+}
+
+void StepGraph::find_lane_pairs(std::uint32_t lane) {
+  if (!sums_.broad_phase) return;
+  pairs_[lane].clear();
+  const SlotRange range = share(cells_.cells.size(), lane);
+  find_pairs(cells_, range.begin, range.end, pairs_[lane]);
+}
+
+void StepGraph::make_chunks() {
+  if (!sums_.broad_phase) return;
+  cells_ = {};
+  const bool several = state_.decomposition.several();
+  Candidates fresh;
+  fresh.components = parameters_.friction ? 3 : 1;
+  fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
+  for (auto& part : pairs_) release(part);
+  fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
+                                     several ? around_.reach : state_.reach_then, wall_margin_);
+  std::vector<char> glued;
+  for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
+  std::vector<CandidateGroup> groups;
+  const double began = graph::seconds_now();
+  if (several) {
+    const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
+                        state_.bodies, state_.candidates);
+    sums_.migrants = state_.decomposition.migrants;
+    renew_slots();
+    sums_.times.dealing += graph::seconds_now() - began;
+  } else {
+    match_impulses(state_.candidates, fresh);
+    state_.candidates = std::move(fresh);
+    const auto all = static_cast<std::int64_t>(state_.candidates.size());
+    groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(all, all));
+  }
+  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
+  allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  const double planning = graph::seconds_now();
+  iteration_.plan();
+  if (several) sums_.times.dealing += graph::seconds_now() - planning;
+  std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
+  ranks_.sum(candidates);
+  all_candidates_ = candidates[0];
+  state_.candidates_valid = true;
+  planned_ = false;
+}
+
+/// What is kept per slot follows the copies to their new places.
+void StepGraph::renew_slots() {
+  const Bodies& bodies = state_.bodies;
+  const double h = parameters_.time_step;
+  state_.x_then = bodies.x;
+  state_.reach_then.clear();
+  for (const SubdomainInterface& interface : state_.decomposition.interfaces)
+    for (Slot body : interface.bodies)
+      state_.reach_then.push_back(around_.reach[static_cast<std::size_t>(body)]);
+  around_ = {};
+  state_.free.u.resize(bodies.size());
+  state_.free.w.resize(parameters_.turns ? bodies.size() : 0);
+  free_velocities({0, bodies.size()}, bodies.velocity, h, parameters_.gravity, state_.free);
+}
+
+void StepGraph::narrow_lane(std::uint32_t lane) {
+  const Bodies& bodies = state_.bodies;
+  if (!settings_.warm_start) {
+    const auto components = static_cast<std::size_t>(state_.candidates.components);
+    const SlotRange own = share(state_.chunks.size(), lane);
+    std::fill(state_.candidates.impulse.begin() +
+                  static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.begin],
+              state_.candidates.impulse.begin() +
+                  static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.end],
+              0.0);
+  }
+  const NarrowPhase in{bodies.x,
+                       bodies.radius,
+                       bodies.velocity,
+                       state_.walls,
+                       parameters_.time_step,
+                       parameters_.alert,
+                       parameters_.law.restitution,
+                       parameters_.gravity,
+                       settings_.overlap_correction};
+  const SlotRange range = share(state_.chunks.size(), lane);
+  for (std::size_t c = range.begin; c < range.end; ++c)
+    narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels(), state_.contacts);
+}
+
+}  // namespace talus
