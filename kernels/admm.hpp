@@ -18,8 +18,6 @@ struct BodyAdmmSettings {
   double relaxation = 1.6;         ///< in [1, 2)
   double linear_tolerance = 0.05;  ///< of the conjugate gradients, on what is left of the residual
   int max_linear = 100;            ///< conjugate gradient iterations within one of ADMM
-  int aggregate = 0;               ///< grains per aggregate; 0: aggregate_target
-  double stiffness = 0;            ///< kappa; 0: estimate_stiffness
 };
 
 struct BodyAdmmResult {

@@ -26,6 +26,8 @@ constexpr int max_rounds = 6;
 constexpr double caution = 3;
 /// Of the impulses between walls, over those of the step: what is smaller is of no interest.
 constexpr double interest = 1e-2;
+/// What rounding leaves of the sample's momentum, over it: grains that fly side by side.
+constexpr double rounding = 1e-12;
 
 /// What the contacts of one part that carry ask of the velocities, and those that do not carry.
 struct Wishes {
@@ -61,7 +63,7 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
       wishes.gap.push_back(std::max(0.0, c.normal.dot(v)));
       continue;
     }
-    if (c.second < 0) wishes.drive = std::max(wishes.drive, c.offset.norm());
+    wishes.drive = std::max(wishes.drive, c.drive);
     wishes.change.push_back(constrained(c, change));
     problem.contacts[kept] = c;
     problem.impulse[kept++] = r;
@@ -170,8 +172,10 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
   // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
   const double sound = most(all[incoming]) + all[mass] * all[fastest];
-  const double scale = std::max(std::min(distance(parts, V, free), sound),
-                                all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed]);
+  const double scale = std::max({std::min(distance(parts, V, free), sound),
+                                 all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed],
+                                 rounding * most(all[incoming])});
+  if (scale == 0) return {};  // nothing moves, and nothing is asked for
 
   VelocityError error;
   // Two motions to begin from: none; and the stop of everything, which is the answer of a sample at rest.
@@ -197,7 +201,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     });
     const PartField began = motion;
     if (fit_of(parts, stop, wishes, kappa).cost < fit_of(parts, motion, wishes, kappa).cost) motion = stop;
-    BodySolver solver(parts, rho, 0);
+    BodySolver solver(parts, rho);
     PartField then = motion;
     left = caution * most(solver.begin(force, motion));
     found = momentum(parts, motion);

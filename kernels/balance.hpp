@@ -62,8 +62,8 @@ struct VelocityError {
 ///
 /// The scale is sum m |V(r) - V_free|, what the contacts do, as far as what comes in explains it; or the
 /// speed of driven walls times the whole mass, if that is more; where no wall is driven, at least a hundredth
-/// of the impulses between walls, as grains pressed at rest gain nothing. Takes about as long as a hundred
-/// sweeps.
+/// of the impulses between walls, as grains pressed at rest gain nothing; never less than what rounding
+/// leaves of the sample's own momentum. Takes about as long as a hundred sweeps.
 VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough);
 /// The whole problem in one part.
 VelocityError velocity_error(BodyProblem problem, double enough);

@@ -126,6 +126,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     if (w >= 0) {
       const Vec3& drive = source.walls[at(w)].free_velocity;
       // Of a wall of finite mass only the normal velocity is an unknown.
+      if (contact.second < 0) contact.drive = drive.norm();
       contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
     }
     contact.place = static_cast<std::int32_t>(k);

@@ -4,7 +4,7 @@
 ///
 ///   min 1/2 (V - V_free)^T M (V - V_free),   H^T V + b n + mu |v_t| n  in  K_mu*  at every contact
 ///
-/// (design.md §4). Unknowns are the grains, 6 numbers each, then the walls of finite mass, 1 each along its
+/// (docs/theory.md). Unknowns are the grains, 6 numbers each, then the walls of finite mass, 1 each along its
 /// normal. Driven walls are data. With several subdomains each holds a part of the problem (body_parts.hpp).
 
 #include <Eigen/Geometry>
@@ -47,6 +47,7 @@ struct ContactEquation {
   Vec3 normal;  ///< unit, to the first body
   Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
   double mu = 0;
+  double drive = 0;          ///< speed of the driven wall [m/s]; 0 between bodies
   std::int32_t first = -1;   ///< unknown
   std::int32_t second = -1;  ///< unknown; -1 at a driven wall
   std::int32_t place = -1;   ///< in `Contacts`
@@ -150,7 +151,7 @@ inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
   return body.mass * u.squaredNorm() + body.spin_mass * w.squaredNorm();
 }
 
-/// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_axis`.
+/// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_freedoms`.
 inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
   Twist& a = F[static_cast<std::size_t>(c.first)];
   const Vec3 turn = c.normal.cross(r);

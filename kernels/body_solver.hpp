@@ -18,7 +18,7 @@ class BodySolver {
  public:
   /// Keeps a reference to `parts`. `rho` [kg] per part and contact; `aggregate`: grains per aggregate, 0:
   /// aggregate_target.
-  BodySolver(const BodyParts& parts, std::span<const std::vector<double>> rho, int aggregate);
+  BodySolver(const BodyParts& parts, std::span<const std::vector<double>> rho, int aggregate = 0);
 
   /// From V on, or from 0 where V is. Returns z.A z of z, the preconditioned residual: about the square of
   /// the error of V in the norm of A, and at most that; this norm is no smaller than the kinetic one [J]. `f`

@@ -51,9 +51,9 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> 
 void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
           std::span<const double> radius, double time_step);
 
-/// How far a grain may travel before the candidates must be found anew; reach = radius + margin.
-/// margin = skin/2 + max(alert/2, h |u|): a pair becomes a contact when its gap is below the alert distance
-/// or closes within a step at its speed, and either grain may then have used up half the skin.
+/// max(alert/2, h |u|): a pair becomes a contact when its gap is below the alert distance or closes within a
+/// step. To this a grain's reach adds its radius, half the skin, which it may have used up before the
+/// candidates are found anew, and more where it flies (StepGraph::make_cells).
 double contact_margin(double speed, double time_step, double alert);
 
 }  // namespace talus

@@ -84,14 +84,14 @@ bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
          })[0] > 0;
 }
 
-/// Without a driven wall: what the others come to rest on.
+/// Without a driven wall: what the others come to rest on, the heaviest body that touches one.
 void mark_heaviest(Graph& graph, PartField& mark) {
   std::vector<std::size_t> heaviest(graph.parts.size());
   const auto find = [&](std::size_t p, std::span<double> row) {
-    const ContactGraph& here = graph.parts[p].graph;
-    for (std::size_t b = 0; b < here.mass.size(); ++b)
-      if (here.counted(b) && here.mass[b] > row[0]) {
-        row[0] = here.mass[b];
+    const Layers& here = graph.parts[p];
+    for (std::size_t b = 0; b < here.depth.size(); ++b)
+      if (!here.neighbours(static_cast<std::int32_t>(b)).empty() && here.graph.mass[b] > row[0]) {
+        row[0] = here.graph.mass[b];
         heaviest[p] = b;
       }
   };
@@ -106,29 +106,47 @@ void mark_heaviest(Graph& graph, PartField& mark) {
     }
 }
 
+/// Of each cluster of one part that no walk has come to, its size and its heaviest body: visit(size, body).
+template <class Visit>
+void each_unreached(const Layers& here, const Visit& visit) {
+  std::vector<char> seen(here.depth.size(), 0);
+  std::vector<std::int32_t> cluster;
+  for (std::size_t b = 0; b < seen.size(); ++b) {
+    if (here.depth[b] >= 0 || seen[b] || here.neighbours(static_cast<std::int32_t>(b)).empty()) continue;
+    cluster.assign(1, static_cast<std::int32_t>(b));
+    seen[b] = 1;
+    std::int32_t heaviest = cluster.front();
+    for (std::size_t k = 0; k < cluster.size(); ++k) {
+      if (here.graph.mass[at(cluster[k])] > here.graph.mass[at(heaviest)]) heaviest = cluster[k];
+      for (const std::int32_t other : here.neighbours(cluster[k]))
+        if (here.depth[at(other)] < 0 && !std::exchange(seen[at(other)], char{1})) cluster.push_back(other);
+    }
+    visit(cluster.size(), heaviest);
+  }
+}
+
+/// The heaviest body of every cluster of every part that no walk has come to. What stands in several parts
+/// may get several: few, where it was small in all of them.
+void mark_rest(Graph& graph, PartField& mark) {
+  graph.each([&](std::size_t p) {
+    each_unreached(graph.parts[p], [&](std::size_t, std::int32_t heaviest) {
+      mark[p][at(heaviest)].u[0] = 1;
+      graph.parts[p].met.push_back(heaviest);
+    });
+  });
+}
+
 /// In what no walk has come to, the heaviest body of the largest cluster that a part has. False when all of
-/// them are small: what few sweeps solve.
+/// them are small.
 bool mark_unreached(Graph& graph, PartField& mark) {
   constexpr double small = 8;
   std::vector<std::int32_t> root(graph.parts.size(), -1);
   const auto find = [&](std::size_t p, std::span<double> row) {
-    const Layers& here = graph.parts[p];
-    std::vector<char> seen(here.depth.size(), 0);
-    std::vector<std::int32_t> cluster;
-    for (std::size_t b = 0; b < seen.size(); ++b) {
-      if (here.depth[b] >= 0 || seen[b]) continue;
-      cluster.assign(1, static_cast<std::int32_t>(b));
-      seen[b] = 1;
-      std::int32_t heaviest = cluster.front();
-      for (std::size_t k = 0; k < cluster.size(); ++k) {
-        if (here.graph.mass[at(cluster[k])] > here.graph.mass[at(heaviest)]) heaviest = cluster[k];
-        for (const std::int32_t other : here.neighbours(cluster[k]))
-          if (here.depth[at(other)] < 0 && !std::exchange(seen[at(other)], char{1})) cluster.push_back(other);
-      }
-      if (static_cast<double>(cluster.size()) <= row[0]) continue;
-      row[0] = static_cast<double>(cluster.size());
+    each_unreached(graph.parts[p], [&](std::size_t size, std::int32_t heaviest) {
+      if (static_cast<double>(size) <= row[0]) return;
+      row[0] = static_cast<double>(size);
       root[p] = heaviest;
-    }
+    });
   };
   const std::vector<double> sizes = rows_of(graph.link, graph.parts.size(), 1, find);
   const auto most = static_cast<std::size_t>(std::ranges::max_element(sizes) - sizes.begin());
@@ -158,7 +176,7 @@ std::int32_t walk(Graph& graph, PartField& mark, std::int32_t depth) {
 }
 
 /// Returns the largest depth. Driven walls are at 0, and the heaviest body where there is none; so is one
-/// body of each larger cluster that hangs on neither, of the few largest.
+/// body of each cluster that hangs on neither: of the few largest one by one, of the others all at once.
 std::int32_t find_layers(Graph& graph) {
   constexpr int most_clusters = 8;
   PartField mark = graph.field();
@@ -181,6 +199,8 @@ std::int32_t find_layers(Graph& graph) {
     take_layer(graph, mark, 0);
     deepest = std::max(deepest, walk(graph, mark, 0));
   }
+  mark_rest(graph, mark);
+  if (take_layer(graph, mark, 0)) deepest = std::max(deepest, walk(graph, mark, 0));
   return deepest;
 }
 
@@ -228,20 +248,6 @@ void hand_on(Graph& graph, std::int32_t deepest) {
 }
 
 }  // namespace
-
-double stiffness_of(const BodyProblem& problem, std::span<const Vec3> impulse) {
-  std::vector<Twist> gained = velocities_of(problem, impulse);
-  double kinetic = 0;
-  for (std::size_t b = 0; b < gained.size(); ++b) {
-    const BodyUnknown& body = problem.bodies[b];
-    kinetic += body.mass * (gained[b].u - body.free.u).squaredNorm() +
-               body.spin_mass * (gained[b].w - body.free.w).squaredNorm();
-  }
-  double sum = 0;
-  for (std::size_t k = 0; k < impulse.size(); ++k)
-    sum += impulse[k].squaredNorm() / effective_mass(problem, problem.contacts[k]);
-  return kinetic > 0 ? sum / kinetic : 0;
-}
 
 double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& link) {
   Graph graph(parts, link);

@@ -38,7 +38,7 @@ struct SweepMomentum {
   SweepSteps& steps;  ///< read, and made anew
 };
 
-/// One pass of nonlinear Gauss-Seidel over grain-grain contacts (design.md §4; Jean 1999, closed form for
+/// One pass of nonlinear Gauss-Seidel over grain-grain contacts (docs/theory.md; Jean 1999, closed form for
 /// spheres):
 ///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
 ///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
@@ -92,7 +92,7 @@ struct ErrorSums {
 };
 
 /// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and rho
-/// = 1/W_nn [m/s] (design.md §4). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
+/// = 1/W_nn [m/s] (docs/theory.md). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
 template <bool Friction>
 ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                        double mu, Multiplicities parts = {});

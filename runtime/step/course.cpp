@@ -230,6 +230,11 @@ void Iteration::plan_sweeps(int epoch, int sweeps) {
 void Iteration::choose_course() {
   const Check* const before = check_before();
   if (!before) return;
+  // What momentum has made worse is not held against the sweeps that follow.
+  const auto give_way = [this] {
+    begin_course(SolverMethod::nlgs, 0);
+    first_residual2_ = std::max(first_residual2_, total_.residual2);
+  };
   if (course_.method == SolverMethod::nlgs && course_.most > 0) {
     begin_course(SolverMethod::momentum, course_.most);
     return;
@@ -242,9 +247,9 @@ void Iteration::choose_course() {
     else if (less > 0 && growth < hopeless_growth)
       begin_course(SolverMethod::momentum, less);
     else
-      begin_course(SolverMethod::nlgs, 0);
+      give_way();
   } else if (course_.method == SolverMethod::nncg && growth > hopeless_growth) {
-    begin_course(SolverMethod::nlgs, 0);
+    give_way();
   }
 }
 
@@ -294,7 +299,9 @@ bool Iteration::balanced() {
     return result_.unbalance <= tolerance;
   }
   const bool last = result_.iterations >= settings_.max_iterations;
-  const double guess = looked_.error * result_.error_rms / looked_.error_rms;
+  // From a residual of 0 nothing is inferred.
+  const double guess =
+      looked_.error_rms > 0 ? looked_.error * result_.error_rms / looked_.error_rms : looked_.error;
   if (looked_.at < 0 || (looked_.at != result_.iterations &&
                          (last || !(guess > tolerance) || 4 * result_.iterations > 5 * looked_.at)))
     looked_ = {result_.iterations, result_.error_rms, admm_.velocity_error(0.2 * tolerance)};

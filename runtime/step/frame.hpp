@@ -17,7 +17,7 @@ struct StepReport {
   std::int64_t step = 0;  ///< number of steps done, from 1
   double time = 0;        ///< [s] at the end of the step
   std::int64_t candidates = 0;
-  std::int64_t contacts = 0;            ///< gap below the alert distance
+  std::int64_t contacts = 0;            ///< pairs that touch, or may within the step (docs/theory.md)
   std::int64_t active = 0;              ///< normal impulse > 0
   int iterations = 0;                   ///< sweeps
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale

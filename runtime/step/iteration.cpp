@@ -451,10 +451,12 @@ void Iteration::turn_conjugate() {
 bool Iteration::judge() {
   const ErrorSums& total = total_;
 
-  const double scale2 = std::max(total.impulse2, total.velocity2);
   const auto count = static_cast<double>(total.contacts);
-  result_.error_rms = scale2 > 0 ? std::sqrt(total.residual2 / scale2) : 0;
-  result_.error_max = scale2 > 0 ? std::sqrt(total.residual_max2 * count / scale2) : 0;
+  // Forces that fade away leave velocities that rounding makes: in gaps, over a step.
+  const double rounding = std::numeric_limits<double>::epsilon() * parameters_.alert / parameters_.time_step;
+  const double scale2 = larger(larger(total.impulse2, total.velocity2), count * rounding * rounding);
+  result_.error_rms = scale2 != 0 ? std::sqrt(total.residual2 / scale2) : 0;
+  result_.error_max = scale2 != 0 ? std::sqrt(total.residual_max2 * count / scale2) : 0;
   result_.jump = jump_.velocity2 > 0 ? std::sqrt(jump_.jump2 / jump_.velocity2) : 0;
   result_.contacts = total.contacts;
   result_.active = total.active;

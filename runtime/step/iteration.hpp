@@ -182,10 +182,11 @@ class Iteration {
   double change2_ = 0;                       ///< NNCG: of all, at the sweep before
   double conjugate_beta_ = 0;                ///< NNCG: of the next sweep
   double began_ = 0, measured_ = 0;  ///< clock at begin() and at the last check [s], for history_ only
-  double first_residual2_ = 0;       ///< at the first check of the step, or the first since ADMM [m^2/s^2]
-  std::size_t history_from_ = 0;     ///< that check
-  std::size_t patience_from_ = 0;    ///< the check since which plain sweeps have their turn
-  double sweeps_needed_ = -1;        ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
+  /// At the first check of the step, or the first since ADMM, or since momentum gave way [m^2/s^2].
+  double first_residual2_ = 0;
+  std::size_t history_from_ = 0;   ///< that check
+  std::size_t patience_from_ = 0;  ///< the check since which plain sweeps have their turn
+  double sweeps_needed_ = -1;      ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
   /// The last answer to that, and the problem it was given for. It holds for later steps on the same
   /// candidates where the problem was far from stiff and is still much the same.
   struct Stiffness {

@@ -58,6 +58,9 @@ void validate(const Setup& setup) {
         fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, stage.law.restitution));
     require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
+    require(!stage.end.time || *stage.end.time >= 0.5 * stage.time_step,
+            fmt::format("stage '{}': end.time = {} s is not half a time step of {} s: no step would be made",
+                        stage.name, stage.end.time.value_or(0), stage.time_step));
     for (const auto& [name, load] : stage.loads) {
       const bool known =
           std::any_of(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
@@ -69,7 +72,16 @@ void validate(const Setup& setup) {
           fmt::format("solver.tolerance and balance_tolerance must be >= 0, got {} and {}",
                       setup.solver.tolerance, setup.solver.balance_tolerance));
   require(setup.solver.max_iterations >= 1, "solver.max_iterations must be >= 1");
+  require(
+      setup.solver.method != SolverMethod::momentum || setup.decomposition.coupling != Coupling::schwarz,
+      "solver.method = \"nlgs+momentum\": Schwarz adds up what all copies of a body carry on, and diverges. "
+      "Take \"auto\", or another decomposition.coupling");
   require(setup.solver.check_every >= 1, "solver.check_every must be >= 1");
+  require(
+      setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,
+      fmt::format("solver.overlap_correction must lie in [0, 1], got {}", setup.solver.overlap_correction));
+  require(setup.decomposition.repartition_every >= 1 && setup.decomposition.sweeps_per_exchange >= 1,
+          "decomposition.repartition_every and sweeps_per_exchange must be >= 1");
   require(
       setup.decomposition.coupling != Coupling::alternating || setup.decomposition.sweeps_per_exchange == 1,
       fmt::format("decomposition.sweeps_per_exchange = {}: subdomains that alternate exchange in every "

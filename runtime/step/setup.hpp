@@ -29,9 +29,9 @@ struct StageEnd {
   std::optional<double> time;    ///< [s] of the stage
   std::optional<double> strain;  ///< |axial strain| (28) since the beginning of the stage, along strain_axis
   int strain_axis = 2;           ///< 0, 1, 2 = x, y, z
-  std::optional<double>
-      equilibrium;  ///< bound on both |net force| / applied force of every pressed wall and kinetic / (p V)
-                    ///< or kinetic / (m g d) energy ratio; checked at the end of every step
+  /// Bound on both the net over the applied force of every pushed wall, and the kinetic energy over (applied
+  /// forces + weight) x mean diameter; checked at the end of every step.
+  std::optional<double> equilibrium;
 };
 
 /// One stage: a time interval with its own loads.

@@ -169,12 +169,13 @@ struct Simulation::Implementation {
     const std::int64_t step = report.step + 1;
     if (graph.iteration().result().diverged)
       throw RunawayError(
-          fmt::format("step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. Undamped "
-                      "Schwarz does so "
-                      "where bodies stand in more than two subdomains: set decomposition.damping = true or "
-                      "coupling = \"nscdd\"",
-                      step, setup.stages[stage_index].name, graph.iteration().result().error_rms,
-                      graph.iteration().result().iterations));
+          fmt::format("step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. {}", step,
+                      setup.stages[stage_index].name, graph.iteration().result().error_rms,
+                      graph.iteration().result().iterations,
+                      setup.decomposition.coupling == Coupling::schwarz && !setup.decomposition.damping
+                          ? "Undamped Schwarz does so where bodies stand in more than two subdomains: set "
+                            "decomposition.damping = true or coupling = \"nscdd\""
+                          : "Reduce the time step, or look for masses too far apart"));
     if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) ||
         std::isnan(graph.iteration().result().error_rms))
       throw RunawayError(fmt::format(
@@ -186,12 +187,20 @@ struct Simulation::Implementation {
     for (const Wall& wall : state.walls)
       fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
     const double energy = motion.energy.translation + motion.energy.rotation;
-    const double supplied = motion.energy_free + wall_energy_free + size.total_mass * fastest_wall2;
+    // So fast part grains whose overlap is opened within the step; deep ones are no supply that anybody
+    // wants.
+    constexpr double deep = 1e-2;  // of the smallest radius
+    const double opened = setup.solver.overlap_correction *
+                          std::min(graph.sums().contacts.penetration_max, deep * size.smallest) /
+                          parameters.time_step;
+    const double supplied =
+        motion.energy_free + wall_energy_free + size.total_mass * (fastest_wall2 + 0.5 * opened * opened);
     if (energy > 100 * supplied && energy > 0)
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. "
-          "Reduce the time "
-          "step or raise solver.max_iterations; with solver.overlap_correction, begin without deep overlaps",
+          "Reduce the time step or raise solver.max_iterations; with solver.overlap_correction, begin "
+          "without "
+          "deep overlaps",
           step, setup.stages[stage_index].name, energy, supplied, describe(state.bodies, motion.fastest)));
   }
 
@@ -397,6 +406,9 @@ std::size_t Simulation::stage_index() const {
 }
 std::int64_t Simulation::steps_of_stage() const {
   return impl_->stage_steps;
+}
+double Simulation::unrest() const {
+  return impl_->unrest();
 }
 const Setup& Simulation::setup() const {
   return impl_->setup;

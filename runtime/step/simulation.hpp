@@ -81,6 +81,8 @@ class Simulation {
   const Stage& stage() const;
   std::size_t stage_index() const;
   std::int64_t steps_of_stage() const;
+  /// Distance from rest after the last step, which StageEnd::equilibrium bounds.
+  double unrest() const;
 
   const Setup& setup() const;
   const StepState& state() const;

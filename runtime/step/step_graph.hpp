@@ -63,14 +63,13 @@ class StepGraph {
 
   const StepSums& sums() const { return sums_; }
   const Iteration& iteration() const { return iteration_; }
-  /// True when this step's candidates were found anew and dealt out by a new partition.
-  bool partition_due() const;
   const graph::Graph& graph() const { return graph_; }
   std::uint32_t lanes() const { return lanes_; }
 
  private:
   void build();
   void predict_lane(std::uint32_t lane);
+  bool partition_due() const;
   bool needs_broad_phase();
   bool candidates_hold() const;
   void make_cells();

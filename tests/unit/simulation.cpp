@@ -415,5 +415,34 @@ TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
   EXPECT_NE(message.find("body "), std::string::npos) << message;
 }
 
+/// What rounding leaves of a touching lattice overlaps by nothing worth speaking of.
+TEST(Runaway, IsNotWhatOverlapsOfRoundingSizePartWith) {
+  talus::Setup setup;
+  Bodies row;
+  for (int k = 0; k < 10; ++k)
+    add_sphere(row, BodyId{k}, radius * Vec3(2.0 * k * (1 - 1e-9), 0, 0), radius, density);
+  setup.stages = {stage("release", 5)};
+  setup.solver.overlap_correction = 0.2;
+  EXPECT_EQ(runaway_message(setup, row, 1), "no error");
+}
+
+TEST(Simulation, RefusesMomentumOnSchwarz) {
+  talus::Setup setup;
+  setup.stages = {stage("fall", 1)};
+  setup.solver.method = SolverMethod::momentum;
+  EXPECT_NO_THROW(validate(setup));
+  setup.decomposition.coupling = Coupling::schwarz;
+  EXPECT_THROW(validate(setup), std::invalid_argument);
+}
+
+TEST(Stages, TooShortForAStepAreRefused) {
+  talus::Setup setup;
+  setup.stages = {stage("blink", 1)};
+  setup.stages[0].end = {.time = 0.4 * setup.stages[0].time_step};
+  EXPECT_THROW(validate(setup), std::invalid_argument);
+  setup.stages[0].end.time = 0.5 * setup.stages[0].time_step;
+  EXPECT_NO_THROW(validate(setup));
+}
+
 }  // namespace
 }  // namespace talus
