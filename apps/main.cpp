@@ -14,6 +14,7 @@
 #include "apps/study_scaling.hpp"
 #include "apps/study_stability.hpp"
 #include "apps/trace_command.hpp"
+#include "io/detail/spelling.hpp"
 #include "io/scene.hpp"
 #include "io/version.hpp"
 #include "runtime/graph/clock.hpp"
@@ -21,8 +22,51 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <utility>
 
 namespace {
+
+/// Beyond it a typing error is likelier than a machine.
+constexpr int most_threads = 4096;
+
+/// CLI11's own says the largest of all doubles when it refuses.
+const CLI::Validator above_zero(
+    [](std::string& text) {
+      double value = 0;
+      return CLI::detail::lexical_cast(text, value) && value > 0 ? "" : "must be above 0, got " + text;
+    },
+    "POSITIVE");
+
+void add_threads(CLI::App& app, int& threads) {
+  app.add_option("--threads", threads, "threads [one per core]")
+      ->type_name("N")
+      ->check(CLI::Range(1, most_threads));
+}
+
+/// The commands of `app` as far as they were recognised, "talus study error", and the last of them.
+std::pair<std::string, const CLI::App*> recognised(const CLI::App* app) {
+  std::string command = "talus";
+  while (!app->get_subcommands().empty()) {
+    app = app->get_subcommands().front();
+    command += " " + app->get_name();
+  }
+  return {command, app};
+}
+
+/// What is wrong with the command line, and where to read what is right.
+std::string failure_message(const CLI::App* of, const CLI::Error& error) {
+  const auto [command, app] = recognised(of);
+  std::string what = error.what();
+  // CLI11 misses a command before it looks at the word that stands in its place.
+  if (const auto words = app->remaining(); error.get_name() == "RequiredError" && !words.empty()) {
+    std::vector<std::string> known;
+    for (const CLI::App* each : app->get_subcommands({})) known.push_back(each->get_name());
+    if (!known.empty())
+      what = fmt::format("'{}' is no command of {}{}", words.front(), command,
+                         talus::io::detail::hint(words.front(), known));
+  }
+  return fmt::format("talus: error: {}; `{} --help` lists what there is\n", what, command);
+}
 
 /// From "KIND=X", each.
 void set_speeds(const std::vector<std::string>& given, talus::trace::Machine& machine) {
@@ -38,7 +82,7 @@ void set_speeds(const std::vector<std::string>& given, talus::trace::Machine& ma
 void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_option("--ranks", replay.ranks, "ranks [as recorded]")->type_name("R");
   app.add_option("--threads", replay.threads, "threads of a rank [as recorded]")->type_name("T");
-  app.add_option("--map", replay.map, "subdomains to ranks: block, cyclic or weight")->capture_default_str();
+  app.add_option("--map", replay.map, "subdomains to ranks: block, cyclic or weight [as recorded]");
   app.add_option("--schedule", replay.schedule, "fixed, as the program does it, or list")
       ->capture_default_str();
   app.add_option("--latency", replay.machine.latency, "of a message between nodes [s]")
@@ -79,6 +123,7 @@ void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
                  "write the machine for smpirun, which runs the real program on it (preset smpi)")
       ->type_name("FILE");
   app.add_option("-o,--out", replay.out, "write what would have been, as a trace")->type_name("FILE");
+  app.add_flag("--force", replay.force, "replace these files where they are there");
 }
 
 }  // namespace
@@ -95,11 +140,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done; 1 failed, or stopped by a signal; 2 bad input, nothing was written; 3 done, but "
       "a\n"
       "step or problem missed its tolerance. First run: docs/tutorial.md; files it leaves: docs/formats.md");
-  app.failure_message([](const CLI::App* of, const CLI::Error& error) {
-    std::string command = "talus";
-    for (const CLI::App* chosen : of->get_subcommands()) command += " " + chosen->get_name();
-    return fmt::format("talus: error: {}; `{} --help` lists what there is\n", error.what(), command);
-  });
+  app.failure_message(failure_message);
 
   RunOptions run;
   run.command_line.assign(argv, argv + argc);
@@ -109,9 +150,7 @@ int main(int argc, char** argv) {
       ->type_name("DIR");
   run_app->add_flag("--force", run.force, "replace earlier results in the directory");
   run_app->add_option("--steps", run.steps, "stop after so many time steps")->type_name("N");
-  run_app->add_option("--threads", run.threads, "threads [one per core]")
-      ->type_name("N")
-      ->check(CLI::PositiveNumber);
+  add_threads(*run_app, run.threads);
   run_app->add_option("--set", run.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
@@ -122,14 +161,20 @@ int main(int argc, char** argv) {
   run_app
       ->add_option(
           "--dump-fclib", run.dump_fclib,
-          "write the contact problem of this step to fclib_STEP.hdf5 in the results, may be repeated")
+          "write the contact problem of this step, of step 12 to fclib_000012.hdf5 in the results, may be "
+          "repeated")
       ->type_name("STEP")
       ->allow_extra_args(false)
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero);
   CLI::Option* const trace_flag = run_app->add_flag(
       "--trace", run.trace, "record every task into trace.h5 (`talus trace`, `talus replay`)");
   run_app->add_option("--trace-steps", run.trace_steps, "record these steps only")
       ->type_name("FIRST:LAST")
+      ->needs(trace_flag);
+  run_app
+      ->add_flag("--trace-own-caches", run.trace_own_caches,
+                 "bring in a subdomain's data before its tasks, so that they take as long as on a core that "
+                 "has no other subdomain: for replay on as many cores as there are subdomains")
       ->needs(trace_flag);
   run_app->add_option("--replay-order", run.replay_order, "begin the loop's tasks in the order of this trace")
       ->type_name("FILE");
@@ -144,9 +189,7 @@ int main(int argc, char** argv) {
   PlanOptions plan;
   CLI::App* plan_app = app.add_subcommand("plan", "say what a scene needs and what is left out");
   plan_app->add_option("scene", plan.scene, "scene file")->type_name("FILE")->required();
-  plan_app->add_option("--threads", plan.threads, "threads [one per core]")
-      ->type_name("N")
-      ->check(CLI::PositiveNumber);
+  add_threads(*plan_app, plan.threads);
   plan_app->add_flag("--measure", plan.measure, "measure what each omission saves, on the scene's sample");
   plan_app->add_option("--set", plan.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
@@ -168,9 +211,7 @@ int main(int argc, char** argv) {
   partition_app->add_option("--out", partition.out, "directory of the files [out/partition-NAME]")
       ->type_name("DIR");
   partition_app->add_flag("--force", partition.force, "replace earlier partitions in the directory");
-  partition_app->add_option("--threads", partition.threads, "threads [one per core]")
-      ->type_name("N")
-      ->check(CLI::PositiveNumber);
+  add_threads(*partition_app, partition.threads);
   partition_app->add_option("--set", partition.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
@@ -188,7 +229,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   solve_app->add_option("--tol", solve.tol, "tolerance on the error")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero);
   solve_app
       ->add_option(
           "--measure", solve.measure,
@@ -198,15 +239,16 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   solve_app->add_option("--max-seconds", solve.max_seconds, "give a solve up after so many seconds")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero);
   solve_app->add_option("--repeat", solve.repeat, "solve each problem so often and tell the median time")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero);
   solve_app->add_option("--out", solve.out, "write /solution into a copy of the file")->type_name("FILE");
   solve_app->add_option("--csv", solve.csv, "write the table to a file")->type_name("FILE");
   solve_app->add_option("--profile", solve.profile, "write the performance profile of the methods to a file")
       ->type_name("FILE");
+  solve_app->add_flag("--force", solve.force, "replace these files where they are there");
 
   TraceShowOptions show;
   CLI::App* trace_app = app.add_subcommand("trace", "look at what `talus run --trace` recorded");
@@ -223,6 +265,7 @@ int main(int argc, char** argv) {
   export_app->add_option("--iteration", trace_export.iteration, "this iteration of the step only");
   export_app->add_option("-o,--out", trace_export.out, "file [the trace's name, .pftrace, .paje or .svg]")
       ->type_name("FILE");
+  export_app->add_flag("--force", trace_export.force, "replace the file where it is there");
 
   ReplayOptions replay;
   CLI::App* replay_app =
@@ -253,11 +296,11 @@ int main(int argc, char** argv) {
       ->add_option("--tolerance", stability.settings.tolerance,
                    "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
       ->type_name("T")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero);
   stability_app
       ->add_option("--seconds", stability.settings.seconds, "a scene is stopped after so many seconds")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero);
   stability_app->add_option("--out", stability.out, "directory of the files [out/study-stability]")
       ->type_name("DIR");
   stability_app->add_flag("--force", stability.force, "replace earlier results in the directory");

@@ -4,7 +4,9 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <array>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 
 #include "apps/exit_codes.hpp"
@@ -69,10 +71,12 @@ struct Cut {
 };
 
 Cut cut_sample(PartitionKind kind, std::int32_t subdomains, const Bodies& bodies,
-               const ContactPairs& contacts, std::size_t walls, const PartitionPoints& points) {
+               const ContactPairs& contacts, std::size_t walls, const PartitionPoints& points,
+               const std::array<std::int32_t, 3>& boxes) {
   PartitionOptions options;
   options.kind = kind;
   options.subdomains = subdomains;
+  options.boxes = boxes;
   Cut cut{kind, make_partition(points, options), {}, {}, {}};
   const std::vector<std::int32_t> subdomain = subdomains_of(cut.partition, points.x);
   cut.home = subdomains_of(cut.partition, bodies.x);
@@ -86,6 +90,21 @@ Cut cut_sample(PartitionKind kind, std::int32_t subdomains, const Bodies& bodies
   std::iota(all.begin(), all.end(), 0);
   cut.load = measure_load(subdomains, build_interfaces(grains, bodies.id, all), grains, of_walls, subdomain);
   return cut;
+}
+
+/// Boxes per axis as the scene has them; zeros when it has none. Throws std::invalid_argument when they are
+/// not the subdomains asked for.
+std::array<std::int32_t, 3> boxes_of(const io::Scene& scene, std::int32_t subdomains) {
+  const DecompositionSettings& asked = scene.setup.decomposition;
+  std::array<std::int32_t, 3> boxes{};
+  std::ranges::transform(asked.boxes, boxes.begin(),
+                         [](std::int64_t n) { return static_cast<std::int32_t>(n); });
+  if (boxes[0] > 0 && asked.subdomains != subdomains)
+    throw std::invalid_argument(
+        fmt::format("--subdomains {}, but the scene's decomposition.boxes are {}: change them "
+                    "with --set 'decomposition.boxes=[X, Y, Z]'",
+                    subdomains, asked.subdomains));
+  return boxes;
 }
 
 std::vector<PartitionKind> kinds_of(const std::vector<std::string>& names) {
@@ -145,7 +164,9 @@ int partition_command(const PartitionCommandOptions& options) {
   io::Scene scene;
   Bodies bodies;
   std::vector<PartitionKind> kinds;
+  std::array<std::int32_t, 3> boxes{};
   std::string directory = options.out;
+  std::optional<io::DirectoryLock> lock;
   try {
     kinds = kinds_of(options.partitioners);
     scene = io::load_scene(options.scene, options.overrides);
@@ -153,7 +174,8 @@ int partition_command(const PartitionCommandOptions& options) {
     io::place_walls(scene, sample);
     append(sample, bodies);
     if (directory.empty()) directory = "out/partition-" + scene.name;
-    io::prepare_output_directory(directory, options.force, io::is_partition_name);
+    boxes = boxes_of(scene, options.subdomains);
+    lock.emplace(io::prepare_output_directory(directory, options.force, io::is_partition_name));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
@@ -167,7 +189,7 @@ int partition_command(const PartitionCommandOptions& options) {
     std::vector<Cut> cuts;
     for (PartitionKind kind : kinds)
       cuts.push_back(
-          cut_sample(kind, options.subdomains, bodies, contacts, scene.setup.walls.size(), points));
+          cut_sample(kind, options.subdomains, bodies, contacts, scene.setup.walls.size(), points, boxes));
     print_table(scene, bodies.size(), contacts, cuts);
     write_files(directory, scene, bodies, cuts);
     fmt::print(stderr, "talus: .vtp and .svg files in {}\n", directory);

@@ -22,13 +22,10 @@ void line(const char* what, bool in, const std::string& why) {
 void print_needs(const Simulation& simulation, const io::Scene& scene, int threads) {
   const StepParameters& parameters = simulation.parameters();
   const StepState& state = simulation.state();
-  const auto pushed = [](const WallLoad& load) {
-    return load.drive == WallDrive::pressure || load.drive == WallDrive::force;
-  };
   const auto driven = std::count_if(state.walls.begin(), state.walls.end(),
                                     [](const Wall& w) { return w.load.drive == WallDrive::velocity; });
   const auto pressed =
-      std::count_if(state.walls.begin(), state.walls.end(), [&](const Wall& w) { return pushed(w.load); });
+      std::count_if(state.walls.begin(), state.walls.end(), [](const Wall& w) { return w.load.pushed(); });
   line("tangential impulses", parameters.friction,
        parameters.friction ? "friction coefficients above 0"
                            : "no friction: one impulse component per contact, no tangential work");
@@ -89,14 +86,18 @@ void print_costs(const Simulation& simulation) {
 }  // namespace
 
 int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
+  io::Scene scene;
+  Bodies bodies;
   try {
-    io::Scene scene = io::load_scene(options.scene, options.overrides);
-    Bodies bodies;
-    {
-      const Sample sample = build_sample(scene);
-      io::place_walls(scene, sample);
-      append(sample, bodies);
-    }
+    scene = io::load_scene(options.scene, options.overrides);
+    const Sample sample = build_sample(scene);
+    io::place_walls(scene, sample);
+    append(sample, bodies);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
+  try {
     scene.setup.solver.max_iterations = 1;  // the contacts are wanted, not their impulses
     const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
     graph::Executor executor({.threads = threads});
@@ -119,7 +120,7 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
     if (options.measure) print_savings(measure_savings(scene, threads, repeats, ranks), threads, repeats);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
-    return exit_bad_input;
+    return exit_failure;
   }
   return exit_done;
 }

@@ -22,10 +22,6 @@ constexpr double friction_put_in = 0.35;
 constexpr int subdomains_put_in = 8;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-bool pushed(const WallLoad& load) {
-  return load.drive == WallDrive::pressure || load.drive == WallDrive::force;
-}
-
 struct Cost {
   double ns = 0;     ///< of a sweep, per contact
   double bytes = 0;  ///< held, per contact
@@ -111,7 +107,7 @@ class Forms {
     const bool any = has_pushed_walls();
     for (Wall& wall : setup.walls) {
       // Still pressing, or there would be nothing to solve: a hundredth of the smallest radius in the step.
-      if (!in && pushed(wall.load))
+      if (!in && wall.load.pushed())
         wall.load = {.drive = WallDrive::velocity,
                      .velocity = 0.01 * smallest_ / setup.stages.front().time_step * wall.normal};
       if (in && !any) wall.load = {.drive = WallDrive::force, .force = 9.81 * mass_, .mass = 0.1 * mass_};
@@ -121,6 +117,7 @@ class Forms {
   Setup subdomains(bool in) const {
     Setup setup = base_;
     setup.decomposition.subdomains = in ? several() : 1;
+    if (!in) setup.decomposition.boxes = {};
     return setup;
   }
 
@@ -130,7 +127,7 @@ class Forms {
   }
   bool has_rotation() const { return has_friction() && base_.rotation; }
   bool has_pushed_walls() const {
-    return std::ranges::any_of(base_.walls, [](const Wall& wall) { return pushed(wall.load); });
+    return std::ranges::any_of(base_.walls, [](const Wall& wall) { return wall.load.pushed(); });
   }
   bool has_subdomains() const { return base_.decomposition.subdomains > 1; }
   bool has_walls() const { return !base_.walls.empty(); }

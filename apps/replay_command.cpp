@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <stdexcept>
+#include <utility>
 
 #include "apps/exit_codes.hpp"
 #include "io/detail/svg.hpp"
@@ -33,25 +35,23 @@ double recorded_makespan(const trace::Trace& trace) {
   return trace::analyse(trace).makespan;
 }
 
-void write_platform(const std::string& file, const trace::Machine& machine) {
-  io::write_whole(file, io::smpi_platform(machine));
+void write_platform(const std::string& file, const std::string& platform, const trace::Machine& machine) {
+  io::write_whole(file, platform);
   std::string hosts;
   if (machine.ranks_per_node > 1) {
     io::write_whole(file + ".hosts", io::smpi_hosts(machine));
     hosts = fmt::format("-hostfile {}.hosts ", file);
   }
-  fmt::print("the machine for SMPI: smpirun -np {} {}-platform {} build/smpi/talus run SCENE ...\n\n",
+  fmt::print("\nthe machine for SMPI: smpirun -np {} {}-platform {} build/smpi/talus run SCENE ...\n",
              machine.ranks, hosts, file);
 }
 
-void report(const ReplayOptions& options, const trace::Timeline& timeline, const trace::Machine& machine) {
+/// Plays, prints, and returns what would have been.
+trace::Trace report(const ReplayOptions& options, const trace::Timeline& timeline,
+                    const trace::Machine& machine) {
   const trace::Trace& recorded = timeline.trace();
-  const bool same = machine.ranks == recorded.ranks && machine.threads == recorded.threads &&
-                    machine.map == trace::RankMap::block && machine.schedule == trace::Schedule::fixed &&
-                    machine.speed == 1 && machine.speed_of.empty() && machine.contacts == 1 &&
-                    machine.noise == 0 && !machine.typical && machine.quantile == 0;
-  const char* label = same ? "" : "predicted";
-  const trace::Replay played = trace::replay(timeline, machine, true);
+  const char* label = trace::was_recorded_on(recorded, machine) ? "" : "predicted";
+  trace::Replay played = trace::replay(timeline, machine, true);
   trace::Machine chain = machine;
   chain.unbounded = true;
   chain.noise = 0;
@@ -69,12 +69,13 @@ void report(const ReplayOptions& options, const trace::Timeline& timeline, const
   fmt::print(
       "machine: {} ranks x {} threads, map {}, schedule {}, latency {}, bandwidth {}, overhead {}, {} ranks "
       "a node\n",
-      machine.ranks, machine.threads, options.map, options.schedule,
+      machine.ranks, machine.threads, name_of(machine.map), name_of(machine.schedule),
       io::detail::with_unit(machine.latency, "s"), io::detail::with_unit(machine.bandwidth, "B/s"),
       io::detail::with_unit(machine.overhead, "s"), machine.ranks_per_node);
   print("makespan", seconds(played.makespan), label);
-  print("recorded makespan", fmt::format("{}   (replay {:+.1f} %)", seconds(recorded_time),
-                                         100 * (played.makespan / recorded_time - 1)));
+  print(recorded.predicted ? "predicted before" : "recorded makespan",
+        fmt::format("{}   (replay {:+.1f} %)", seconds(recorded_time),
+                    100 * (played.makespan / recorded_time - 1)));
   print("work of all tasks", seconds(played.work), label);
   print("speedup over 1 x 1", fmt::format("{:.2f} of {:.0f}", alone / played.makespan, workers), label);
   print("efficiency", percent(alone / (played.makespan * workers)), label);
@@ -90,33 +91,45 @@ void report(const ReplayOptions& options, const trace::Timeline& timeline, const
                     *options.steps),
         "predicted");
   fmt::print("\n{}", trace::describe(summary));
-  if (!options.out.empty()) io::write_trace(options.out, played.trace);
+  return std::move(played.trace);
 }
 
 }  // namespace
 
 int replay_command(ReplayOptions options) {
+  trace::Machine machine = options.machine;
+  std::string platform;
+  trace::Trace played;
   try {
-    for (const std::string& out : {options.out, options.smpi_platform})
-      if (!out.empty()) io::check_output_file(options.file, out);
+    const std::string& file = options.smpi_platform;
+    io::check_output_files({options.file}, {options.out, file, file.empty() ? "" : file + ".hosts"},
+                           options.force);
+    if (options.steps && !(*options.steps >= 1))
+      throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     const trace::Trace recorded = io::read_trace(options.file);
-    trace::Machine machine = options.machine;
     machine.ranks = options.ranks.value_or(recorded.ranks);
     machine.threads = options.threads.value_or(recorded.threads);
     const trace::Machine there = trace::recorded_machine(recorded);
     machine.ranks_per_node =
         options.ranks_per_node.value_or(machine.ranks == recorded.ranks ? there.ranks_per_node : 1);
     machine.node_latency = options.node_latency.value_or(there.node_latency);
-    machine.map = trace::rank_map_named(options.map);
+    machine.map = options.map.empty() ? there.map : trace::rank_map_named(options.map);
     machine.schedule = trace::schedule_named(options.schedule);
     machine.late_check = !options.blocking_check;
     validate(machine, recorded);
-    if (!options.smpi_platform.empty()) write_platform(options.smpi_platform, machine);
+    if (!options.smpi_platform.empty()) platform = io::smpi_platform(machine);
     const trace::Timeline timeline(recorded);
-    report(options, timeline, machine);
+    played = report(options, timeline, machine);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
+  }
+  try {
+    if (!options.smpi_platform.empty()) write_platform(options.smpi_platform, platform, machine);
+    if (!options.out.empty()) io::write_trace(options.out, played);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_failure;
   }
   return exit_done;
 }

@@ -1,15 +1,19 @@
 #include "apps/run.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <omp.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <set>
+#include <sstream>
 
 #include "apps/dump_fclib.hpp"
 #include "apps/exit_codes.hpp"
@@ -112,6 +116,7 @@ class RecorderFeed {
         recorder_.record_step(row.step, row.walls, row.triaxial);
         recorder_.record_errors(row.step.step, row.errors);
       }
+      recorder_.flush();
     });
     rows_.clear();
   }
@@ -131,6 +136,11 @@ class RecorderFeed {
   Stopwatch since_;
 };
 
+/// The larger one; NaN when one of them is, which std::max would hide.
+double worse(double a, double b) {
+  return std::isnan(a) || a >= b ? a : b;
+}
+
 struct Tally {
   std::int64_t unconverged = 0;
   std::int64_t passed = 0;     ///< pairs that went through one another
@@ -139,6 +149,7 @@ struct Tally {
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;
+  double worst_penetration = 0;       ///< [smallest radius]
   double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
 
   void add(const Simulation& simulation) {
@@ -152,8 +163,20 @@ struct Tally {
       ++stagnated;
       floor = std::max(floor, report.error_rms);
     }
-    worst_error = std::max(worst_error, report.error_rms);
-    worst_balance = std::max(worst_balance, report.balance);
+    worst_error = worse(worst_error, report.error_rms);
+    worst_balance = worse(worst_balance, report.balance);
+    worst_penetration = worse(worst_penetration, report.penetration_max);
+  }
+
+  void sum_up(const StepReport& last, io::Summary& summary) const {
+    summary.steps = last.step;
+    summary.time = last.time;
+    summary.iterations = iterations;
+    summary.unconverged_steps = unconverged;
+    summary.converged_steps = last.step - unconverged;
+    summary.worst_error_rms = worst_error;
+    summary.worst_balance = worst_balance;
+    summary.worst_penetration = worst_penetration;
   }
 };
 
@@ -191,6 +214,24 @@ int signal_of(const graph::Communicator& ranks) {
   return static_cast<int>(signal[0]);
 }
 
+/// Which of its conditions a stage has come to, and how far it was from rest where that was one.
+void print_stage_end(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+  const StageEnd& end = simulation.stage().end;
+  const double unrest = simulation.unrest();
+  const char* met = "time reached";
+  if (end.steps && simulation.steps_of_stage() >= *end.steps) {
+    met = "steps reached";
+  } else if (end.equilibrium && unrest <= *end.equilibrium) {
+    met = "equilibrium reached";
+  } else if (end.strain && triaxial &&
+             std::abs(triaxial->strain[static_cast<std::size_t>(end.strain_axis)]) >= *end.strain) {
+    met = "strain reached";
+  }
+  fmt::print(stderr, "talus: stage '{}' ended after {}: {}{}\n", simulation.stage().name,
+             counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"), met,
+             end.equilibrium ? fmt::format(", unrest {:.2g} (asked {:.2g})", unrest, *end.equilibrium) : "");
+}
+
 /// Runs the steps; returns the signal that stopped them, or 0.
 int advance(Simulation& simulation, const RunOptions& options, const io::OutputSpec& output,
             const std::string& directory, RecorderFeed& feed, Tally& tally,
@@ -211,6 +252,10 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
     const bool last = options.steps && report.step >= *options.steps;
     if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
     if (progress) progress->update(report, simulation.stage().name, simulation.stage_fraction());
+    if (progress && stage_ends) {
+      progress->finish();
+      print_stage_end(simulation, triaxial);
+    }
     if (const int signal = signal_of(ranks); signal != 0) {
       if (progress) progress->finish();
       return signal;
@@ -228,22 +273,69 @@ struct Recordings {
   std::unique_ptr<trace::TaskTimes> times;
 };
 
-/// Takes the run to its end, or to what breaks it off; the summary says which.
-io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     const std::string& directory, const Recordings& recordings, io::Recorder& recorder,
-                     const graph::Communicator& ranks) {
-  Stopwatch watch;
-  io::Summary summary;
-  summary.bodies = sample.size();
-  summary.status = "done";
-  Tally tally;
-  const auto failed = [&summary](const std::exception& error) {
-    summary.status = "failed";
-    summary.message = error.what();
-    summary.exit_code = exit_failure;
+/// What was asked of steps that a run did not come to, and did not need to end well.
+void warn_of_unreached(const RunOptions& options, std::int64_t steps) {
+  const auto warn = [&](const char* option, const std::string& asked) {
+    fmt::print(stderr, "talus: warning: {} {}: the run ended after step {}\n", option, asked, steps);
   };
+  if (!options.error_history.empty() && StepList(options.error_history).last() > steps)
+    warn("--error-history", options.error_history);
+  if (options.trace_steps.empty()) return;
+  const StepRange traced = parse_steps(options.trace_steps);
+  if ((traced.last == trace::largest_step ? traced.first : traced.last) > steps)
+    warn("--trace-steps", options.trace_steps);
+}
+
+/// A run that is done may have left something undone: what was asked for, or more that the scene has.
+void add_undone(const RunOptions& options, bool scene_ended, io::Summary& summary) {
+  std::vector<std::string> undone;
+  if (!scene_ended)
+    undone.push_back(fmt::format("stopped after {} by --steps; the scene has more",
+                                 counted(static_cast<std::size_t>(summary.steps), "step")));
+  for (const std::int64_t step : options.dump_fclib)
+    if (step > summary.steps) {
+      undone.push_back(fmt::format("no dump of step {}: the run ended after step {}", step, summary.steps));
+      summary.exit_code = exit_failure;
+    }
+  summary.message = fmt::format("{}", fmt::join(undone, "; "));
+}
+
+void print_notes(const Simulation& simulation, const Tally& tally) {
+  const MessageCount& messages = simulation.messages();
+  if (messages.messages > 0)
+    fmt::print(stderr,
+               "talus: an exchange: {} messages of {} bytes between subdomains, {} of {} between ranks; "
+               "waiting for them took {:.1f} % of the iterations on rank 0\n",
+               messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
+               tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
+  if (tally.passed > 0)
+    fmt::print(stderr,
+               "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
+               "these steps count as unconverged. Reduce time_step\n",
+               tally.passed);
+  if (tally.stagnated > 0)
+    fmt::print(stderr,
+               "talus: warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
+               "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
+               "time_step, or try another solver.method\n",
+               tally.stagnated, tally.floor);
+}
+
+void fail(io::Summary& summary, const std::exception& error) {
+  summary.status = "failed";
+  summary.message = error.what();
+  summary.exit_code = exit_failure;
+}
+
+/// Takes the run to its end, or to what breaks it off; the summary says which. Throws what the beginning and
+/// the end of a run throw.
+void run_steps(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
+               const std::string& directory, const Recordings& recordings, io::Recorder& recorder,
+               const graph::Communicator& ranks, io::Summary& summary) {
+  Tally tally;
   std::optional<TraceFeed> trace;
-  if (options.trace) trace.emplace(directory, parse_steps(options.trace_steps), threads, ranks);
+  if (options.trace)
+    trace.emplace(directory, parse_steps(options.trace_steps), options.trace_own_caches, threads, ranks);
   graph::Executor executor(
       {.threads = threads, .trace = trace ? &trace->recorder() : nullptr, .times = recordings.times.get()});
   if (trace) trace->start(executor);
@@ -252,6 +344,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   if (recordings.order) simulation.follow(recordings.order.get());
   RecorderFeed feed(executor, recorder, ranks,
                     options.error_history.empty() ? StepList() : StepList(options.error_history));
+  summary.status = "done";
   try {
     if (const int signal = advance(simulation, options, scene.output, directory, feed, tally, ranks);
         signal != 0) {
@@ -260,54 +353,51 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
       summary.exit_code = exit_failure;
     }
   } catch (const std::exception& error) {
-    failed(error);
+    fail(summary, error);
   }
   try {
     feed.flush();
     executor.drain();
   } catch (const std::exception& error) {
-    failed(error);
+    fail(summary, error);
   }
-  summary.steps = simulation.report().step;
-  summary.time = simulation.report().time;
-  summary.iterations = tally.iterations;
-  summary.unconverged_steps = tally.unconverged;
-  summary.converged_steps = summary.steps - tally.unconverged;
-  summary.worst_error_rms = tally.worst_error;
-  summary.worst_balance = tally.worst_balance;
-  summary.wall_s = watch.seconds();
+  tally.sum_up(simulation.report(), summary);
   // The other ranks may wait for what will not come: the caller ends them when the files are whole.
-  if (summary.status == "failed") return summary;
+  if (summary.status == "failed") return;
   if (trace) trace->finish(executor);
-  const MessageCount& messages = simulation.messages();
-  if (ranks.rank() == 0 && messages.messages > 0)
-    fmt::print(stderr,
-               "talus: an exchange: {} messages of {} bytes between subdomains, {} of {} between ranks; "
-               "waiting for them "
-               "took {:.1f} % of the iterations on rank 0\n",
-               messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
-               tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
-  if (ranks.rank() == 0 && tally.passed > 0)
-    fmt::print(stderr,
-               "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
-               "these steps count as unconverged. Reduce time_step\n",
-               tally.passed);
-  if (ranks.rank() == 0 && tally.stagnated > 0)
-    fmt::print(stderr,
-               "talus: warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
-               "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
-               "time_step, or try another solver.method\n",
-               tally.stagnated, tally.floor);
-  if (summary.exit_code == exit_done && tally.unconverged > 0 && !scene.setup.allow_unconverged)
-    summary.exit_code = exit_tolerance_missed;
+  if (ranks.rank() == 0) print_notes(simulation, tally);
+  if (summary.status == "done") {
+    if (tally.unconverged > 0 && !scene.setup.allow_unconverged) summary.exit_code = exit_tolerance_missed;
+    const bool last_stage = simulation.stage_index() + 1 == scene.setup.stages.size();
+    add_undone(options, last_stage && simulation.stage_fraction() >= 1, summary);
+    if (ranks.rank() == 0) warn_of_unreached(options, summary.steps);
+  }
   summary.digest = simulation.digest();
+}
+
+/// The same with all that it throws in the summary.
+io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
+                     const std::string& directory, const Recordings& recordings, io::Recorder& recorder,
+                     const graph::Communicator& ranks) {
+  const Stopwatch watch;
+  io::Summary summary;
+  summary.bodies = sample.size();
+  try {
+    run_steps(options, scene, std::move(sample), threads, directory, recordings, recorder, ranks, summary);
+  } catch (const std::exception& error) {
+    fail(summary, error);
+  }
   summary.wall_s = watch.seconds();
   return summary;
 }
 
 void print_end(const io::Summary& summary, const SolverSettings& solver, const std::string& directory) {
   if (!summary.message.empty())
-    fmt::print(stderr, "talus: {}: {}\n", summary.status == "failed" ? "error" : "stopped", summary.message);
+    fmt::print(stderr, "talus: {}{}\n",
+               summary.exit_code != exit_failure ? ""
+               : summary.status == "stopped"     ? "stopped: "
+                                                 : "error: ",
+               summary.message);
   const std::string digest = summary.digest ? fmt::format(", digest {:016x}", *summary.digest) : "";
   fmt::print(stderr, "talus: {}, {:.6g} s simulated in {:.1f} s, {} sweeps{}\n",
              counted(static_cast<std::size_t>(summary.steps), "step"), summary.time, summary.wall_s,
@@ -340,11 +430,30 @@ void share_walls(Setup& setup, const graph::Communicator& ranks) {
   for (std::size_t k = 0; k < values.size(); ++k) *values[k] = shared[k];
 }
 
-/// True when something failed on any rank.
-bool any_failed(bool failed, const graph::Communicator& ranks) {
-  double flag[1] = {failed ? 1.0 : 0.0};
-  ranks.max(flag);
-  return flag[0] > 0;
+/// True when any rank refuses to run: `why` says it for this one, "" when it does not. Rank 0 speaks for all:
+/// of itself, or else says each sentence once.
+bool any_refused(const std::string& why, const graph::Communicator& ranks) {
+  const std::string own = why.empty() ? "" : fmt::format("{} {}", ranks.rank(), why) + '\0';
+  const std::vector<char> all = ranks.gather_records(std::span<const char>(own));
+  std::istringstream refusals(ranks.rank() == 0 ? std::string(all.begin(), all.end()) : "");
+  std::set<std::string> said;
+  for (std::string refusal; std::getline(refusals, refusal, '\0');) {
+    const std::size_t space = refusal.find(' ');
+    const std::string rank = refusal.substr(0, space), sentence = refusal.substr(space + 1);
+    if (!said.insert(sentence).second) continue;
+    fmt::print(stderr, "talus: error: {}{}\n", rank == "0" ? "" : "rank " + rank + ": ", sentence);
+    if (rank == "0") break;
+  }
+  return !all.empty();
+}
+
+/// Ends a run that failed on this rank of several. Rank 0 has tables and run.json to write, in the middle of
+/// which it must not be killed: the others wait for it, but not for ever, since it may wait for them. It
+/// waits a moment for what they have to say.
+[[noreturn]] void end_all(int code, const graph::Communicator& ranks) {
+  std::fflush(nullptr);
+  ranks.meet(ranks.rank() == 0 ? 1 : 20);
+  ranks.abort(code);
 }
 
 int threads_of(const RunOptions& options) {
@@ -376,35 +485,40 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
                                   .fields = scene.output.fields,
                                   .contacts = scene.output.contacts,
                                   .pictures = scene.output.pictures};
-  bool refused = false;
+  std::string refused;
+  std::optional<io::DirectoryLock> lock;
   if (ranks.rank() == 0) {
     try {
-      io::prepare_output_directory(directory, options.force);
+      lock.emplace(io::prepare_output_directory(directory, options.force));
     } catch (const io::FileError& error) {
-      fmt::print(stderr, "talus: error: {}\n", error.what());
-      refused = true;
-    }
-    if (!refused) {
-      io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
-      print_start(scene, sample.size(), threads, ranks);
+      refused = error.what();
     }
   }
-  if (any_failed(refused, ranks)) return exit_bad_input;
-  // Of one rank it writes on the background lane, from where a trace must hear of no call.
-  io::Recorder recorder(directory, files, scene.setup, provenance,
-                        ranks.ranks() > 1 ? ranks : graph::one_rank());
+  if (any_refused(refused, ranks)) return exit_bad_input;
+  if (ranks.rank() == 0) {
+    io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
+    print_start(scene, sample.size(), threads, ranks);
+  }
+  std::optional<io::Recorder> recorder;
+  try {
+    // Of one rank it writes on the background lane, from where a trace must hear of no call.
+    recorder.emplace(directory, files, scene.setup, provenance,
+                     ranks.ranks() > 1 ? ranks : graph::one_rank());
+  } catch (const std::exception& error) {
+    io::Summary none;
+    fail(none, error);
+    if (ranks.rank() == 0) io::write_run_json(directory + "/run.json", provenance, none);
+    throw;
+  }
   const io::Summary summary =
-      simulate(options, scene, std::move(sample), threads, directory, recordings, recorder, ranks);
-  recorder.finish(summary);
+      simulate(options, scene, std::move(sample), threads, directory, recordings, *recorder, ranks);
+  recorder->finish(summary);
   if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
   } else if (summary.status == "failed") {
     fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);
   }
-  if (summary.status == "failed" && ranks.ranks() > 1) {
-    std::fflush(nullptr);
-    ranks.abort(summary.exit_code);
-  }
+  if (summary.status == "failed" && ranks.ranks() > 1) end_all(summary.exit_code, ranks);
   return summary.exit_code;
 }
 
@@ -414,6 +528,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Sample sample;
   Recordings recordings;
+  std::string refused;
   try {
     if (options.threads < 0)
       throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
@@ -436,6 +551,8 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (ranks.rank() == 0) {
       sample = build_sample(scene);
       io::place_walls(scene, sample);
+      if (const std::string overlaps = describe_overlaps(scene, sample); !overlaps.empty())
+        fmt::print(stderr, "talus: warning: {}\n", overlaps);
     }
     if (options.dry_run && ranks.rank() == 0) {
       fmt::print("{}", io::resolved_scene(scene));
@@ -443,11 +560,9 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
                  options.scene, contents(scene, sample.size()));
     }
   } catch (const std::exception& error) {
-    if (ranks.rank() == 0) fmt::print(stderr, "talus: error: {}\n", error.what());
-    any_failed(true, ranks);
-    return exit_bad_input;
+    refused = error.what();
   }
-  if (any_failed(false, ranks)) return exit_bad_input;
+  if (any_refused(refused, ranks)) return exit_bad_input;
   if (options.dry_run) return exit_done;
   share_walls(scene.setup, ranks);
   std::signal(SIGINT, request_stop);
@@ -456,7 +571,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     return run_scene(options, scene, std::move(sample), recordings, ranks);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
-    if (ranks.ranks() > 1) ranks.abort(exit_failure);
+    if (ranks.ranks() > 1) end_all(exit_failure, ranks);
     return exit_failure;
   }
 }

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
+#include <string_view>
 
 #include "apps/child_process.hpp"
 #include "io/csv_table.hpp"
@@ -41,19 +43,19 @@ std::string curve_of(const ScalingRow& row) {
 
 std::string table_of(const std::vector<ScalingRow>& rows, ScalingKind kind) {
   io::CsvTable table(
-      {"curve",     "result",        "source",   "network",    "variant",       "subdomains", "ranks",
-       "threads",   "cores",         "grains",   "contacts",   "repeats",       "seconds",    "fastest",
-       "slowest",   "iterations",    "speedup",  "efficiency", "of_iterations", "of_sweeps",  "work",
-       "balance",   "communication", "within",   "bound",      "critical_path", "exposed",    "partitioning",
-       "detection", "inloop_1",      "inloop_2", "update"});
+      {"curve",        "result",     "source",        "network",  "variant",    "subdomains",    "ranks",
+       "threads",      "cores",      "grains",        "contacts", "repeats",    "seconds",       "fastest",
+       "slowest",      "iterations", "missed",        "speedup",  "efficiency", "of_iterations", "of_sweeps",
+       "work",         "balance",    "communication", "within",   "bound",      "critical_path", "exposed",
+       "partitioning", "detection",  "inloop_1",      "inloop_2", "update"});
   for (const ScalingRow& r : rows)
     if (r.kind == kind) {
       const auto part = [&](std::size_t p) { return r.source == ScalingSource::replay ? r.share[p] : r.nan; };
       table.row(curve_of(r), r.predicted() ? "predicted" : "measured", name_of(r.source), r.network,
                 r.variant, r.subdomains, r.ranks, r.threads, r.cores(), static_cast<std::int64_t>(r.grains),
-                r.contacts, r.repeats, r.seconds, r.fastest, r.slowest, r.iterations, r.speedup, r.efficiency,
-                r.of_iterations, r.of_sweeps, r.work, r.balance, r.communication, r.within, bound_of(r),
-                r.path, r.exposed, part(0), part(1), part(2), part(3), part(4));
+                r.contacts, r.repeats, r.seconds, r.fastest, r.slowest, r.iterations, r.missed, r.speedup,
+                r.efficiency, r.of_iterations, r.of_sweeps, r.work, r.balance, r.communication, r.within,
+                bound_of(r), r.path, r.exposed, part(0), part(1), part(2), part(3), part(4));
     }
   return table.text();
 }
@@ -101,7 +103,7 @@ std::string percent(double part) {
 
 io::HtmlTable efficiency_table(const std::vector<ScalingRow>& rows, ScalingKind kind) {
   io::HtmlTable table{{"curve", "ranks x threads", "subdomains", "grains", "s a step (range)", "iterations",
-                       "speedup", "efficiency", "= iterations", "x time an iteration", "bound"},
+                       "missed", "speedup", "efficiency", "= iterations", "x time an iteration", "bound"},
                       {}};
   for (const ScalingRow& r : rows)
     if (r.kind == kind)
@@ -110,8 +112,8 @@ io::HtmlTable efficiency_table(const std::vector<ScalingRow>& rows, ScalingKind 
                             r.repeats > 1 ? fmt::format("{:.3g} ({:.3g} - {:.3g}, {})", r.seconds, r.fastest,
                                                         r.slowest, r.repeats)
                                           : fmt::format("{:.3g}", r.seconds),
-                            cell(r.iterations, "{:.1f}"), cell(r.speedup), cell(r.efficiency),
-                            cell(r.of_iterations), cell(r.of_sweeps), bound_of(r)});
+                            cell(r.iterations, "{:.1f}"), fmt::format("{}", r.missed), cell(r.speedup),
+                            cell(r.efficiency), cell(r.of_iterations), cell(r.of_sweeps), bound_of(r)});
   return table;
 }
 
@@ -151,6 +153,13 @@ std::string introduction_of(const ScalingReport& report) {
     text +=
         fmt::format(" Tasks were given the {:g} quantile of their times in the step: the machine was busy.",
                     report.quantile);
+  const auto missed = std::ranges::count_if(report.rows, [](const ScalingRow& r) { return r.missed > 0; });
+  if (missed > 0)
+    text += fmt::format(
+        " Of {} of the {} rows the runs, or those that were recorded, missed the tolerance in some of these "
+        "steps (column `missed`): their times are those of solves that were given up, and speedups of such "
+        "rows compare sweeps, not solutions.",
+        missed, report.rows.size());
   return text;
 }
 
@@ -255,6 +264,22 @@ StudyReport page_of(ScalingReport report) {
   return page;
 }
 
+/// "weak-12.csv", "traces/strong-4-variant1-2.h5": a stem, numbers and dashes, an ending.
+bool is_numbered(std::string_view name) {
+  for (const std::string_view stem : {"weak-", "traces/strong-", "traces/weak-"}) {
+    if (!name.starts_with(stem)) continue;
+    const std::string_view rest = name.substr(stem.size()),
+                           ending = rest.substr(std::min(rest.find('.'), rest.size()));
+    const bool trace = stem.starts_with("traces/");
+    if (trace ? ending != ".h5" : ending != ".toml" && ending != ".csv") return false;
+    std::string numbers(rest.substr(0, rest.size() - ending.size()));
+    if (const std::size_t at = numbers.find("variant"); trace && at != std::string::npos)
+      numbers.erase(at, 7);
+    return !numbers.empty() && numbers.find_first_not_of("0123456789-") == std::string::npos;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<OtherSpeedup> read_speedups(const std::string& path) {
@@ -286,6 +311,18 @@ std::vector<OtherSpeedup> read_speedups(const std::string& path) {
     }
   }
   return all;
+}
+
+bool is_study_scaling_name(const std::filesystem::path& relative) {
+  constexpr std::array<std::string_view, 4> tables{"strong_scaling.csv", "weak_scaling.csv", "hybrid.csv",
+                                                   "beside.csv"};
+  constexpr std::array<std::string_view, 6> charts{
+      "speedup", "efficiency", "efficiency_iterations", "efficiency_sweeps", "weak_efficiency", "hybrid"};
+  constexpr std::array<std::string_view, 5> others{"commands.sh", "slurm.sh", "strong.toml", "strong.csv",
+                                                   "traces/times.csv"};
+  const std::string name = whole_name(relative);
+  return is_report_name(name, tables, charts) || std::ranges::find(others, name) != others.end() ||
+         is_numbered(name);
 }
 
 void write_scaling_report(const std::filesystem::path& directory, const ScalingReport& report) {

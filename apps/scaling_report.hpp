@@ -44,6 +44,10 @@ struct ScalingReport {
   std::vector<ScalingRow> rows;  ///< related
 };
 
+/// True for the names of files that `talus study scaling` may have written: those of write_scaling_report,
+/// and scenes and traces.
+bool is_study_scaling_name(const std::filesystem::path& relative);
+
 /// Writes commands.sh and slurm.sh, and once there are rows the tables, pictures, plot.gp and report.html.
 /// Throws io::FileError.
 void write_scaling_report(const std::filesystem::path& directory, const ScalingReport& report);

@@ -150,20 +150,26 @@ std::vector<RecordedTrace> read_recordings(const fs::path& times_csv) {
   while (std::getline(in, line)) {
     const std::vector<std::string> cells = cells_of(line);
     try {
-      if (cells.size() != 6) throw std::invalid_argument(line);
+      if (cells.size() != 7) throw std::invalid_argument(line);
       recorded.push_back(
-          {cells[0], cells[2], cells[1], {std::stod(cells[3]), std::stod(cells[4]), std::stod(cells[5]), 0}});
+          {cells[0],
+           cells[2],
+           cells[1],
+           {std::stod(cells[3]), std::stod(cells[4]), std::stod(cells[5]), std::stoll(cells[6])}});
     } catch (const std::logic_error&) {
-      throw io::FileError(times_csv.string(), fmt::format("'{}' is no line of a list of recordings", line));
+      throw io::FileError(
+          times_csv.string(),
+          fmt::format("'{}' is no line of a list of recordings; --force records them anew", line));
     }
   }
   return recorded;
 }
 
 void write_recordings(const fs::path& times_csv, const std::vector<RecordedTrace>& recorded) {
-  io::CsvTable table({"file", "variant", "steps", "seconds", "iterations", "contacts"});
+  io::CsvTable table({"file", "variant", "steps", "seconds", "iterations", "contacts", "missed"});
   for (const RecordedTrace& r : recorded)
-    table.row(r.file, r.variant, r.steps, r.times.seconds, r.times.iterations, r.times.contacts);
+    table.row(r.file, r.variant, r.steps, r.times.seconds, r.times.iterations, r.times.contacts,
+              r.times.missed);
   io::write_whole(times_csv, table.text());
 }
 
@@ -195,6 +201,7 @@ ScalingRow row_of(const ScalingSubject& subject, const ScalingMachine& machine,
   row.slowest = std::ranges::max(seconds);
   row.iterations = median(values(&RunTimes::iterations));
   row.contacts = median(values(&RunTimes::contacts));
+  for (const RunTimes& time : times) row.missed = std::max(row.missed, time.missed);
   return row;
 }
 

@@ -74,15 +74,15 @@ struct RecordedTrace {
   RunTimes times;
 };
 
-/// The list of recordings beside them, times.csv: file,variant,steps,seconds,iterations,contacts. Reading a
-/// list that is not there gives none. Throw io::FileError.
+/// The list of recordings beside them, times.csv: file,variant,steps,seconds,iterations,contacts,missed.
+/// Reading a list that is not there gives none. Throw io::FileError.
 std::vector<RecordedTrace> read_recordings(const std::filesystem::path& times_csv);
 void write_recordings(const std::filesystem::path& times_csv, const std::vector<RecordedTrace>& recorded);
 
 /// Numbers of ranks that share `cores` with the same number of threads each, ascending: the divisors.
 std::vector<int> rank_counts(int cores);
 
-/// Median and range of the seconds, medians of the rest, in the row of a machine.
+/// Median and range of the seconds, the most missed steps, medians of the rest, in the row of a machine.
 ScalingRow row_of(const ScalingSubject& subject, const ScalingMachine& machine,
                   const std::vector<RunTimes>& times);
 

@@ -15,7 +15,8 @@ namespace talus {
 
 namespace {
 
-/// Drops the stages before `name`, whose loads stay on the walls.
+/// Drops the stages before `name`, whose loads stay on the walls, and puts its own on them: a wall that it
+/// pushes has a velocity of its own before the first step.
 void begin_with(io::Scene& scene, const std::string& name) {
   if (name.empty()) return;
   std::vector<Stage>& stages = scene.setup.stages;
@@ -25,14 +26,14 @@ void begin_with(io::Scene& scene, const std::string& name) {
       known += (known.empty() ? "" : ", ") + stages[k].name;
       continue;
     }
-    for (std::size_t before = 0; before < k; ++before)
-      for (const auto& [wall_name, load] : stages[before].loads)
+    for (std::size_t to = 0; to <= k; ++to)
+      for (const auto& [wall_name, load] : stages[to].loads)
         for (Wall& wall : scene.setup.walls)
           if (wall.name == wall_name) wall.load = load;
     stages.erase(stages.begin(), stages.begin() + static_cast<std::ptrdiff_t>(k));
     return;
   }
-  throw std::invalid_argument(fmt::format("there is no stage '{}': {}", name, known));
+  throw std::invalid_argument(fmt::format("there is no stage '{}'; there are: {}", name, known));
 }
 
 Sample grains_of(const Frame& frame, const io::Scene& scene) {
@@ -55,6 +56,7 @@ void put_walls(io::Scene& scene, const Frame& frame, const std::string& file) {
     for (const WallReport& there : frame.walls)
       if (there.name == wall.name) {
         wall.point = there.position * wall.normal;
+        wall.velocity = there.velocity * wall.normal;  // of one that is not pushed its load decides
         found = true;
       }
     if (!found)
@@ -89,7 +91,29 @@ ScalingSample scaling_sample(const std::string& path, const std::vector<std::str
   if (frames == 0) throw std::invalid_argument(from + " holds no frame");
   const Frame frame = io::read_frame(from, frames - 1);
   put_walls(scene, frame, from);
-  return finished(std::move(scene), grains_of(frame, scene), stage);
+  const std::string first = stage.empty() ? scene.setup.stages.front().name : stage;
+  return finished(std::move(scene), grains_of(frame, scene), first);
+}
+
+std::string range_of_radii(const Sample& grains) {
+  const auto [smallest, largest] = std::ranges::minmax(grains.radius);
+  return fmt::format("{:.4g} to {:.4g} m", smallest, largest);
+}
+
+std::string other_sample(const io::Scene& scene, const Sample& grains) {
+  const io::SampleSpec& spec = scene.sample;
+  if (spec.kind == io::SampleSpec::Kind::bodies) return "";
+  const std::int64_t count = spec.count > 0 ? spec.count : spec.cells[0] * spec.cells[1] * spec.cells[2];
+  if (const auto there = static_cast<std::int64_t>(grains.size()); there != count)
+    return fmt::format("{} grains where the scene's sample has {}", there, count);
+  const SizeDistribution& radii = spec.radii;
+  const double least = radii.kind == SizeDistribution::Kind::constant ? radii.max : radii.min;
+  const auto [smallest, largest] = std::ranges::minmax(grains.radius);
+  constexpr double rounding = 1e-9;
+  if (smallest < least * (1 - rounding) || largest > radii.max * (1 + rounding))
+    return fmt::format("radii of {} where the scene's sample has {:.4g} to {:.4g} m", range_of_radii(grains),
+                       least, radii.max);
+  return "";
 }
 
 std::string why_not_weak(const io::Scene& scene) {

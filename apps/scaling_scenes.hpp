@@ -26,6 +26,13 @@ struct ScalingSample {
 ScalingSample scaling_sample(const std::string& path, const std::vector<std::string>& overrides,
                              const std::string& from, const std::string& stage);
 
+/// "0.008 to 0.012 m". There are grains.
+std::string range_of_radii(const Sample& grains);
+
+/// In what the grains are not those that the scene's sample asks for: their number, or a radius beyond its
+/// range; "" when in neither, or where the sample is a file. There are grains.
+std::string other_sample(const io::Scene& scene, const Sample& grains);
+
 /// Why the sample cannot be made with fewer grains; "" when it can.
 std::string why_not_weak(const io::Scene& scene);
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -37,6 +38,7 @@ struct ScalingRow {
   int repeats = 1;
   double seconds = 0, fastest = 0, slowest = 0;  ///< of a step: median of the repeats, and their range [s]
   double iterations = 0;                         ///< of a step
+  std::int64_t missed = 0;  ///< steps over tolerance, of those that count, in the worst of the repeats
 
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   double speedup = nan;        ///< over one core, per grain

@@ -16,14 +16,12 @@ talus_install_missing() {
     esac
   done
   [ $((${#missing[@]} + ${#wished[@]})) -gt 0 ] || return 0
-  local without="setup: without ${wished[*]} the tests that ask it are skipped"
-
   local become=()
   if [ "$(id -u)" -ne 0 ]; then
     if ! command -v sudo >/dev/null; then
       echo "setup: not root and no sudo; as root, run: apt-get update && apt-get install ${missing[*]} ${wished[*]}" >&2
       [ ${#missing[@]} -eq 0 ] || return 1
-      echo "$without" >&2
+      echo "setup: the tests that ask ${wished[*]} are skipped" >&2
       return 0
     fi
     become=(sudo)
@@ -35,9 +33,9 @@ talus_install_missing() {
     echo "setup: apt-get failed; Talus needs Debian 12 or newer with its main archive" >&2
     return 1
   fi
-  if [ ${#wished[@]} -gt 0 ] && ! "${get[@]}" install --no-install-recommends "${wished[@]}"; then
-    echo "$without" >&2
-  fi
+  for package in ${wished[@]+"${wished[@]}"}; do  # one by one: one that cannot be had takes no other along
+    "${get[@]}" install --no-install-recommends "$package" || echo "setup: without $package the tests that ask it are skipped" >&2
+  done
 }
 
 talus_install_missing "$(dirname "${BASH_SOURCE[0]}")/packages.txt" "${1:-}" || exit 1

@@ -67,9 +67,9 @@ Plan plan_of(const SolveOptions& options) {
   plan.table = plan.methods.size() > 1 || std::filesystem::is_directory(options.path);
   if (!options.out.empty() && plan.table)
     throw std::invalid_argument("--out wants one problem and one method");
-  for (const std::filesystem::path& out : {options.out, options.csv, options.profile})
-    for (const io::FclibFile& file : plan.files)
-      if (!out.empty()) io::check_output_file(file.path, out);
+  std::vector<std::filesystem::path> inputs;
+  for (const io::FclibFile& file : plan.files) inputs.push_back(file.path);
+  io::check_output_files(inputs, {options.out, options.csv, options.profile}, options.force);
   return plan;
 }
 
@@ -121,9 +121,8 @@ void print_line(const SolveRow& row) {
   std::fflush(stdout);
 }
 
-/// The command without its error handling; throws what the kernels and io throw.
-int solve(const SolveOptions& options) {
-  const Plan plan = plan_of(options);
+/// Solves and writes; throws what the kernels throw, and io::FileError for a file that cannot be written.
+int solve(const SolveOptions& options, const Plan& plan) {
   std::vector<SolveRow> rows;
   bool unreadable = false;
   for (const auto& file : plan.files) {
@@ -131,8 +130,8 @@ int solve(const SolveOptions& options) {
     try {
       problem = io::read_fclib_problem(file.path);
     } catch (const io::FileError& error) {
-      if (!plan.table) throw;
       fmt::print(stderr, "talus solve: {}\n", error.what());
+      if (!plan.table) return exit_bad_input;
       unreadable = true;
       continue;
     }
@@ -159,18 +158,21 @@ int solve(const SolveOptions& options) {
 }  // namespace
 
 int solve_command(const SolveOptions& options) {
+  Plan plan;
   try {
-    return solve(options);
+    plan = plan_of(options);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus solve: {}\n", error.what());
+    return exit_bad_input;
+  }
+  try {
+    return solve(options, plan);
   } catch (const io::FileError& error) {
     fmt::print(stderr, "talus solve: {}\n", error.what());
-    return exit_bad_input;
-  } catch (const std::invalid_argument& error) {
-    fmt::print(stderr, "talus solve: {}\n", error.what());
-    return exit_bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus solve: {}: {}\n", options.path.string(), error.what());
-    return exit_failure;
   }
+  return exit_failure;
 }
 
 }  // namespace talus

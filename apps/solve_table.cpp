@@ -9,6 +9,8 @@
 #include <map>
 #include <vector>
 
+#include "io/csv_table.hpp"
+
 namespace talus {
 namespace {
 
@@ -27,14 +29,6 @@ std::map<std::string, double> best_times(std::span<const SolveRow> rows) {
     if (row.converged) time = std::min(time, row.seconds);
   }
   return best;
-}
-
-/// A file name may hold anything.
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + '"';
 }
 
 }  // namespace
@@ -63,31 +57,50 @@ std::string solve_table(std::span<const SolveRow> rows) {
 }
 
 std::string solve_csv(std::span<const SolveRow> rows) {
-  std::string text =
-      "problem,contacts,method,error,scaled_error,iterations,factorisations,seconds,converged\n";
+  io::CsvTable table({"problem", "contacts", "method", "error", "scaled_error", "iterations",
+                      "factorisations", "seconds", "converged"});
   for (const SolveRow& row : rows)
-    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{}\n", quoted(row.problem),
-                   row.contacts, row.method, row.error, row.scaled_error, row.iterations, row.factorisations,
-                   row.seconds, row.converged ? 1 : 0);
-  return text;
+    table.row(row.problem, static_cast<std::int64_t>(row.contacts), row.method, row.error, row.scaled_error,
+              row.iterations, row.factorisations, row.seconds, row.converged);
+  return table.text();
+}
+
+std::vector<std::array<double, 2>> profile_of(std::span<const SolveRow> rows, const std::string& method) {
+  const auto best = best_times(rows);
+  std::vector<double> factors;
+  for (const SolveRow& row : rows)
+    if (row.method == method && row.converged)
+      // A solve too short for the clock takes no time: it is the fastest, and nothing is a multiple of it.
+      factors.push_back(row.seconds == best.at(row.problem) ? 1 : row.seconds / best.at(row.problem));
+  std::sort(factors.begin(), factors.end());
+  std::vector<std::array<double, 2>> points;
+  for (std::size_t k = 0; k < factors.size(); ++k) {
+    const double part = static_cast<double>(k + 1) / static_cast<double>(best.size());
+    if (!points.empty() && points.back()[0] == factors[k])
+      points.back()[1] = part;
+    else
+      points.push_back({factors[k], part});
+  }
+  return points;
 }
 
 std::string performance_profile(std::span<const SolveRow> rows) {
-  const auto methods = methods_of(rows);
-  const auto best = best_times(rows);
   std::string text = "factor";
-  for (const std::string& method : methods) text += ',' + method;
+  std::vector<std::vector<std::array<double, 2>>> profiles;
+  for (const std::string& method : methods_of(rows)) {
+    text += ',' + method;
+    profiles.push_back(profile_of(rows, method));
+  }
   text += '\n';
   constexpr int per_decade = 20;
   for (int k = 0; k <= 3 * per_decade; ++k) {
     const double factor = std::pow(10.0, static_cast<double>(k) / per_decade);
     fmt::format_to(std::back_inserter(text), "{:.6g}", factor);
-    for (const std::string& method : methods) {
-      const auto within = std::count_if(rows.begin(), rows.end(), [&](const SolveRow& row) {
-        return row.method == method && row.converged && row.seconds <= factor * best.at(row.problem);
-      });
-      fmt::format_to(std::back_inserter(text), ",{:.6g}",
-                     static_cast<double>(within) / static_cast<double>(best.size()));
+    for (const auto& points : profiles) {
+      double part = 0;
+      for (const auto& [at, solved] : points)
+        if (at <= factor) part = solved;
+      fmt::format_to(std::back_inserter(text), ",{:.6g}", part);
     }
     text += '\n';
   }

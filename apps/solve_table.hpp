@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace talus {
 
@@ -24,9 +26,11 @@ std::string solve_table(std::span<const SolveRow> rows);
 /// For programs: a header and a line per row.
 std::string solve_csv(std::span<const SolveRow> rows);
 
-/// Performance profile (Dolan and More 2002): per line a factor t from 1 to 1000 and, for each method, the
-/// part of the problems that it solved in at most t times the time of the fastest method. Problems that no
-/// method solved count.
+/// Performance profile (Dolan and More 2002) of a method: points (t, part of the problems that it solved in
+/// at most t times the time of the fastest), t ascending, each once. Problems that no method solved count.
+std::vector<std::array<double, 2>> profile_of(std::span<const SolveRow> rows, const std::string& method);
+
+/// The same of all methods for programs: per line a factor t from 1 to 1000 and a part for each method.
 std::string performance_profile(std::span<const SolveRow> rows);
 
 /// True when every problem was solved by some method.

@@ -3,38 +3,30 @@
 /// Runs one scene of the stability study and judges it.
 
 #include <array>
-#include <string_view>
 
 #include "apps/stability_scenes.hpp"
 
 namespace talus::stability {
 
-/// The bound of a certified step is twice what its certificate says (the larger of error_rms and balance),
-/// but at least twice the tolerance asked for, below which nothing is claimed. Where the truth holds for a
-/// sample at rest, the certificate of the step before is added: what that left over must be stopped in this
-/// one.
-enum class Verdict {
-  right,      ///< every step certified, and the true error is within its bound
-  certified,  ///< every step certified, the truth is not known
-  honest,     ///< some step missed its tolerance, or time ran out, and it says so
-  refused,    ///< an error that names its cause
-  wrong,      ///< a step is certified, and its true error is beyond its bound
-  failed,     ///< not a number, an unforeseen error, a crash or a hang
-};
-std::string_view name_of(Verdict verdict);
-
 /// What a scene came to. Trivially copyable: it comes out of another process through a pipe.
+///
+/// The bound of a certified step is twice what its certificate says (the larger of error_rms and balance),
+/// but at least twice the tolerance asked for, below which nothing is claimed; with TruthFrom::rest
+/// the step's distance from rest is added, in momentum over the impulse of the loads. Energy goes with the
+/// square of velocities: without restitution and correction of overlaps a step may gain twice that bound of
+/// what it would have without contacts.
 struct Outcome {
   Verdict verdict = Verdict::failed;
-  int steps = 0, missed = 0;  ///< done, and not converged
+  int steps = 0, judged = 0;  ///< done; certified and compared with a truth
+  int missed = 0;             ///< not converged
   int iterations = 0;         ///< of all steps
-  /// Of the step whose true error is largest against its certificate; of the last one when no truth is known.
+  /// Of the step whose true error is largest against its bound; of the last one when no truth is known.
   double true_error = -1;  ///< < 0: not known
   double error_rms = 0, balance = 0;
-  double energy_gained = 0;     ///< largest gain over the run that no load supplied, over the largest kinetic
-                                ///< energy that a step would reach without contacts
-  double penetration = 0;       ///< largest overlap over the smallest radius, over the run
-  double seconds = 0;           ///< of the steps
+  double energy_gained = 0;  ///< largest gain of a step that no load supplied, over the kinetic energy that
+                             ///< the step would reach without contacts
+  double penetration = 0;    ///< largest overlap over the smallest radius, over the run
+  double seconds = 0;        ///< of the steps
   std::array<char, 400> why{};  ///< for verdicts that need it, one line
 };
 
@@ -43,6 +35,10 @@ struct RunSettings {
   double tolerance = 0;                           ///< > 0: of error_rms; on balance 50 times as much
   double seconds = 30;                            ///< a scene is stopped between two steps after so many
 };
+
+/// Whether the verdict is one that the scene's table expects. With a method or tolerance of one's own
+/// anything goes that is neither wrong nor failed.
+bool as_expected(const Scene& scene, const Outcome& outcome, const RunSettings& settings);
 
 /// In this process. Throws nothing.
 Outcome run_scene(const Scene& scene, const RunSettings& settings);

@@ -3,11 +3,28 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <numbers>
 #include <utility>
 
 namespace talus::stability {
+
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::right:
+      return "right";
+    case Verdict::certified:
+      return "certified";
+    case Verdict::honest:
+      return "honest";
+    case Verdict::refused:
+      return "refused";
+    case Verdict::wrong:
+      return "WRONG";
+    case Verdict::failed:
+      return "FAILED";
+  }
+  return "";
+}
 
 Problem problem(double time_step, const Vec3& gravity, double mu) {
   Problem made;
@@ -54,7 +71,7 @@ Velocity& add_grain(Problem& problem, const Vec3& centre, double r, double mass)
 }
 
 Truth wall_forces(std::vector<Vec3> exact) {
-  return [exact = std::move(exact)](const StepView& step) -> std::optional<double> {
+  const auto largest = [exact = std::move(exact)](const StepView& step) -> std::optional<double> {
     double error = 0, scale = 0;
     const std::vector<WallReport> walls = step.simulation.walls();
     for (std::size_t w = 0; w < exact.size(); ++w) {
@@ -63,47 +80,49 @@ Truth wall_forces(std::vector<Vec3> exact) {
     }
     return error / scale;
   };
+  return {largest, TruthFrom::rest};
 }
 
 Truth at_rest(Truth truth) {
-  return [truth = std::move(truth)](const StepView& step) -> std::optional<double> {
+  const auto where_it_rests = [error =
+                                   std::move(truth.error)](const StepView& step) -> std::optional<double> {
     const double most = step.time_step() * step.gravity().norm() / 20;
     const auto rests = [&](const Vec3& u) { return u.norm() <= most; };
     if (!std::all_of(step.before.u.begin(), step.before.u.end(), rests)) return std::nullopt;
-    return truth(step);
+    return error(step);
   };
+  return {where_it_rests, truth.from, "the others begin in motion"};
 }
 
-Truth reference_velocities(const Problem& of) {
-  Setup setup = of.setup;
-  setup.solver.method = SolverMethod::nncg;
-  setup.solver.tolerance = 1e-10;
-  setup.solver.balance_tolerance = 1e-8;
-  setup.solver.max_iterations = 50000;
-  graph::Executor executor({.threads = 1});
-  Simulation reference(setup, of.bodies, executor);
-  const bool known = reference.step().converged;
-  return [known, exact = reference.frame(false),
-          bodies = of.bodies](const StepView& step) -> std::optional<double> {
-    if (!known || step.after.step != 1) return std::nullopt;
+Truth reference_velocities() {
+  const auto error_of_momentum = [](const StepView& step) -> std::optional<double> {
+    Setup setup = step.simulation.setup();
+    setup.solver.method = SolverMethod::nncg;
+    setup.solver.tolerance = 1e-10;
+    setup.solver.balance_tolerance = 1e-8;
+    setup.solver.max_iterations = 50000;
+    graph::Executor executor({.threads = 1});
+    const SavedState& start = step.start.value();
+    Simulation reference(setup, start, executor);
+    if (!reference.step().converged) return std::nullopt;
+    const Frame exact = reference.frame(false);
     const double h = step.time_step();
-    double error = 0, change = 0;  // ids count from 0, so frames and `bodies` have one order
-    for (std::size_t k = 0; k < bodies.size(); ++k) {
-      const Vec3 free = Eigen::Map<const Vec3>(bodies.velocity[k].u) + h * step.gravity();
-      error += bodies.mass(k) * (step.after.u[k] - exact.u[k]).norm();
-      change += bodies.mass(k) * (exact.u[k] - free).norm();
+    double error = 0, change = 0;
+    for (std::size_t s = 0; s < start.bodies.size(); ++s) {
+      const auto k = static_cast<std::size_t>(start.bodies.id[s]);  // ids count from 0: the order of frames
+      error += start.bodies.mass(s) * (step.after.u[k] - exact.u[k]).norm();
+      change += start.bodies.mass(s) * (exact.u[k] - step.before.u[k] - h * step.gravity()).norm();
     }
-    const std::vector<Wall>& walls = step.simulation.setup().walls;
-    const std::vector<WallReport> reports = step.simulation.walls();
-    for (std::size_t w = 0; w < walls.size(); ++w) {
-      if (walls[w].inv_mass() == 0) continue;
-      const double free =
-          walls[w].velocity.dot(walls[w].normal) + h * walls[w].load.force * walls[w].inv_mass();
-      error += std::abs(reports[w].velocity - exact.walls[w].velocity) / walls[w].inv_mass();
-      change += std::abs(exact.walls[w].velocity - free) / walls[w].inv_mass();
+    for (std::size_t w = 0; w < start.walls.size(); ++w) {
+      const Wall& wall = start.walls[w];
+      if (wall.inv_mass() == 0) continue;
+      const double free = wall.velocity.dot(wall.normal) + h * wall.load.force * wall.inv_mass();
+      error += std::abs(step.after.walls[w].velocity - exact.walls[w].velocity) / wall.inv_mass();
+      change += std::abs(exact.walls[w].velocity - free) / wall.inv_mass();
     }
     return error / change;
   };
+  return {error_of_momentum, TruthFrom::any_state, "the solution of the others to 1e-10 was not found"};
 }
 
 std::vector<Scene> scenes() {

@@ -39,4 +39,10 @@ bool StepList::contains(std::int64_t step) const {
                              [&](const auto& range) { return range.first <= step && step <= range.second; });
 }
 
+std::int64_t StepList::last() const {
+  std::int64_t step = 0;
+  for (const auto& range : ranges_) step = std::max(step, range.second);
+  return step;
+}
+
 }  // namespace talus

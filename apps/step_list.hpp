@@ -18,6 +18,8 @@ class StepList {
 
   bool empty() const { return ranges_.empty(); }
   bool contains(std::int64_t step) const;
+  /// The largest step in it; 0 when it is empty.
+  std::int64_t last() const;
 
  private:
   std::vector<std::pair<std::int64_t, std::int64_t>> ranges_;

@@ -4,9 +4,10 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -74,84 +75,119 @@ std::string where_and_when() {
                      provenance.git_hash, provenance.host, provenance.cores_allowed, provenance.date_utc);
 }
 
+/// What a run of the scene would find out late. Throws std::invalid_argument.
+void check_lengths(const io::Scene& scene, const StudyPlan& plan, const std::string& only) {
+  const double last = most_steps(scene.setup.stages);
+  if (only != "run" && static_cast<double>(plan.at_step) >= last)
+    throw std::invalid_argument(
+        fmt::format("--at-step {}: {} ends after step {}, so there is no step to solve behind it; choose a "
+                    "smaller one",
+                    plan.at_step, scene.source_file, last));
+  if (only == "step") return;
+  for (const double time_step : plan.time_steps)
+    if (const std::string why = why_no_step(scene, plan, time_step); !why.empty())
+      throw std::invalid_argument(why);
+}
+
 int study_scene(const StudyErrorOptions& options) {
   StudyPlan plan;
   std::vector<StudySample> samples;
   std::string directory = options.out;
+  std::optional<io::DirectoryLock> lock;
   try {
     const io::Scene scene = io::load_scene(options.subject, options.overrides);
     plan = plan_of(options, scene.setup.seed);
+    check_lengths(scene, plan, options.only);
     for (const StudyVariant& variant : plan.variants)
       if (samples.empty() || samples.back().scene.setup.seed != variant.seed)
         samples.push_back(study_sample(options.subject, options.overrides, variant.seed));
     if (directory.empty()) directory = "out/error-" + scene.name;
-    io::prepare_output_directory(directory, options.force, is_study_name);
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   }
-  StudyReport report;
   const io::Scene& scene = samples.front().scene;
-  report.title = fmt::format("{}: error against run time", scene.name);
-  report.introduction =
+  const std::string title = fmt::format("{}: error against run time", scene.name);
+  const std::string introduction =
       (scene.description.empty() ? "" : scene.description + ". ") + where_and_when() +
       " Times are medians of three where a solve takes less than " +
       fmt::format("{:g} s. The tables are beside this page; plot.gp draws them.", cheap_solve);
   say(fmt::format("{}: {} grains, {} ways to solve", scene.name, samples.front().bodies.size(),
                   plan.variants.size()));
-  bool sound = true;
-  if (options.only != "run") {
-    ProblemStudy study;
-    for (const StudySample& sample : samples) study_problem(sample, plan, say, study);
-    report_problem(study, plan, report);
-    sound &= std::ranges::all_of(study.references, &ProblemReference::converged);
-    write_report(directory, report);  // the runs may take long
-  }
-  if (options.only != "step") {
-    RunStudy study;
-    for (const StudySample& sample : samples) study_runs(sample, plan, say, study);
-    report_runs(study, plan, report);
-    sound &= std::ranges::all_of(study.references, [](const RunReference& r) { return r.missed == 0; });
+  ProblemStudy problem;
+  RunStudy runs;
+  const auto keep = [&] {  // a study that is stopped leaves what it has
+    StudyReport report;
+    report.title = title;
+    report.introduction = introduction;
+    if (!problem.references.empty()) report_problem(problem, plan, report);
+    if (!runs.references.empty()) report_runs(runs, plan, report);
     write_report(directory, report);
-  }
+  };
+  if (options.only != "run")
+    for (const StudySample& sample : samples) study_problem(sample, plan, say, keep, problem);
+  if (options.only != "step")
+    for (const StudySample& sample : samples) study_runs(sample, plan, say, keep, runs);
+  keep();
   say(fmt::format("tables, pictures and report.html in {}", directory));
+  const bool sound =
+      std::ranges::all_of(problem.references, &ProblemReference::converged) &&
+      std::ranges::all_of(runs.references, [](const RunReference& r) { return r.missed == 0; });
   return sound ? exit_done : exit_tolerance_missed;
 }
 
 int study_folder(const StudyErrorOptions& options) {
   const fs::path folder = options.subject;
   std::string directory = options.out;
+  std::optional<io::DirectoryLock> lock;
   std::vector<std::string> methods = or_else(options.methods, profile_methods());
-  std::vector<ProfileRow> rows;
   try {
     const std::string name = fs::absolute(folder / "x").lexically_normal().parent_path().filename().string();
     if (directory.empty()) directory = "out/error-" + name;
     check_profile(folder, methods);
-    io::prepare_output_directory(directory, options.force, is_study_name);
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   }
-  rows =
-      study_profile(folder, methods, descending(options.tolerances, {1e-4, 1e-8}), options.max_seconds, say);
-  StudyReport report;
-  report.title = "FCLIB problems: who solves how many, and how fast";
-  report.introduction =
+  const std::string introduction =
       where_and_when() + fmt::format(
                              " A solve may take {:g} s; times are medians of three where it takes less than "
                              "{:g} s. The tables are beside this page; plot.gp draws them.",
                              options.max_seconds, cheap_solve);
-  report_profile(rows, report);
-  write_report(directory, report);
+  std::vector<ProfileRow> rows;
+  const auto keep = [&] {
+    StudyReport report;
+    report.title = "FCLIB problems: who solves how many, and how fast";
+    report.introduction = introduction;
+    report_profile(rows, report);
+    write_report(directory, report);
+  };
+  study_profile(folder, methods, descending(options.tolerances, {1e-4, 1e-8}), options.max_seconds, say, keep,
+                rows);
   say(fmt::format("tables, picture and report.html in {}", directory));
   std::set<std::string> solved, problems, names;
-  for (const ProfileRow& row : rows) {
-    names.insert(row.problem);
-    problems.insert(fmt::format("{} {}", row.problem, row.tolerance));
-    if (row.solved) solved.insert(fmt::format("{} {}", row.problem, row.tolerance));
+  for (const auto& [tolerance, solve] : rows) {
+    names.insert(solve.problem);
+    problems.insert(fmt::format("{} {}", solve.problem, tolerance));
+    if (solve.converged) solved.insert(fmt::format("{} {}", solve.problem, tolerance));
   }
   if (names.size() < io::fclib_files(folder).size()) return exit_bad_input;  // some could not be read
   return solved == problems ? exit_done : exit_tolerance_missed;
+}
+
+/// Refuses options that were given and would do nothing. Throws CLI::ValidationError.
+void refuse_idle_options(const CLI::App& app, const StudyErrorOptions& options) {
+  const auto refuse = [&](const std::string& of_what, std::initializer_list<const char*> names) {
+    for (const char* name : names)
+      if (app.count(name) > 0) throw CLI::ValidationError(name, "has no meaning for " + of_what);
+  };
+  if (fs::is_directory(options.subject))
+    refuse("a folder of FCLIB files", {"--set", "--subdomains", "--threads", "--seeds", "--only", "--steps",
+                                       "--time-steps", "--at-step", "--max-sweeps"});
+  if (options.only == "run") refuse("--only run", {"--at-step", "--max-sweeps", "--max-seconds"});
+  if (options.only == "step") refuse("--only step", {"--steps", "--time-steps"});
 }
 
 }  // namespace
@@ -202,19 +238,23 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  app->add_option("--max-seconds", options.max_seconds, "of a solve")
+  app->add_option("--max-seconds", options.max_seconds, "of a solve of the one step, or of an FCLIB problem")
       ->type_name("S")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   app->add_option("--set", options.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);
+  app->callback([app, &options] { refuse_idle_options(*app, options); });
   return app;
 }
 
 int study_error_command(const StudyErrorOptions& options) {
   try {
     return fs::is_directory(options.subject) ? study_folder(options) : study_scene(options);
+  } catch (const std::invalid_argument& error) {  // a scene that ends sooner than its stages say
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_failure;

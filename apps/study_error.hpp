@@ -27,7 +27,8 @@ struct StudyErrorOptions {
   double max_seconds = 60;             ///< of a solve
 };
 
-/// Adds `error` to the command `study`; `options` must outlive the parsing.
+/// Adds `error` to the command `study`; `options` must outlive the parsing, which refuses options that would
+/// do nothing for the subject or with --only.
 CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options);
 
 /// Measures and writes the study (docs/formats.md). Progress and errors go to stderr. Returns an ExitCode;

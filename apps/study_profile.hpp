@@ -1,23 +1,19 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "apps/solve_table.hpp"
+
 namespace talus {
 
-/// One solve of one FCLIB problem.
+/// One solve of one FCLIB problem to a tolerance; times are elapsed ones, medians of the repetitions [s].
 struct ProfileRow {
-  std::string problem, method;
   double tolerance = 0;
-  std::int64_t contacts = 0, iterations = 0;
-  double seconds = 0;                  ///< of the solve, median of the repetitions [s]
-  double error = 0, scaled_error = 0;  ///< kernels/delassus.hpp
-  bool solved = false;
+  SolveRow solve;
 };
 
 /// Names of the methods for problems given by W.
@@ -28,17 +24,11 @@ std::vector<std::string> profile_methods();
 void check_profile(const std::filesystem::path& folder, std::span<const std::string> methods);
 
 /// Solves every FCLIB file of the folder (io::fclib_files) with every method and tolerance, in at most
-/// `max_seconds` each. A file that cannot be read is said and left out. Throws io::FileError when none can,
-/// std::invalid_argument when a method is not known.
-std::vector<ProfileRow> study_profile(const std::filesystem::path& folder,
-                                      std::span<const std::string> methods,
-                                      std::span<const double> tolerances, double max_seconds,
-                                      const std::function<void(const std::string&)>& say);
-
-/// Performance profile (Dolan and More 2002) of a method at a tolerance: points (ratio, part of the problems
-/// that it solved in at most ratio times the time of the fastest method at this tolerance), ratios ascending,
-/// each once. Problems that no method solved count as well.
-std::vector<std::array<double, 2>> performance_profile(std::span<const ProfileRow> rows,
-                                                       const std::string& method, double tolerance);
+/// `max_seconds` each, and appends the rows; `keep` is called behind each file. A file that cannot be read is
+/// said and left out. Throws io::FileError when none can, std::invalid_argument when a method is not known.
+void study_profile(const std::filesystem::path& folder, std::span<const std::string> methods,
+                   std::span<const double> tolerances, double max_seconds,
+                   const std::function<void(const std::string&)>& say, const std::function<void()>& keep,
+                   std::vector<ProfileRow>& rows);
 
 }  // namespace talus

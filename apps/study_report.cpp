@@ -140,11 +140,12 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyRepor
   const std::string subtitle =
       fmt::format("step {}: {} grains, {} contacts", reference.step, reference.bodies, reference.contacts);
   const std::string honesty = fmt::format(
-      " The reference was solved with {} to a residual of {:.1e}{}; with friction forces, and to a lesser "
-      "degree "
-      "velocities, are not unique, so that curves may level off above it.",
-      reference.method, reference.error_rms,
-      reference.converged ? "" : fmt::format(" ({:.1e} was wanted)", reference.tolerance));
+      " The reference was solved with {} to a residual of {:.1e} and a balance of {:.1e}{}; with friction "
+      "forces, and to a lesser degree velocities, are not unique, so that curves may level off above it.",
+      reference.method, reference.error_rms, reference.balance,
+      reference.converged ? ""
+                          : fmt::format(" ({:.1e} and {:.1e} were wanted)", reference.tolerance,
+                                        reference.balance_tolerance));
   const std::string residual_label = "residual: relative error of the contact law  [1]";
   const std::string velocity_label = "velocity error, kinetic norm, relative  [1]";
   const std::string seconds_label = "elapsed time of the iterations  [s]", sweeps_label = "sweeps  [1]";
@@ -194,7 +195,8 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyRepor
                           return std::array<double, 2>{r.seconds, r.velocity_error};
                         }),
             "How far the velocities that a solve hands back after a given time are from the reference, over "
-            "the larger of the velocities themselves and what the contacts changed in them." +
+            "the largest of the velocities themselves, what the contacts changed in them, and what a wall's "
+            "impulse would give to all grains." +
                 honesty);
   add_chart(report,
             solve_chart(study.truth, plan,
@@ -306,13 +308,19 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, StudyReport& repo
 void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
   io::CsvTable solves({"problem", "contacts", "method", "tolerance", "seconds", "iterations", "error",
                        "scaled_error", "solved"});
-  for (const ProfileRow& r : rows)
-    solves.row(r.problem, r.contacts, r.method, r.tolerance, r.seconds, r.iterations, r.error, r.scaled_error,
-               r.solved);
+  for (const auto& [tolerance, r] : rows)
+    solves.row(r.problem, static_cast<std::int64_t>(r.contacts), r.method, tolerance, r.seconds, r.iterations,
+               r.error, r.scaled_error, r.converged);
   io::CsvTable profile({"method", "tolerance", "ratio", "solved_part"});
   std::vector<std::string> methods;
   std::vector<double> tolerances;
-  for (const ProfileRow& r : rows) place_in(methods, r.method), place_in(tolerances, r.tolerance);
+  std::vector<std::vector<SolveRow>> solves_to;  // per tolerance
+  for (const auto& [tolerance, solve] : rows) {
+    place_in(methods, solve.method);
+    const std::size_t place = place_in(tolerances, tolerance);
+    solves_to.resize(tolerances.size());
+    solves_to[place].push_back(solve);
+  }
   io::Chart chart{.name = "profile",
                   .title = "Performance profile",
                   .subtitle = "part of the problems solved within a multiple of the fastest method's time",
@@ -327,30 +335,29 @@ void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
   io::HtmlTable table{{"method", "tolerance", "solved", "problems", "geometric mean of the times [s]"}, {}};
   double slowest = 1;
   for (const std::string& method : methods)
-    for (const double tolerance : tolerances)
-      for (const auto& point : performance_profile(rows, method, tolerance))
-        slowest = std::max(slowest, point[0]);
+    for (const std::vector<SolveRow>& solved : solves_to)
+      for (const auto& point : profile_of(solved, method)) slowest = std::max(slowest, point[0]);
   for (const std::string& method : methods)
-    for (const double tolerance : tolerances) {
-      auto points = performance_profile(rows, method, tolerance);
+    for (std::size_t t = 0; t < tolerances.size(); ++t) {
+      auto points = profile_of(solves_to[t], method);
       // All curves are drawn as far as the longest.
       if (!points.empty() && points.back()[0] < slowest) points.push_back({slowest, points.back()[1]});
-      for (const auto& [ratio, part] : points) profile.row(method, tolerance, ratio, part);
-      chart.series.push_back({fmt::format("{}, {:g}", method, tolerance),
+      for (const auto& [ratio, part] : points) profile.row(method, tolerances[t], ratio, part);
+      chart.series.push_back({fmt::format("{}, {:g}", method, tolerances[t]),
                               points,
                               place_in(methods, method),
-                              place_in(tolerances, tolerance),
-                              {{"method", method}, {"tolerance", cell(tolerance)}}});
+                              t,
+                              {{"method", method}, {"tolerance", cell(tolerances[t])}}});
       double logarithms = 0;
       int solved = 0, problems = 0;
-      for (const ProfileRow& r : rows) {
-        if (r.method != method || r.tolerance != tolerance) continue;
+      for (const SolveRow& r : solves_to[t]) {
+        if (r.method != method) continue;
         ++problems;
-        if (!r.solved) continue;
+        if (!r.converged) continue;
         ++solved;
         logarithms += std::log(r.seconds);
       }
-      table.rows.push_back({method, fmt::format("{:g}", tolerance), fmt::format("{}", solved),
+      table.rows.push_back({method, fmt::format("{:g}", tolerances[t]), fmt::format("{}", solved),
                             fmt::format("{}", problems),
                             solved > 0 ? fmt::format("{:.3g}", std::exp(logarithms / solved)) : "none"});
     }
@@ -367,51 +374,6 @@ void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
       std::move(table));
 }
 
-namespace {
-
-constexpr std::array<std::string_view, 9> table_names{
-    "residual.csv",       "true_error.csv",   "runs.csv",   "solves.csv", "profile.csv",
-    "strong_scaling.csv", "weak_scaling.csv", "hybrid.csv", "beside.csv"};
-constexpr std::array<std::string_view, 15> chart_names{"residual_seconds",
-                                                       "residual_sweeps",
-                                                       "velocity_seconds",
-                                                       "velocity_sweeps",
-                                                       "wall_forces_seconds",
-                                                       "velocity_residual",
-                                                       "run_stress_seconds",
-                                                       "run_position_seconds",
-                                                       "profile",
-                                                       "speedup",
-                                                       "efficiency",
-                                                       "efficiency_iterations",
-                                                       "efficiency_sweeps",
-                                                       "weak_efficiency",
-                                                       "hybrid"};
-constexpr std::array<std::string_view, 7> other_names{
-    "plot.gp", "report.html", "commands.sh", "slurm.sh", "strong.toml", "strong.csv", "traces/times.csv"};
-
-bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
-  return std::ranges::find(names, name) != names.end();
-}
-
-/// "weak-12.csv", "traces/strong-4-variant1-2.h5": a stem, numbers and dashes, an ending.
-bool is_of_scaling(std::string_view name) {
-  for (const std::string_view stem : {"weak-", "traces/strong-", "traces/weak-"}) {
-    if (!name.starts_with(stem)) continue;
-    const std::string_view rest = name.substr(stem.size()),
-                           ending = rest.substr(std::min(rest.find('.'), rest.size()));
-    const bool trace = stem.starts_with("traces/");
-    if (trace ? ending != ".h5" : ending != ".toml" && ending != ".csv") return false;
-    std::string numbers(rest.substr(0, rest.size() - ending.size()));
-    if (const std::size_t at = numbers.find("variant"); trace && at != std::string::npos)
-      numbers.erase(at, 7);
-    return !numbers.empty() && numbers.find_first_not_of("0123456789-") == std::string::npos;
-  }
-  return false;
-}
-
-}  // namespace
-
 void write_report(const std::filesystem::path& directory, const StudyReport& report) {
   for (const auto& [name, text] : report.tables) io::write_whole(directory / name, text);
   for (const io::Chart& chart : report.charts)
@@ -421,13 +383,29 @@ void write_report(const std::filesystem::path& directory, const StudyReport& rep
                   io::html_page(report.title, report.introduction, report.sections));
 }
 
-bool is_study_name(const std::filesystem::path& relative) {
+std::string whole_name(const std::filesystem::path& relative) {
   std::string name = relative.generic_string();
   if (name.ends_with(".part")) name.resize(name.size() - 5);
-  if (is_one_of(name, table_names) || is_one_of(name, other_names) || is_of_scaling(name)) return true;
-  return std::ranges::any_of(chart_names, [&](std::string_view chart) {
+  return name;
+}
+
+bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
+                    std::span<const std::string_view> charts) {
+  const auto is_chart = [&](std::string_view chart) {
     return name == std::string(chart) + ".svg" || name == std::string(chart) + ".gnuplot.svg";
-  });
+  };
+  return name == "plot.gp" || name == "report.html" || std::ranges::find(tables, name) != tables.end() ||
+         std::ranges::any_of(charts, is_chart);
+}
+
+bool is_study_error_name(const std::filesystem::path& relative) {
+  constexpr std::array<std::string_view, 5> tables{"residual.csv", "true_error.csv", "runs.csv", "solves.csv",
+                                                   "profile.csv"};
+  constexpr std::array<std::string_view, 9> charts{
+      "residual_seconds",   "residual_sweeps",      "velocity_seconds",
+      "velocity_sweeps",    "wall_forces_seconds",  "velocity_residual",
+      "run_stress_seconds", "run_position_seconds", "profile"};
+  return is_report_name(whole_name(relative), tables, charts);
 }
 
 }  // namespace talus

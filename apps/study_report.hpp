@@ -4,7 +4,9 @@
 /// each picture.
 
 #include <filesystem>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -34,8 +36,15 @@ void add_chart(StudyReport& report, io::Chart chart, const std::string& sentence
 /// Writes the tables, NAME.svg for every chart, plot.gp and report.html. Throws io::FileError.
 void write_report(const std::filesystem::path& directory, const StudyReport& report);
 
-/// True for the names that a study may have written: those of write_report, and the scenes, traces and
-/// scripts of `talus study scaling`.
-bool is_study_name(const std::filesystem::path& relative);
+/// A name relative to the directory of a study, without the ending of a file that is not finished.
+std::string whole_name(const std::filesystem::path& relative);
+
+/// True for the names of what write_report makes of `tables` (names of files) and `charts` (their names), and
+/// of what its plot.gp draws.
+bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
+                    std::span<const std::string_view> charts);
+
+/// True for the names of files that `talus study error` may have written.
+bool is_study_error_name(const std::filesystem::path& relative);
 
 }  // namespace talus

@@ -31,11 +31,13 @@ Outcome run_once(const StudySample& sample, const StudyPlan& plan, const StudyVa
   const double duration = static_cast<double>(plan.steps) * setup.stages.front().time_step;
   for (Stage& stage : setup.stages) {
     stage.time_step *= time_step;
-    if (stage.end.steps) stage.end.steps = std::llround(static_cast<double>(*stage.end.steps) / time_step);
+    if (stage.end.steps.value_or(0) > 0)
+      stage.end.steps =
+          std::max<std::int64_t>(1, std::llround(static_cast<double>(*stage.end.steps) / time_step));
   }
   setup.decomposition.subdomains = variant.subdomains;
+  setup.solver = at_tolerance(setup.solver, tolerance);
   setup.solver.method = io::solver_method(variant.method);
-  setup.solver.tolerance = tolerance;
   graph::Executor executor({.threads = variant.threads});
   Simulation simulation(setup, sample.bodies, executor);
   Outcome out;
@@ -86,7 +88,23 @@ double position_error(const Outcome& run, const Outcome& reference, const Bodies
 
 }  // namespace
 
-void study_runs(const StudySample& sample, const StudyPlan& plan, const Say& say, RunStudy& study) {
+std::string why_no_step(const io::Scene& scene, const StudyPlan& plan, double time_step) {
+  const std::vector<Stage>& stages = scene.setup.stages;
+  if (time_step > static_cast<double>(plan.steps))
+    return fmt::format(
+        "--time-steps {:g}: a run of {} steps of the scene has no step that long; raise --steps", time_step,
+        plan.steps);
+  for (const Stage& stage : stages)
+    if (stage.end.time && *stage.end.time < 0.5 * time_step * stage.time_step)
+      return fmt::format(
+          "--time-steps {:g}: stage '{}' ends after {:g} s, before half a step of {:g} s; choose a smaller "
+          "factor",
+          time_step, stage.name, *stage.end.time, time_step * stage.time_step);
+  return "";
+}
+
+void study_runs(const StudySample& sample, const StudyPlan& plan, const Say& say,
+                const std::function<void()>& keep, RunStudy& study) {
   const std::uint64_t seed = sample.scene.setup.seed;
   RunReference& row = study.references.emplace_back();
   StudyVariant finest{.method = "auto", .subdomains = 1, .threads = 1, .seed = seed};
@@ -96,6 +114,7 @@ void study_runs(const StudySample& sample, const StudyPlan& plan, const Say& say
   row.tolerance = 0.1 * plan.tolerances.back();
   row.time_step = plan.time_steps.back();
   StudySample patient = sample;
+  patient.scene.setup.solver = at_tolerance(patient.scene.setup.solver, plan.tolerances.back());
   patient.scene.setup.solver.max_iterations *= 4;
   const Outcome reference = run_once(patient, plan, finest, row.tolerance, row.time_step);
   row.steps = reference.steps;
@@ -121,12 +140,17 @@ void study_runs(const StudySample& sample, const StudyPlan& plan, const Say& say
                                 median(seconds), rms_difference(run.stress, reference.stress),
                                 position_error(run, reference, sample.bodies)});
           const RunRow& done = study.rows.back();
-          say(fmt::format("{}: {} sweeps, {:.3g} s, q/p off by {:.1e}, positions by {:.1e} d{}", name,
-                          done.sweeps, done.seconds, done.stress_error, done.position_error,
+          const auto off = [](const char* what, double error, const char* unit) {
+            return std::isnan(error) ? "" : fmt::format(", {} off by {:.1e}{}", what, error, unit);
+          };
+          say(fmt::format("{}: {} sweeps, {:.3g} s{}{}{}", name, done.sweeps, done.seconds,
+                          off("q/p", done.stress_error, ""), off("positions", done.position_error, " d"),
                           done.missed > 0 ? fmt::format(", {} steps missed", done.missed) : ""));
-        } catch (const RunawayError& error) {
+        } catch (const std::exception& error) {
           say(fmt::format("{} failed: {}", name, error.what()));
+          continue;
         }
+        keep();
       }
   }
 }

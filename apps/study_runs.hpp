@@ -40,9 +40,15 @@ struct RunStudy {
 /// Runs the beginning of the scene with every variant of its seed, tolerance and time step, and once with the
 /// smallest time step, a tenth of the smallest tolerance and four times the sweeps: the reference. The
 /// simulated time is that of `plan.steps` steps of the first stage, or the scene's. Stages that end after
-/// steps end after the same time. Adds to `study`.
+/// steps end after the same time. Adds to `study`; `keep` is called behind every run, of which one that fails
+/// is said and left out. Throws what Simulation throws for the reference.
 void study_runs(const StudySample& sample, const StudyPlan& plan,
-                const std::function<void(const std::string&)>& say, RunStudy& study);
+                const std::function<void(const std::string&)>& say, const std::function<void()>& keep,
+                RunStudy& study);
+
+/// Why runs of the scene with that factor of the time step would make no step, or a stage of them none: key
+/// and remedy; "" when they make some.
+std::string why_no_step(const io::Scene& scene, const StudyPlan& plan, double time_step);
 
 /// Rms difference of the references' q/p from one seed to another: an error below is lost in it. NaN with one
 /// seed, or without q/p.

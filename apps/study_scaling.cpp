@@ -3,12 +3,17 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -128,11 +133,24 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
   return plan;
 }
 
+/// Open MPI's mpirun refuses root unless told so; a container has no other user. What the user says stays.
+void let_root_run_ranks() {
+  if (::geteuid() != 0) return;
+  ::setenv("OMPI_ALLOW_RUN_AS_ROOT", "1", 0);
+  ::setenv("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1", 0);
+}
+
 class Study {
  public:
+  using Keep = std::function<void(const std::vector<ScalingRow>&)>;
+
+  /// `keep` is called with all rows whenever there are new ones.
   Study(const StudyScalingOptions& options, ScalingPlan plan, fs::path directory,
-        std::vector<RecordedTrace> recordings)
-      : plan_(std::move(plan)), directory_(std::move(directory)), recordings_(std::move(recordings)) {
+        std::vector<RecordedTrace> recordings, Keep keep)
+      : plan_(std::move(plan)),
+        directory_(std::move(directory)),
+        recordings_(std::move(recordings)),
+        keep_(std::move(keep)) {
     simulated_ = {options.smpi, options.smpirun};
     launcher_.talus = own_path();
     launcher_.mpirun = split_words(options.mpirun);
@@ -176,10 +194,7 @@ class Study {
     predict_from(traces.front());
   }
 
-  const std::vector<ScalingRow>& rows() {
-    relate(rows_);
-    return rows_;
-  }
+  const std::vector<ScalingRow>& rows() const { return rows_; }
   const ScalingLauncher& launcher() const { return launcher_; }
 
  private:
@@ -196,16 +211,25 @@ class Study {
     for (const int count : cores)
       for (const int ranks : rank_counts(count)) machines.push_back({count, ranks, count / ranks});
     std::vector<std::vector<RunTimes>> times(machines.size());
+    const std::size_t before = rows_.size();
     for (int repeat = 0; repeat < plan_.repeat; ++repeat)
-      for (std::size_t m = 0; m < machines.size(); ++m)
+      for (std::size_t m = 0; m < machines.size(); ++m) {
         times[m].push_back(run_once(launcher_, subject, machines[m]));
+        rows_.resize(std::max(rows_.size(), before + m + 1));
+        rows_[before + m] = row_of(subject, machines[m], times[m]);
+        keep();
+      }
     for (std::size_t m = 0; m < machines.size(); ++m) {
-      rows_.push_back(row_of(subject, machines[m], times[m]));
-      const ScalingRow& row = rows_.back();
+      const ScalingRow& row = rows_[before + m];
       say(fmt::format("{}, {} ranks x {} threads: {:.4g} s a step ({:.4g} - {:.4g}), {:.1f} iterations",
                       name_of(row.kind), row.ranks, row.threads, row.seconds, row.fastest, row.slowest,
                       row.iterations));
     }
+  }
+
+  void keep() {
+    relate(rows_);
+    keep_(rows_);
   }
 
   void simulate(const ScalingSubject& subject, int n, const ScalingNetwork& network) {
@@ -238,10 +262,12 @@ class Study {
   /// Of an earlier study, or recorded now.
   RunTimes recorded(const std::string& name, const fs::path& file, const ScalingTraces& traces) {
     const std::string steps = fmt::format("{}:{}", plan_.first, plan_.last);
-    for (const RecordedTrace& there : recordings_)
-      if (there.file == name && there.variant == traces.subject.variant && there.steps == steps &&
-          fs::exists(file))
-        return there.times;
+    for (const RecordedTrace& there : recordings_) {
+      if (there.file != name || !fs::exists(file)) continue;
+      if (there.variant == traces.subject.variant && there.steps == steps) return there.times;
+      say(fmt::format("{} was of steps {}{}: recorded anew", name, there.steps,
+                      there.variant.empty() ? "" : ", " + there.variant));
+    }
     const RunTimes times = record_once(launcher_, traces.subject, traces.subdomains, file);
     say(fmt::format("recorded {}: {:.4g} s a step, {:.1f} iterations", name, times.seconds,
                     times.iterations));
@@ -282,6 +308,7 @@ class Study {
           row.threads, row.network, name_of(row.source), row.seconds, row.iterations));
       rows_.push_back(row);
     }
+    keep();
   }
 
   ScalingPlan plan_;
@@ -289,12 +316,13 @@ class Study {
   ScalingLauncher launcher_;
   SimulatedLauncher simulated_;
   std::vector<RecordedTrace> recordings_;
+  Keep keep_;
   std::vector<ScalingRow> rows_;
 };
 
 /// Traces, and the scenes that those of weak scaling are of.
-bool is_study_name_but_recorded(const fs::path& relative) {
-  return is_study_name(relative) && *relative.begin() != "traces" &&
+bool is_name_but_recorded(const fs::path& relative) {
+  return is_study_scaling_name(relative) && *relative.begin() != "traces" &&
          !relative.generic_string().starts_with("weak-");
 }
 
@@ -322,19 +350,31 @@ void write_strong(const ScalingSample& sample, const fs::path& directory, bool r
   write_scaling_sample(sample, directory, "strong");
 }
 
+/// The scene with the overrides of a variant. Throws io::SceneError.
+io::Scene scene_of(const StudyScalingOptions& options, const std::string& variant) {
+  std::vector<std::string> overrides = options.overrides;
+  for (const std::string& word : split_words(variant)) overrides.push_back(word);
+  return io::load_scene(options.scene, overrides);
+}
+
+/// Rows of steps that missed their tolerance where the scene does not allow it.
+std::size_t rows_over_tolerance(const StudyScalingOptions& options, const std::vector<ScalingRow>& rows) {
+  const auto over = [&](const ScalingRow& row) {
+    return row.missed > 0 && !scene_of(options, row.variant).setup.allow_unconverged;
+  };
+  return static_cast<std::size_t>(std::ranges::count_if(rows, over));
+}
+
 int run_study(const StudyScalingOptions& options) {
   ScalingPlan plan;
   ScalingSample sample;
   std::vector<RecordedTrace> recordings;
   std::string directory = options.out, no_weak;
+  std::optional<io::DirectoryLock> lock;
   try {
     plan = plan_of(options);
-    const io::Scene scene = io::load_scene(options.scene, options.overrides);
-    for (const std::string& variant : plan.variants) {  // a mistake in it is heard of now
-      std::vector<std::string> overrides = options.overrides;
-      for (const std::string& word : split_words(variant)) overrides.push_back(word);
-      io::load_scene(options.scene, overrides);
-    }
+    const io::Scene scene = scene_of(options, "");
+    for (const std::string& variant : plan.variants) scene_of(options, variant);  // a mistake is heard of now
     no_weak = options.from.empty() ? why_not_weak(scene) : "it begins from results";
     if (!options.weak.empty() && !no_weak.empty())
       refuse(fmt::format("--weak: the sample cannot grow, since {}", no_weak));
@@ -344,8 +384,9 @@ int run_study(const StudyScalingOptions& options) {
     if (directory.empty()) directory = "out/scaling-" + sample.scene.name;
     if (options.reuse) recordings = read_recordings(fs::path(directory) / "traces" / "times.csv");
     write_strong(sample, directory, options.reuse, [&] {
-      io::prepare_output_directory(directory, options.force || options.reuse,
-                                   options.reuse ? is_study_name_but_recorded : is_study_name);
+      lock.emplace(
+          io::prepare_output_directory(directory, options.force || options.reuse,
+                                       options.reuse ? is_name_but_recorded : is_study_scaling_name));
     });
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
@@ -362,9 +403,19 @@ int run_study(const StudyScalingOptions& options) {
   report.record = plan.record;
   report.typical = plan.typical;
   report.quantile = plan.quantile;
-  Study study(options, plan, directory, std::move(recordings));
+  let_root_run_ranks();
+  Study study(options, plan, directory, std::move(recordings), [&](const std::vector<ScalingRow>& rows) {
+    report.rows = rows;
+    write_scaling_report(directory, report);
+  });
   const ScalingSubject subject{ScalingKind::strong, directory + "/strong.toml", "", sample.grains.size()};
   say(fmt::format("{}: {} grains, steps {} to {}", report.name, subject.grains, plan.first, plan.last));
+  if (!options.from.empty()) {
+    say(fmt::format("grains and walls are those of {}; radii {}", options.from,
+                    range_of_radii(sample.grains)));
+    if (const std::string other = other_sample(sample.scene, sample.grains); !other.empty())
+      say(fmt::format("warning: {} holds {}: is it the results of this scene?", options.from, other));
+  }
   report.commands = scaling_commands(study.launcher(), plan.strong, plan.repeat);
   write_scaling_report(directory, report);  // what a cluster needs is there at once
   fmt::print("{}", report.commands.lines);
@@ -383,10 +434,14 @@ int run_study(const StudyScalingOptions& options) {
   } else if (!options.no_weak) {
     say(fmt::format("no weak scaling: the sample cannot grow, since {}", no_weak));
   }
-  report.rows = study.rows();
-  write_scaling_report(directory, report);
   say(fmt::format("tables, pictures, traces and report.html in {}", directory));
-  return exit_done;
+  const std::size_t over = rows_over_tolerance(options, study.rows());
+  if (over == 0) return exit_done;
+  say(
+      fmt::format("{} of {} rows are of runs that missed the tolerance in some of the steps {} to {} (column "
+                  "missed); with --set allow_unconverged=true that is no error",
+                  over, study.rows().size(), plan.first, plan.last));
+  return exit_tolerance_missed;
 }
 
 }  // namespace
@@ -398,7 +453,8 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
   app->add_option("--out", options.out, "directory of the study [out/scaling-NAME]")->type_name("DIR");
   app->add_flag("--force", options.force, "replace an earlier study in the directory");
   app->add_flag("--reuse", options.reuse,
-                "the same, but play the traces again that it has recorded of the same scene");
+                "the same, but play the traces again that it has recorded of the same scene and steps; real "
+                "runs are made anew (--repeat 0: none)");
   app->add_option("--steps", options.steps, "steps that count, first and last")
       ->type_name("FIRST:LAST")
       ->capture_default_str();

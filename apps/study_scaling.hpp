@@ -42,7 +42,8 @@ struct StudyScalingOptions {
 CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options);
 
 /// Measures, predicts and writes the study (docs/formats.md). Progress and errors go to stderr, the commands
-/// to stdout. Returns an ExitCode.
+/// to stdout. Returns an ExitCode; exit_tolerance_missed when steps that count missed their tolerance and the
+/// scene does not allow it.
 int study_scaling_command(const StudyScalingOptions& options);
 
 }  // namespace talus

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -11,12 +10,15 @@
 
 #include "apps/exit_codes.hpp"
 
+#include "io/csv_table.hpp"
+#include "io/detail/svg.hpp"
 #include "io/output_directory.hpp"
 
 namespace talus {
 
 namespace {
 
+using io::detail::escaped;
 using stability::Outcome;
 using stability::Scene;
 using stability::Verdict;
@@ -30,10 +32,24 @@ bool is_stability_name(const std::filesystem::path& relative) {
 struct Row {
   Scene scene;
   Outcome outcome;
+  bool as_expected;
 };
 
-bool bad(Verdict verdict) {
-  return verdict == Verdict::wrong || verdict == Verdict::failed;
+std::string expectation(const Scene& scene) {
+  std::string text;
+  for (Verdict verdict : scene.expected) {
+    if (!text.empty()) text += " or ";
+    text += name_of(verdict);
+  }
+  return text;
+}
+
+/// Why the verdict is what it is, and what it should have been.
+std::string note(const Row& row) {
+  std::string text = row.outcome.why.data();
+  if (row.as_expected) return text;
+  if (!text.empty()) text += "; ";
+  return text + "EXPECTED: " + expectation(row.scene);
 }
 
 std::vector<Scene> chosen(const std::vector<std::string>& only) {
@@ -55,10 +71,14 @@ std::string number(double value, const char* none) {
   return value < 0 ? none : fmt::format("{:.1e}", value);
 }
 
-constexpr const char* table_row = "{:<33} {:>9} {:>8} {:>8} {:>8} {:>8} {:>5} {:>6} {:>7} {:>7}  {:<9} {}\n";
+std::string judged(const Outcome& outcome) {
+  return fmt::format("{}/{}", outcome.judged, outcome.steps);
+}
+
+constexpr const char* table_row = "{:<33} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>6} {:>7} {:>7}  {:<9} {}\n";
 
 std::string table_head() {
-  return fmt::format(table_row, "scene", "true", "rms", "balance", "energy", "overlap", "steps", "missed",
+  return fmt::format(table_row, "scene", "true", "rms", "balance", "energy", "overlap", "judged", "missed",
                      "sweeps", "seconds", "verdict", "");
 }
 
@@ -66,84 +86,67 @@ std::string table_line(const Row& row) {
   const Outcome& o = row.outcome;
   return fmt::format(table_row, row.scene.name, number(o.true_error, "-"), number(o.error_rms, "-"),
                      number(o.balance, "-"), number(o.energy_gained, "-"), number(o.penetration, "-"),
-                     o.steps, o.missed, o.iterations, fmt::format("{:.2f}", o.seconds), name_of(o.verdict),
-                     o.why.data());
-}
-
-std::string quoted(std::string text) {
-  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
-  return '"' + text + '"';
+                     judged(o), o.missed, o.iterations, fmt::format("{:.2f}", o.seconds), name_of(o.verdict),
+                     note(row));
 }
 
 std::string csv(const std::vector<Row>& rows) {
-  std::string text =
-      "scene,true_error,error_rms,balance,energy_gained,penetration,steps,missed,iterations,seconds,verdict,"
-      "why,asks\n";
+  io::CsvTable table({"scene", "true_error", "error_rms", "balance", "energy_gained", "penetration", "steps",
+                      "judged", "missed", "iterations", "seconds", "verdict", "expected", "why", "asks"});
   for (const Row& row : rows) {
     const Outcome& o = row.outcome;
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{:.3f},{},{},{}\n", row.scene.name,
-                        o.true_error < 0 ? "" : fmt::format("{}", o.true_error), o.error_rms, o.balance,
-                        o.energy_gained, o.penetration, o.steps, o.missed, o.iterations, o.seconds,
-                        name_of(o.verdict), quoted(o.why.data()), quoted(row.scene.asks));
+    table.row(row.scene.name, o.true_error < 0 ? "" : fmt::format("{}", o.true_error), o.error_rms, o.balance,
+              o.energy_gained, o.penetration, o.steps, o.judged, o.missed, o.iterations, o.seconds,
+              name_of(o.verdict), expectation(row.scene), o.why.data(), row.scene.asks);
   }
-  return text;
+  return table.text();
 }
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (char c : text) {
-    if (c == '<')
-      out += "&lt;";
-    else if (c == '&')
-      out += "&amp;";
-    else
-      out += c;
-  }
-  return out;
-}
+constexpr const char* page_head = R"(<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>Talus: stability</title>
+<style>
+body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:80rem;padding:0 1rem;color:#1a1a1a}
+table{border-collapse:collapse;font-variant-numeric:tabular-nums}
+th,td{padding:.25rem .6rem;border-bottom:1px solid #ddd;text-align:right;vertical-align:top}
+th{position:sticky;top:0;background:#fff}
+td:first-child,th:first-child,td:last-child,th:last-child{text-align:left}
+small{color:#555}
+.right,.certified{color:#1a6b2f}.honest{color:#8a5a00}.refused{color:#555}
+.wrong,.failed{color:#fff;background:#b00020}
+</style></head><body>
+<h1>Stability</h1>
+)";
+
+constexpr const char* page_legend = R"(<p><b>true</b>: error against the exact answer, of the step where
+it is largest against its bound; <b>rms</b>, <b>balance</b>: that step's certificate; <b>energy</b>: largest
+gain of a step that no load supplied, over the kinetic energy that it would reach without contacts;
+<b>overlap</b>: largest, over the smallest radius; <b>judged</b>: steps that are certified and were compared
+with an exact answer, of those made. The <b>bound</b> of a step is twice the largest of rms, balance and
+tolerance; where the exact answer is that of a sample at rest, how far the step begins from rest is added.
+Without restitution and correction of overlaps a step may gain twice its bound of energy.</p>
+<p><b>right</b>: every step is certified and judged, and within its bounds; <b>certified</b>: every step is
+certified, but not all of it is known to be right; <b>honest</b>: missed the tolerance and says so;
+<b>refused</b>: an error that names its cause; <b>WRONG</b>: certified, and further from the exact answer than
+its bound; <b>FAILED</b>: not a number, a crash, a hang.</p>
+<table><thead><tr><th>scene</th><th>true</th><th>rms</th><th>balance</th><th>energy</th><th>overlap</th>
+<th>judged</th><th>missed</th><th>sweeps</th><th>s</th><th>verdict</th></tr></thead><tbody>
+)";
 
 std::string html(const std::vector<Row>& rows, const std::string& summary) {
-  std::string text = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Talus: "
-      "stability</title>\n<style>\n"
-      "body{{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:80rem;padding:0 "
-      "1rem;color:#1a1a1a}}\n"
-      "table{{border-collapse:collapse;font-variant-numeric:tabular-nums}}\n"
-      "th,td{{padding:.25rem .6rem;border-bottom:1px solid #ddd;text-align:right;vertical-align:top}}\n"
-      "th{{position:sticky;top:0;background:#fff}}\n"
-      "td:first-child,th:first-child,td:last-child,th:last-child{{text-align:left}}\n"
-      "small{{color:#555}}\n"
-      ".right,.certified{{color:#1a6b2f}}.honest{{color:#8a5a00}}.refused{{color:#555}}"
-      ".wrong,.failed{{color:#fff;background:#b00020}}\n"
-      "</style></head><body>\n<h1>Stability</h1>\n<p>{}</p>\n"
-      "<p><b>true</b>: error against the exact answer, of the step where it is largest against the "
-      "certificate; "
-      "<b>rms</b>, <b>balance</b>: that step's certificate; <b>energy</b>: largest gain that no load "
-      "supplied, "
-      "over the largest kinetic energy of a step without contacts; <b>overlap</b>: largest, over the "
-      "smallest "
-      "radius. <b>right</b>: certified, and the true error is at most twice the certificate; "
-      "<b>certified</b>: "
-      "the truth is not known; <b>honest</b>: missed the tolerance and says so; <b>refused</b>: an error "
-      "that "
-      "names its cause; <b>WRONG</b>: certified, and it is not so; <b>FAILED</b>: not a number, a crash, a "
-      "hang.</p>\n<table><thead><tr><th>scene</th><th>true</th><th>rms</th><th>balance</th><th>energy</th>"
-      "<th>overlap</th><th>steps</th><th>missed</th><th>sweeps</th><th>s</th><th>verdict</th></tr></thead>"
-      "<tbody>\n",
-      escaped(summary));
+  std::string text = page_head + fmt::format("<p>{}</p>\n", escaped(summary)) + page_legend;
   for (const Row& row : rows) {
     const Outcome& o = row.outcome;
     std::string word(name_of(o.verdict)), style = word;
     std::transform(style.begin(), style.end(), style.begin(),
                    [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-    text += fmt::format(
-        "<tr><td>{}<br><small>{}</small></td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</"
-        "td>"
-        "<td>{}</td><td>{}</td><td>{:.2f}</td><td><span "
-        "class=\"{}\">{}</span><br><small>{}</small></td></tr>\n",
-        row.scene.name, escaped(row.scene.asks), number(o.true_error, ""), number(o.error_rms, ""),
-        number(o.balance, ""), number(o.energy_gained, ""), number(o.penetration, ""), o.steps, o.missed,
-        o.iterations, o.seconds, style, word, escaped(o.why.data()));
+    text += fmt::format("<tr><td>{}<br><small>{}</small></td>", row.scene.name, escaped(row.scene.asks));
+    for (const std::string& cell :
+         {number(o.true_error, ""), number(o.error_rms, ""), number(o.balance, ""),
+          number(o.energy_gained, ""), number(o.penetration, ""), judged(o), fmt::format("{}", o.missed),
+          fmt::format("{}", o.iterations), fmt::format("{:.2f}", o.seconds)})
+      text += "<td>" + cell + "</td>";
+    text += fmt::format("<td><span class=\"{}\">{}</span><br><small>{}</small></td></tr>\n", style, word,
+                        escaped(note(row)));
   }
   return text + "</tbody></table>\n</body></html>\n";
 }
@@ -181,7 +184,8 @@ int stability_command(const StabilityOptions& options) {
     fmt::print("{}", table_head());
     for (const Scene& scene : scenes) {
       std::fflush(nullptr);  // the process of the scene must not print again what waits here
-      rows.push_back({scene, run_scene_apart(scene, options.settings)});
+      const Outcome outcome = run_scene_apart(scene, options.settings);
+      rows.push_back({scene, outcome, as_expected(scene, outcome, options.settings)});
       fmt::print("{}", table_line(rows.back()));
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -190,9 +194,14 @@ int stability_command(const StabilityOptions& options) {
     io::write_whole(directory + "/stability.csv", csv(rows));
     io::write_whole(directory + "/stability.html", html(rows, summary));
     fmt::print(stderr, "talus: stability.csv and stability.html in {}\n", directory);
-    const bool sound =
-        std::none_of(rows.begin(), rows.end(), [](const Row& row) { return bad(row.outcome.verdict); });
-    return sound ? exit_done : exit_failure;
+    int code = exit_done;
+    for (const Row& row : rows)
+      if (!row.as_expected) {
+        fmt::print(stderr, "talus: error: scene '{}' is {}: {}\n", row.scene.name,
+                   name_of(row.outcome.verdict), note(row));
+        code = exit_failure;
+      }
+    return code;
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_failure;

@@ -16,8 +16,8 @@ struct StabilityOptions {
   bool list = false;   ///< print the names and what each asks, run nothing
 };
 
-/// Prints a row per scene as it ends, then writes both files. Returns the exit code: 0 when nothing is wrong
-/// or failed, 1 otherwise, 2 when no scene has such a name or the directory is refused.
+/// Prints a row per scene as it ends, then writes both files. Returns the exit code: 0 when every scene comes
+/// out as expected, 1 otherwise, 2 when no scene has such a name or the directory is refused.
 int stability_command(const StabilityOptions& options);
 
 }  // namespace talus

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "apps/sample_builder.hpp"
@@ -18,6 +19,23 @@ StudySample study_sample(const std::string& path, const std::vector<std::string>
   io::place_walls(sample.scene, grains);
   append(grains, sample.bodies);
   return sample;
+}
+
+SolverSettings at_tolerance(SolverSettings solver, double tolerance) {
+  solver.balance_tolerance *= std::min(1.0, tolerance / solver.tolerance);
+  solver.tolerance = tolerance;
+  return solver;
+}
+
+double most_steps(std::span<const Stage> stages) {
+  double sum = 0;
+  for (const Stage& stage : stages) {
+    double steps = std::numeric_limits<double>::infinity();
+    if (stage.end.steps) steps = static_cast<double>(*stage.end.steps);
+    if (stage.end.time) steps = std::min(steps, std::ceil(*stage.end.time / stage.time_step - 0.5));
+    sum += steps;
+  }
+  return sum;
 }
 
 std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> all) {

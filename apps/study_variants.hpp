@@ -39,6 +39,14 @@ struct StudySample {
 StudySample study_sample(const std::string& path, const std::vector<std::string>& overrides,
                          std::uint64_t seed);
 
+/// `solver` asked for another tolerance (> 0). Its balance_tolerance keeps its ratio to the tolerance, but
+/// becomes no looser: a residual that stiff samples meet early says little without it.
+SolverSettings at_tolerance(SolverSettings solver, double tolerance);
+
+/// Steps after which the stages have ended at the latest; infinite where one waits for a strain or an
+/// equilibrium alone.
+double most_steps(std::span<const Stage> stages);
+
 /// "nlgs, 12 subdomains, 2 threads, seed 1"; of the last three only those in which `all` differ.
 std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> all);
 

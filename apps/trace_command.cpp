@@ -43,6 +43,7 @@ std::uint32_t step_to_draw(const trace::Timeline& timeline, const TraceExportOpt
 }  // namespace
 
 int trace_export_command(const TraceExportOptions& options) {
+  std::string out, content;
   try {
     static const std::map<std::string, std::string> endings{
         {"perfetto", ".pftrace"}, {"paje", ".paje"}, {"svg", ".svg"}};
@@ -50,24 +51,28 @@ int trace_export_command(const TraceExportOptions& options) {
     if (ending == endings.end())
       throw std::invalid_argument(
           fmt::format("there is no format '{}': perfetto, paje or svg", options.format));
-    const std::string out =
-        options.out.empty() ? std::filesystem::path(options.file).replace_extension(ending->second).string()
-                            : options.out;
-    io::check_output_file(options.file, out);
+    out = options.out.empty() ? std::filesystem::path(options.file).replace_extension(ending->second).string()
+                              : options.out;
+    io::check_output_files({options.file}, {out}, options.force);
     const trace::Trace trace = io::read_trace(options.file);
     const trace::Timeline timeline(trace);
     io::TraceWindow window{options.step, options.iteration};
     if (options.step || options.iteration || options.format == "svg")
       window.step = step_to_draw(timeline, options);
-    const std::string content = options.format == "perfetto" ? io::to_perfetto(trace, window)
-                                : options.format == "paje"   ? io::to_paje(trace, window)
-                                                             : io::draw_gantt(timeline, window);
-    io::write_whole(out, content);
-    fmt::print(stderr, "talus: {} written\n", out);
+    content = options.format == "perfetto" ? io::to_perfetto(trace, window)
+              : options.format == "paje"   ? io::to_paje(trace, window)
+                                           : io::draw_gantt(timeline, window);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   }
+  try {
+    io::write_whole(out, content);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_failure;
+  }
+  fmt::print(stderr, "talus: {} written\n", out);
   return exit_done;
 }
 

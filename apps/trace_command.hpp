@@ -16,6 +16,7 @@ struct TraceExportOptions {
   std::string out;                        ///< empty: the trace's name with another ending
   std::optional<std::uint32_t> step;      ///< one step only
   std::optional<std::int32_t> iteration;  ///< one epoch of that step's loop only
+  bool force = false;                     ///< replace a file that is there
 };
 
 /// `talus trace show`: where the time of a trace went. Returns an ExitCode.

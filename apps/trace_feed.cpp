@@ -32,7 +32,7 @@ StepRange parse_steps(const std::string& text, const std::string& option) {
   return range;
 }
 
-TraceFeed::TraceFeed(const std::string& directory, StepRange steps, int threads,
+TraceFeed::TraceFeed(const std::string& directory, StepRange steps, bool own_caches, int threads,
                      const graph::Communicator& ranks)
     : directory_(directory),
       ranks_(ranks),
@@ -40,6 +40,7 @@ TraceFeed::TraceFeed(const std::string& directory, StepRange steps, int threads,
                  .threads = threads,
                  .first_step = steps.first,
                  .last_step = steps.last,
+                 .own_caches = own_caches,
                  .sink =
                      [this](trace::Block&& block) {
                        executor_->submit_background(
@@ -70,7 +71,6 @@ void TraceFeed::finish(graph::Executor& executor) {
   clock_.offsets[1] = {reading.time, reading.offset};
   recorder_.finish();
   executor.drain();
-  writer_.append(recorder_.rank(), recorder_.tasks());
   writer_.append(clock_);
   double written[1] = {1};
   ranks_.max(written);  // every rank's file is whole

@@ -22,14 +22,16 @@ StepRange parse_steps(const std::string& text, const std::string& option = "--tr
 /// The way of a trace from the recorder to DIR/trace.h5: full buffers are written on the executor's
 /// background lane. Each rank writes a file of its own, which rank 0 puts together in the end.
 ///
-///     TraceFeed feed(directory, steps, threads, ranks);
+///     TraceFeed feed(directory, steps, false, threads, ranks);
 ///     Executor executor({.threads = threads, .trace = &feed.recorder()});
 ///     feed.start(executor);
 ///     ... steps ...
 ///     feed.finish(executor);
 class TraceFeed {
  public:
-  TraceFeed(const std::string& directory, StepRange steps, int threads, const graph::Communicator& ranks);
+  /// `own_caches`: RecorderOptions has it.
+  TraceFeed(const std::string& directory, StepRange steps, bool own_caches, int threads,
+            const graph::Communicator& ranks);
   ~TraceFeed();
   TraceFeed(const TraceFeed&) = delete;
   TraceFeed& operator=(const TraceFeed&) = delete;

@@ -53,6 +53,8 @@ Number number(std::string_view field, std::string_view column, const Place& plac
   const char* const first = field.data() + (field.starts_with('+') ? 1 : 0);  // from_chars takes no plus sign
   const char* const last = field.data() + field.size();
   const auto [end, error] = std::from_chars(first, last, value);
+  if (error == std::errc::result_out_of_range && end == last)
+    place.fail(column, fmt::format("{} is out of the range of numbers", field));
   if (error != std::errc{} || end != last)
     place.fail(column,
                fmt::format("'{}' is not {}", field, std::is_integral_v<Number> ? "an integer" : "a number"));
@@ -87,6 +89,9 @@ Sample read_bodies(const std::string& path, double density, bool turns) {
   Place place{path, 0};
   for (std::string text; std::getline(in, text);) {
     ++place.line;
+    // Spreadsheets mark a text as UTF-8 by three bytes before it.
+    constexpr std::string_view mark = "\xef\xbb\xbf";
+    if (place.line == 1 && text.starts_with(mark)) text.erase(0, mark.size());
     const std::string_view line = trimmed(text);
     if (line.empty() || line.front() == '#') continue;
     if (count == 0) {

@@ -13,9 +13,6 @@
 namespace talus::io {
 namespace {
 
-constexpr std::size_t flush_bytes = 32 * 1024;
-constexpr std::chrono::milliseconds flush_interval{500};
-
 using detail::put;
 
 /// One column: its name and how a row's value is written. The tables below drive both the header and the
@@ -158,20 +155,15 @@ CsvFile::~CsvFile() {
   }
 }
 
-void CsvFile::commit() {
-  if (pending_.size() >= flush_bytes || std::chrono::steady_clock::now() - last_flush_ >= flush_interval)
-    flush();
-}
-
 void CsvFile::flush() {
+  if (pending_.empty()) return;
   // Emptied first: lines that failed are not tried again, lest half of them appear twice.
   const std::string lines = std::exchange(pending_, {});
   file_.write(lines);
-  last_flush_ = std::chrono::steady_clock::now();
 }
 
 void CsvFile::close() {
-  if (!pending_.empty()) flush();
+  flush();
   file_.close();
 }
 

@@ -3,7 +3,6 @@
 /// The tables of a run: steps.csv, walls.csv, triaxial.csv, error_history.csv (columns and units:
 /// docs/formats.md).
 
-#include <chrono>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -27,10 +26,8 @@ void append_walls_row(std::string& text, const StepReport& report, const WallRep
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
 void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check);
 
-/// A file that grows by whole lines.
-/// commit() hands lines to the system when half a second has passed since the last time, or 32 KiB have
-/// gathered, always up to the end of a line: a killed run leaves a table that lacks at most the lines of half
-/// a second (a kill in the middle of a write may cut one). A call costs no system call otherwise.
+/// A file that grows by whole lines: what a killed run leaves lacks those that were not flushed (a kill in
+/// the middle of a write may cut one).
 class CsvFile {
  public:
   /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.
@@ -38,11 +35,9 @@ class CsvFile {
   /// Writes what is left. A failure cannot be told from here: call close() to hear of it.
   ~CsvFile();
 
-  /// Place to append whole lines; call commit() after them.
+  /// Place to append whole lines.
   std::string& pending() { return pending_; }
-  /// Hands over the pending lines if it is time. Throws FileError.
-  void commit();
-  /// Hands over the pending lines. Throws FileError.
+  /// Hands the pending lines to the system. Throws FileError.
   void flush();
   /// Flushes and closes. Throws FileError.
   void close();
@@ -50,7 +45,6 @@ class CsvFile {
  private:
   detail::Descriptor file_;
   std::string pending_;
-  std::chrono::steady_clock::time_point last_flush_;
 };
 
 }  // namespace talus::io

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "io/detail/fclib_file.hpp"
+#include "io/detail/hdf5_read.hpp"
 #include "io/error.hpp"
 #include "io/output_directory.hpp"
 
@@ -100,6 +101,18 @@ GlobalProblem read_global(hid_t file, const std::string& path) {
   return p;
 }
 
+/// Results and traces, which stand beside the problems that a run has dumped. A file that cannot be read is
+/// none of them: whoever reads it next says what is wrong with it.
+bool belongs_to_a_run(const std::filesystem::path& path) {
+  const detail::QuietHdf5 quiet;
+  try {
+    const detail::Hdf5Object file = detail::open_file(path.string(), H5F_ACC_RDONLY);
+    return detail::read_text({file.id(), path.string()}, "format").starts_with("talus-");
+  } catch (const FileError&) {
+    return false;
+  }
+}
+
 /// Makes the group `name` and lets `fill` write into it.
 template <class Fill>
 void write_group(hid_t place, const std::string& path, const char* name, Fill&& fill) {
@@ -163,11 +176,13 @@ std::vector<FclibFile> fclib_files(const std::filesystem::path& path) {
   std::vector<FclibFile> files;
   for (const auto& entry : std::filesystem::directory_iterator(path)) {
     const auto extension = entry.path().extension();
-    if (entry.is_regular_file() && (extension == ".hdf5" || extension == ".h5"))
+    if (entry.is_regular_file() && (extension == ".hdf5" || extension == ".h5") &&
+        !belongs_to_a_run(entry.path()))
       files.push_back({entry.path(), entry.path().filename().string()});
   }
   if (files.empty())
-    throw FileError(path.string(), "holds no .hdf5 or .h5 file; give a problem or a folder of problems");
+    throw FileError(path.string(),
+                    "holds no FCLIB problem (.hdf5, .h5); give a problem or a folder of problems");
   std::ranges::sort(files, {}, &FclibFile::path);
   std::map<std::filesystem::path, int> stems;
   for (const FclibFile& file : files) ++stems[file.path.stem()];
@@ -197,7 +212,7 @@ FclibSolution fclib_solution(const FclibProblem& problem, std::span<const double
 
 void write_fclib_solution(const std::filesystem::path& input, const std::filesystem::path& out,
                           const FclibSolution& solution) {
-  check_output_file(input, out);
+  check_output_files({input}, {out}, true);
   write_by_draft(out, [&](const std::filesystem::path& draft) {
     std::filesystem::copy_file(input, draft, std::filesystem::copy_options::overwrite_existing);
     // Problems are often read-only, and a copy keeps that.
@@ -214,7 +229,7 @@ void write_fclib_solution(const std::filesystem::path& input, const std::filesys
 
 void write_fclib(const DelassusProblem& problem, const FclibSolution& solution, const FclibInfo& info,
                  const std::filesystem::path& out) {
-  check_output_file({}, out);
+  check_output_files({}, {out}, true);
   const auto size = static_cast<std::size_t>(problem.dimension);
   std::vector<double> q, mu;
   for (std::size_t c = 0; c < problem.contacts(); ++c) {

@@ -33,8 +33,8 @@ struct FclibFile {
   std::string name;  ///< of the file, without its ending where no other problem has the same
 };
 
-/// The .hdf5 and .h5 files of a folder, sorted; or the file that `path` names. Throws FileError when a folder
-/// holds none.
+/// The .hdf5 and .h5 files of a folder, sorted, but for results and traces of runs; or the file that `path`
+/// names. Throws FileError when a folder holds none.
 std::vector<FclibFile> fclib_files(const std::filesystem::path& path);
 
 /// What a file's /solution holds, in its dimension (2 or 3 values per contact).

@@ -1,14 +1,17 @@
 #include "io/output_directory.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <cstdlib>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "io/detail/descriptor.hpp"
@@ -50,7 +53,7 @@ bool is_dump(std::string_view name) {
 std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
   std::vector<fs::path> found;
   for (const fs::path& folder : {directory, directory / "fields", directory / "traces"}) {
-    if (!fs::is_directory(folder)) continue;
+    if (!fs::is_directory(folder) || (folder != directory && fs::is_symlink(folder))) continue;
     for (const auto& entry : fs::directory_iterator(folder)) {
       if (entry.is_symlink() || !entry.is_regular_file()) continue;
       const fs::path relative = entry.path().lexically_relative(directory);
@@ -81,12 +84,29 @@ bool is_partition_name(const fs::path& relative) {
   });
 }
 
-void prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours) {
+DirectoryLock::DirectoryLock(const fs::path& directory)
+    : descriptor_(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ < 0 || ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  ::close(descriptor_);
+  throw FileError(directory.string(),
+                  "another run is writing there; wait for its end, or choose another directory with --out");
+}
+
+DirectoryLock::DirectoryLock(DirectoryLock&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+DirectoryLock::~DirectoryLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+DirectoryLock prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours) {
   try {
     if (fs::exists(directory) && !fs::is_directory(directory)) {
       throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
     }
-    if (fs::exists(directory) && !fs::is_empty(directory)) {
+    fs::create_directories(directory);
+    DirectoryLock lock(directory);
+    if (!fs::is_empty(directory)) {
       if (!force) {
         throw FileError(
             directory.string(),
@@ -95,14 +115,13 @@ void prepare_output_directory(const fs::path& directory, bool force, IsOutputNam
       }
       for (const fs::path& relative : former_outputs(directory, is_ours)) fs::remove(directory / relative);
     }
-    fs::create_directories(directory);
+    // Asked before the run starts, not an hour later when the first file is written.
+    if (::access(directory.c_str(), W_OK | X_OK) != 0)
+      throw FileError(directory.string(), "cannot write into this directory: " + detail::last_error());
+    return lock;
   } catch (const fs::filesystem_error& error) {
     const fs::path& culprit = error.path1().empty() ? directory : error.path1();
     throw FileError(culprit.string(), "cannot prepare the directory of the run: " + error.code().message());
-  }
-  // Asked before the run starts, not an hour later when the first file is written.
-  if (::access(directory.c_str(), W_OK | X_OK) != 0) {
-    throw FileError(directory.string(), "cannot write into this directory: " + detail::last_error());
   }
 }
 
@@ -120,15 +139,27 @@ ScratchFolder::~ScratchFolder() {
   fs::remove_all(path_, ignored);
 }
 
-void check_output_file(const fs::path& input, const fs::path& out) {
+void check_output_files(const std::vector<fs::path>& inputs, const std::vector<fs::path>& outs, bool force) {
   std::error_code error;
-  if (fs::equivalent(input, out, error))
-    throw FileError(out.string(), "is what is read, and would be overwritten; give another name");
-  if (fs::is_directory(out, error)) throw FileError(out.string(), "is a folder; give the name of a file");
-  const fs::path folder = fs::absolute(out).parent_path();
-  if (!fs::is_directory(folder, error))
-    throw FileError(out.string(),
-                    "cannot be written, there is no folder " + folder.string() + "; make it first");
+  std::vector<fs::path> places;
+  for (const fs::path& out : outs) {
+    if (out.empty()) continue;
+    for (const fs::path& input : inputs)
+      if (fs::equivalent(input, out, error))
+        throw FileError(out.string(), "is what is read, and would be overwritten; give another name");
+    if (fs::is_directory(out, error)) throw FileError(out.string(), "is a folder; give the name of a file");
+    const fs::path folder = fs::absolute(out).parent_path();
+    if (!fs::is_directory(folder, error))
+      throw FileError(out.string(),
+                      "cannot be written, there is no folder " + folder.string() + "; make it first");
+    if (fs::exists(out, error) && !fs::is_regular_file(out, error))
+      throw FileError(out.string(), "is no regular file; give the name of a file");
+    if (!force && fs::exists(out, error))
+      throw FileError(out.string(), "exists; give another name, or replace it with --force");
+    places.push_back(fs::weakly_canonical(out, error));
+    if (std::ranges::count(places, places.back()) > 1)
+      throw FileError(out.string(), "is asked for twice; give every output a name of its own");
+  }
 }
 
 void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {

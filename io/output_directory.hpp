@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <vector>
 
 #include "io/write_text.hpp"
 
@@ -20,12 +21,27 @@ bool is_output_name(const std::filesystem::path& relative);
 /// The same for the files of `talus partition`: partition_NAME.vtp and partition_NAME.svg.
 bool is_partition_name(const std::filesystem::path& relative);
 
-/// Makes `directory` (and its parents) ready for a run.
+/// A directory as long as a run writes there. The system takes the lock away when the process ends, however
+/// it ends, and nothing is left in the directory.
+class DirectoryLock {
+ public:
+  /// Throws FileError when another holds the lock. Where a file system has no such locks there is none.
+  explicit DirectoryLock(const std::filesystem::path& directory);
+  DirectoryLock(DirectoryLock&& other) noexcept;
+  DirectoryLock& operator=(DirectoryLock&&) = delete;
+  ~DirectoryLock();
+
+ private:
+  int descriptor_ = -1;
+};
+
+/// Makes `directory` (and its parents) ready for a run, which holds the lock until it has written all.
 /// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
-/// only files that `is_ours` knows are removed; whatever else the user keeps there stays. Throws
-/// FileError naming the directory when it is refused, is not a directory, or cannot be created or written to.
-void prepare_output_directory(const std::filesystem::path& directory, bool force,
-                              IsOutputName is_ours = is_output_name);
+/// only files that `is_ours` knows are removed; whatever else the user keeps there stays, and so do symbolic
+/// links and what is behind them. Throws FileError naming the directory when it is refused, when another run
+/// is writing there, or when it is not a directory, or cannot be created or written to.
+DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
+                                       IsOutputName is_ours = is_output_name);
 
 /// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.
 class ScratchFolder {
@@ -41,9 +57,11 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Throws FileError when `out` cannot be meant as a file to write: it is the input itself (under whatever
-/// name), or a folder, or its folder is not there. To be asked before long work.
-void check_output_file(const std::filesystem::path& input, const std::filesystem::path& out);
+/// Throws FileError when one of `outs` cannot be meant as a file to write: it is one of the inputs or of the
+/// other outs (under whatever name), no regular file, or a file that is there already and `force` is false,
+/// or its folder is not there. Empty names are passed over. To be asked before long work.
+void check_output_files(const std::vector<std::filesystem::path>& inputs,
+                        const std::vector<std::filesystem::path>& outs, bool force);
 
 /// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
 /// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.

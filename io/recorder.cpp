@@ -70,13 +70,10 @@ void Recorder::record_step(const StepReport& report, std::span<const WallReport>
                            const std::optional<TriaxialReport>& triaxial) {
   if (ranks_.rank() != 0) return;
   append_steps_row(steps_->pending(), report);
-  steps_->commit();
   for (const WallReport& wall : walls) append_walls_row(wall_rows_->pending(), report, wall);
-  wall_rows_->commit();
   if (!triaxial) return;
   if (!triaxial_) triaxial_.emplace(directory_ / "triaxial.csv", triaxial_csv_header());
   append_triaxial_row(triaxial_->pending(), *triaxial);
-  triaxial_->commit();
   if (options_.pictures) curve_.add(*triaxial);
 }
 
@@ -84,7 +81,11 @@ void Recorder::record_errors(std::int64_t step, std::span<const Iteration::Check
   if (checks.empty() || ranks_.rank() != 0) return;
   if (!errors_) errors_.emplace(directory_ / "error_history.csv", error_history_csv_header());
   for (const Iteration::Check& check : checks) append_error_history_row(errors_->pending(), step, check);
-  errors_->commit();
+}
+
+void Recorder::flush() {
+  for (std::optional<CsvFile>* table : {&steps_, &wall_rows_, &triaxial_, &errors_})
+    if (*table) (*table)->flush();
 }
 
 void Recorder::record_frame(Frame&& frame) {

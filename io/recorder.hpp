@@ -2,11 +2,11 @@
 
 /// Everything that a run leaves behind, in one place (docs/formats.md has the list of files).
 ///
-///     Recorder recorder(directory, options, setup, provenance);        // run.json says "running"
-///     recorder.record_step(report, wall_reports, triaxial);            // every step: a line in each table
-///     recorder.record_frame(std::move(frame));                         // now and then: results.h5, fields,
-///     pictures recorder.finish(summary);                                        // the last lines; run.json
-///     says what came of it
+///     Recorder recorder(directory, options, setup, provenance);  // run.json says "running"
+///     recorder.record_step(report, wall_reports, triaxial);  // every step: a line in each table
+///     recorder.flush();                                      // now and then: the lines go to the system
+///     recorder.record_frame(std::move(frame));               // now and then: results.h5, fields, pictures
+///     recorder.finish(summary);                              // run.json says what came of it
 ///
 /// Not locked: calls come one after the other, from one thread at a time (the service lane of the graph runs
 /// beside the steps and is such a thread). HDF5 allows no other thread in it meanwhile.
@@ -72,6 +72,9 @@ class Recorder {
 
   /// A line in error_history.csv per check; the file appears with its first line.
   void record_errors(std::int64_t step, std::span<const Iteration::Check> checks);
+
+  /// Hands the lines so far to the system: a run that is killed later has them.
+  void flush();
 
   /// Writes a state, of which each rank has its part, and lets go of it. Throws std::invalid_argument when
   /// its arrays do not fit together.

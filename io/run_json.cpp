@@ -89,6 +89,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"unconverged_steps", s.unconverged_steps},
       {"worst_error_rms", s.worst_error_rms},
       {"worst_balance", s.worst_balance},
+      {"worst_penetration", s.worst_penetration},
       {"iterations", s.iterations},
       {"wall_s", s.wall_s},
       {"bodies", s.bodies},

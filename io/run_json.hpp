@@ -39,22 +39,24 @@ Provenance collect_provenance();
 /// What came of the run.
 struct Summary {
   std::string status = "running";  ///< "running", "done", "failed" or "stopped"
-  std::string message;             ///< why it failed or stopped
+  std::string message;             ///< why it failed or stopped, or what was left undone
   int exit_code = 0;
   std::int64_t steps = 0;
   double time = 0;                      ///< [s] simulated
   std::optional<std::uint64_t> digest;  ///< talus::digest of the final state, as 16 hexadecimal digits
   std::int64_t converged_steps = 0;
   std::int64_t unconverged_steps = 0;
-  double worst_error_rms = 0;   ///< over all steps
-  double worst_balance = 0;     ///< over all steps
-  std::int64_t iterations = 0;  ///< over all steps
-  double wall_s = 0;            ///< elapsed [s]
+  double worst_error_rms = 0;    ///< over all steps
+  double worst_balance = 0;      ///< over all steps
+  double worst_penetration = 0;  ///< over all steps, in smallest radii
+  std::int64_t iterations = 0;   ///< over all steps
+  double wall_s = 0;             ///< elapsed [s]
   std::size_t bodies = 0;
   std::size_t frames = 0;  ///< output times
 };
 
-/// The text of run.json. Without a digest, as long as it runs and when it failed, that is null.
+/// The text of run.json. Without a digest, as long as it runs and when it failed, that is null; so are
+/// numbers that are not finite.
 std::string run_json(const Provenance& provenance, const Summary& summary);
 
 /// Writes run.json whole (write_whole). Throws FileError.

@@ -40,8 +40,7 @@ class SceneReader {
     read_stages();
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
-    read_table(table_at(root_, "decomposition"), "decomposition", keys_.decomposition, {},
-               scene_.setup.decomposition);
+    read_decomposition();
     read_table(table_at(root_, "output"), "output", keys_.output, {}, scene_.output);
     if (scene_.output.directory.empty()) scene_.output.directory = "out/" + scene_.name;
     return std::move(scene_);
@@ -235,6 +234,22 @@ class SceneReader {
       in_force[index] = load.second;
       stage.loads.push_back(std::move(load));
     }
+  }
+
+  void read_decomposition() {
+    DecompositionSettings& settings = scene_.setup.decomposition;
+    const toml::table& table = table_at(root_, "decomposition");
+    read_table(table, "decomposition", keys_.decomposition, {}, settings);
+    const auto& [x, y, z] = settings.boxes;
+    const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
+    if (boxes == 0) return;
+    if (boxes > most_subdomains || (settings.subdomains > 0 && boxes != settings.subdomains))
+      fail_at(*table.get("boxes"), "decomposition.boxes",
+              fmt::format("{} x {} x {} boxes are not {} subdomains", x, y, z,
+                          settings.subdomains > 0 ? fmt::format("{}", settings.subdomains)
+                                                  : fmt::format("at most {}", most_subdomains)));
+    settings.subdomains = static_cast<int>(boxes);
+    if (settings.partitioner == PartitionKind::automatic) settings.partitioner = PartitionKind::boxes;
   }
 
   void read_end(const toml::table& table, const std::string& path, Stage& stage,

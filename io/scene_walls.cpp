@@ -40,8 +40,7 @@ double automatic_position(const Wall& wall, int axis, const SampleSpec& sample, 
 }
 
 void give_mass(WallLoad& load, double mass) {
-  const bool pushed = load.drive == WallDrive::pressure || load.drive == WallDrive::force;
-  if (pushed && load.mass == 0) load.mass = mass;
+  if (load.pushed() && load.mass == 0) load.mass = mass;
 }
 
 }  // namespace

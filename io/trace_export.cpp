@@ -118,6 +118,29 @@ void in_order(const trace::Lane& lane, const TraceWindow& window, Begin begin, E
   for (; !open.empty(); open.pop_back()) end(*open.back());
 }
 
+/// Numbers the messages that somebody waited for, by their records at both ends: of several of one name in an
+/// epoch the last that was sent by the end of the wait. Others have no end that is known, which the format
+/// wants.
+std::unordered_map<const Record*, std::size_t> links_of(const trace::Trace& trace,
+                                                        const TraceWindow& window) {
+  const auto each = [&](trace::Kind kind, const auto& use) {
+    for (const trace::Lane& lane : trace.lanes)
+      for (const Record& record : lane.records)
+        if (record.kind() == kind && window.shows(record)) use(record);
+  };
+  std::unordered_map<std::uint64_t, std::vector<const Record*>> sent;
+  each(trace::kind_send, [&](const Record& record) { sent[flow_of(record)].push_back(&record); });
+  std::unordered_map<const Record*, std::size_t> links;
+  each(trace::kind_receive, [&](const Record& record) {
+    const Record* last = nullptr;
+    for (const Record* const send : sent[flow_of(record)])
+      if (static_cast<double>(send->begin) <= record.end() && (!last || send->begin >= last->begin))
+        last = send;
+    if (last && links.try_emplace(last, links.size()).second) links[&record] = links[last];
+  });
+  return links;
+}
+
 }  // namespace
 
 bool TraceWindow::shows(const Record& record) const {
@@ -284,21 +307,25 @@ std::string to_paje(const trace::Trace& trace, const TraceWindow& window) {
     std::string text;
   };
   std::vector<Happening> happenings;
+  const std::unordered_map<const Record*, std::size_t> links = links_of(trace, window);
+  const auto link = [&](char event, double time, const std::string& here, const Record& r) {
+    if (const auto found = links.find(&r); found != links.end())
+      happenings.push_back(
+          {time, fmt::format("{} {:.9f} message all m {} {}", event, time, here, found->second)});
+  };
   const auto start = static_cast<double>(first_begin(trace, window));
   for (const trace::Lane& lane : trace.lanes) {
     const std::string here = fmt::format("r{}t{}", lane.rank, lane.thread);
     const auto begin = [&](const Record& r) {
       const double time = 1e-9 * (static_cast<double>(r.begin) - start);
-      if (r.kind() == trace::kind_send)
-        happenings.push_back({time, fmt::format("7 {:.9f} message all m {} {:x}", time, here, flow_of(r))});
+      if (r.kind() == trace::kind_send) link('7', time, here, r);
       happenings.push_back(
           {time, fmt::format("5 {:.9f} task {} k{}", time, here, static_cast<int>(r.kind()))});
     };
     const auto end = [&](const Record& r) {
       const double time = 1e-9 * (r.end() - start);
       happenings.push_back({time, fmt::format("6 {:.9f} task {}", time, here)});
-      if (r.kind() == trace::kind_receive)
-        happenings.push_back({time, fmt::format("8 {:.9f} message all m {} {:x}", time, here, flow_of(r))});
+      if (r.kind() == trace::kind_receive) link('8', time, here, r);
     };
     in_order(lane, window, begin, end);
   }

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <stdexcept>
+#include <type_traits>
 
 #include "io/detail/hdf5_read.hpp"
 #include "io/detail/hdf5_write.hpp"
@@ -98,6 +99,45 @@ void write_plan(Place place, const trace::Plan& plan) {
   write_array(place, "messages", "1, 1, byte", messages);
 }
 
+/// Numbers of a machine by name, for both ways: use(name, member).
+template <class Machine, class Use>
+void each_number(Machine& machine, const Use& use) {
+  use("latency", machine.latency);
+  use("bandwidth", machine.bandwidth);
+  use("overhead", machine.overhead);
+  use("ranks_per_node", machine.ranks_per_node);
+  use("node_latency", machine.node_latency);
+  use("node_bandwidth", machine.node_bandwidth);
+  use("line", machine.line);
+  use("noise", machine.noise);
+  use("seed", machine.seed);
+  use("speed", machine.speed);
+  use("contacts", machine.contacts);
+  use("typical", machine.typical);
+  use("quantile", machine.quantile);
+  use("late_check", machine.late_check);
+  use("unbounded", machine.unbounded);
+}
+
+void write_machine(Place place, const trace::Machine& machine) {
+  write_attribute(place, "map", name_of(machine.map));
+  write_attribute(place, "schedule", name_of(machine.schedule));
+  each_number(machine, [&](const char* name, auto value) {
+    if constexpr (std::is_floating_point_v<decltype(value)>)
+      write_attribute(place, name, value);
+    else
+      write_attribute(place, name, static_cast<std::int64_t>(value));
+  });
+  std::vector<std::string> kinds;
+  std::vector<double> speeds;
+  for (const auto& [kind, speed] : machine.speed_of) {
+    kinds.push_back(kind);
+    speeds.push_back(speed);
+  }
+  detail::write_names(place, "kind", kinds);
+  write_array(place, "speed_of", "1", speeds);
+}
+
 [[noreturn]] void damaged(const std::string& file, const std::string& what) {
   throw FileError(file, what + ": the file is damaged, or was written by another version; record it again");
 }
@@ -122,6 +162,28 @@ std::vector<trace::KindInfo> read_kinds(Place place) {
     kinds.push_back({names[k], static_cast<trace::Phase>(phase[k]), blocked[k] != 0, shared[k] != 0});
   }
   return kinds;
+}
+
+trace::Machine read_machine(Place place) {
+  trace::Machine machine;
+  try {
+    machine.map = trace::rank_map_named(detail::read_text(place, "map"));
+    machine.schedule = trace::schedule_named(detail::read_text(place, "schedule"));
+  } catch (const std::invalid_argument& error) {
+    damaged(place.file, error.what());
+  }
+  each_number(machine, [&](const char* name, auto& value) {
+    using Value = std::remove_reference_t<decltype(value)>;
+    if constexpr (std::is_floating_point_v<Value>)
+      detail::read_attribute(place, name, H5T_NATIVE_DOUBLE, &value);
+    else
+      value = static_cast<Value>(read_integer(place, name));
+  });
+  const auto kinds = detail::read_names(place, "kind");
+  const auto speeds = read_array<double>(place, "speed_of");
+  demand_length(place.file, "/machine/speed_of", speeds.size(), kinds.size());
+  for (std::size_t k = 0; k < kinds.size(); ++k) machine.speed_of[kinds[k]] = speeds[k];
+  return machine;
 }
 
 std::vector<trace::Task> read_tasks(Place place) {
@@ -188,17 +250,12 @@ RankClock read_clock(Place root, const std::string& name) {
 Hdf5Object open_trace(const std::string& path) {
   if (!std::filesystem::exists(path)) throw FileError(path, "there is no such file");
   Hdf5Object file = detail::open_file(path);
-  std::string format = "nothing";
-  if (H5Aexists(file.id(), "format") > 0) {
-    std::vector<char*> text(1);
-    detail::read_attribute({file.id(), path}, "format", detail::text_type(path).id(), text.data());
-    format = detail::take_texts(text).front();
-  }
+  const std::string format = detail::read_text({file.id(), path}, "format");
   if (format != "talus-trace")
-    throw FileError(path,
-                    fmt::format("is no trace of talus (it says '{}'); `talus run --trace` writes one as "
-                                "trace.h5",
-                                format));
+    throw FileError(
+        path, fmt::format("is no trace of talus (its format is '{}'); `talus run --trace` writes one as "
+                          "trace.h5",
+                          format));
   if (const std::int64_t version = read_integer({file.id(), path}, "format_version");
       version != format_version)
     throw FileError(path, fmt::format("is of trace format {}, this talus reads {}: record it again", version,
@@ -214,10 +271,32 @@ void turn_clock(const RankClock& clock, trace::Lane& lane) {
     record.begin += std::llround(first.offset + drift * (static_cast<double>(record.begin) - first.time));
 }
 
+/// What a killed run leaves: of ranks without a clock, steps that all of their threads have gone on from.
+/// Throws FileError when there is none.
+void drop_cut_steps(const std::string& file, const std::vector<char>& has_clock, trace::Trace& trace) {
+  std::uint32_t whole = trace::largest_step;
+  for (const trace::Lane& lane : trace.lanes) {
+    const auto rank = static_cast<std::size_t>(lane.rank);
+    if (has_clock[rank] != 0) continue;
+    std::uint32_t last = 0;
+    for (const trace::Record& record : lane.records) last = std::max(last, record.step());
+    if (trace.tasks[rank].empty()) last = 0;
+    whole = std::min(whole, last > 0 ? last - 1 : 0);
+  }
+  for (trace::Lane& lane : trace.lanes)
+    std::erase_if(lane.records, [&](const trace::Record& record) { return record.step() > whole; });
+  std::erase_if(trace.plans, [&](const trace::Plan& plan) { return plan.step > whole; });
+  if (trace.record_count() == 0)
+    throw FileError(file, fmt::format("is of a run of {} ranks that was stopped before a step of "
+                                      "--trace-steps was written by all threads: record it again",
+                                      trace.ranks));
+}
+
 }  // namespace
 
 TraceWriter::TraceWriter(const std::filesystem::path& path, int ranks, int threads, bool predicted,
-                         const std::vector<trace::KindInfo>& kinds)
+                         const std::vector<trace::KindInfo>& kinds,
+                         const std::optional<trace::Machine>& machine)
     : path_(path.string()) {
   const detail::QuietHdf5 quiet;
   const Hdf5Object access = detail::file_access(path_);
@@ -232,6 +311,7 @@ TraceWriter::TraceWriter(const std::filesystem::path& path, int ranks, int threa
     write_attribute(root, "threads", std::int64_t{threads});
     write_attribute(root, "predicted", std::int64_t{predicted});
     write_kinds({detail::create_group(root, "kinds").id(), path_}, kinds);
+    if (machine) write_machine({detail::create_group(root, "machine").id(), path_}, *machine);
     for (const char* name : {"records", "plans", "tasks", "clocks"}) detail::create_group(root, name);
   }
   detail::close_file(file, path_);
@@ -262,6 +342,7 @@ void TraceWriter::append(const trace::Block& block) {
       write_plan({group.id(), path_}, *block.plan);
       return group;
     });
+  if (!block.tasks.empty()) append(block.rank, block.tasks);
   if (block.records.empty()) return;
   add("records", records_++, [&](Place root) {
     const hsize_t extent = block.records.size();
@@ -318,12 +399,13 @@ void TraceWriter::append_file(const std::filesystem::path& other) {
 }
 
 void write_trace(const std::filesystem::path& path, const trace::Trace& trace) {
-  TraceWriter writer(path, trace.ranks, trace.threads, trace.predicted, trace.kinds);
+  TraceWriter writer(path, trace.ranks, trace.threads, trace.predicted, trace.kinds, trace.machine);
   for (const trace::Lane& lane : trace.lanes)
     writer.append(trace::Block{lane.rank, lane.thread, lane.records, std::nullopt});
   for (const trace::Plan& plan : trace.plans) writer.append(trace::Block{plan.rank, 0, {}, plan});
   for (std::size_t rank = 0; rank < trace.tasks.size(); ++rank)
     writer.append(static_cast<std::int32_t>(rank), trace.tasks[rank]);
+  for (std::int32_t rank = 0; rank < trace.ranks; ++rank) writer.append(RankClock{rank, {}});
 }
 
 trace::Trace read_trace(const std::filesystem::path& path) {
@@ -340,6 +422,11 @@ trace::Trace read_trace(const std::filesystem::path& path) {
   trace.threads = static_cast<int>(threads);
   trace.predicted = read_integer(root, "predicted") != 0;
   trace.kinds = read_kinds({open_group(root, "/kinds").id(), name});
+  if (H5Lexists(root.group, "machine", H5P_DEFAULT) > 0) {
+    trace.machine = read_machine({open_group(root, "/machine").id(), name});
+    trace.machine->ranks = trace.ranks;
+    trace.machine->threads = trace.threads;
+  }
   trace.tasks.resize(static_cast<std::size_t>(ranks));
   for (std::int32_t rank = 0; rank < trace.ranks; ++rank)
     for (std::int32_t thread = 0; thread < trace.threads; ++thread) trace.lanes.push_back({rank, thread, {}});
@@ -367,11 +454,15 @@ trace::Trace read_trace(const std::filesystem::path& path) {
   if (trace.record_count() == 0)
     throw FileError(name,
                     "holds no tasks: the run ended before a step of --trace-steps was done, or was killed");
+  std::vector<char> has_clock(static_cast<std::size_t>(ranks), trace.predicted ? 1 : 0);
   for (const std::string& clock : detail::names_in(root, "/clocks")) {
     const RankClock offsets = read_clock(root, "/clocks/" + clock);
+    lane_of(offsets.rank, 0);
+    has_clock[static_cast<std::size_t>(offsets.rank)] = 1;
     for (std::int64_t thread = 0; thread < threads; ++thread)
       turn_clock(offsets, lane_of(offsets.rank, thread));
   }
+  if (std::ranges::find(has_clock, 0) != has_clock.end()) drop_cut_steps(name, has_clock, trace);
   try {
     trace::sort_lanes(trace);
     trace::validate(trace);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,13 +27,15 @@ struct RankClock {
 };
 
 /// Writes the file of one rank, or one for all. The file is closed between blocks, and a block gets its name
-/// when it is whole, so that a killed run leaves a file that can be read. Blocks are written by one thread at
-/// a time.
+/// when it is whole, so that a killed run leaves a file that can be read, if the tasks came first (as
+/// trace::Recorder hands them over). The clock of a rank comes last, and says that all of it is there. Blocks
+/// are written by one thread at a time.
 class TraceWriter {
  public:
-  /// Starts an empty file. Throws FileError.
+  /// Starts an empty file; of a prediction for `machine` if there is one. Throws FileError.
   TraceWriter(const std::filesystem::path& path, int ranks, int threads, bool predicted,
-              const std::vector<trace::KindInfo>& kinds);
+              const std::vector<trace::KindInfo>& kinds,
+              const std::optional<trace::Machine>& machine = std::nullopt);
   const std::string& path() const { return path_; }
   void append(const trace::Block& block);
   void append(std::int32_t rank, const std::vector<trace::Task>& tasks);
@@ -51,8 +54,9 @@ class TraceWriter {
 /// Writes a trace to a new file. Throws FileError.
 void write_trace(const std::filesystem::path& path, const trace::Trace& trace);
 
-/// The whole trace, with all clocks turned to that of rank 0. Throws FileError when the file is not a trace,
-/// is damaged, or lacks what it refers to.
+/// The whole trace, with all clocks turned to that of rank 0. Of a run that was killed the steps that are
+/// there of all threads: each writes when its buffer is full. Throws FileError when the file is not a trace,
+/// is damaged, or lacks what it refers to, or when no step is whole.
 trace::Trace read_trace(const std::filesystem::path& path);
 
 }  // namespace talus::io

@@ -22,6 +22,9 @@ struct WallLoad {
   double pressure = 0;           ///< [Pa] > 0 pushes along +normal, into the grains; drive pressure
   double force = 0;              ///< [N] > 0 pushes along +normal, into the grains; drive force
   double mass = 0;               ///< [kg] > 0; drives pressure and force
+
+  /// Free along the wall's normal.
+  bool pushed() const { return drive == WallDrive::pressure || drive == WallDrive::force; }
 };
 
 /// A plane wall: the half space normal . (x - point) < 0 is solid.
@@ -35,10 +38,7 @@ struct Wall {
   Vec3 velocity = Vec3::Zero();  ///< [m/s] now
   Vec3 gain = Vec3::Zero();      ///< what the load adds to it within the step, without contacts [m/s]
   /// 1/M [1/kg] of a pushed wall; 0 for one that is fixed or driven, whatever mass its load names.
-  double inv_mass() const {
-    const bool pushed = load.drive == WallDrive::pressure || load.drive == WallDrive::force;
-    return pushed && load.mass > 0 ? 1 / load.mass : 0;
-  }
+  double inv_mass() const { return load.pushed() && load.mass > 0 ? 1 / load.mass : 0; }
 };
 
 /// Area of the face of wall `index` [m^2]: its own `area` if positive, else the product of the distances

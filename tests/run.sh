@@ -9,10 +9,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source apps/setup.sh tests
 status=0
 
-# An archive without .git holds sources only; `safe.directory`: a container may not own the checkout.
+# An archive without .git holds sources only, and may lie inside another checkout; `safe.directory`: a container may not own this one.
 sources() {
-  git -c safe.directory="$PWD" ls-files -z -- '*.cpp' '*.hpp' 2>/dev/null ||
-    find kernels partition runtime io apps tests \( -name '*.cpp' -o -name '*.hpp' \) -print0 2>/dev/null
+  if [ -e .git ] && git -c safe.directory="$PWD" ls-files -z -- '*.cpp' '*.hpp' 2>/dev/null; then return; fi
+  find kernels partition runtime io apps tests \( -name '*.cpp' -o -name '*.hpp' \) -print0 2>/dev/null
 }
 if sources | xargs -0 --no-run-if-empty clang-format --dry-run -Werror; then
   echo "format: clean"

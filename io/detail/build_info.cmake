@@ -5,7 +5,7 @@ set(GIT_HASH unknown)
 set(GIT_DIRTY 0)
 if(GIT)
   # A tarball unpacked inside somebody else's checkout must not take that one's hash: ask for the top of the tree.
-  execute_process(COMMAND ${GIT} -C ${SOURCE} rev-parse --show-toplevel HEAD
+  execute_process(COMMAND ${GIT} -c safe.directory=${SOURCE} -C ${SOURCE} rev-parse --show-toplevel HEAD
                   OUTPUT_VARIABLE answer ERROR_QUIET RESULT_VARIABLE failed OUTPUT_STRIP_TRAILING_WHITESPACE)
   string(REPLACE "\n" ";" answer "${answer}")
   list(LENGTH answer parts)
@@ -15,7 +15,7 @@ if(GIT)
     get_filename_component(source "${SOURCE}" REALPATH)
     if(top STREQUAL source)
       list(GET answer 1 GIT_HASH)
-      execute_process(COMMAND ${GIT} -C ${SOURCE} status --porcelain
+      execute_process(COMMAND ${GIT} -c safe.directory=${SOURCE} -C ${SOURCE} status --porcelain
                       OUTPUT_VARIABLE changes ERROR_QUIET OUTPUT_STRIP_TRAILING_WHITESPACE)
       if(changes)
         set(GIT_DIRTY 1)

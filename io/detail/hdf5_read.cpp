@@ -54,6 +54,13 @@ void read_attribute(Place place, const char* name, hid_t type, void* value) {
   demand(H5Aread(attribute.id(), type, value), place.file, action);
 }
 
+std::string read_text(Place place, const char* name) {
+  if (H5Aexists(place.group, name) <= 0) return "";
+  std::vector<char*> text(1);
+  read_attribute(place, name, text_type(place.file).id(), text.data());
+  return take_texts(text).front();
+}
+
 std::int64_t read_integer(Place place, const char* name) {
   std::int64_t value = 0;
   read_attribute(place, name, H5T_NATIVE_INT64, &value);

@@ -38,6 +38,8 @@ std::vector<T> read_array(Place place, const std::string& name) {
 
 std::vector<std::string> read_names(Place place, const std::string& name);
 void read_attribute(Place place, const char* name, hid_t type, void* value);
+/// The text of an attribute; "" when there is none of that name.
+std::string read_text(Place place, const char* name);
 std::int64_t read_integer(Place place, const char* name);
 
 /// Names in a group, in their order.

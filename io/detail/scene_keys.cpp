@@ -174,10 +174,7 @@ std::vector<Key<WallLoad>> load_keys() {
           .need(),
       key<WallLoad>("mass", "kg", positive, "Inertia of the wall.", &WallLoad::mass)
           .or_auto(0, "a tenth of the mass of the grains")
-          .only("drive = pressure or force",
-                [](const WallLoad& load) {
-                  return load.drive == WallDrive::pressure || load.drive == WallDrive::force;
-                }),
+          .only("drive = pressure or force", [](const WallLoad& load) { return load.pushed(); }),
   };
 }
 
@@ -231,9 +228,7 @@ Section<Wall> wall_keys() {
   for (auto& load_key : within(load_keys(), &Wall::load)) keys.push_back(std::move(load_key));
   keys.push_back(key<Wall>("initial_velocity", "m/s", any, "Velocity at the beginning, along the normal.",
                            &Wall::velocity)
-                     .only("drive = pressure or force", [](const Wall& wall) {
-                       return wall.load.drive == WallDrive::pressure || wall.load.drive == WallDrive::force;
-                     }));
+                     .only("drive = pressure or force", [](const Wall& wall) { return wall.load.pushed(); }));
   return {"[[wall]]",
           "A plane wall: everything behind it is solid. Its load holds from the beginning, until a stage "
           "changes it.",
@@ -333,10 +328,9 @@ Section<SolverSettings> solver_keys() {
               &SolverSettings::balance_tolerance),
           key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
                               &SolverSettings::max_iterations),
-          key<SolverSettings>(
-              "check_every", "", countable,
-              "Sweeps between the first checks of the error, at least 2; later checks are rarer.",
-              &SolverSettings::check_every),
+          key<SolverSettings>("check_every", "", {.low = 2, .high = countable.high},
+                              "Sweeps between the first checks of the error; later checks are rarer.",
+                              &SolverSettings::check_every),
           key<SolverSettings>("warm_start", "", any, "Begin from the impulses of the last step.",
                               &SolverSettings::warm_start),
           key<SolverSettings>(
@@ -361,6 +355,9 @@ Section<SolverSettings> solver_keys() {
 Section<DecompositionSettings> decomposition_keys() {
   using D = DecompositionSettings;
   const auto schwarz = [](const D& d) { return d.coupling == Coupling::schwarz; };
+  const auto cuts_boxes = [](const D& d) {
+    return d.partitioner != PartitionKind::rcb && d.partitioner != PartitionKind::metis;
+  };
   return {
       "[decomposition]",
       "How the sample is cut into subdomains, and how these act on one another.",
@@ -368,14 +365,16 @@ Section<DecompositionSettings> decomposition_keys() {
           key<D>("subdomains", "", {.low = 1, .high = most_subdomains},
                  "Number of subdomains, at least one per rank.", &D::subdomains)
               .blank_when_zero()
-              .or_else("one per rank"),
+              .or_else("product of `boxes`, else one per rank"),
           choice<D>(
               "partitioner", {"auto", "boxes", "fitted", "rcb", "metis"},
               "`boxes`: equal boxes; `fitted`: boxes of equal work; `rcb`: recursive bisection; `metis`: "
-              "a graph of cells; `auto`: boxes where they are balanced, else rcb.",
+              "a graph of cells; `auto`: boxes where they are balanced or given, else rcb.",
               &D::partitioner),
-          key<D>("boxes", "", countable, "Boxes along x, y and z; their product is `subdomains`.", &D::boxes)
-              .blank_when_zero(),
+          key<D>("boxes", "", countable,
+                 "Boxes along x, y and z; their product is `subdomains`, which need not be given.", &D::boxes)
+              .blank_when_zero()
+              .only("partitioner = auto, boxes or fitted", cuts_boxes),
           choice<D>(
               "coupling", {"nscdd", "alternating", "schwarz"},
               "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "
@@ -391,8 +390,8 @@ Section<DecompositionSettings> decomposition_keys() {
                     "Subdomains on ranks, `block`: consecutive ones share a rank; `cyclic`: dealt out one by "
                     "one. No result depends on it.",
                     &D::mapping),
-          key<D>("sweeps_per_exchange", "", countable, "Sweeps between two exchanges (n_GS).",
-                 &D::sweeps_per_exchange),
+          key<D>("sweeps_per_exchange", "", countable,
+                 "Sweeps between two exchanges (n_GS); `alternating` takes 1 only.", &D::sweeps_per_exchange),
           choice<D>(
               "balance", {"work", "contacts", "time"},
               "What subdomains get equal shares of. `work`: contacts, and what it takes to glue their "

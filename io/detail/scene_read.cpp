@@ -1,11 +1,22 @@
 #include "io/detail/scene_read.hpp"
 
+#include <charconv>
+#include <system_error>
+
 namespace talus::io::detail {
 
 namespace {
 
 std::string found_text(const toml::node& node) {
-  if (const auto* text = node.as_string()) return fmt::format("the text '{}'", text->get());
+  if (const auto* text = node.as_string()) {
+    const std::string& held = text->get();
+    double number = 0;
+    const auto [end, error] = std::from_chars(held.data(), held.data() + held.size(), number);
+    // TOML's reader refuses such a number, so that an override with one is a text.
+    if (error == std::errc::result_out_of_range && end == held.data() + held.size())
+      return held + ", which is out of the range of numbers";
+    return fmt::format("the text '{}'", held);
+  }
   if (const auto* whole = node.as_integer()) return fmt::format("the integer {}", whole->get());
   if (const auto* real = node.as_floating_point()) return "the real " + toml_text(real->get());
   if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";

@@ -66,18 +66,19 @@ toml::node& insert(toml::table& table, const std::string& key, toml::table&& par
   return *table.get(key);
 }
 
-std::string name_of(const toml::node& element) {
-  const toml::table* table = element.as_table();
+/// Stages without a name, which alone need none, have that of their number.
+std::string name_of(const toml::array& array, std::size_t k) {
+  const toml::table* table = array[k].as_table();
   if (!table) return "";
   for (const char* key : {"name", "wall"})
     if (const auto name = (*table)[key].value<std::string>()) return *name;
-  return "";
+  return fmt::format("stage-{}", k + 1);
 }
 
 /// Place in `array` of the element with this number or name.
 std::optional<std::size_t> find_element(const toml::array& array, const std::string& segment) {
   for (std::size_t k = 0; k < array.size(); ++k)
-    if (name_of(array[k]) == segment) return k;
+    if (name_of(array, k) == segment) return k;
   std::size_t index = 0;
   const auto [end, error] = std::from_chars(segment.data(), segment.data() + segment.size(), index);
   if (error == std::errc{} && end == segment.data() + segment.size() && index < array.size()) return index;
@@ -87,8 +88,8 @@ std::optional<std::size_t> find_element(const toml::array& array, const std::str
 toml::node& element_of(toml::array& array, const std::string& segment, const Override& override) {
   if (const auto index = find_element(array, segment)) return array[*index];
   std::vector<std::string> names;
-  for (const toml::node& element : array)
-    names.push_back(fmt::format("{} '{}'", names.size(), name_of(element)));
+  for (std::size_t k = 0; k < array.size(); ++k)
+    names.push_back(fmt::format("{} '{}'", k, name_of(array, k)));
   override.fail(fmt::format("no element '{}'; there are: {}", segment, listed(names)));
 }
 

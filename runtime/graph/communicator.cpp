@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
+#include <thread>
 #include <utility>
 
 #include "runtime/graph/clock.hpp"
@@ -24,6 +25,13 @@ bool launched() {
   return false;
 }
 
+/// What MPI counts with; throws std::runtime_error for more.
+int byte_count(std::uint64_t bytes) {
+  if (bytes > static_cast<std::uint64_t>(std::numeric_limits<int>::max()))
+    throw std::runtime_error("a message of more than 2 GiB between ranks; use more ranks");
+  return static_cast<int>(bytes);
+}
+
 }  // namespace
 
 void demand_thread_level(const std::string& level, int ranks, int threads) {
@@ -37,6 +45,8 @@ MpiSession::MpiSession(int* argc, char*** argv, bool always) {
   if (!always && !launched()) return;
   int level = 0;
   check(MPI_Init_thread(argc, argv, MPI_THREAD_MULTIPLE, &level), "MPI_Init_thread");
+  // By default MPI ends the program itself; check() would never throw.
+  check(MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN), "MPI_Comm_set_errhandler");
   started_ = true;
   MpiCall::begin_rank();
 }
@@ -105,19 +115,16 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
         "MPI_Alltoall");
   sizes.end();
   const trace::Span parts(trace_, trace::kind_collective);
-  constexpr std::uint64_t limit = 0x7fffffff;
+  for (std::size_t r = 0; r < n; ++r) byte_count(std::max(out_bytes[r], in_bytes[r]));
   std::vector<MPI_Request> requests;
-  for (std::size_t r = 0; r < n; ++r) {
-    if (out_bytes[r] > limit || in_bytes[r] > limit)
-      throw std::runtime_error("a message of more than 2 GiB between two ranks; use more ranks");
+  for (std::size_t r = 0; r < n; ++r)
     if (in_bytes[r] > 0)
-      check(MPI_Irecv(room(r, in_bytes[r]), static_cast<int>(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
+      check(MPI_Irecv(room(r, in_bytes[r]), byte_count(in_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
                       MPI_COMM_WORLD, &requests.emplace_back()),
             "MPI_Irecv");
-  }
   for (std::size_t r = 0; r < n; ++r)
     if (out_bytes[r] > 0)
-      check(MPI_Isend(to[r].data(), static_cast<int>(out_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
+      check(MPI_Isend(to[r].data(), byte_count(out_bytes[r]), MPI_BYTE, static_cast<int>(r), 0,
                       MPI_COMM_WORLD, &requests.emplace_back()),
             "MPI_Isend");
   check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
@@ -151,15 +158,22 @@ std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) con
   const MpiCall call;
   trace::Span sizes(trace_, trace::kind_collective);
   const auto n = static_cast<std::size_t>(ranks_);
-  const int own = static_cast<int>(part.size());
-  std::vector<int> bytes(n), begin(n + 1, 0);
-  check(MPI_Allgather(&own, 1, MPI_INT, bytes.data(), 1, MPI_INT, MPI_COMM_WORLD), "MPI_Allgather");
+  const std::uint64_t own = part.size();
+  std::vector<std::uint64_t> sizes_of(n);
+  check(MPI_Allgather(&own, 1, MPI_UINT64_T, sizes_of.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD),
+        "MPI_Allgather");
   sizes.end();
   const trace::Span parts(trace_, trace::kind_collective);
-  for (std::size_t r = 0; r < n; ++r) begin[r + 1] = begin[r] + bytes[r];
-  std::vector<std::byte> all(static_cast<std::size_t>(begin[n]));
-  check(MPI_Allgatherv(part.data(), own, MPI_BYTE, all.data(), bytes.data(), begin.data(), MPI_BYTE,
-                       MPI_COMM_WORLD),
+  std::uint64_t total = 0;
+  std::vector<int> bytes, begin;
+  for (const std::uint64_t size : sizes_of) {
+    begin.push_back(byte_count(total));
+    bytes.push_back(byte_count(size));
+    total += size;
+  }
+  std::vector<std::byte> all(static_cast<std::size_t>(byte_count(total)));
+  check(MPI_Allgatherv(part.data(), byte_count(own), MPI_BYTE, all.data(), bytes.data(), begin.data(),
+                       MPI_BYTE, MPI_COMM_WORLD),
         "MPI_Allgatherv");
   return all;
 }
@@ -202,6 +216,20 @@ void Communicator::progress() const {
   if (simulated_ranks) return;  // a simulated network needs nobody's help
   int flag = 0;
   MPI_Iprobe(MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_COMM_SELF, &flag, MPI_STATUS_IGNORE);
+}
+
+bool Communicator::meet(double seconds) const {
+  if (ranks_ == 1) return true;
+  const MpiCall call;
+  MPI_Request all;
+  check(MPI_Ibarrier(MPI_COMM_WORLD, &all), "MPI_Ibarrier");
+  const double end = seconds_now() + seconds;
+  int here = 0;
+  while (!here && seconds_now() < end) {
+    check(MPI_Test(&all, &here, MPI_STATUS_IGNORE), "MPI_Test");
+    std::this_thread::yield();
+  }
+  return here != 0;
 }
 
 void Communicator::abort(int code) const {

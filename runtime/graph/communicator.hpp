@@ -66,10 +66,10 @@ class Communicator {
   int largest_tag() const noexcept { return largest_tag_; }
   /// Ranks on this machine.
   int ranks_on_node() const noexcept { return ranks_on_node_; }
-  /// Collective calls and channels leave spans in `trace` from now on; null: no more. It must outlive them.
-  /// Calls of one rank, which do nothing, leave theirs too (start_gather none): replay counts them for many.
-  /// Exchanges and gathers are two calls, the first of lengths. Only threads of the recorder's team may make
-  /// calls then.
+  /// Collective calls leave spans in `trace` from now on; null: no more. It must outlive them. Those of
+  /// channels are left by who uses them. Calls of one rank, which do nothing, leave theirs too (start_gather
+  /// none): replay counts them for many. Exchanges and gathers are two calls, the first of lengths. Only
+  /// threads of the recorder's team may make calls then.
   void record_to(trace::Recorder* trace) const { trace_ = trace; }
   trace::Recorder* trace() const { return trace_; }
 
@@ -94,6 +94,9 @@ class Communicator {
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   void progress() const;
+  /// True when all ranks have called it; false when some have not come after `seconds`, since they are dead
+  /// or wait for one that has failed. Nothing but abort() is left then.
+  bool meet(double seconds) const;
   /// Ends all ranks with exit code `code`: what is left when one of several ranks has failed and the others
   /// wait for it.
   [[noreturn]] void abort(int code) const;

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "runtime/graph/detail/splitmix.hpp"
+
 namespace talus::graph {
 namespace {
 
@@ -42,13 +44,6 @@ void check_shape(const Conflicts& conflicts, std::span<const std::uint32_t> owne
              std::to_string(threads));
 }
 
-/// Finaliser of splitmix64: a bijection that scatters its input.
-std::uint64_t scatter(std::uint64_t z) noexcept {
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  return z ^ (z >> 31);
-}
-
 /// A one-sided conflict would let two threads write the same data at once, only now and then, so it is looked
 /// for at every build: the two directions of each pair cancel in a sum of scattered pairs, which costs far
 /// less than to search for each partner. Pairs are searched only when the sum is not 0.
@@ -64,7 +59,7 @@ void check_conflicts(const Conflicts& conflicts) {
         refuse(pair(node, other) + " conflict and have the same colour " +
                std::to_string(conflicts.colour[node]));
       const std::uint64_t key =
-          scatter((std::uint64_t{std::min(node, other)} << 32 | std::max(node, other)) + 1);
+          detail::scatter((std::uint64_t{std::min(node, other)} << 32 | std::max(node, other)) + 1);
       sum += node < other ? key : ~key + 1;
     }
   }

@@ -16,8 +16,10 @@
 /// and a thread publishes only where somebody asks. With two threads that own halves of a grid a few percent
 /// of the nodes wait or publish:
 ///
-///     thread 0:  a b c |publish 3| d e ... |wait for u1 >= 4| k ...          per epoch, no barrier between
-///     epochs thread 1:  p q |wait for u0 >= 3| r s |publish 4| ...
+///     thread 0:  a b c |publish 3| d e ... |wait for u1 >= 4| k ...
+///     thread 1:  p q |wait for u0 >= 3| r s |publish 4| ...
+///
+/// per epoch, and no barrier between epochs.
 ///
 /// No deadlock: of all unfinished (epoch, colour, index), the smallest has nothing unfinished to wait for.
 

@@ -3,10 +3,12 @@
 /// Runs the loop that an EpochGraph plans. A program gives the work:
 ///
 ///     struct Sweep {
-///       void node(std::uint32_t chunk, int epoch);   // one node; runs beside nodes it does not conflict
-///       with bool gate(int epoch);                        // does anybody decide after this epoch? bool
-///       decide(int epoch);                      // all nodes have finished the epoch, nothing else runs;
-///       false ends the loop
+///       // One node; runs beside nodes that it does not conflict with.
+///       void node(std::uint32_t chunk, int epoch);
+///       // Does anybody decide after this epoch?
+///       bool gate(int epoch);
+///       // All nodes have finished the epoch, nothing else runs; false ends the loop.
+///       bool decide(int epoch);
 ///     };
 ///     graph.build(conflicts, owner, executor.threads());
 ///     step.team("iterate", accesses, [&](Worker& me) { run_epochs(graph, me, sweep); });

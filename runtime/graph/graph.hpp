@@ -5,13 +5,15 @@
 ///
 ///     Graph step;
 ///     const Handle poses = step.data("poses");
-///     const Handles cells = step.data("cells", 8);                  // eight parts, each with readers and
-///     writers of its own step.task("predict", {write(poses)}, [&] { ... }); for (std::uint32_t i = 0; i < 8;
-///     ++i)
-///       step.task("bin", {read(poses), write(cells[i])}, [&, i] { ... });    // all eight after predict,
-///       beside each other
-///     step.team("iterate", {read(cells)}, [&](Worker& me) { ... });          // all threads together, after
-///     the eight executor.run(step);
+///     // Eight parts, each with readers and writers of its own.
+///     const Handles cells = step.data("cells", 8);
+///     step.task("predict", {write(poses)}, [&] { ... });
+///     // All eight after predict, beside each other.
+///     for (std::uint32_t i = 0; i < 8; ++i)
+///       step.task("bin", {read(poses), write(cells[i])}, [&, i] { ... });
+///     // All threads together, after the eight.
+///     step.team("iterate", {read(cells)}, [&](Worker& me) { ... });
+///     executor.run(step);
 ///
 /// The result is that of running the tasks one after the other in the order of submission: a reader comes
 /// after the last writer before it, a writer after the last writer and all readers since (superscalar

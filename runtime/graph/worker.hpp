@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <thread>
 
+#include "runtime/graph/detail/splitmix.hpp"
+
 namespace talus::graph {
 
 /// Bytes that two threads must not both write to: one line of the caches of x86 and of most ARM processors.
@@ -44,7 +46,7 @@ class Delay {
       : state_(seed * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(thread) * 0xd1342543de82ef95ULL) {}
 
   void operator()() noexcept {
-    const std::uint64_t draw = next();
+    const std::uint64_t draw = detail::scatter(state_ += 0x9e3779b97f4a7c15ULL);
     const std::uint64_t kind = draw & 31;
     if (kind == 0) std::this_thread::yield();
     const std::uint64_t spins = (draw >> 8) % (kind == 1 ? 2048 : 32);
@@ -52,14 +54,6 @@ class Delay {
   }
 
  private:
-  /// splitmix64 (Steele, Lea, Flood 2014).
-  std::uint64_t next() noexcept {
-    std::uint64_t z = state_ += 0x9e3779b97f4a7c15ULL;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-    return z ^ (z >> 31);
-  }
-
   std::uint64_t state_;
 };
 

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 #include "runtime/step/detail/gluing_parts.hpp"
 
@@ -399,6 +400,31 @@ auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<cons
     for (std::size_t k = 0; k < Width; ++k) added.sum[k] += number_at<Number>(from, k);
   }
   return added;
+}
+
+std::uint64_t Gluing::touch(std::size_t e) const {
+  if (!needed_) return 0;
+  std::uint64_t sum = 0;
+  const auto read = [&sum](const auto& values) {
+    sum += detail::sum_of_lines(std::span(std::as_const(values)));
+  };
+  const Subdomain& mine = subdomains_[e];
+  for (const Side& side : mine.sides) {
+    read(side.slots);
+    read(side.pairs);
+    read(side.given);
+    read(side.taken);
+    read(side.link.out);
+    // As long as what goes there; of a neighbour on another rank it has come in.
+    read(std::span(side.source, side.source ? side.link.out.size() * sizeof(double) : 0));
+  }
+  read(mine.shared);
+  read(mine.taken);
+  read(mine.corners);
+  read(mine.taken_corners);
+  read(mine.base);
+  read(mine.partial);
+  return sum;
 }
 
 template <std::size_t Width, class Record>

@@ -106,6 +106,10 @@ class Gluing {
   void take(std::size_t e, bool single);
   void glue(std::size_t e, Mode mode, bool single = false);
 
+  /// Reads what publish, take and glue of e read, messages of its neighbours here included: into the cache of
+  /// the core that calls. Returns a sum over it, which means nothing.
+  std::uint64_t touch(std::size_t e) const;
+
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
   void forget_jumps() { jumps_.assign(jumps_.size(), {}); }
   const MessageCount& messages() const { return messages_; }

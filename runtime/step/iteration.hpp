@@ -76,6 +76,12 @@ class Iteration {
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
+  /// Subdomain here that the node works on; none: the centre.
+  std::optional<std::size_t> subdomain_of(std::uint32_t node) const;
+  /// Reads all that the loop reads and writes of a subdomain here, so that it is in the cache of the core
+  /// that calls. Returns a sum over it, which means nothing.
+  std::uint64_t touch(std::size_t subdomain) const;
+
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();
 

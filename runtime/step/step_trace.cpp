@@ -96,7 +96,7 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
 
 void StepGraph::note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) {
   trace::Plan plan = describe_plan(conflicts, owner);
-  if (order_) order_->check(plan, static_cast<std::uint32_t>(steps_));
+  if (order_) order_->plan(plan);
   if (executor_.times()) executor_.times()->plan(plan);
   if (executor_.trace()) executor_.trace()->plan(std::move(plan));
 }

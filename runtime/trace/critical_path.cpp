@@ -59,7 +59,7 @@ class Walker {
       const Record& other = lane.records[i];
       const Kind kind = other.kind();
       if (other.step() != index_.step) return {};
-      if (kind == kind_team || kind == kind_send || kind == kind_receive || kind == kind_collective) continue;
+      if (kind == kind_team || is_communication(kind)) continue;
       if (other.end() > static_cast<double>(record(place).begin)) continue;
       if (other.epoch < 0 && kind != kind_outside && !is_task(place.lane, i)) continue;
       return {place.lane, i};
@@ -73,15 +73,18 @@ class Walker {
     return r.node < tasks.size() && tasks[r.node].kind == r.kind();
   }
 
-  /// The longest wait within a task, or none.
-  Place longest_wait(Place place) const {
+  /// What a task went on with, or none: the last message that it waited for; of calls of all ranks the
+  /// longest, since in the first the others are awaited, and what comes behind has them together.
+  Place deciding_wait(Place place) const {
     const Lane& lane = timeline_.trace().lanes[place.lane];
     Place best;
     for (std::uint32_t i = place.record + 1; i < lane.records.size(); ++i) {
       const Record& inside = lane.records[i];
       if (static_cast<double>(inside.begin) >= record(place).end()) break;
-      if (inside.kind() != kind_receive && inside.kind() != kind_collective) continue;
-      if (!best.exists() || inside.duration > record(best).duration) best = {place.lane, i};
+      if (static_cast<double>(inside.duration) <= no_wait) continue;
+      if (inside.kind() == kind_receive ||
+          (inside.kind() == kind_collective && (!best.exists() || inside.duration > record(best).duration)))
+        best = {place.lane, i};
     }
     return best;
   }
@@ -97,8 +100,7 @@ class Walker {
 
   Cause cause_of(Place at) const {
     const auto begin = static_cast<double>(record(at).begin);
-    if (const Place wait = longest_wait(at);
-        wait.exists() && static_cast<double>(record(wait).duration) > no_wait) {
+    if (const Place wait = deciding_wait(at); wait.exists()) {
       const bool message = record(wait).kind() == kind_receive;
       const Place cause = message ? sender_of(wait) : last_to_come(at);
       if (cause.exists() && !(cause.lane == at.lane && cause.record == at.record)) {

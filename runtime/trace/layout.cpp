@@ -27,11 +27,7 @@ class Builder {
  public:
   Builder(const std::vector<const Plan*>& plans, const std::vector<std::uint32_t>& groups,
           const std::vector<std::uint32_t>& rank_of, const Machine& machine)
-      : plans_(plans),
-        groups_(groups),
-        rank_of_(rank_of),
-        machine_(machine),
-        faces_(std::pow(machine.contacts, 2.0 / 3)) {}
+      : plans_(plans), groups_(groups), rank_of_(rank_of), machine_(machine), faces_(machine.faces()) {}
 
   LoopLayout build() {
     find_group_nodes();
@@ -91,6 +87,8 @@ class Builder {
         const Role role = static_cast<Role>(plan.role[n]);
         if (role == Role::centre) continue;
         Group& group = group_[place_of(plan.group[n])];
+        if (group.source >= 0 && group.source != static_cast<std::int32_t>(s))
+          throw TraceError(fmt::format("subdomain {} is on two ranks at once", plan.group[n]));
         group.source = static_cast<std::int32_t>(s);
         if (role == Role::compute) group.chunks.push_back(n);
         if (role == Role::publish) group.publish = n;

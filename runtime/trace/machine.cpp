@@ -1,3 +1,5 @@
+#include "runtime/trace/machine.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "runtime/trace/replay.hpp"
+#include "runtime/trace/layout.hpp"
 
 namespace talus::trace {
 namespace {
@@ -59,19 +61,51 @@ double median_delay(const Trace& trace) {
   return *middle;
 }
 
+/// Cyclic where the first plans say so and block would not; the program knows no other.
+RankMap recorded_map(const Trace& trace) {
+  const std::vector<std::uint32_t> groups = groups_of(trace);
+  Machine machine;
+  machine.ranks = trace.ranks;
+  machine.map = RankMap::cyclic;
+  const std::vector<std::uint64_t> alike(groups.size(), 1);
+  const std::vector<std::uint32_t> cyclic = map_groups(alike, machine);
+  machine.map = RankMap::block;
+  if (map_groups(alike, machine) == cyclic) return RankMap::block;
+  for (const Plan& plan : trace.plans)
+    for (const std::uint32_t group : plan.group) {
+      const auto at = std::lower_bound(groups.begin(), groups.end(), group);
+      if (group != centre_group &&
+          cyclic[static_cast<std::size_t>(at - groups.begin())] != static_cast<std::uint32_t>(plan.rank))
+        return RankMap::block;
+    }
+  return RankMap::cyclic;
+}
+
+constexpr std::string_view map_names[] = {"block", "cyclic", "weight"};
+constexpr std::string_view schedule_names[] = {"fixed", "list"};
+
 }  // namespace
 
 RankMap rank_map_named(std::string_view name) {
-  if (name == "block") return RankMap::block;
-  if (name == "cyclic") return RankMap::cyclic;
-  if (name == "weight") return RankMap::weight;
-  throw std::invalid_argument(fmt::format("there is no map '{}': block, cyclic or weight", name));
+  const auto found = std::ranges::find(map_names, name);
+  if (found == std::end(map_names))
+    throw std::invalid_argument(fmt::format("there is no map '{}': block, cyclic or weight", name));
+  return static_cast<RankMap>(found - std::begin(map_names));
 }
 
 Schedule schedule_named(std::string_view name) {
-  if (name == "fixed") return Schedule::fixed;
-  if (name == "list") return Schedule::list;
-  throw std::invalid_argument(fmt::format("there is no schedule '{}': fixed or list", name));
+  const auto found = std::ranges::find(schedule_names, name);
+  if (found == std::end(schedule_names))
+    throw std::invalid_argument(fmt::format("there is no schedule '{}': fixed or list", name));
+  return static_cast<Schedule>(found - std::begin(schedule_names));
+}
+
+std::string name_of(RankMap map) {
+  return std::string(map_names[static_cast<std::size_t>(map)]);
+}
+
+std::string name_of(Schedule schedule) {
+  return std::string(schedule_names[static_cast<std::size_t>(schedule)]);
 }
 
 void validate(const Machine& machine, const Trace& trace) {
@@ -104,6 +138,7 @@ void validate(const Machine& machine, const Trace& trace) {
 }
 
 Machine recorded_machine(const Trace& trace) {
+  if (trace.machine) return *trace.machine;
   Machine machine;
   machine.ranks = trace.ranks;
   machine.threads = trace.threads;
@@ -111,7 +146,12 @@ Machine recorded_machine(const Trace& trace) {
   // well.
   machine.ranks_per_node = trace.ranks;
   if (const double delay = median_delay(trace); delay > 0) machine.node_latency = 1e-9 * delay;
+  machine.map = recorded_map(trace);
   return machine;
+}
+
+bool was_recorded_on(const Trace& trace, const Machine& machine) {
+  return !trace.predicted && machine == recorded_machine(trace);
 }
 
 }  // namespace talus::trace

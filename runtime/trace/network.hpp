@@ -11,7 +11,8 @@ namespace talus::trace {
 
 /// When messages arrive. A message leaves through the link of its node when those before it have left, is
 /// under way for the latency, and takes the link of the other node in turn: alone on the network it needs
-/// latency + bytes/bandwidth. Inside a node nothing is shared.
+/// latency + bytes/bandwidth. Inside a node nothing is shared, and nowhere where the machine is unbounded:
+/// whoever shares a link in another order may be the sooner for it, and a bound must hold for every order.
 class Network {
  public:
   explicit Network(const Machine& machine);
@@ -37,6 +38,7 @@ class Network {
   std::size_t node_of(std::uint32_t rank) const { return rank / ranks_per_node_; }
   std::uint32_t ranks_per_node_;
   double latency_, per_byte_, node_latency_, node_per_byte_, overhead_, collective_, collective_byte_, first_;
+  bool unbounded_;
   std::vector<double> out_free_, in_free_;  ///< per node: when its link is free again
 };
 

@@ -14,6 +14,7 @@ Order::Order(const Trace& trace, int rank) : ranks_(trace.ranks), threads_(trace
     std::int64_t begin;
     std::int32_t epoch;
     std::uint32_t colour, node;
+    int thread;
     auto walked() const { return std::tuple(epoch, colour, node); }
   };
   std::map<std::uint32_t, std::vector<Begun>> steps;
@@ -23,10 +24,8 @@ Order::Order(const Trace& trace, int rank) : ranks_(trace.ranks), threads_(trace
     const Plan* plan = nullptr;
     std::optional<Begun> last;
     for (const Record& record : lane.records) {
-      const Kind kind = record.kind();
-      if (record.epoch < 0 || kind == kind_check || kind == kind_send || kind == kind_receive ||
-          kind == kind_collective)
-        continue;
+      if (record.kind() == kind_check) steps_[record.step()].gates.insert(record.epoch);
+      if (record.epoch < 0 || record.kind() == kind_check || is_communication(record.kind())) continue;
       if (!plan || record.step() != step) {
         step = record.step();
         plan = plan_of(trace, rank, step);
@@ -34,7 +33,7 @@ Order::Order(const Trace& trace, int rank) : ranks_(trace.ranks), threads_(trace
       }
       if (!plan || record.node >= plan->size())
         throw TraceError(fmt::format("step {} has a node {} that its plan does not know", step, record.node));
-      const Begun begun{record.begin, record.epoch, plan->colour[record.node], record.node};
+      const Begun begun{record.begin, record.epoch, plan->colour[record.node], record.node, thread};
       if (plan->owner[record.node] != static_cast<std::uint32_t>(thread) ||
           (last && last->walked() >= begun.walked()))
         throw TraceError(
@@ -50,30 +49,47 @@ Order::Order(const Trace& trace, int rank) : ranks_(trace.ranks), threads_(trace
     std::sort(begun.begin(), begun.end(), [](const Begun& a, const Begun& b) {
       return a.begin != b.begin ? a.begin < b.begin : a.walked() < b.walked();
     });
-    std::vector<Turn>& turns = turns_[step];
-    for (const Begun& b : begun) turns.push_back({b.epoch, b.node});
+    Step& of = steps_[step];
+    of.threads.resize(static_cast<std::size_t>(threads_));
+    for (const Plan& plan : plans_)
+      if (plan.step <= step) of.plan = &plan;
+    for (std::size_t place = 0; place < begun.size(); ++place)
+      of.threads[static_cast<std::size_t>(begun[place].thread)].push_back(
+          {{begun[place].epoch, begun[place].node}, place});
   }
 }
 
 bool Order::begin_step(std::uint32_t step) {
-  const auto found = turns_.find(step);
-  if (found == turns_.end()) return false;
+  const auto found = steps_.find(step);
+  if (found == steps_.end() || !found->second.plan) return false;
+  number_ = step;
   current_ = &found->second;
-  turn_.store(0, std::memory_order_relaxed);
-  return true;
-}
-
-void Order::check(const Plan& plan, std::uint32_t step) const {
-  const Plan* recorded = nullptr;
-  for (const Plan& candidate : plans_)
-    if (candidate.step <= step) recorded = &candidate;
-  if (!recorded || !turns_.count(step)) return;
-  if (plan.colour != recorded->colour || plan.owner != recorded->owner ||
-      plan.neighbour != recorded->neighbour)
+  const Plan& recorded = *current_->plan;
+  if (plan_ && (plan_->colour != recorded.colour || plan_->owner != recorded.owner ||
+                plan_->neighbour != recorded.neighbour))
     throw TraceError(
         fmt::format("step {} has another loop than the recorded one: the scene, the subdomains or the number "
                     "of threads differ",
                     step));
+  turn_.store(0, std::memory_order_relaxed);
+  return true;
+}
+
+std::optional<std::size_t> Order::place(int thread, std::size_t done, Turn turn, bool works) const {
+  const std::vector<Placed>& own = current_->threads[static_cast<std::size_t>(thread)];
+  const bool recorded = done < own.size() && own[done].turn == turn;
+  if (recorded != works)
+    throw TraceError(fmt::format(
+        "in step {}, epoch {}, node {} {} and the recorded one {}: the run has other settings", number_,
+        turn.epoch, turn.node, works ? "works" : "does not work", recorded ? "did" : "did not"));
+  return recorded ? std::optional(own[done].place) : std::nullopt;
+}
+
+void Order::check_gate(int epoch) const {
+  if (current_->gates.count(epoch) == 0)
+    throw TraceError(fmt::format(
+        "in step {} the run decides behind epoch {}, the recorded one did not: the run has other settings",
+        number_, epoch));
 }
 
 }  // namespace talus::trace

@@ -7,7 +7,8 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <stdexcept>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "runtime/trace/trace.hpp"
@@ -18,6 +19,7 @@ namespace talus::trace {
 /// The recorded order of one rank.
 class Order {
  public:
+  /// A node in an epoch.
   struct Turn {
     std::int32_t epoch;
     std::uint32_t node;
@@ -30,29 +32,46 @@ class Order {
 
   int ranks() const { return ranks_; }
   int threads() const { return threads_; }
-  /// Called by one thread before the loop of a step; true when the step was recorded.
+  /// The run's loop from now on. Called by one thread between loops.
+  void plan(Plan plan) { plan_ = std::move(plan); }
+  /// Called by one thread before the loop of a step; true when the step was recorded. Throws TraceError when
+  /// its loop is not the recorded one: another scene, partition or number of threads.
   bool begin_step(std::uint32_t step);
-  /// The plan of the loop in the run. Throws TraceError when it is not the recorded one: another scene,
-  /// partition or number of threads.
-  void check(const Plan& plan, std::uint32_t step) const;
 
-  /// True when it is this node's turn, and the next one's from then on. Called by the thread that owns the
-  /// node, until true. Throws TraceError when the recorded loop had ended by then.
-  bool take(std::uint32_t node, int epoch) {
+  /// Where in the order the `done`-th node of a thread begins in this step. Called for each node that the
+  /// thread comes to; none when it does nothing there, neither in the run (`works`) nor in the recording.
+  /// Throws TraceError where they differ: others would wait for ever for a turn that nobody takes.
+  std::optional<std::size_t> place(int thread, std::size_t done, Turn turn, bool works) const;
+  /// Throws TraceError when the run decides behind an epoch and the recording had gone on: its order may need
+  /// nodes of both sides in turn.
+  void check_gate(int epoch) const;
+  /// True when it is the turn of that place, and the next one's from then on. Called by one thread, until
+  /// true.
+  bool take(std::size_t place) {
     // Relaxed: the order of beginnings is all it says; what nodes share is guarded by the loop itself.
-    const std::size_t turn = turn_.load(std::memory_order_relaxed);
-    if (turn >= current_->size())
-      throw TraceError("the run goes on where the recorded loop had ended: its settings are others");
-    if ((*current_)[turn] != Turn{epoch, node}) return false;
-    turn_.store(turn + 1, std::memory_order_relaxed);  // only the one whose turn it is gets here
+    if (turn_.load(std::memory_order_relaxed) != place) return false;
+    turn_.store(place + 1, std::memory_order_relaxed);
     return true;
   }
 
  private:
+  /// A node of a thread, and its place among those of all.
+  struct Placed {
+    Turn turn;
+    std::size_t place;
+  };
+  struct Step {
+    const Plan* plan = nullptr;
+    std::vector<std::vector<Placed>> threads;
+    std::set<std::int32_t> gates;  ///< epochs behind which something was decided
+  };
+
   int ranks_ = 1, threads_ = 1;
-  std::vector<Plan> plans_;                           ///< of the rank, ascending steps
-  std::map<std::uint32_t, std::vector<Turn>> turns_;  ///< per step
-  const std::vector<Turn>* current_ = nullptr;
+  std::vector<Plan> plans_;              ///< of the rank, ascending steps
+  std::map<std::uint32_t, Step> steps_;  ///< by number
+  std::optional<Plan> plan_;             ///< the run's
+  std::uint32_t number_ = 0;             ///< of the step
+  const Step* current_ = nullptr;
   std::atomic<std::size_t> turn_{0};  ///< written by the thread whose turn it is, read by all
 };
 
@@ -63,15 +82,26 @@ class Ordered : public View<Program> {
   Ordered(Program& program, Order& order, const graph::Worker& me)
       : View<Program>(program), order_(order), me_(me) {}
   void node(std::uint32_t node, int epoch) {
-    // What leaves no record has no turn. A run that was stopped elsewhere ends by itself.
-    if (program_.kind(node, epoch) && !me_.wait([&] { return order_.take(node, epoch); })) return;
+    // What leaves no record has no turn.
+    const bool works = program_.kind(node, epoch).has_value();
+    if (const auto place = order_.place(me_.thread(), done_, {epoch, node}, works)) {
+      // A run that was stopped elsewhere ends by itself.
+      if (!me_.wait([&] { return order_.take(*place); })) return;
+      ++done_;
+    }
     program_.node(node, epoch);
+  }
+  bool gate(int epoch) {
+    const bool decides = program_.gate(epoch);
+    if (decides) order_.check_gate(epoch);
+    return decides;
   }
 
  private:
   using View<Program>::program_;
   Order& order_;
   const graph::Worker& me_;
+  std::size_t done_ = 0;  ///< nodes that had a turn
 };
 
 }  // namespace talus::trace

@@ -22,6 +22,7 @@ void Recorder::begin_step(std::uint32_t step) {
   active_ = step >= options_.first_step && step <= options_.last_step;
   if (!active_) return;
   last_ = step_;
+  if (!std::exchange(declared_, true) && !tasks_.empty()) pass({options_.rank, 0, {}, std::nullopt, tasks_});
   if (pending_) plan(std::move(*std::exchange(pending_, std::nullopt)));
   if (left_ >= 0) lane(0).add(left_, now(), 0, -1, kind_outside);
 }
@@ -29,13 +30,14 @@ void Recorder::begin_step(std::uint32_t step) {
 void Recorder::end_step() {
   left_ = active_ ? now() : -1;
   ++step_;  // what follows is between two steps, and counts to the next
+  report_failure();
 }
 
 void Recorder::plan(Plan plan) {
   plan.rank = options_.rank;
   plan.step = step_;
   if (active_)
-    options_.sink({options_.rank, 0, {}, std::move(plan)});
+    pass({options_.rank, 0, {}, std::move(plan)});
   else
     pending_ = std::move(plan);
 }
@@ -46,6 +48,7 @@ void Recorder::finish() {
     while (!lane.records_.empty() && lane.records_.back().step() > last_) lane.records_.pop_back();
     hand_over(lane);
   }
+  report_failure();
 }
 
 void Recorder::hand_over(Lane& lane) {
@@ -53,7 +56,26 @@ void Recorder::hand_over(Lane& lane) {
   std::vector<Record> full;
   full.reserve(options_.block + Lane::records_ahead);
   std::swap(full, lane.records_);
-  options_.sink({options_.rank, lane.thread_, std::move(full), std::nullopt});
+  pass({options_.rank, lane.thread_, std::move(full), std::nullopt});
+}
+
+/// A full disk must not end the program in the destructor of a span.
+void Recorder::pass(Block&& block) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (failed_) return;  // a file with a hole is no use
+  }
+  try {
+    options_.sink(std::move(block));
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    if (!std::exchange(failed_, true)) failure_ = std::current_exception();
+  }
+}
+
+void Recorder::report_failure() {
+  const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
 }
 
 }  // namespace talus::trace

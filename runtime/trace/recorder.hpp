@@ -20,7 +20,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -29,11 +31,13 @@
 
 namespace talus::trace {
 
-/// Records of one thread, on their way to the file; or a plan.
+/// Records of one thread, on their way to the file; or a plan; or, before all others, the tasks of every
+/// step.
 struct Block {
   std::int32_t rank = 0, thread = 0;
   std::vector<Record> records;
   std::optional<Plan> plan;
+  std::vector<Task> tasks{};
 };
 
 struct RecorderOptions {
@@ -41,7 +45,10 @@ struct RecorderOptions {
   int threads = 1;
   std::uint32_t first_step = 1, last_step = largest_step;  ///< the steps that are recorded
   std::size_t block = 1U << 15;                            ///< records in a buffer
-  std::function<void(Block&&)> sink;
+  /// Before a thread begins with the nodes of another subdomain it reads what they will, outside of all
+  /// records: times are those of a core whose caches hold one subdomain.
+  bool own_caches = false;
+  std::function<void(Block&&)> sink;  ///< may throw; by any thread
 };
 
 class Recorder {
@@ -82,14 +89,17 @@ class Recorder {
   const std::vector<Task>& tasks() const { return tasks_; }
   int rank() const { return options_.rank; }
 
-  /// Called by one thread, between steps: all that follows belongs to `step`, up to end_step.
+  /// Called by one thread, between steps: all that follows belongs to `step`, up to end_step. What the sink
+  /// has thrown since, on whatever thread, end_step throws, once: a task or a span must not fail for it.
+  /// Nothing more is handed over then.
   void begin_step(std::uint32_t step);
   void end_step();
   /// The loop's plan, from this step on. `plan.rank` and `plan.step` are filled in.
   void plan(Plan plan);
-  /// Hands over all that is buffered. Called by one thread, between steps.
+  /// Hands over all that is buffered. Called by one thread, between steps. Throws like end_step.
   void finish();
 
+  bool own_caches() const { return options_.own_caches; }
   /// False outside the steps that are wanted: then nothing is to be recorded.
   bool active() const { return active_; }
   /// [ns] since the recorder was made.
@@ -107,6 +117,8 @@ class Recorder {
  private:
   std::uint32_t step_and_kind(Kind kind) const { return pack(step_, kind); }
   void hand_over(Lane& lane);
+  void pass(Block&& block);
+  void report_failure();
 
   const RecorderOptions options_;
   const graph::Clock::time_point start_ = graph::Clock::now();
@@ -117,6 +129,10 @@ class Recorder {
   std::uint32_t last_ = 0;  ///< step that was recorded
   bool active_ = false;
   std::int64_t left_ = -1;  ///< end of the step before, if it was recorded
+  bool declared_ = false;   ///< the tasks were handed over
+  std::mutex mutex_;        ///< guards what follows
+  bool failed_ = false;
+  std::exception_ptr failure_;  ///< not yet reported
 };
 
 /// Records the time from here to the end of the block; nothing without a recorder or when it does not record.

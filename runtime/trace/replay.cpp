@@ -22,8 +22,7 @@ double dispatch_time(const Trace& trace) {
   for (const Lane& lane : trace.lanes) {
     const Record* last = nullptr;
     for (const Record& record : lane.records) {
-      const Kind kind = record.kind();
-      if (record.epoch < 0 || kind == kind_send || kind == kind_receive || kind == kind_collective) continue;
+      if (record.epoch < 0 || is_communication(record.kind())) continue;
       if (last && last->epoch == record.epoch && last->step() == record.step()) {
         const double gap = static_cast<double>(record.begin) - last->end();
         if (gap >= 0 && gap < longest) {
@@ -49,12 +48,14 @@ class Player {
                Log(machine_, keep ? &out_.trace : nullptr),
                {},
                speeds(machine_, trace_),
-               trace_.predicted ? 0 : dispatch_time(trace_)} {
+               trace_.predicted ? 0 : dispatch_time(trace_),
+               machine_.faces()} {
     validate(machine_, trace_);
     if (groups_.empty()) groups_.push_back(0);
     out_.trace.ranks = machine.ranks;
     out_.trace.threads = machine.threads;
     out_.trace.predicted = true;
+    out_.trace.machine = machine;
     out_.trace.kinds = trace_.kinds;
     if (!keep) return;
     for (std::int32_t r = 0; r < machine.ranks; ++r)
@@ -131,6 +132,12 @@ class Player {
       if (rank_of_[g] == r) mine += static_cast<double>(weight_[g]);
     }
     return whole > 0 ? mine / whole : 1.0 / machine_.ranks;
+  }
+
+  /// Threads of a rank that find a subdomain to work on.
+  template <class Rank>
+  static double helpers(const std::vector<Rank>& rank_of, Rank rank, int threads) {
+    return static_cast<double>(std::clamp<std::ptrdiff_t>(std::ranges::count(rank_of, rank), 1, threads));
   }
 
   TimedTask time_task(const StepIndex& index, std::size_t r, const SimTask& task, std::size_t number) const {
@@ -241,7 +248,7 @@ class Player {
       epoch.gate = epoch.reads = true;
       do_together(index, e, epoch);
     };
-    std::size_t unread = 0;  // posted, not read: of a recording of several ranks
+    bool unread = false;  // posted, not read: of a recording of several ranks
     for (std::size_t e = 0; e < recorded.epochs; ++e) {
       SimEpoch epoch;
       epoch.source = e;
@@ -254,17 +261,16 @@ class Player {
       epoch.exchange = exchanges(index, e);
       if (machine_.ranks > 1 && epoch.gate) {
         if (trace_.ranks > 1) {
-          epoch.reads = recorded.awaited[e] != 0;
-          epoch.posts = epoch.reads && unread == 0;
-          if (epoch.reads) unread = 0;
+          // What was posted before is one call; whatever else was awaited the epoch had posted itself.
+          epoch.reads = unread && recorded.awaited[e] > 0;
+          epoch.waits = recorded.awaited[e] > (unread ? 1 : 0);
           // A gate that waits for nobody posts what the next one that does reads.
-          if (!epoch.reads && unread == 0 && next_reads(recorded, e)) {
-            epoch.posts = true;
-            unread = 1;
-          }
+          const bool sets_out = !unread && recorded.awaited[e] == 0 && next_reads(recorded, e);
+          epoch.posts = epoch.waits || sets_out;
+          unread = sets_out;
         } else {
           epoch.posts = true;
-          epoch.reads = !later;
+          epoch.waits = !later;
         }
       }
       if (read_next) read_here(e - 1, epoch);
@@ -274,22 +280,24 @@ class Player {
     if (read_next) {
       const std::size_t last = epochs.size() - 1;
       SimEpoch sweep = epochs[last >= 2 ? last - 2 : 0], undo = epochs[last >= 1 ? last - 1 : 0];
+      undo.waits = false;
       for (SimEpoch* added : {&sweep, &undo}) {
-        added->posts = added->reads = false;
+        added->posts = added->waits;
+        added->reads = false;
         added->gate = true;
       }
       read_here(last, sweep);
       epochs.push_back(sweep);
       epochs.push_back(undo);
     }
-    std::size_t exchanged = 0, posted = 0, read = 0;
+    std::size_t exchanged = 0, posted = 0, unread_round = 0;
     for (SimEpoch& epoch : epochs) {
       epoch.exchanges_before = exchanged;
-      epoch.posts_before = posted;
-      epoch.reads_before = read;
+      epoch.round = posted;
+      epoch.late_round = unread_round;
       exchanged += epoch.exchange ? 1 : 0;
+      if (epoch.posts && !epoch.waits) unread_round = posted;
       posted += epoch.posts ? 1 : 0;
-      read += epoch.reads ? 1 : 0;
     }
     return epochs;
   }
@@ -307,19 +315,19 @@ class Player {
   }
 
   /// Adds what all ranks did together within the check of recorded epoch e. As long as the rank with the
-  /// largest share needs; threads that wait help.
+  /// largest share needs; threads that wait help, each with a subdomain.
   void do_together(const StepIndex& index, std::size_t e, SimEpoch& epoch) const {
     for (std::size_t k = 0; k < index.ranks[0].whole[e].size(); ++k) {
       const Record& record = stage_.timeline.record(index.ranks[0].whole[e][k]);
-      const double part =
-          machine_.contacts / stage_.speed_of(record.kind()) * trace_.threads / machine_.threads;
+      const double scale = machine_.contacts / stage_.speed_of(record.kind());
       double most = 0;
-      for (std::size_t r = 0; r < static_cast<std::size_t>(machine_.ranks); ++r) {
+      for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) {
         double work = 0;
         for (std::size_t s = 0; s < index.ranks.size(); ++s)
           if (k < index.ranks[s].whole[e].size())
-            work += share(r, s) * stage_.timeline.self(index.ranks[s].whole[e][k]);
-        most = std::max(most, work * part);
+            work += share(r, s) * stage_.timeline.self(index.ranks[s].whole[e][k]) *
+                    helpers(source_, s, trace_.threads);
+        most = std::max(most, work * scale / helpers(rank_of_, r, machine_.threads));
       }
       epoch.spans.push_back({epoch.whole, epoch.whole + most, record.node, record.kind()});
       epoch.whole += most;

@@ -7,7 +7,7 @@
 namespace talus::trace {
 namespace {
 
-/// Kinds that some task of the step, or the loop's nodes, may have: all that are no spans.
+/// Kinds that some task of a step has.
 bool names_task(const Trace& trace, Kind kind) {
   for (const auto& tasks : trace.tasks)
     for (const Task& task : tasks)
@@ -81,12 +81,14 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
     if (kind == kind_outside) {
       rank.outside = place;
     } else if (kind == kind_collective) {
-      if (within(*it, last_check))
-        rank.awaited[static_cast<std::size_t>(record(last_check).epoch)] = 1;
-      else if (within(*it, last_task))
+      if (within(*it, last_check)) {
+        const auto epoch = static_cast<std::size_t>(record(last_check).epoch);
+        if (rank.whole[epoch].empty() || !within(*it, rank.whole[epoch].back())) ++rank.awaited[epoch];
+      } else if (within(*it, last_task)) {
         rank.calls[record(last_task).node].add(it->node);
-      else if (within(*it, rank.outside))
+      } else if (within(*it, rank.outside)) {
         rank.calls_outside.add(it->node);
+      }
     } else if (kind == kind_check) {
       const auto epoch = static_cast<std::size_t>(it->epoch);
       if (rank.check.size() <= epoch) resize_checks(rank, epoch + 1);

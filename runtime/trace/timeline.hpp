@@ -48,7 +48,7 @@ struct StepIndex {
     std::vector<Place> check;   ///< per epoch; absent where nothing was decided
     std::vector<Place> task;    ///< per task of the step, absent for teams
     std::vector<Calls> calls;   ///< per task: collective calls within
-    std::vector<char> awaited;  ///< per epoch: its check waited for other ranks
+    std::vector<int> awaited;   ///< per epoch: calls of all ranks in its check, outside of `whole`
     std::vector<char> settled;  ///< per epoch: its check reads its own sums on any number of ranks
     std::vector<std::vector<Place>> whole;  ///< per epoch: what all ranks did together within its check
     std::vector<Place> alone;               ///< per epoch: what the rank did for its own part there

@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 namespace talus::trace {
 namespace {
+
+constexpr std::size_t role_count = static_cast<std::size_t>(Role::tell) + 1;
 
 [[noreturn]] void refuse(const std::string& reason) {
   throw TraceError("the trace makes no sense: " + reason);
@@ -26,6 +30,21 @@ void check(const Plan& plan, int ranks) {
     if (other >= n) refuse(fmt::format("{}: a conflict with node {} of {}", where, other, n));
   for (std::uint8_t role : plan.role)
     if (role > static_cast<std::uint8_t>(Role::tell)) refuse(fmt::format("{}: role {}", where, role));
+  // What copies are glued by stands together: what there is of each role, by group.
+  std::map<std::uint32_t, std::array<std::size_t, role_count>> count;
+  for (std::size_t node = 0; node < n; ++node) {
+    const Role role = static_cast<Role>(plan.role[node]);
+    if (role == Role::compute || role == Role::centre) continue;
+    ++count[plan.group[node]][plan.role[node]];
+    if (plan.place[node] >= most_turns)
+      refuse(fmt::format("{}: subdomain {} has turn {}", where, plan.group[node], plan.place[node]));
+  }
+  for (const auto& [group, of] : count) {
+    const auto has = [&of = of](Role role) { return of[static_cast<std::size_t>(role)]; };
+    if (has(Role::publish) != 1 || has(Role::glue) != 1 || has(Role::take) > 1 || has(Role::tell) > 1)
+      refuse(fmt::format("{}: subdomain {} publishes {} times, glues {}, takes {}, tells {}", where, group,
+                         has(Role::publish), has(Role::glue), has(Role::take), has(Role::tell)));
+  }
 }
 
 void check(const std::vector<Task>& tasks, std::size_t kinds) {
@@ -93,7 +112,8 @@ void validate(const Trace& trace) {
       refuse(fmt::format("lane {} is of rank {}, thread {}", k, lane.rank, lane.thread));
     for (const Record& record : lane.records)
       if (static_cast<std::size_t>(record.kind()) >= trace.kinds.size() || record.epoch < -1 ||
-          record.epoch >= most_epochs || !std::isfinite(record.duration) || record.duration < 0)
+          (record.kind() == kind_check && record.epoch < 0) || record.epoch >= most_epochs ||
+          !std::isfinite(record.duration) || record.duration < 0)
         refuse(fmt::format("a record of rank {}, thread {} in step {}: kind {}, epoch {}, duration {}",
                            lane.rank, lane.thread, record.step(), static_cast<int>(record.kind()),
                            record.epoch, record.duration));

@@ -9,12 +9,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "runtime/graph/tree.hpp"
+#include "runtime/trace/machine.hpp"
 
 namespace talus::trace {
 
@@ -56,6 +58,10 @@ inline constexpr Kind kind_check{5};       ///< decides after an epoch; node = 0
 /// A check that reads its own sums at once on any number of ranks; others are read a sweep later by several.
 inline constexpr std::uint32_t check_settles = 1;
 std::vector<KindInfo> runtime_kinds();
+/// What ranks say to one another: never a task, but a span within one.
+inline bool is_communication(Kind kind) {
+  return kind == kind_send || kind == kind_receive || kind == kind_collective;
+}
 
 /// How often all ranks meet in a task that they share: numbers that everybody learns, and copies that all
 /// subdomains exchange. Within a check it is Record::node of its span.
@@ -95,6 +101,9 @@ enum class Role : std::uint8_t {
   take,  ///< of a group whose turn is not 0, before its border: takes what those of earlier turns published
   tell,  ///< its group's part for the centre leaves, which without one its publish sends
 };
+
+/// Of subdomains whose borders are swept one after the other (talus::choose_turns).
+inline constexpr std::uint32_t most_turns = 4;
 
 /// Names the centre as the end of a message.
 inline constexpr std::uint16_t centre_group = 0xffffU;
@@ -163,7 +172,8 @@ struct Lane {
 
 struct Trace {
   int ranks = 1, threads = 1;
-  bool predicted = false;  ///< by replay; else recorded
+  bool predicted = false;          ///< by replay; else recorded
+  std::optional<Machine> machine;  ///< that a prediction was made for
   std::vector<KindInfo> kinds;
   std::vector<std::vector<Task>> tasks;  ///< per rank
   std::vector<Plan> plans;               ///< of every rank, ascending steps within a rank

@@ -53,6 +53,7 @@ class Traced : public View<Program> {
   void node(std::uint32_t node, int epoch) {
     const std::optional<Kind> kind = program_.kind(node, epoch);
     if (!kind) return program_.node(node, epoch);
+    if (recorder_.own_caches()) bring_in(node);
     const std::int64_t begin = last_end_ >= 0 ? last_end_ : recorder_.now();
     program_.node(node, epoch);
     last_end_ = recorder_.now();
@@ -73,9 +74,20 @@ class Traced : public View<Program> {
   }
 
  private:
+  void bring_in(std::uint32_t node) {
+    if constexpr (requires { program_.subdomain_of(node); }) {
+      const auto subdomain = program_.subdomain_of(node);
+      if (!subdomain || subdomain == at_hand_) return;
+      at_hand_ = subdomain;
+      program_.touch(*subdomain);
+      last_end_ = -1;
+    }
+  }
+
   using View<Program>::program_;
   Recorder& recorder_;
   Recorder::Lane& lane_;
+  std::optional<std::size_t> at_hand_;  ///< subdomain whose data were read last
   std::int64_t last_end_ = -1;  ///< [ns] of a node with nothing between it and what comes next; else -1
 };
 

@@ -179,6 +179,20 @@ TEST_F(Ranks, EndTogetherOnBadInput) {
   EXPECT_EQ(outcome.code, 2) << outcome.messages;
 }
 
+// Rank 1 stands in another folder. It says so, with its number, where rank 0 found nothing wrong.
+TEST_F(Ranks, SayWhichOfThemCannotReadTheScene) {
+  fs::create_directory(at("elsewhere"));
+  const std::string moved =
+      " sh -c 'if [ $OMPI_COMM_WORLD_RANK -gt 0 ]; then cd elsewhere; fi; exec \"$0\" \"$@\"'";
+  const Outcome one = test::run(folder_.path(), "run scene.toml --threads 1", launcher(3) + moved);
+  EXPECT_EQ(one.code, 2) << one.messages;
+  EXPECT_NE(one.messages.find("rank 1: scene.toml: cannot open"), std::string::npos) << one.messages;
+  EXPECT_EQ(occurrences(one.messages, "cannot open"), 1u) << "once, not once a rank: " << one.messages;
+  const Outcome all = run(3, "run missing.toml --threads 1");
+  EXPECT_EQ(occurrences(all.messages, "cannot open"), 1u) << all.messages;
+  EXPECT_EQ(all.messages.find("rank "), std::string::npos) << all.messages;
+}
+
 /// A floor, and the grains of `rows` (id,x,y,z,radius) that fall on it.
 std::string on_a_floor(int subdomains, int steps) {
   return fmt::format(R"(gravity = [0, 0, -9.81]
@@ -202,6 +216,21 @@ subdomains = {}
 pictures = false
 )",
                      steps, subdomains);
+}
+
+// Two grains inside one another are parted within a microsecond: nothing supplied what that takes.
+TEST_F(Ranks, EndARunawayTogetherWithAllFilesWhole) {
+  std::string burst = on_a_floor(3, 30);
+  burst.replace(burst.find("time_step = 1e-3"), 16, "time_step = 1e-6");
+  write(at("scene.toml"), burst + "[solver]\noverlap_correction = 1\n");
+  write(at("grains.csv"), "id,x,y,z,radius\n0,0,0,1,0.01\n7,0.01,0,1,0.01\n");
+  const Outcome outcome = run(3, "run scene.toml --out burst --threads 1");
+  EXPECT_EQ(outcome.code, 1) << outcome.messages;
+  EXPECT_EQ(summary(at("burst")).at("status"), "failed");
+  EXPECT_TRUE(summary(at("burst")).at("digest").is_null());
+  EXPECT_NE(outcome.messages.find("results in burst"), std::string::npos) << outcome.messages;
+  for (const std::string rank : {"rank 1: step 1 ", "rank 2: step 1 "})
+    EXPECT_NE(outcome.messages.find(rank), std::string::npos) << outcome.messages;
 }
 
 TEST_F(Ranks, BearHavingNoGrainAtAll) {

@@ -52,9 +52,18 @@ TEST_F(CsvBodies, AngularVelocityBecomesSurfaceVelocity) {
   EXPECT_EQ(sliding.velocity[0].w[2], 0);
 }
 
+TEST_F(CsvBodies, AMarkOfUtf8IsNoMistake) {
+  EXPECT_EQ(read_bodies(write("\xef\xbb\xbfid,x,y,z,radius\n7,0,0,0,1\n"), 1).id.at(0), BodyId{7});
+  expect_refused(
+      "id,x,y,z,radius\n\xef\xbb\xbf"
+      "1,0,0,0,1\n",
+      2, "id", "is not an integer");
+}
+
 TEST_F(CsvBodies, MistakesAreFoundWithLineAndColumn) {
   expect_refused("id,x,y,z,radius\n1,0,0,0,1\n2,0,0,0,-1\n", 3, "radius", "must be > 0 m, got -1");
   expect_refused("id,x,y,z,radius\n1,0,0,zero,1\n", 2, "z", "'zero' is not a number");
+  expect_refused("id,x,y,z,radius\n1,0,0,1e400,1\n", 2, "z", "1e400 is out of the range of numbers");
   expect_refused("id,x,y,z,radius\n1,nan,0,0,1\n", 2, "x", "must be finite");
   expect_refused("id,x,y,z,radius\n1.5,0,0,0,1\n", 2, "id", "'1.5' is not an integer");
   expect_refused("id,x,y,z,radius\n1,0,0,0\n", 2, "", "5 fields expected as in the header, got 4");

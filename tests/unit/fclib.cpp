@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/error.hpp"
+#include "io/results.hpp"
 
 namespace talus::io {
 namespace {
@@ -159,6 +160,18 @@ TEST_F(Fclib, OfOneStemInAFolderHaveNamesOfTheirOwn) {
   for (const FclibFile& file : fclib_files(folder)) names.push_back(file.name);
   EXPECT_EQ(names, (std::vector<std::string>{"a.h5", "a.hdf5", "b"}));
   EXPECT_EQ(fclib_files(folder / "a.h5").at(0).name, "a");
+}
+
+TEST_F(Fclib, ProblemsInTheFolderOfARunStandBesideItsOtherFiles) {
+  const fs::path folder = path("run");
+  fs::create_directory(folder);
+  fs::copy_file(write(Contents{}), folder / "fclib_000003.hdf5");
+  ResultsWriter(folder / "results.h5", {});
+  const std::vector<FclibFile> files = fclib_files(folder);
+  ASSERT_EQ(files.size(), 1U);
+  EXPECT_EQ(files[0].name, "fclib_000003");
+  fs::remove(folder / "fclib_000003.hdf5");
+  EXPECT_THROW(fclib_files(folder), FileError);
 }
 
 TEST_F(Fclib, ReadsAProblemWithoutContacts) {

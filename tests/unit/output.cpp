@@ -65,6 +65,33 @@ TEST(OutputDirectory, ForceRemovesOurFilesAndNeverTheUsers) {
   EXPECT_TRUE(fs::is_symlink(scratch / "triaxial.csv"));
 }
 
+TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
+  const ScratchDirectory scratch, elsewhere;
+  touch(elsewhere / "grains_000000.vtp");
+  touch(scratch / "steps.csv");
+  fs::create_directory_symlink(elsewhere.path(), scratch / "fields");
+  prepare_output_directory(scratch.path(), true);
+  EXPECT_FALSE(fs::exists(scratch / "steps.csv"));
+  EXPECT_TRUE(fs::is_symlink(scratch / "fields"));
+  EXPECT_EQ(content_of(elsewhere / "grains_000000.vtp"), "mine");
+}
+
+TEST(OutputDirectory, IsRefusedAsLongAsAnotherRunWritesThere) {
+  const ScratchDirectory scratch;
+  {
+    const DirectoryLock lock = prepare_output_directory(scratch / "run", false);
+    touch(scratch / "run/steps.csv");
+    for (const bool force : {false, true}) {
+      const std::string message =
+          message_of<FileError>([&] { prepare_output_directory(scratch / "run", force); });
+      EXPECT_NE(message.find("another run is writing there"), std::string::npos) << message;
+    }
+    EXPECT_EQ(content_of(scratch / "run/steps.csv"), "mine");
+  }
+  EXPECT_NO_THROW(prepare_output_directory(scratch / "run", true));
+  EXPECT_TRUE(fs::is_empty(scratch / "run")) << "the lock leaves nothing behind";
+}
+
 TEST(OutputDirectory, OfScratchGoesWithTheScopeAndNothingElseDoes) {
   const ScratchDirectory scratch;
   fs::create_directory(scratch / "run");
@@ -82,9 +109,24 @@ TEST(OutputFile, MayNotBeWhatIsReadNorAFolder) {
   const ScratchDirectory scratch;
   touch(scratch / "trace.h5");
   fs::create_symlink("trace.h5", scratch / "link.h5");
-  EXPECT_NO_THROW(check_output_file(scratch / "trace.h5", scratch / "other.h5"));
+  EXPECT_NO_THROW(check_output_files({scratch / "trace.h5"}, {scratch / "other.h5", ""}, false));
   for (const char* out : {"trace.h5", "link.h5", ".", "nowhere/other.h5"})
-    EXPECT_THROW(check_output_file(scratch / "trace.h5", scratch / out), FileError) << out;
+    EXPECT_THROW(check_output_files({scratch / "trace.h5"}, {scratch / out}, true), FileError) << out;
+  EXPECT_THROW(check_output_files({}, {"/dev/null"}, true), FileError);
+}
+
+TEST(OutputFile, ReplacesNothingUnlessForcedAndIsAskedForOnce) {
+  const ScratchDirectory scratch;
+  touch(scratch / "table.csv");
+  const std::string message =
+      message_of<FileError>([&] { check_output_files({}, {scratch / "table.csv"}, false); });
+  EXPECT_NE(message.find("--force"), std::string::npos) << message;
+  EXPECT_NO_THROW(check_output_files({}, {scratch / "table.csv"}, true));
+  for (const char* same : {"new.csv", "./new.csv", "../new.csv"}) {
+    const fs::path place = same == std::string("../new.csv") ? scratch / "sub" / same : scratch / same;
+    fs::create_directories(scratch / "sub");
+    EXPECT_THROW(check_output_files({}, {scratch / "new.csv", place}, true), FileError) << same;
+  }
 }
 
 TEST(OutputDirectory, ThatCannotBeMadeIsNamed) {
@@ -188,13 +230,11 @@ TEST(Csv, OnDiskAreWholeLinesAtAnyMoment) {
   EXPECT_EQ(content_of(scratch / "steps.csv"), steps_csv_header());
   for (int k = 0; k < 5000; ++k) {
     append_steps_row(file.pending(), StepReport{.step = k, .time = k / 3.0});
-    file.commit();
-    if (k % 500 == 0) {
-      EXPECT_EQ(content_of(scratch / "steps.csv").back(), '\n');
-    }
+    if (k % 500 != 0) continue;
+    file.flush();
+    EXPECT_EQ(content_of(scratch / "steps.csv").back(), '\n');
+    EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 2u + static_cast<std::size_t>(k));
   }
-  const std::size_t before = occurrences(content_of(scratch / "steps.csv"), "\n");
-  EXPECT_GT(before, 1u) << "a long run is not kept in memory";
   file.close();
   EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 5001u);
 }
@@ -220,6 +260,15 @@ TEST(RunJson, SaysWhatWasRunAndWhatCameOfIt) {
   }
   EXPECT_GE(json["provenance"]["cores_online"], json["provenance"]["cores_allowed"]);
   EXPECT_TRUE(nlohmann::json::parse(run_json(provenance, Summary{}))["summary"]["digest"].is_null());
+}
+
+TEST(RunJson, DoesNotHideThatANumberIsNone) {
+  Summary summary;
+  summary.worst_penetration = 0.25;
+  summary.worst_balance = std::numeric_limits<double>::quiet_NaN();
+  const auto json = nlohmann::json::parse(run_json(Provenance{}, summary))["summary"];
+  EXPECT_EQ(json["worst_penetration"], 0.25);
+  EXPECT_TRUE(json["worst_balance"].is_null()) << json;
 }
 
 TEST(RunJson, SurvivesAFileNameThatIsNotUtf8) {
@@ -305,6 +354,21 @@ TEST(Recorder, WritesWhatItWasGiven) {
   const auto summary = nlohmann::json::parse(content_of(scratch / "run.json"))["summary"];
   EXPECT_EQ(summary["status"], "done");
   EXPECT_EQ(summary["frames"], 2);
+}
+
+TEST(Recorder, HandsOverAllLinesSoFarWhenAsked) {
+  const ScratchDirectory scratch;
+  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
+  const Frame frame = three_grains();
+  for (int k = 1; k <= 3; ++k) {
+    recorder.record_step(StepReport{.step = k}, frame.walls, triaxial_row(k, "shear"));
+    recorder.record_errors(k, std::vector<Iteration::Check>(2));
+  }
+  recorder.flush();
+  EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 1u + 3u);
+  EXPECT_EQ(occurrences(content_of(scratch / "walls.csv"), "\n"), 1u + 3u * 2u);
+  EXPECT_EQ(occurrences(content_of(scratch / "triaxial.csv"), "\n"), 1u + 3u);
+  EXPECT_EQ(occurrences(content_of(scratch / "error_history.csv"), "\n"), 1u + 3u * 2u);
 }
 
 TEST(Recorder, WritesNothingThatWasNotAskedFor) {

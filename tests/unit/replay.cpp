@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "io/smpi_platform.hpp"
 #include "runtime/trace/analysis.hpp"
 #include "runtime/trace/network.hpp"
 #include "runtime/trace/task_times.hpp"
@@ -80,8 +81,8 @@ TEST(Replay, BytesTakeTheirTimeOnTheLink) {
   Machine machine = bare(2, 1);
   machine.bandwidth = 1000 / 70e-9;  // the message of 1000 bytes takes 70 ns
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (180 + 20));
-  machine.contacts = 8;  // sweeps grow with the volume, messages with the faces
-  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (8 * 150 + 10 + 20));
+  machine.contacts = 8;  // sweeps grow with the volume; messages, publish and glue with the faces
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * (8 * 150 + 4 * (10 + 20)));
 }
 
 TEST(Replay, OverheadIsPaidBySenderAndTaker) {
@@ -110,6 +111,31 @@ TEST(Replay, OfTwoRecordedRanksOnOneAddsThemUp) {
   EXPECT_DOUBLE_EQ(makespan(two, bare(2, 1)), 2 * 180);
 }
 
+// Rank 0 waits longer for rank 1, but goes on with what comes from rank 2.
+TEST(CriticalPath, GoesToTheSenderOfTheLastMessage) {
+  Trace trace = test::all_neighbours(3, 3);
+  for (Lane& lane : trace.lanes)
+    for (Record& record : lane.records) {
+      record.begin *= 100;
+      record.duration *= 100;
+    }
+  std::vector<Record>& records = trace.lanes[0].records;
+  const auto glue = std::ranges::find(records, test::glue, &Record::kind);
+  const std::int64_t begin = glue->begin;
+  for (auto later = std::next(glue); later != records.end(); ++later) later->begin += 3500;
+  glue->duration += 3500;
+  records.insert(std::next(glue), {{begin, 3000, message_name(1, 0), 0, pack(1, kind_receive)},
+                                   {begin + 3000, 500, message_name(2, 0), 0, pack(1, kind_receive)}});
+  const Timeline timeline(trace);
+  const std::vector<PathHop> path = critical_path(timeline, timeline.index(1));
+  const auto lane_of = [](const PathHop& hop) { return hop.place.lane; };
+  const auto crossing = std::ranges::find_if(
+      path, [](std::uint32_t lane) { return lane != 0; }, lane_of);
+  ASSERT_NE(crossing, path.end());
+  EXPECT_EQ(crossing->place.lane, 2u);
+  EXPECT_EQ(timeline.record(crossing->place).kind(), test::publish);
+}
+
 TEST(CriticalPath, GoesFromTakerToSenderUpAndDownTheTreeOfRanks) {
   const Trace recorded = test::all_neighbours(40, 1, true);
   Machine machine = bare(40, 1);
@@ -131,15 +157,20 @@ TEST(CriticalPath, GoesFromTakerToSenderUpAndDownTheTreeOfRanks) {
 
 TEST(Replay, WaitsAreRecordedAsWaits) {
   const Trace trace = test::two_subdomains(1);
-  Machine machine = bare(2, 1);
-  machine.latency = 80e-9;
-  const Replay played = replay(Timeline(trace), machine, true);
-  const Summary sum = analyse(played.trace);
-  EXPECT_TRUE(sum.predicted);
-  EXPECT_DOUBLE_EQ(played.work, 2 * 2 * 180);
-  EXPECT_NEAR(sum.work, played.work, 1e-3);  // records are single precision
-  EXPECT_NEAR(sum.exposed, 2 * (2 * 30 + 80), 1e-3);
-  EXPECT_EQ(sum.messages, 4u);
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.latency = 80e-9;
+    const Replay played = replay(Timeline(trace), machine, true);
+    EXPECT_NO_THROW(validate(played.trace));
+    const Summary sum = analyse(played.trace);
+    EXPECT_TRUE(sum.predicted);
+    EXPECT_DOUBLE_EQ(played.work, 2 * 2 * 180);
+    EXPECT_NEAR(sum.work, played.work, 1e-3);  // records are single precision
+    EXPECT_NEAR(sum.exposed, 2 * (2 * 30 + 80), 1e-3);
+    EXPECT_NEAR(sum.idle, 0, 1e-3);
+    EXPECT_EQ(sum.messages, 4u);
+  }
 }
 
 // What a task or the program between two steps asks of all ranks is in a trace of one rank, where it takes no
@@ -280,6 +311,52 @@ TEST(Replay, SumsGoTheRestOfTheirWayWhenAllWait) {
   }
 }
 
+/// Two subdomains on one rank, twice: an epoch whose sums the next one needs (1 ns, two calls), another
+/// without a decision, and one with a check.
+Trace conjugate() {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  const Record before = records.front(), behind = records.back();
+  std::vector<Record> epochs[2];
+  for (const Record& record : records)
+    if (record.epoch >= 0 && record.kind() != kind_check) epochs[record.epoch].push_back(record);
+  records = {before};
+  std::int64_t now = 0;
+  for (std::int32_t e = 0; e < 6; ++e) {
+    for (Record record : epochs[0]) {
+      record.begin += now;
+      record.epoch = e;
+      records.push_back(record);
+    }
+    now += 360;
+    if (e % 3 == 0) {
+      records.push_back({now, 1, 0, e, pack(1, kind_check)});
+      for (int call = 0; call < 2; ++call) records.push_back({now, 0, 0, -1, pack(1, kind_collective)});
+      ++now;
+    } else if (e % 3 == 2) {
+      records.push_back({now, 0, 0, e, pack(1, kind_check)});
+    }
+  }
+  records.push_back(behind);
+  records.back().begin = now;
+  return trace;
+}
+
+// Sums of a check are read where others are awaited besides: none of them stands for the other.
+TEST(Replay, SumsThatAreReadLaterHideNoOthers) {
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.latency = 200e-9;
+    const double epoch = 130 + 200;  // the inner sweep hides 50 ns of each exchange
+    EXPECT_DOUBLE_EQ(makespan(conjugate(), machine), 6 * epoch + 2 * (200 + 1) + 2 * 200);
+    machine.late_check = true;  // a sweep with sums of its own, and what undoes it, more
+    const Replay late = replay(Timeline(conjugate()), machine, true);
+    EXPECT_DOUBLE_EQ(late.makespan, 8 * epoch + 3 * (200 + 1));
+    EXPECT_DOUBLE_EQ(makespan(late.trace, machine), late.makespan) << "again";
+  }
+}
+
 TEST(Replay, ACheckThatSettlesIsReadAtOnce) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.lanes[0].records;
@@ -321,7 +398,10 @@ TEST(Replay, WhatARankAddsUpInACheckGoesWithItsPart) {
   EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90);
   EXPECT_DOUBLE_EQ(makespan(trace, bare(2, 1)), 2 * 180 + 10 + 40);
   EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 2)), makespan(test::two_subdomains(1), bare(1, 2)) + 90);
-  EXPECT_DOUBLE_EQ(makespan(with_a_look(), bare(1, 2)), makespan(test::two_subdomains(1), bare(1, 2)) + 50);
+  // A third thread finds no subdomain.
+  for (const int threads : {2, 3})
+    EXPECT_DOUBLE_EQ(makespan(with_a_look(), bare(1, threads)),
+                     makespan(test::two_subdomains(1), bare(1, threads)) + 50);
   Machine machine = bare(2, 1);
   machine.schedule = Schedule::list;
   EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40);
@@ -397,13 +477,20 @@ TEST(Replay, NoiseIsTheSameForTheSameSeed) {
   EXPECT_NE(makespan(trace, machine), once);
 }
 
+/// What a thread needs from one node to the next, 10 ns, is seen between records.
+Trace with_gaps(Trace trace) {
+  std::int64_t gaps = 0;
+  for (Record& record : trace.lanes[0].records) record.begin += 10 * gaps++;
+  return trace;
+}
+
 TEST(Replay, NoMachineBeatsItsBounds) {
-  const Trace trace =
-      test::one_loop({0, 1, 0, 1, 2}, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}}, {13, 7, 29, 3, 17}, 5);
+  const Trace trace = with_gaps(
+      test::one_loop({0, 1, 0, 1, 2}, {{0, 1}, {1, 2}, {2, 3}, {3, 4}, {0, 4}}, {13, 7, 29, 3, 17}, 5));
   Machine chain = bare(1, 1);
   chain.unbounded = true;
   const double longest = makespan(trace, chain);
-  const double work = makespan(trace, bare(1, 1));
+  const double work = replay(Timeline(trace), bare(1, 1), false).work;
   for (const Schedule schedule : {Schedule::fixed, Schedule::list})
     for (int threads : {1, 2, 3, 5}) {
       Machine machine = bare(1, threads);
@@ -411,6 +498,32 @@ TEST(Replay, NoMachineBeatsItsBounds) {
       EXPECT_GE(makespan(trace, machine), longest) << threads;
       EXPECT_GE(makespan(trace, machine), work / threads) << threads;
     }
+}
+
+// Links that are shared, and slow: who sends in another order may be the sooner for it.
+TEST(Replay, NoNetworkBeatsTheLongestChain) {
+  Trace trace = with_gaps(test::all_neighbours(8, 1, true));
+  for (Plan& plan : trace.plans)
+    for (std::size_t k = 0; k < plan.messages.size(); ++k)
+      plan.messages[k].bytes = static_cast<std::uint32_t>(1 + (k * 7919) % 1500);
+  for (const int ranks : {2, 4, 8})
+    for (const int ranks_per_node : {1, 2})
+      for (const double bandwidth : {1e9, 5e9, 2e10}) {
+        Machine machine = bare(ranks, 1);
+        machine.ranks_per_node = ranks_per_node;
+        machine.bandwidth = bandwidth;
+        machine.latency = 100e-9;
+        machine.overhead = 5e-9;
+        Machine chain = machine;
+        chain.unbounded = true;
+        for (const Schedule schedule : {Schedule::fixed, Schedule::list})
+          for (const int threads : {1, 2, 4}) {
+            machine.schedule = schedule;
+            machine.threads = chain.threads = threads;
+            EXPECT_GE(makespan(trace, machine), makespan(trace, chain))
+                << ranks << " x " << threads << ", " << ranks_per_node << " a node, " << bandwidth;
+          }
+      }
 }
 
 TEST(Replay, KindsOfTasksMayHaveSpeedsOfTheirOwn) {
@@ -425,6 +538,41 @@ TEST(Replay, KindsOfTasksMayHaveSpeedsOfTheirOwn) {
   ASSERT_GT(publishes, 0);
   machine.speed_of["publish"] = 4;
   EXPECT_DOUBLE_EQ(makespan(trace, machine), (alone - publishes) / 2 + publishes / 4);
+}
+
+TEST(RecordedMachine, HasTheMapOfItsRanks) {
+  for (const RankMap map : {RankMap::block, RankMap::cyclic}) {
+    Machine machine = bare(2, 1);
+    machine.map = map;
+    Trace trace = replay(Timeline(test::all_neighbours(4, 1)), machine, true).trace;
+    EXPECT_EQ(recorded_machine(trace), machine) << "a prediction knows its machine";
+    trace.machine.reset();
+    EXPECT_EQ(name_of(recorded_machine(trace).map), name_of(map));
+  }
+}
+
+TEST(RecordedMachine, IsWhereAReplayPredictsNothing) {
+  Trace trace = test::two_subdomains(2);
+  Machine machine = recorded_machine(trace);
+  EXPECT_TRUE(was_recorded_on(trace, machine));
+  machine.latency *= 2;
+  EXPECT_FALSE(was_recorded_on(trace, machine));
+  const Trace predicted = replay(Timeline(trace), machine, true).trace;
+  EXPECT_FALSE(was_recorded_on(predicted, machine));
+}
+
+TEST(SmpiPlatform, RefusesWhatItCannotSay) {
+  const auto refuses = [](auto change) {
+    Machine machine;
+    machine.ranks = 2;
+    EXPECT_NO_THROW(io::smpi_platform(machine));
+    change(machine);
+    EXPECT_THROW(io::smpi_platform(machine), std::invalid_argument);
+  };
+  refuses([](Machine& machine) { machine.noise = 0.1; });
+  refuses([](Machine& machine) { machine.speed_of["sweep"] = 2; });
+  refuses([](Machine& machine) { machine.map = RankMap::weight; });
+  refuses([](Machine& machine) { machine.schedule = Schedule::list; });
 }
 
 TEST(Replay, RefusesMachinesThatMakeNoSense) {

@@ -29,11 +29,12 @@ ScalingRow row(ScalingKind kind, int ranks, double seconds, double iterations, s
 TEST(Scaling, RecordingsReadBackWhateverTheirVariantHolds) {
   const test::ScratchDirectory scratch;
   const std::string variant = "gravity=[0,0,-1] description=\"a, b\"";
-  write_recordings(scratch / "times.csv", {{"strong-1-1.h5", "1:2", variant, {0.5, 3, 7, 0}}});
+  write_recordings(scratch / "times.csv", {{"strong-1-1.h5", "1:2", variant, {0.5, 3, 7, 2}}});
   const std::vector<RecordedTrace> back = read_recordings(scratch / "times.csv");
   ASSERT_EQ(back.size(), 1U);
   EXPECT_EQ(back[0].variant, variant);
   EXPECT_EQ(back[0].times.contacts, 7);
+  EXPECT_EQ(back[0].times.missed, 2);
 }
 
 TEST(Scaling, StrongEfficiencyIsIterationsTimesTimeOfAnIteration) {
@@ -91,6 +92,12 @@ TEST(Scaling, PredictionsAreNeverHeldAgainstMeasurements) {
 TEST(Scaling, RanksAndThreadsShareTheCoresEvenly) {
   EXPECT_EQ(rank_counts(1), (std::vector<int>{1}));
   EXPECT_EQ(rank_counts(12), (std::vector<int>{1, 2, 3, 4, 6, 12}));
+}
+
+TEST(Scaling, ARowHasTheMissedStepsOfItsWorstRun) {
+  const ScalingRow made = row_of({}, {}, {{1, 9, 4, 0}, {2, 9, 4, 3}, {3, 9, 4, 1}});
+  EXPECT_EQ(made.missed, 3);
+  EXPECT_DOUBLE_EQ(made.seconds, 2);
 }
 
 TEST(Scaling, TimesAreMeansOverTheStepsThatCount) {

@@ -298,6 +298,41 @@ TEST(Overrides, ReachKeysElementsAndListEntries) {
   EXPECT_EQ(scene.name, "moon");
 }
 
+TEST(Overrides, NameAStageWithoutANameAsTheRunDoes) {
+  const std::string text = replaced(scene_with("#stage", "[[stage]]\ntime_step = 1e-3\nend = { steps = 1 }"),
+                                    "name = \"press\"", "");
+  const Scene scene = parse_scene(text, file, {"stage.stage-2.friction=0.5"});
+  EXPECT_EQ(scene.setup.stages[1].name, "stage-2");
+  EXPECT_EQ(scene.setup.stages[1].law.mu_grains, 0.5);
+  EXPECT_EQ(scene.setup.stages[0].law.mu_grains, 0);
+  EXPECT_NE(std::string(error_of(text, {"stage.shear.friction=1"}).what()).find("0 'stage-1', 1 'stage-2'"),
+            std::string::npos);
+}
+
+TEST(Decomposition, OfBoxesAloneHasThemAllAndNothingElse) {
+  const auto read = [](const std::string& keys) {
+    return parse_scene(scene_with("#tail", "[decomposition]\nboxes = [2, 3, 1]\n" + keys), file);
+  };
+  const Scene alone = read("");
+  EXPECT_EQ(alone.setup.decomposition.subdomains, 6);
+  EXPECT_EQ(alone.setup.decomposition.partitioner, PartitionKind::boxes);
+  EXPECT_EQ(resolved_scene(parse_scene(resolved_scene(alone), file)), resolved_scene(alone));
+  EXPECT_EQ(read("partitioner = \"fitted\"").setup.decomposition.partitioner, PartitionKind::fitted);
+  EXPECT_EQ(read("subdomains = 6").setup.decomposition.subdomains, 6);
+}
+
+TEST(SceneErrors, BoxesAreRefusedWhereTheyWouldBeWithoutEffect) {
+  const auto refused = [](const std::string& keys, const std::string& said) {
+    expect_refused(scene_with("#tail", "[decomposition]\nboxes = [2, 3, 1]\n" + keys),
+                   "boxes =", "decomposition.boxes", said);
+  };
+  refused("partitioner = \"rcb\"", "only with: partitioner = auto, boxes or fitted");
+  refused("partitioner = \"metis\"", "only with");
+  refused("subdomains = 5", "2 x 3 x 1 boxes are not 5 subdomains");
+  expect_refused(scene_with("#tail", "[decomposition]\nboxes = [65536, 1, 1]"),
+                 "boxes =", "decomposition.boxes", "at most 65535");
+}
+
 TEST(Scenes, OfMoreGrainsThanCanBeCountedAreRefused) {
   const std::string lattice =
       replaced(replaced(scene_with(), "\"deposition\"", "\"lattice\""), "count = 10\nbase = [0.1, 0.1]",
@@ -321,6 +356,8 @@ TEST(Overrides, MistakesNameTheOverride) {
   expect_named("slover.tolerance=1", "did you mean 'solver'?");
   expect_named("material.friction=-1", "must be >= 0");
   expect_named("material.friction=rough", "got the text 'rough'");
+  expect_named("material.density=1e400", "got 1e400, which is out of the range of numbers");
+  expect_named("solver.check_every=1", "must be 2 to");
   expect_named("description=\xff", "not UTF-8");
   expect_named("decomposition.subdomains=4294967297", "65535");
   expect_named("stage.shear.time_step=1", "no element 'shear'; there are: 0 'press'");

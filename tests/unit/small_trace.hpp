@@ -31,7 +31,7 @@ class PlanBuilder {
     plan_.group.push_back(group);
     plan_.colour.push_back(colour);
     plan_.weight.push_back(role == Role::compute ? weight : 0);
-    plan_.place.push_back(static_cast<std::uint32_t>(plan_.place.size()));
+    plan_.place.push_back(role == Role::compute ? static_cast<std::uint32_t>(plan_.place.size()) : 0);
     plan_.owner.push_back(0);
     adjacent_.emplace_back();
     return static_cast<std::uint32_t>(adjacent_.size() - 1);

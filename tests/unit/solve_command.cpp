@@ -168,6 +168,32 @@ TEST_F(SolveCommand, AFolderWithOneBadFileIsSolvedAllTheSameAndSaysTwo) {
   EXPECT_NE(outcome.output.find("auto: 1 of 1 solved"), std::string::npos) << outcome.output;
 }
 
+TEST_F(SolveCommand, ReplacesAFileOnlyWhenForced) {
+  const auto problem = write_chain(folder_ / "chain.hdf5", 3);
+  std::ofstream(folder_ / "thesis.tex") << "mine\n";
+  const auto size = fs::file_size(folder_ / "thesis.tex");
+  for (const std::string option : {"--out", "--csv", "--profile"}) {
+    const std::string command = "solve " + problem.string() + " " + option + " ";
+    const Outcome refused = talus(command + (folder_ / "thesis.tex").string(), true);
+    EXPECT_EQ(refused.code, 2) << option;
+    EXPECT_NE(refused.output.find("--force"), std::string::npos) << refused.output;
+    EXPECT_EQ(fs::file_size(folder_ / "thesis.tex"), size) << option;
+    ASSERT_EQ(talus(command + (folder_ / "answer").string()).code, 0) << option;
+    EXPECT_EQ(talus(command + (folder_ / "answer").string()).code, 2) << option;
+    EXPECT_EQ(talus(command + (folder_ / "answer").string() + " --force").code, 0) << option;
+    fs::remove(folder_ / "answer");
+  }
+  const std::string table = (folder_ / "table.csv").string();
+  EXPECT_EQ(talus("solve " + problem.string() + " --csv " + table + " --profile " + table).code, 2);
+  EXPECT_FALSE(fs::exists(table));
+}
+
+TEST_F(SolveCommand, ReturnsOneWhenItsFileCannotBeWritten) {
+  const auto problem = write_chain(folder_ / "chain.hdf5", 3);
+  for (const std::string option : {"--out", "--csv", "--profile"})
+    EXPECT_EQ(talus("solve " + problem.string() + " " + option + " /proc/talus").code, 1) << option;
+}
+
 TEST_F(SolveCommand, ReturnsTwoForBadInputWithoutALineOrAFile) {
   const auto problem = write_chain(folder_ / "chain.hdf5", 3);
   const std::string good = "solve " + problem.string();

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -13,6 +16,7 @@
 #include "io/trace_export.hpp"
 #include "io/trace_file.hpp"
 #include "runtime/graph/executor.hpp"
+#include "runtime/graph/task_error.hpp"
 #include "runtime/trace/analysis.hpp"
 #include "runtime/trace/order.hpp"
 #include "runtime/trace/traced.hpp"
@@ -87,6 +91,7 @@ TEST_F(TraceFile, OffsetsOfClocksAreTakenOut) {
   for (const Plan& plan : trace.plans) writer.append(Block{plan.rank, 0, {}, plan});
   for (std::int32_t rank = 0; rank < 2; ++rank)
     writer.append(rank, trace.tasks[static_cast<std::size_t>(rank)]);
+  writer.append(io::RankClock{0, {}});
   // Rank 1 is 500 ns behind in the beginning, 700 ns at time 2000.
   writer.append(io::RankClock{1, {io::ClockOffset{0, 500}, io::ClockOffset{2000, 700}}});
   const Trace back = io::read_trace(path_);
@@ -102,6 +107,7 @@ TEST_F(TraceFile, PartsOfRanksMakeOneTrace) {
     io::TraceWriter writer(path, 2, 1, false, trace.kinds);
     writer.append(Block{rank, 0, trace.lane(rank, 0).records, trace.plans[static_cast<std::size_t>(rank)]});
     writer.append(rank, trace.tasks[static_cast<std::size_t>(rank)]);
+    writer.append(io::RankClock{rank, {}});
     return writer;
   };
   io::TraceWriter whole = write(path_, 0);
@@ -133,6 +139,83 @@ TEST_F(TraceFile, NoticesIndicesThatPointNowhere) {
   EXPECT_NE(complaint().find("damaged"), std::string::npos) << complaint();
 }
 
+TEST_F(TraceFile, NoticesACheckOutsideOfTheLoop) {
+  Trace trace = test::two_subdomains(1);
+  std::ranges::find(trace.lanes[0].records, kind_check, &Record::kind)->epoch = -1;
+  io::write_trace(path_, trace);
+  EXPECT_NE(complaint().find("epoch -1"), std::string::npos) << complaint();
+}
+
+TEST_F(TraceFile, NoticesASubdomainThatPublishesAndDoesNotGlue) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<std::uint8_t>& role = trace.plans[0].role;
+  std::ranges::replace(role, static_cast<std::uint8_t>(Role::glue), std::uint8_t{0});
+  io::write_trace(path_, trace);
+  EXPECT_NE(complaint().find("glues 0"), std::string::npos) << complaint();
+}
+
+TEST_F(TraceFile, NoticesATurnThatNoSubdomainHas) {
+  Trace trace = test::two_subdomains(1);
+  Plan& plan = trace.plans[0];
+  const auto publish = std::ranges::find(plan.role, static_cast<std::uint8_t>(Role::publish));
+  plan.place[static_cast<std::size_t>(publish - plan.role.begin())] = most_turns;
+  io::write_trace(path_, trace);
+  EXPECT_NE(complaint().find("turn 4"), std::string::npos) << complaint();
+}
+
+/// Two threads; what is recorded comes in parts of steps 1, 2 and so on, as of a run that was killed.
+class CutTraceFile : public TraceFile {
+ protected:
+  /// Steps that the lane of each thread has come to.
+  void write(std::uint32_t first, std::uint32_t second) const {
+    const Trace trace = test::two_subdomains(1);
+    io::TraceWriter writer(path_, 1, 2, false, trace.kinds);
+    writer.append(Block{0, 0, {}, std::nullopt, trace.tasks[0]});
+    writer.append(Block{0, 0, {}, trace.plans[0]});
+    for (const auto& [thread, steps] : {std::pair(0, first), std::pair(1, second)}) {
+      std::vector<Record> records;
+      for (std::uint32_t step = 1; step <= steps; ++step)
+        for (Record record : trace.lanes[0].records) {
+          if (thread == 1) record = {record.begin, 1, 1, -1, pack(1, kind_team)};
+          record.begin += 10000 * step;
+          record.step_and_kind = pack(step, record.kind());
+          records.push_back(record);
+        }
+      writer.append(Block{0, thread, records, std::nullopt});
+    }
+  }
+};
+
+TEST_F(CutTraceFile, OfAKilledRunHasTheStepsThatAllThreadsWereThrough) {
+  write(5, 3);
+  const Trace back = io::read_trace(path_);
+  EXPECT_EQ(steps_of(back), (std::vector<std::uint32_t>{1, 2}));
+  const Timeline timeline(back);
+  EXPECT_NO_THROW(timeline.index(2));
+}
+
+TEST_F(CutTraceFile, SaysThatAKilledRunCameToNothing) {
+  write(5, 1);
+  EXPECT_NE(complaint().find("was stopped before a step"), std::string::npos) << complaint();
+}
+
+TEST_F(TraceFile, OfAPredictionKnowsItsMachine) {
+  Trace trace = test::two_subdomains(2);
+  trace.predicted = true;
+  trace.machine = Machine{};
+  trace.machine->ranks = 2;
+  trace.machine->map = RankMap::cyclic;
+  trace.machine->latency = 3e-6;
+  trace.machine->seed = 7;
+  trace.machine->late_check = false;
+  trace.machine->speed_of["sweep"] = 1.5;
+  io::write_trace(path_, trace);
+  const Trace back = io::read_trace(path_);
+  EXPECT_EQ(back.machine, trace.machine);
+  EXPECT_EQ(recorded_machine(back), *trace.machine);
+  EXPECT_FALSE(was_recorded_on(back, *trace.machine));
+}
+
 TEST(Timelines, RefuseAStepThatWasRecordedInPart) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.lanes[0].records;
@@ -151,10 +234,15 @@ TEST(Timelines, TimeWithinATaskIsNotCountedTwice) {
   EXPECT_EQ(self_times(trace)[0], (std::vector<float>{50, 30, 20, 5}));
 }
 
-TEST(Analysis, AddsUpToTheWholeOfAllThreads) {
-  const Trace trace = test::two_subdomains(2);
+TEST(Analysis, KnowsHowLongThreadsWereIdle) {
+  Trace trace = test::two_subdomains(2);
+  EXPECT_NEAR(analyse(trace).idle, 0, 1e-9);
+  // Rank 0 does nothing for 70 ns between its two epochs, rank 1 nothing for as long at the end.
+  for (Record& record : trace.lanes[0].records)
+    if (record.begin >= 180) record.begin += 70;
   const Summary sum = analyse(trace);
-  EXPECT_NEAR(sum.work + sum.exposed + sum.idle, sum.makespan * 2, 1e-9 * sum.makespan);
+  EXPECT_NEAR(sum.makespan, 2 * 180 + 70, 1e-9);
+  EXPECT_NEAR(sum.idle, 2 * 70, 1e-9);
   const Efficiencies& e = sum.efficiency;
   EXPECT_NEAR(e.parallel, e.load_balance * e.communication * e.threads, 1e-12);
   EXPECT_NEAR(e.parallel, sum.work / (2 * sum.makespan), 1e-12);
@@ -202,6 +290,36 @@ TEST(Recording, KeepsToItsStepsAndBringsThePlanAlong) {
   recorder.finish();
   EXPECT_EQ(records, 2u + 2u);  // one span a step, the time between the two and what was done in it
   EXPECT_EQ(plans, 1u);
+}
+
+// Spans end in destructors, which must not throw: on a disk that is full the program ends by itself, later.
+TEST(Recording, AFailureIsToldAtTheEndOfTheStep) {
+  int calls = 0;
+  Recorder recorder({.block = 1, .sink = [&](Block&&) {
+                       ++calls;
+                       throw std::runtime_error("the disk is full");
+                     }});
+  recorder.begin_step(1);
+  { const Span span(&recorder, kind_collective); }
+  { const Span span(&recorder, kind_collective); }
+  EXPECT_THROW(recorder.end_step(), std::runtime_error);
+  EXPECT_EQ(calls, 1);
+  recorder.begin_step(2);
+  EXPECT_NO_THROW(recorder.end_step()) << "told once";
+  EXPECT_NO_THROW(recorder.finish());
+  EXPECT_EQ(calls, 1) << "a file with a hole";
+}
+
+TEST(Recording, HandsOverTheTasksBeforeAnythingElse) {
+  std::vector<std::size_t> tasks;
+  Recorder recorder({.first_step = 2, .sink = [&](Block&& block) { tasks.push_back(block.tasks.size()); }});
+  recorder.declare(test::three_tasks());
+  for (std::uint32_t step = 1; step <= 3; ++step) {
+    recorder.begin_step(step);
+    recorder.plan(test::two_subdomains(1).plans[0]);
+    recorder.end_step();
+  }
+  EXPECT_EQ(tasks, (std::vector<std::size_t>{3, 0, 0, 0}));
 }
 
 /// Three nodes, two epochs.
@@ -264,36 +382,59 @@ TEST(Recording, ANodeBeginsWhereTheLastOneEndedUnlessItWaited) {
 
 /// Beginnings of nodes, as they come.
 struct Beginnings {
+  int epochs = 1, idle_node = -1;
   std::atomic<int> count{0};
   std::vector<int> place = std::vector<int>(8, -1);
   void node(std::uint32_t node, int) { place[node] = count.fetch_add(1); }
   bool gate(int) const { return true; }
-  bool decide(int) { return false; }
-  std::optional<Kind> kind(std::uint32_t, int) const { return test::sweep; }
+  bool decide(int epoch) { return epoch + 1 < epochs; }
+  std::optional<Kind> kind(std::uint32_t node, int) const {
+    return static_cast<int>(node) == idle_node ? std::nullopt : std::optional(test::sweep);
+  }
 };
 
-TEST(Orders, AreFollowedByThreadsThatNeedNotWait) {
-  // Eight nodes without conflicts on two threads, begun in turn: 0, 4, 1, 5, 2, 6, 3, 7.
-  const std::vector<std::uint32_t> colour(8, 0), offset(9, 0), neighbour, owner{0, 0, 0, 0, 1, 1, 1, 1};
-  Trace trace = test::one_loop(colour, {}, std::vector<float>(8, 1));
-  trace.threads = 2;
-  trace.plans[0].owner = owner;
-  trace.lanes = {{0, 0, {}}, {0, 1, {}}};
-  for (std::uint32_t n = 0; n < 8; ++n)
-    trace.lanes[n / 4].records.push_back({2 * (n % 4) + n / 4, 1, n, 0, pack(1, test::sweep)});
-  Order order(trace, 0);
+/// Eight nodes without conflicts on two threads, begun in turn: 0, 4, 1, 5, 2, 6, 3, 7. Then as many again,
+/// with a decision behind each epoch, or the second only.
+class Orders : public testing::Test {
+ protected:
+  Trace trace(bool two_gates = true) const {
+    Trace trace = test::one_loop(colour_, {}, std::vector<float>(8, 1));
+    trace.threads = 2;
+    trace.plans[0].owner = owner_;
+    trace.lanes = {{0, 0, {}}, {0, 1, {}}};
+    for (int epoch = 0; epoch < 2; ++epoch) {
+      for (std::uint32_t n = 0; n < 8; ++n)
+        trace.lanes[n / 4].records.push_back(
+            {20 * epoch + 2 * (n % 4) + n / 4, 1, n, epoch, pack(1, test::sweep)});
+      if (epoch == 1 || two_gates)
+        trace.lanes[0].records.push_back({20 * epoch + 10, 1, 0, epoch, pack(1, kind_check)});
+    }
+    return trace;
+  }
+  Plan plan() const { return trace().plans[0]; }
+  void run(Order& order, Beginnings& program) const {
+    graph::EpochGraph loop;
+    loop.build({colour_, offset_, {}}, owner_, 2);
+    graph::Graph graph;
+    graph.team("loop", {}, [&](graph::Worker& me) {
+      Ordered ordered(program, order, me);
+      graph::run_epochs(loop, me, ordered);
+    });
+    graph::Executor executor({.threads = 2});
+    executor.run(graph);
+  }
+
+  const std::vector<std::uint32_t> colour_ = std::vector<std::uint32_t>(8, 0),
+                                   offset_ = std::vector<std::uint32_t>(9, 0), owner_{0, 0, 0, 0, 1, 1, 1, 1};
+};
+
+TEST_F(Orders, AreFollowedByThreadsThatNeedNotWait) {
+  Order order(trace(), 0);
+  order.plan(plan());
   ASSERT_TRUE(order.begin_step(1));
-  EXPECT_FALSE(Order(trace, 0).begin_step(2));
-  graph::EpochGraph loop;
-  loop.build({colour, offset, neighbour}, owner, 2);
+  EXPECT_FALSE(Order(trace(), 0).begin_step(2));
   Beginnings program;
-  graph::Graph graph;
-  graph.team("loop", {}, [&](graph::Worker& me) {
-    Ordered ordered(program, order, me);
-    graph::run_epochs(loop, me, ordered);
-  });
-  graph::Executor executor({.threads = 2});
-  executor.run(graph);
+  run(order, program);
   ASSERT_EQ(program.count, 8);
   // Each takes its place right after its turn: of two neighbours in the order the later may overtake by that
   // much.
@@ -301,11 +442,41 @@ TEST(Orders, AreFollowedByThreadsThatNeedNotWait) {
     EXPECT_NEAR(program.place[n], static_cast<int>(2 * (n % 4) + n / 4), 1) << n;
 }
 
-TEST(Orders, OfFreeThreadsAreRefused) {
-  Trace trace = test::one_loop({0, 1}, {}, {1, 1});
-  std::swap(trace.lanes[0].records[1].begin, trace.lanes[0].records[2].begin);
-  sort_lanes(trace);
-  EXPECT_THROW(Order(trace, 0), TraceError);
+// The run may plan its loop long before the first step that was recorded.
+TEST_F(Orders, OfAnotherLoopAreRefusedWhereverItWasPlanned) {
+  Order order(trace(), 0);
+  Plan other = plan();
+  other.owner[3] = 1;
+  order.plan(other);
+  EXPECT_FALSE(order.begin_step(7));
+  EXPECT_THROW(order.begin_step(1), TraceError);
+}
+
+// Each of these would leave threads waiting for a turn that nobody takes.
+TEST_F(Orders, ThatCannotBeFollowedEndTheRun) {
+  const auto expect_failure = [&](const Trace& recorded, int epochs, int idle_node) {
+    Order order(recorded, 0);
+    order.plan(plan());
+    ASSERT_TRUE(order.begin_step(1));
+    Beginnings program;
+    program.epochs = epochs;
+    program.idle_node = idle_node;
+    EXPECT_THROW(run(order, program), graph::TaskError);
+  };
+  expect_failure(trace(), 1, 0);        // a node that did something does nothing
+  expect_failure(trace(), 1, 7);        // the last before a decision
+  expect_failure(trace(), 3, -1);       // the recorded loop had ended
+  expect_failure(trace(false), 2, -1);  // it had gone on without a decision
+  Trace idle = trace();
+  std::erase_if(idle.lanes[1].records, [](const Record& record) { return record.node == 5; });
+  expect_failure(idle, 1, -1);  // a node that did nothing does something
+}
+
+TEST_F(Orders, OfFreeThreadsAreRefused) {
+  Trace free = test::one_loop({0, 1}, {}, {1, 1});
+  std::swap(free.lanes[0].records[1].begin, free.lanes[0].records[2].begin);
+  sort_lanes(free);
+  EXPECT_THROW(Order(free, 0), TraceError);
 }
 
 TEST(Recording, OfAnExecutorHasItsTasks) {
@@ -369,6 +540,28 @@ TEST(Export, PajeOpensAndClosesEachTask) {
   for (std::size_t at = text.find("\n6 "); at != std::string::npos; at = text.find("\n6 ", at + 1)) ++closed;
   EXPECT_EQ(opened, trace.record_count());
   EXPECT_EQ(closed, trace.record_count());
+}
+
+TEST(Export, PajeLinksTheMessagesThatWereWaitedFor) {
+  Trace trace = test::two_subdomains(2);
+  const std::uint32_t there = message_name(0, 1), back = message_name(1, 0);
+  trace.lanes[0].records.push_back({110, 0, there, 0, pack(1, kind_send)});
+  trace.lanes[1].records.push_back({110, 0, back, 0, pack(1, kind_send)});
+  trace.lanes[1].records.push_back({160, 10, there, 0, pack(1, kind_receive)});
+  // Once more, as copies are added up within a check.
+  trace.lanes[0].records.push_back({171, 0, there, 0, pack(1, kind_send)});
+  trace.lanes[1].records.push_back({172, 5, there, 0, pack(1, kind_receive)});
+  sort_lanes(trace);
+  std::istringstream text(io::to_paje(trace, {}));
+  std::vector<std::string> begun, ended;
+  for (std::string line; std::getline(text, line);) {
+    const std::string key = line.substr(line.rfind(' ') + 1);
+    if (line.starts_with("7 ")) begun.push_back(key);
+    if (line.starts_with("8 ")) ended.push_back(key);
+  }
+  EXPECT_EQ(begun.size(), 2u) << "nobody waited for the other";
+  EXPECT_EQ(std::set(begun.begin(), begun.end()).size(), 2u) << "a key names one link";
+  EXPECT_EQ(begun, ended);
 }
 
 }  // namespace

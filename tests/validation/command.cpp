@@ -34,12 +34,17 @@ class Command : public testing::Test {
 // ---- bad input: exit code 2, nothing written
 
 TEST_F(Command, WithoutWhatItNeedsSaysSoAndReturnsTwo) {
-  for (const std::string arguments : {"", "run", "plan", "solve", "walk scene.toml", "run a.toml b.toml",
-                                      "run a.toml --threads many", "run a.toml --step 3"}) {
+  for (const std::string arguments :
+       {"", "run", "plan", "solve", "walk scene.toml", "run a.toml b.toml", "run a.toml --threads many",
+        "run a.toml --step 3", "run a.toml --threads 999999999", "solve a.hdf5 --tol -1"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_TRUE(says(outcome, "--help")) << arguments << ": " << outcome.messages;
+    EXPECT_LT(outcome.messages.size(), 200U) << outcome.messages;
   }
+  EXPECT_TRUE(says(run("rnu scene.toml"), "'rnu' is no command of talus; did you mean 'run'?"));
+  EXPECT_TRUE(says(run("study eror scene.toml"), "`talus study --help`"));
+  EXPECT_TRUE(says(run("study error scene.toml --bad"), "`talus study error --help`"));
   EXPECT_EQ(entries(), 0U);
 }
 
@@ -151,6 +156,29 @@ TEST_F(Command, ReplacesNothingForASceneItCannotRun) {
   EXPECT_EQ(files_below(at("results")), before);
 }
 
+// What a step could not go on from is seen before anything is removed.
+TEST_F(Command, KeepsEarlierResultsWhenABodyHasNoMass) {
+  write(at("scene.toml"), column);
+  ASSERT_EQ(run("run scene.toml --out results").code, 0);
+  const auto before = files_below(at("results"));
+  std::string text = column;
+  const std::size_t begin = text.find("kind = "), end = text.find("[[wall]]");
+  text.replace(begin, end - begin, "kind = \"bodies\"\nfile = \"grains.csv\"\n\n");
+  write(at("scene.toml"), text);
+  const std::vector<std::pair<std::string, std::string>> mistakes = {
+      {"radius\n0,0,0,1,0.01\n7,0,0,2,1e-120\n", "1e-120"},
+      {"radius\n7,0,0,0,1e120\n", "1e+120"},
+      {"radius,vx,vy,vz,wx,wy,wz\n7,0,0,0,1e10,0,0,0,1e300,0,0\n", "angular velocity"}};
+  for (const auto& [rows, word] : mistakes) {
+    write(at("grains.csv"), "id,x,y,z," + rows);
+    const Outcome outcome = run("run scene.toml --out results --force");
+    EXPECT_EQ(outcome.code, 2) << outcome.messages;
+    EXPECT_TRUE(says(outcome, "grains.csv: body 7: ")) << outcome.messages;
+    EXPECT_TRUE(says(outcome, word)) << outcome.messages;
+    EXPECT_EQ(files_below(at("results")), before);
+  }
+}
+
 TEST_F(Command, NamesADirectoryItCannotWriteTo) {
   write(at("scene.toml"), column);
   write(at("file"), "not a directory");
@@ -249,6 +277,67 @@ TEST_F(Command, StopsAfterSoManyStepsAndTakesOverrides) {
   EXPECT_EQ(nlohmann::json::parse(content(at("results/run.json"))).at("provenance").at("seed"), 7);
   EXPECT_FALSE(fs::exists(at("results/fields.pvd")));
   EXPECT_FALSE(fs::exists(at("results/forces.svg")));
+}
+
+TEST_F(Command, SaysWhatAStepOptionAskedForAndDidNotGet) {
+  write(at("scene.toml"), column);
+  const Outcome late =
+      run("run scene.toml --out results --error-history 2,50 --trace --trace-steps 90:99 --steps 3");
+  EXPECT_EQ(late.code, 0) << late.messages;
+  EXPECT_TRUE(says(late, "--error-history 2,50: the run ended after step 3")) << late.messages;
+  EXPECT_TRUE(says(late, "--trace-steps 90:99: the run ended after step 3")) << late.messages;
+  EXPECT_EQ(summary(at("results")).at("message"), "stopped after 3 steps by --steps; the scene has more");
+
+  const Outcome all =
+      run("run scene.toml --force --out results --error-history 1:3 --dump-fclib 4 --steps 4");
+  EXPECT_EQ(all.code, 0) << all.messages;
+  EXPECT_FALSE(says(all, "the run ended after")) << all.messages;
+  EXPECT_EQ(summary(at("results")).at("message"), "");
+
+  // A file that was asked for and is not there: whoever waits for it must hear of it.
+  const Outcome none = run("run scene.toml --force --out results --dump-fclib 4 --dump-fclib 20");
+  EXPECT_EQ(none.code, 1) << none.messages;
+  EXPECT_TRUE(says(none, "no dump of step 20: the run ended after step 4")) << none.messages;
+  EXPECT_TRUE(fs::exists(at("results/fclib_000004.hdf5")));
+  EXPECT_EQ(summary(at("results")).at("status"), "done");
+  EXPECT_EQ(summary(at("results")).at("exit_code"), 1);
+}
+
+TEST_F(Command, SaysWhyAStageEndedAndHowFarFromRest) {
+  std::string text = column;
+  text.replace(text.find("steps = 4"), 9, "steps = 2, equilibrium = 1e-12");
+  write(at("scene.toml"), text + "\n[[stage]]\nname = \"long\"\nend = { steps = 50, equilibrium = 0.1 }\n");
+  const Outcome outcome = run("run scene.toml --out results");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: steps reached, unrest ")) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "(asked 1e-12)")) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "stage 'long' ended after 1 step: equilibrium reached")) << outcome.messages;
+  const Table steps = read_table(at("results/steps.csv"));
+  double worst = 0;
+  for (std::size_t k = 0; k < steps.rows.size(); ++k)
+    worst = std::max(worst, steps.number(k, "penetration_max"));
+  EXPECT_EQ(summary(at("results")).at("worst_penetration").get<double>(), worst);
+}
+
+TEST_F(Command, WarnsOfGrainsThatBeginDeepInsideOthersOrWalls) {
+  std::string text = column;
+  const std::size_t begin = text.find("kind = "), end = text.find("[[wall]]");
+  text.replace(begin, end - begin, "kind = \"bodies\"\nfile = \"grains.csv\"\n\n");
+  text.replace(text.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
+  write(at("scene.toml"), text);
+  write(at("grains.csv"), "id,x,y,z,radius\n3,0,0,0.01,0.01\n4,0,0,0.0292,0.01\n9,1,0,0.008,0.01\n");
+  const Outcome wall = run("run scene.toml --dry-run");
+  EXPECT_EQ(wall.code, 0);
+  EXPECT_TRUE(says(wall,
+                   "1 overlap of more than 10 % of the smaller radius, the deepest of 20 % between grain 9 "
+                   "and wall 'floor'"))
+      << wall.messages;
+  EXPECT_TRUE(says(wall, "solver.overlap_correction")) << wall.messages;
+  write(at("grains.csv"), "id,x,y,z,radius\n3,0,0,0.01,0.01\n4,0,0,0.025,0.01\n9,1,0,0.008,0.01\n");
+  EXPECT_TRUE(says(run("run scene.toml --dry-run"), "2 overlaps")) << "and the worst is that of two grains";
+  EXPECT_TRUE(says(run("run scene.toml --dry-run"), "50 % between grains 3 and 4"));
+  write(at("grains.csv"), "id,x,y,z,radius\n3,0,0,0.0095,0.01\n4,0,0,0.0287,0.01\n");
+  EXPECT_FALSE(says(run("run scene.toml --dry-run"), "overlap"));
 }
 
 TEST_F(Command, DryRunPrintsTheResolvedSceneAndWritesNothing) {

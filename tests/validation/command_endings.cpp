@@ -71,6 +71,20 @@ overlap_correction = 1
   EXPECT_NE(summary(at("results")).at("message").get<std::string>().find("step 1 "), std::string::npos);
 }
 
+// A folder stands where a file of the run belongs: seen when the run has begun, before its first step.
+TEST_F(Ending, BeforeTheFirstStepIsInRunJson) {
+  write(at("scene.toml"), column);
+  for (const std::string name : {"trace.h5", "results.h5"}) {
+    fs::create_directories(at("results/" + name));
+    const Outcome outcome = run("run scene.toml --trace --force --out results");
+    EXPECT_EQ(outcome.code, 1) << name << ": " << outcome.messages;
+    EXPECT_EQ(summary(at("results")).at("status"), "failed") << name;
+    EXPECT_EQ(summary(at("results")).at("exit_code"), 1) << name;
+    EXPECT_NE(summary(at("results")).at("message").get<std::string>().find(name), std::string::npos);
+    fs::remove_all(at("results"));
+  }
+}
+
 TEST_F(Ending, BySignalLeavesWholeFiles) {
   std::string endless = pressed_box;
   endless.replace(endless.find("steps = 6"), 9, "steps = 1000000000");

@@ -126,6 +126,18 @@ TEST_F(PartitionCommand, SaysWhenNothingTouches) {
   EXPECT_EQ(row(outcome.output, "contacts"), Numbers(8, 0));
 }
 
+TEST_F(PartitionCommand, CutsTheBoxesOfTheScene) {
+  write(at("scene.toml"), column + "[decomposition]\nboxes = [1, 3, 1]\n");
+  const Outcome outcome = run("partition scene.toml --subdomains 3 --partitioner boxes");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  // All grains stand above one another: chosen boxes would lie so too.
+  EXPECT_EQ(field("out/partition-column/partition_boxes.vtp", "multiplicity"),
+            (std::vector<std::int32_t>{1, 1, 1}));
+  const Outcome others = run("partition scene.toml --subdomains 2 --out other");
+  EXPECT_EQ(others.code, 2);
+  EXPECT_NE(others.messages.find("decomposition.boxes"), std::string::npos) << others.messages;
+}
+
 TEST_F(PartitionCommand, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {
   write(at("scene.toml"), column);
   const std::string command = "partition scene.toml --subdomains 2 --out cut";

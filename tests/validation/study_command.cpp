@@ -70,6 +70,52 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
   EXPECT_NE(page.find("not unique"), std::string::npos) << "the page says what the reference is worth";
 }
 
+/// The residual of a long column is small long before anything is carried: `auto`, which the reference tries
+/// first, ends on the balance, and the reference must ask more of that than anybody else.
+TEST_F(StudyError, TheReferenceIsTheAnswerInStiffSamplesToo) {
+  write(at("column.toml"), column);
+  ASSERT_EQ(run("study error column.toml --out s --threads 1 --only step --at-step 0 --methods auto,admm "
+                "--tolerances 1e-2 --set sample.cells=[1,1,60]")
+                .code,
+            0);
+  const Table truth = read_table(at("s/true_error.csv"));
+  const auto last = [&](const char* method) {
+    return rows_where(truth, [&](const auto& row) { return row.at("method") == method; }).back();
+  };
+  EXPECT_LT(truth.number(last("admm"), "wall_force_error"), 1e-3) << "ADMM is right";
+  EXPECT_GT(truth.number(last("auto"), "wall_force_error"), 1e-3) << "and `auto` stops where it may";
+}
+
+/// With gravity such a column hangs in the balance of the scene; a variant asked for a hundredth of the
+/// scene's tolerance is asked for a hundredth of its balance as well.
+TEST_F(StudyError, ATighterToleranceTightensTheBalance) {
+  write(at("column.toml"), column);
+  ASSERT_EQ(run("study error column.toml --out s --threads 1 --only step --at-step 0 --methods auto "
+                "--tolerances 1e-5 --set sample.cells=[1,1,60]")
+                .code,
+            0);
+  const Table truth = read_table(at("s/true_error.csv"));
+  EXPECT_LT(truth.number(truth.rows.size() - 1, "wall_force_error"), 5e-3) << "the scene's balance is 5e-2";
+}
+
+/// Velocities are nothing but the solver's noise there, and no measure of its errors.
+TEST_F(StudyError, VelocityErrorsOfASamplePressedAtRestAreThoseOfItsForces) {
+  std::string pressed = column;
+  pressed.replace(pressed.find("gravity"), pressed.find("time_step") - pressed.find("gravity"), "");
+  pressed.insert(pressed.find("[[stage]]"),
+                 "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"force\"\nforce = 1\n\n");
+  write(at("pressed.toml"), pressed);
+  ASSERT_EQ(run("study error pressed.toml --out s --threads 1 --only step --at-step 0 --methods nlgs "
+                "--tolerances 1e-2 --set sample.cells=[1,1,20]")
+                .code,
+            0);
+  const Table truth = read_table(at("s/true_error.csv"));
+  for (std::size_t k = 0; k < truth.rows.size(); ++k) {
+    EXPECT_LT(truth.number(k, "velocity_error"), 2 * truth.number(k, "wall_force_error"));
+    EXPECT_GT(truth.number(k, "velocity_error"), 0.5 * truth.number(k, "wall_force_error"));
+  }
+}
+
 TEST_F(StudyError, WarmStartsBeginNearerThanColdOnes) {
   ASSERT_NE(run(std::string(brief) + "--only step --at-step 4 --methods nlgs --tolerances 1e-2").code, 1);
   const Table residual = read_table(at("s/residual.csv"));
@@ -112,6 +158,34 @@ TEST_F(StudyError, WholeRunsComeNearerTheReferenceAsTheToleranceFalls) {
   EXPECT_TRUE(fs::exists(at("s/run_position_seconds.svg")));
 }
 
+TEST_F(StudyError, TimeStepsLongerThanAStageMakeOneStepOfIt) {
+  const Outcome outcome = run(std::string(brief) +
+                              "--only run --steps 12 --methods nlgs --tolerances 1e-2 --time-steps 5 --set "
+                              "stage.press.end.steps=2");
+  ASSERT_NE(outcome.code, 1) << outcome.messages;
+  // Two steps of the first stage become one, six of the second too.
+  EXPECT_EQ(read_table(at("s/runs.csv")).number(0, "steps"), 2);
+}
+
+TEST_F(StudyError, LeavesOutWhatTheSceneDoesNotHave) {
+  write(at("column.toml"), column);
+  const Outcome outcome =
+      run("study error column.toml --out s --threads 1 --only run --steps 2 --methods nlgs "
+          "--tolerances 1e-1 --set allow_unconverged=true");
+  ASSERT_NE(outcome.code, 1) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("positions off by"), std::string::npos) << outcome.messages;
+  EXPECT_EQ(outcome.messages.find("nan"), std::string::npos) << outcome.messages;
+}
+
+TEST_F(StudyError, AStudyThatIsStoppedLeavesWhatItHasMeasured) {
+  // `sed` goes away behind the first result, and the system stops who goes on writing to it.
+  run(std::string(brief) +
+      "--tolerances 1e-4 --at-step 2 --subdomains 1,2,3 2>&1 | sed '/auto, 1 subdomain, cold/q'");
+  EXPECT_FALSE(read_table(at("s/true_error.csv")).rows.empty());
+  EXPECT_TRUE(fs::exists(at("s/report.html")));
+  EXPECT_FALSE(fs::exists(at("s/runs.csv"))) << "it was not stopped";
+}
+
 TEST_F(StudyError, GnuplotDrawsTheTables) {
   if (std::system("command -v gnuplot >/dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
   ASSERT_NE(run(std::string(brief) + "--only step --at-step 2 --methods nlgs,nncg --tolerances 1e-2").code,
@@ -128,7 +202,14 @@ TEST_F(StudyError, RefusesWhatHasNoMeaningAndWritesNothing) {
        {"missing.toml", "scene.toml --methods newtonian", "scene.toml --tolerances 0",
         "scene.toml --tolerances x", "scene.toml --subdomains 0", "scene.toml --time-steps -1",
         "scene.toml --steps 0", "scene.toml --threads 0", "scene.toml --only both",
-        "scene.toml --set solver.tolerances=1", "empty", ""}) {
+        "scene.toml --set solver.tolerances=1", "empty", "", "scene.toml --time-steps 50 --steps 4",
+        "scene.toml --only run --time-steps 8 --set 'stage.press.end={time=3e-3}'",
+        // Options that would do nothing.
+        "scene.toml --only run --at-step 1", "scene.toml --only run --max-sweeps 1",
+        "scene.toml --only run --max-seconds 1", "scene.toml --only step --steps 1",
+        "scene.toml --only step --time-steps 1", "empty --set seed=1", "empty --subdomains 1",
+        "empty --threads 1", "empty --seeds 1", "empty --only step", "empty --steps 1",
+        "empty --time-steps 1", "empty --at-step 1", "empty --max-sweeps 1"}) {
     const Outcome outcome = run("study error " + arguments);
     EXPECT_EQ(outcome.code, 2) << arguments << outcome.messages;
     EXPECT_NE(outcome.messages.find("error"), std::string::npos) << arguments << outcome.messages;
@@ -137,6 +218,9 @@ TEST_F(StudyError, RefusesWhatHasNoMeaningAndWritesNothing) {
   EXPECT_NE(run("study error scene.toml --methods newtonian").messages.find("nlgs+momentum"),
             std::string::npos)
       << "says what there is";
+  EXPECT_NE(run("study error empty --only step").messages.find("--only"), std::string::npos);
+  EXPECT_NE(run("study error scene.toml --time-steps 50 --steps 4").messages.find("--time-steps 50"),
+            std::string::npos);
 }
 
 TEST_F(StudyError, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {
@@ -155,9 +239,18 @@ TEST_F(StudyError, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {
 }
 
 TEST_F(StudyError, SaysWhenTheSceneEndsBeforeTheStep) {
-  const Outcome outcome = run("study error scene.toml --out s --only step --at-step 1000");
-  EXPECT_EQ(outcome.code, 1);
-  EXPECT_NE(outcome.messages.find("--at-step"), std::string::npos) << outcome.messages;
+  const Outcome outcome = run("study error scene.toml --out s --only step --at-step 12");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.messages.find("after step 12"), std::string::npos) << outcome.messages;
+  EXPECT_FALSE(fs::exists(at("s")));
+  EXPECT_NE(run("study error scene.toml --out s --only step --at-step 11 --methods nlgs --tolerances 1").code,
+            2);
+  // Nobody knows before when a sample comes to rest.
+  const Outcome late =
+      run("study error scene.toml --out t --only step --at-step 12 --set "
+          "'stage.press.end={equilibrium=1e9}'");
+  EXPECT_EQ(late.code, 2);
+  EXPECT_NE(late.messages.find("--at-step"), std::string::npos) << late.messages;
 }
 
 TEST_F(StudyError, ARunWritesTheErrorsOfChosenSteps) {

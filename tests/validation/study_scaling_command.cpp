@@ -16,8 +16,9 @@ class StudyScaling : public testing::Test {
  protected:
   void SetUp() override { write(at("scene.toml"), pressed_box); }
   Outcome run(const std::string& arguments, const std::string& before = "") {
+    // The study itself lets root start ranks.
     return test::run(folder_.path(), arguments,
-                     "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " + before);
+                     "env -u OMPI_ALLOW_RUN_AS_ROOT -u OMPI_ALLOW_RUN_AS_ROOT_CONFIRM " + before);
   }
   fs::path at(const std::string& name) const { return folder_.path() / name; }
   ScratchDirectory folder_;
@@ -98,6 +99,57 @@ TEST_F(StudyScaling, BeginsFromTheEndOfARun) {
   EXPECT_FALSE(fs::exists(at("t")));
 }
 
+/// The lid comes down at some speed at the end of the run; as long as it is pushed, that is where it goes on.
+TEST_F(StudyScaling, PushedWallsGoOnAtTheSpeedTheyHad) {
+  ASSERT_EQ(run("run scene.toml --out r --threads 1 --steps 3 --set allow_unconverged=true").code, 0);
+  const Table walls = read_table(at("r/walls.csv"));
+  const std::size_t last = walls.rows.size() - 1;
+  ASSERT_EQ(walls.rows[last].at("wall"), "z+");
+  ASSERT_GT(walls.number(last, "velocity"), 0);
+  ASSERT_NE(
+      run("study scaling scene.toml --out s --steps 1:1 --subdomains 1 --repeat 0 --from r/results.h5").code,
+      1);
+  EXPECT_NE(content(at("s/strong.toml")).find(", -" + walls.rows[last].at("velocity") + "]"),
+            std::string::npos)
+      << content(at("s/strong.toml"));
+}
+
+TEST_F(StudyScaling, SaysWhenResultsAreOfAnotherSample) {
+  ASSERT_EQ(run("run scene.toml --out r --threads 1 --steps 1 --set allow_unconverged=true").code, 0);
+  const std::string command = std::string("study scaling scene.toml --steps 1:1 --subdomains 1 --repeat 0 ") +
+                              "--set allow_unconverged=true --from r/results.h5 ";
+  const Outcome same = run(command + "--out a"), fewer = run(command + "--out b --set sample.count=300"),
+                finer = run(command + "--out c --set sample.radius_max=0.01");
+  EXPECT_NE(same.messages.find("r/results.h5; radii"), std::string::npos) << same.messages;
+  EXPECT_EQ(same.messages.find("warning"), std::string::npos) << same.messages;
+  EXPECT_NE(fewer.messages.find("warning"), std::string::npos) << fewer.messages;
+  EXPECT_NE(finer.messages.find("warning"), std::string::npos) << finer.messages;
+}
+
+/// A sweep too few on purpose is a study too, and says so.
+TEST_F(StudyScaling, MissedTolerancesAreToldAndMustBeAllowed) {
+  const std::string command =
+      "study scaling scene.toml --steps 2:3 --subdomains 2 --repeat 1 --cores 1 --no-weak --set "
+      "solver.tolerance=1e-9 --set solver.max_iterations=4 ";
+  const Outcome missed = run(command + "--out a"),
+                allowed = run(command + "--out b --set allow_unconverged=true");
+  EXPECT_EQ(missed.code, 3) << missed.messages;
+  EXPECT_NE(missed.messages.find("allow_unconverged"), std::string::npos) << missed.messages;
+  EXPECT_EQ(allowed.code, 0) << allowed.messages;
+  for (const char* out : {"a", "b"}) {
+    const Table table = read_table(at(std::string(out) + "/strong_scaling.csv"));
+    for (std::size_t k = 0; k < table.rows.size(); ++k) EXPECT_EQ(table.number(k, "missed"), 2) << k;
+    EXPECT_NE(content(at(std::string(out) + "/report.html")).find("missed the tolerance"), std::string::npos);
+  }
+}
+
+/// The first run on one core ends well; no core is left for the one that is to follow.
+TEST_F(StudyScaling, AStudyThatFailsLeavesWhatItHasMeasured) {
+  const Outcome outcome = run(std::string(small) + "--repeat 1 --cores 2 --no-weak --mpirun false");
+  EXPECT_EQ(outcome.code, 1) << outcome.messages;
+  EXPECT_EQ(read_table(at("s/strong_scaling.csv")).rows.front().at("source"), "run");
+}
+
 TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
   const std::string command =
       "study scaling scene.toml --out s --steps 2:3 --subdomains 2 --repeat 0 --no-weak ";
@@ -111,6 +163,10 @@ TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
   const Table after = read_table(at("s/strong_scaling.csv"));
   EXPECT_EQ(after.rows[0].at("seconds"), before.rows[0].at("seconds")) << "one core sends nothing";
   EXPECT_GT(after.number(1, "seconds"), before.number(1, "seconds"));
+  const Outcome longer =
+      run("study scaling scene.toml --out s --steps 2:4 --subdomains 2 --repeat 0 --no-weak --reuse");
+  EXPECT_NE(longer.messages.find("strong-2-1.h5 was of steps 2:3: recorded anew"), std::string::npos)
+      << longer.messages;
   const auto files = files_below(at("s"));
   const Outcome other = run(command + "--reuse --set material.friction=0.1");
   EXPECT_EQ(other.code, 2);
@@ -180,6 +236,12 @@ TEST_F(StudyScaling, OverwritesItsOwnFilesOnlyAndOnlyWhenAsked) {
   EXPECT_EQ(content(at("s/notes.txt")), "mine");
   EXPECT_EQ(content(at("s/traces/mine.h5")), "mine");
   EXPECT_FALSE(fs::exists(at("s/traces/strong-4-1.h5"))) << "of the earlier study";
+  ASSERT_NE(run("study error scene.toml --out s --force --threads 1 --only step --at-step 1 --methods nlgs "
+                "--tolerances 1")
+                .code,
+            2);
+  EXPECT_TRUE(fs::exists(at("s/traces/strong-2-1.h5"))) << "of another command";
+  EXPECT_TRUE(fs::exists(at("s/strong_scaling.csv"))) << "of another command";
 }
 
 }  // namespace

@@ -185,6 +185,22 @@ TEST_F(TraceCommand, RefusesWhatIsNoTrace) {
   EXPECT_EQ(talus("trace show " + trace).code, 2);
 }
 
+TEST_F(TraceCommand, ReplacesAFileOnlyWhenForced) {
+  const std::string trace = recorded("out", 1);
+  for (const std::string command : {"trace export " + trace + " --format svg", "replay " + trace}) {
+    write(folder_ / "thesis.tex", "mine");
+    const Outcome refused = talus(command + " -o thesis.tex");
+    EXPECT_EQ(refused.code, 2) << command;
+    EXPECT_NE(refused.messages.find("--force"), std::string::npos) << refused.messages;
+    EXPECT_EQ(content(folder_ / "thesis.tex"), "mine");
+    EXPECT_EQ(talus(command + " -o thesis.tex --force").code, 0) << command;
+    EXPECT_NE(content(folder_ / "thesis.tex"), "mine");
+    EXPECT_EQ(talus(command + " -o /proc/talus").code, 1) << "not bad input: " << command;
+  }
+  EXPECT_EQ(talus("replay " + trace + " -o same --smpi-platform same").code, 2);
+  EXPECT_FALSE(fs::exists(folder_ / "same"));
+}
+
 TEST_F(TraceCommand, RefusesMachinesThatMakeNoSense) {
   const std::string trace = recorded("out", 1);
   const Outcome many = talus("replay " + trace + " --ranks 5");
@@ -192,6 +208,7 @@ TEST_F(TraceCommand, RefusesMachinesThatMakeNoSense) {
   EXPECT_NE(many.messages.find("5 ranks for 4 subdomains"), std::string::npos) << many.messages;
   EXPECT_EQ(talus("replay " + trace + " --map random").code, 2);
   EXPECT_EQ(talus("replay " + trace + " --bandwidth 0").code, 2);
+  EXPECT_EQ(talus("replay " + trace + " --steps 0").code, 2);
   EXPECT_EQ(talus("replay " + trace + " --speed-of glue=2 publish=3").code, 0);
   for (const char* wrong : {"glue", "glue=fast", "glu=2", "glue=0"})
     EXPECT_EQ(talus("replay " + trace + " --speed-of " + wrong).code, 2) << wrong;

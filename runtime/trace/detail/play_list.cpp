@@ -2,9 +2,11 @@
 /// and any thread of the rank takes it. With a thread for every node the time is that of the longest chain.
 
 #include <algorithm>
+#include <limits>
+#include <queue>
 #include <tuple>
 
-#include "runtime/trace/detail/simulation.hpp"
+#include "runtime/trace/detail/loop_events.hpp"
 
 namespace talus::trace::detail {
 namespace {
@@ -18,14 +20,15 @@ class ListLoop {
         layout_(layout),
         epochs_(epochs),
         threads_(static_cast<std::uint32_t>(stage.machine.threads)),
-        rounds_(stage.machine.ranks, epochs, stage.network),
+        events_(stage, index, layout, epochs),
         ranks_(start.size()),
         missing_(layout.nodes.size(), 0),
         epoch_(layout.nodes.size(), 0),
-        arrived_(2 * layout.nodes.size(), 0) {
-    for (std::size_t r = 0; r < ranks_.size(); ++r) {
-      ranks_[r].time = start[r];
-      for (std::uint32_t t = threads_; t-- > 0;) ranks_[r].idle.push_back(t);
+        ready_(layout.nodes.size(), never),
+        last_name_(layout.nodes.size(), 0) {
+    for (std::uint32_t r = 0; r < ranks_.size(); ++r) {
+      ranks_[r].begin = start[r];
+      for (std::uint32_t t = threads_; t-- > 0;) ranks_[r].idle.push_back({stage.log.worker(r, t), start[r]});
       ranks_[r].allowed = last_before_gate(0);
     }
     for (std::uint32_t n = 0; n < layout.nodes.size(); ++n)
@@ -34,179 +37,126 @@ class ListLoop {
   }
 
   std::vector<double> run() {
-    for (std::uint32_t r = 0; r < ranks_.size(); ++r) agenda_.add(ranks_[r].time, gate_opens, r, 1);
-    while (!agenda_.empty()) {
-      const Event event = agenda_.next();
-      switch (event.what) {
-        case node_ends:
-          node_ended(event.a, event.b, event.time);
-          break;
-        case message_leaves:
-          message_left(event.a, event.b, event.time);
-          break;
-        case message_comes: {
-          const SimMessage& came = message(event.a);
-          ++arrived_[inbox(came.to, event.b)];
-          offer(came.to);
-          dispatch(layout_.nodes[came.to].rank, event.time);
-          break;
-        }
-        case gate_reached:
-          decide(event.a, event.time);
-          break;
-        case gate_opens:
-          open_gate(event.a, event.time, event.b != 0);
-          break;
-      }
-    }
-    std::vector<double> end;
-    for (const Rank& rank : ranks_) {
-      if (!rank.left) throw TraceError("the loop of a step stands still in replay: its plan has no order");
-      end.push_back(rank.time);
-    }
-    return end;
+    for (std::uint32_t r = 0; r < ranks_.size(); ++r) begin_epochs(r, ranks_[r].begin);
+    return events_.run(*this);
+  }
+
+  void node_ended(std::uint32_t n, std::uint32_t worker, double now) {
+    const SimNode& node = layout_.nodes[n];
+    Rank& rank = ranks_[node.rank];
+    const std::uint32_t e = epoch_[n];
+    if (epochs_[e].exchange) events_.send_up(n, worker, e, now);
+    // From now on everything that conflicts must end once more before this node runs again.
+    ++epoch_[n];
+    missing_[n] = static_cast<std::uint32_t>(layout_.neighbours(n).size());
+    if (missing_[n] == 0 && epoch_[n] < epochs_.size()) offer(n, now);
+    for (std::uint32_t other : layout_.neighbours(n))
+      if (--missing_[other] == 0 && epoch_[other] < epochs_.size()) offer(other, now);
+    const std::size_t nodes = layout_.rank_begin[node.rank + 1] - layout_.rank_begin[node.rank];
+    if (e == rank.allowed && ++rank.ended == nodes) events_.reach_gate(node.rank, e, now);
+    dispatch(node.rank, now);
+  }
+
+  void thread_freed(std::uint32_t worker, double now) {
+    const std::uint32_t r = worker / threads_;
+    ranks_[r].idle.push_back({worker, now});
+    dispatch(r, now);
+  }
+
+  void message_came(const SimMessage& came, std::uint32_t, double now) {
+    last_name_[came.to] = came.name;
+    offer(came.to, now);
+    dispatch(layout_.nodes[came.to].rank, now);
+  }
+
+  void goes_on(std::uint32_t r, double now) {
+    ranks_[r].ended = 0;
+    ranks_[r].allowed = last_before_gate(ranks_[r].allowed + 1);
+    begin_epochs(r, now);
   }
 
  private:
-  enum : std::uint32_t { node_ends, message_leaves, message_comes, gate_reached, gate_opens };
   using Ready = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>;  ///< epoch, colour, node
+  static constexpr double never = std::numeric_limits<double>::infinity();
 
+  struct Idle {
+    std::uint32_t worker;
+    double since;
+  };
   struct Rank {
     std::priority_queue<Ready, std::vector<Ready>, std::greater<>> ready;
-    std::vector<std::uint32_t> idle;  ///< threads
-    std::uint32_t allowed = 0;        ///< last epoch that may be worked on
-    std::size_t ended = 0;            ///< nodes that have ended that epoch
-    std::uint32_t told = 0;
-    double time = 0, decided = 0;
-    bool left = false;
+    std::vector<Idle> idle;
+    std::uint32_t allowed = 0;  ///< last epoch that may be worked on
+    std::size_t ended = 0;      ///< nodes that have ended that epoch
+    double begin = 0;
   };
 
   std::uint32_t last_before_gate(std::uint32_t epoch) const {
     while (!epochs_[epoch].gate) ++epoch;
     return epoch;
   }
-  std::size_t inbox(std::uint32_t node, std::size_t epoch) const {
-    return 2 * node + epochs_[epoch].exchanges_before % 2;
-  }
-  const SimMessage& message(std::size_t number) const {
-    return number < layout_.sends.size() ? layout_.sends[number]
-                                         : layout_.to_centre[number - layout_.sends.size()];
+  /// From when the rank may work on the epochs up to the next gate.
+  void begin_epochs(std::uint32_t r, double now) {
+    if (layout_.rank_begin[r] == layout_.rank_begin[r + 1]) {
+      events_.reach_gate(r, ranks_[r].allowed, now);  // nothing to do until the next gate
+      return;
+    }
+    for (std::uint32_t n = layout_.rank_begin[r]; n < layout_.rank_begin[r + 1]; ++n) offer(n, now);
+    dispatch(r, now);
   }
 
   /// Puts the node among the ready ones if it is.
-  void offer(std::uint32_t n) {
-    const SimNode& node = layout_.nodes[n];
-    Rank& rank = ranks_[node.rank];
-    if (missing_[n] > 0 || epoch_[n] > rank.allowed) return;
-    if (epochs_[epoch_[n]].exchange && arrived_[inbox(n, epoch_[n])] < layout_.incoming[n]) return;
-    rank.ready.push({epoch_[n], node.colour, n});
+  void offer(std::uint32_t n, double now) {
+    Rank& rank = ranks_[layout_.nodes[n].rank];
+    const std::uint32_t e = epoch_[n];
+    if (missing_[n] > 0 || e > rank.allowed) return;
+    ready_[n] = std::min(ready_[n], now);
+    if (epochs_[e].exchange && !events_.all_arrived(n, e)) return;
+    rank.ready.push({e, layout_.nodes[n].colour, n});
     ++missing_[n];  // taken: what comes later must not offer it again
   }
 
   void dispatch(std::uint32_t r, double now) {
     Rank& rank = ranks_[r];
-    while (!rank.ready.empty() && (stage_.machine.unbounded || !rank.idle.empty())) {
+    const bool unbounded = stage_.machine.unbounded;
+    while (!rank.ready.empty() && (unbounded || !rank.idle.empty())) {
       const std::uint32_t n = std::get<2>(rank.ready.top());
       rank.ready.pop();
-      std::uint32_t thread = 0;
-      if (!stage_.machine.unbounded) {
+      Idle thread{stage_.log.worker(r, 0), now};
+      if (!unbounded) {
         thread = rank.idle.back();
         rank.idle.pop_back();
       }
-      const SimEpoch& epoch = epochs_[epoch_[n]];
-      const NodeWork recorded = work_of(stage_, index_, layout_.nodes[n], n, epoch, epoch_[n]);
-      ExchangeWork exchange;
-      if (epoch.exchange) {
-        exchange = exchange_work(stage_, layout_, n);
-        // A thread that has nothing else to do takes each message as it comes; the last one is left.
-        if (stage_.machine.unbounded) exchange.takes = std::min(exchange.takes, stage_.network.overhead());
-        arrived_[inbox(n, epoch_[n])] = 0;
-      }
-      const double worked = now + exchange.takes + recorded.work + exchange.shares,
-                   end = worked + exchange.sends;
-      if (epoch.exchange) {
-        const std::uint32_t first = layout_.send_begin[n];
-        for (std::uint32_t k = first; k < layout_.send_begin[n + 1]; ++k)
-          agenda_.add(worked + (k - first + 1) * stage_.network.overhead(), message_leaves, k, epoch_[n]);
-      }
-      if (recorded.recorded)
-        stage_.log.task(stage_.log.worker(r, thread), now, end, 0, n - layout_.rank_begin[r],
-                        static_cast<std::int32_t>(epoch_[n]), recorded.kind);
-      agenda_.add(end + (recorded.recorded ? stage_.dispatch : 0), node_ends, n, thread);
+      start(n, thread, now);
     }
   }
 
-  void node_ended(std::uint32_t n, std::uint32_t thread, double now) {
-    const SimNode& node = layout_.nodes[n];
-    Rank& rank = ranks_[node.rank];
+  void start(std::uint32_t n, const Idle& thread, double now) {
     const std::uint32_t e = epoch_[n];
-    if (epochs_[e].exchange) send_up(n, e, now);
-    if (!stage_.machine.unbounded) rank.idle.push_back(thread);
-    // From now on everything that conflicts must end once more before this node runs again.
-    ++epoch_[n];
-    missing_[n] = static_cast<std::uint32_t>(layout_.neighbours(n).size());
-    if (missing_[n] == 0 && epoch_[n] < epochs_.size()) offer(n);
-    for (std::uint32_t other : layout_.neighbours(n))
-      if (--missing_[other] == 0 && epoch_[other] < epochs_.size()) offer(other);
-    const std::size_t nodes = layout_.rank_begin[node.rank + 1] - layout_.rank_begin[node.rank];
-    if (e == rank.allowed && ++rank.ended == nodes) agenda_.add(now, gate_reached, node.rank);
-    dispatch(node.rank, now);
-  }
-
-  /// The last of a leaf of the tree that tells sends for all.
-  void send_up(std::uint32_t n, std::uint32_t e, double now) {
-    const SimNode& node = layout_.nodes[n];
-    Rank& rank = ranks_[node.rank];
-    if (!node.tells || ++rank.told < layout_.tellers[node.rank]) return;
-    rank.told = 0;
-    if (layout_.to_centre[node.rank].bytes > 0)
-      message_left(static_cast<std::uint32_t>(layout_.sends.size() + node.rank), e, now);
-  }
-
-  void message_left(std::uint32_t number, std::uint32_t e, double now) {
-    const SimMessage& left = message(number);
-    agenda_.add(
-        stage_.network.arrival(layout_.nodes[left.from].rank, layout_.nodes[left.to].rank, left.bytes, now),
-        message_comes, number, e);
-  }
-
-  void decide(std::uint32_t r, double now) {
-    Rank& rank = ranks_[r];
-    const SimEpoch& epoch = epochs_[rank.allowed];
-    rank.time = now;
-    rank.decided = now + check_work(stage_, index_, epoch) + epoch.own[r];
-    if (epoch.posts) {
-      rounds_.post(epoch.posts_before, rank.decided);
-      rank.decided += stage_.network.overhead();
+    const SimEpoch& epoch = epochs_[e];
+    const NodeWork recorded = work_of(stage_, index_, layout_.nodes[n], n, epoch, e);
+    ExchangeWork exchange;
+    if (epoch.exchange) {
+      exchange = exchange_work(stage_, layout_, n);
+      // A thread that has nothing else to do takes each message as it comes; the last one is left.
+      if (stage_.machine.unbounded) exchange.takes = std::min(exchange.takes, stage_.network.overhead());
+      events_.take_messages(n, e);
     }
-    const double behind = epoch.meetings + epoch.whole;
-    if (!epoch.reads)
-      agenda_.add(rank.decided + behind, gate_opens, r);
-    else if (rounds_.read(epoch.reads_before, rank.decided))
-      for (std::uint32_t other = 0; other < ranks_.size(); ++other)
-        agenda_.add(std::max(ranks_[other].decided, rounds_.known(epoch.reads_before)) + behind, gate_opens,
-                    other);
-  }
-
-  void open_gate(std::uint32_t r, double now, bool first) {
-    Rank& rank = ranks_[r];
-    if (!first) {
-      log_check(stage_, stage_.log.worker(r, 0), static_cast<std::int32_t>(rank.allowed),
-                epochs_[rank.allowed], epochs_[rank.allowed].own[r], rank.time, rank.decided, now);
-      rank.time = now;
-      rank.ended = 0;
-      if (rank.allowed + 1 == epochs_.size()) {
-        rank.left = true;
-        return;
-      }
-      rank.allowed = last_before_gate(rank.allowed + 1);
+    const double worked = now + exchange.takes + recorded.work + exchange.shares,
+                 end = worked + exchange.sends;
+    if (epoch.exchange) events_.send(n, thread.worker, e, worked);
+    if (recorded.recorded) {
+      // A thread without work lacked the node's last message only.
+      const double waited = now - std::max(thread.since, ready_[n]);
+      const auto number = static_cast<std::int32_t>(e);
+      stage_.log.task(thread.worker, now - waited, end, waited, n - layout_.rank_begin[layout_.nodes[n].rank],
+                      number, recorded.kind);
+      if (waited > 0) stage_.log.span(thread.worker, now - waited, now, last_name_[n], number, kind_receive);
     }
-    if (layout_.rank_begin[r] == layout_.rank_begin[r + 1]) {
-      agenda_.add(now, gate_reached, r);  // nothing to do until the next gate
-      return;
-    }
-    for (std::uint32_t n = layout_.rank_begin[r]; n < layout_.rank_begin[r + 1]; ++n) offer(n);
-    dispatch(r, now);
+    ready_[n] = never;
+    events_.end_node(n, thread.worker, end);
+    if (!stage_.machine.unbounded)
+      events_.free_thread(thread.worker, end + (recorded.recorded ? stage_.dispatch : 0));
   }
 
   Stage& stage_;
@@ -214,14 +164,14 @@ class ListLoop {
   const LoopLayout& layout_;
   const std::vector<SimEpoch>& epochs_;
   const std::uint32_t threads_;
-  Rounds rounds_;
-  Agenda agenda_;
+  LoopEvents events_;
   std::vector<Rank> ranks_;
   /// Per node: conflicting nodes that must end before it begins: those of lower colour in its epoch, the
   /// others in the one before.
   std::vector<std::uint32_t> missing_;
-  std::vector<std::uint32_t> epoch_;    ///< per node: the next
-  std::vector<std::uint32_t> arrived_;  ///< two per node, as in play_fixed.cpp
+  std::vector<std::uint32_t> epoch_;      ///< per node: the next
+  std::vector<double> ready_;             ///< per node: when it was, but for messages
+  std::vector<std::uint32_t> last_name_;  ///< per node: of the last message that came
 };
 
 }  // namespace

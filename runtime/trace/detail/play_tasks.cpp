@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "runtime/trace/detail/agenda.hpp"
 #include "runtime/trace/detail/simulation.hpp"
 
 namespace talus::trace::detail {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/graph/detail/splitmix.hpp"
+
 namespace talus::trace::detail {
 
 void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
@@ -23,13 +25,10 @@ void Log::calls(std::uint32_t worker, double begin, double end, double known, co
 
 double Stage::stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const {
   if (machine.noise == 0) return 1;
-  // splitmix64 (Steele, Lea, Flood 2014) of the task's name.
-  std::uint64_t z = machine.seed * 0x9e3779b97f4a7c15ULL + step * 0xd1342543de82ef95ULL +
-                    worker * 0x2545f4914f6cdd1dULL + what * 0x9fb21c651e98df25ULL;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
-  z ^= z >> 31;
-  return 1 + machine.noise * static_cast<double>(z >> 11) * 0x1p-53;
+  const std::uint64_t name =
+      graph::detail::scatter(machine.seed * 0x9e3779b97f4a7c15ULL + step * 0xd1342543de82ef95ULL +
+                             worker * 0x2545f4914f6cdd1dULL + what * 0x9fb21c651e98df25ULL);
+  return 1 + machine.noise * static_cast<double>(name >> 11) * 0x1p-53;
 }
 
 NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node, std::uint32_t number,
@@ -40,8 +39,10 @@ NodeWork work_of(const Stage& stage, const StepIndex& index, const SimNode& node
   if (!place.exists()) return {};
   if (node.waits_only) return {0, true, stage.timeline.record(place).kind()};
   const Kind kind = stage.timeline.record(place).kind();
-  const double scale = (node.role == Role::compute ? stage.machine.contacts : 1.0) / stage.speed_of(kind) *
-                       stage.stretch(index.step, number, number_of_epoch);
+  double scale = stage.stretch(index.step, number, number_of_epoch) / stage.speed_of(kind);
+  if (node.role == Role::compute) scale *= stage.machine.contacts;
+  // These copy what the messages hold.
+  if (node.role == Role::publish || node.role == Role::glue || node.role == Role::take) scale *= stage.faces;
   double work = stage.timeline.self(place);
   if (stage.machine.typical || stage.machine.quantile > 0) {
     const auto usual = static_cast<double>(
@@ -158,7 +159,11 @@ void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const Si
   const double waited = end - decided - epoch.whole, from = end - epoch.whole;
   stage.log.task(worker, begin, end, waited, epoch.settles ? check_settles : 0, number, kind_check);
   if (own > 0) stage.log.span(worker, begin, begin + own, 0, -1, epoch.own_kind);
-  if (waited > 0) stage.log.span(worker, decided, from, 0, number, kind_collective);
+  // One wait, and what else is read takes no time; where nobody waited it stands where it is within.
+  const int calls = std::max((epoch.waits ? 1 : 0) + (epoch.reads ? 1 : 0), waited > 0 ? 1 : 0);
+  const double at = waited > 0 ? decided : begin;
+  for (int call = 0; call < calls; ++call)
+    stage.log.span(worker, at, waited > 0 && call == 0 ? from : at, 0, number, kind_collective);
   for (const SimEpoch::Span& span : epoch.spans)
     stage.log.span(worker, from + span.begin, from + span.end, span.meetings, -1, span.kind);
 }

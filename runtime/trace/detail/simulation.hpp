@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
-#include <queue>
 #include <vector>
 
 #include "runtime/trace/layout.hpp"
@@ -58,6 +57,7 @@ struct Stage {
   std::vector<std::map<Kind, std::vector<float>>> typical{};
   std::vector<double> speed{};  ///< per kind
   double dispatch = 0;          ///< from the end of one node to the beginning of the next on a thread [ns]
+  double faces = 1;             ///< what copies grow by where contacts grow
 
   double speed_of(Kind kind) const { return speed[static_cast<std::size_t>(kind)]; }
   /// Factor on the work of a task, by what it is: the same in every replay of the same seed.
@@ -80,9 +80,10 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
 struct SimEpoch {
   std::size_t source = 0;  ///< recorded epoch whose work it has
   bool gate = false;       ///< a decision behind it
-  bool posts = false;      ///< the sums of the rank leave at that decision
-  bool reads = false;      ///< and it waits for those that all ranks have posted
-  bool settles = false;    ///< those it posts itself (check_settles)
+  bool posts = false;      ///< the sums of the rank leave at that decision, as round `round`,
+  bool waits = false;      ///< and it waits for those of all ranks
+  bool reads = false;      ///< it waits for those of an earlier decision, round `late_round`
+  bool settles = false;    ///< its record says so (check_settles)
   /// What all ranks do together then: work, and waits where they meet [ns]; its parts, one after the other.
   struct Span {
     double begin = 0, end = 0;  ///< in `whole`
@@ -95,7 +96,7 @@ struct SimEpoch {
   Kind own_kind{};
   bool exchange = false;  ///< copies are glued
   std::size_t exchanges_before = 0;
-  std::size_t reads_before = 0, posts_before = 0;
+  std::size_t round = 0, late_round = 0;
 };
 
 /// The loop of one step: epochs of `layout` from `start` [ns], per rank; returns when each rank has left it.
@@ -113,8 +114,7 @@ struct TimedTask {
 };
 
 /// Tasks [begin[r], end[r]) of each rank from `start`, each thread taking the ready task that was submitted
-/// first; returns when all tasks of a rank have ended. `first_free` gets, per worker, when it has nothing
-/// more to do.
+/// first; returns when all tasks of a rank have ended.
 std::vector<double> play_tasks(Stage& stage, const std::vector<std::vector<SimTask>>& tasks,
                                const std::vector<std::vector<TimedTask>>& timed,
                                const std::vector<std::size_t>& begin, const std::vector<std::size_t>& end,
@@ -143,56 +143,5 @@ double alone_work(const Stage& stage, const StepIndex& index, std::size_t source
 /// all that follows.
 void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double own,
                double begin, double decided, double end);
-
-/// Things that happen, in order of time, then of their making.
-struct Event {
-  double time;
-  std::uint64_t order;
-  std::uint32_t what, a, b;
-  bool operator>(const Event& other) const {
-    return time != other.time ? time > other.time : order > other.order;
-  }
-};
-class Agenda {
- public:
-  void add(double time, std::uint32_t what, std::uint32_t a, std::uint32_t b = 0) {
-    events_.push({time, order_++, what, a, b});
-  }
-  bool empty() const { return events_.empty(); }
-  Event next() {
-    const Event event = events_.top();
-    events_.pop();
-    return event;
-  }
-
- private:
-  std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
-  std::uint64_t order_ = 0;
-};
-
-/// Sums that all ranks post and read, one round per check. What a rank posts is on its way to one other rank;
-/// the rest of the way is gone when all ranks wait for it.
-class Rounds {
- public:
-  Rounds(int ranks, const std::vector<SimEpoch>& epochs, const Network& network)
-      : ranks_(ranks),
-        whole_way_(network.collective()),
-        rest_(network.collective_rest()),
-        read_(epochs.size() + 1, 0),
-        at_(epochs.size() + 1, 0) {}
-  void post(std::size_t round, double time) { at_[round] = std::max(at_[round], time + whole_way_); }
-  /// True when this was the last rank: then all know the sums at known().
-  bool read(std::size_t round, double time) {
-    at_[round] = std::max(at_[round], time + rest_);
-    return ++read_[round] == ranks_;
-  }
-  double known(std::size_t round) const { return at_[round]; }
-
- private:
-  int ranks_;
-  double whole_way_, rest_;
-  std::vector<int> read_;
-  std::vector<double> at_;
-};
 
 }  // namespace talus::trace::detail

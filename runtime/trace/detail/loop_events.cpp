@@ -1,0 +1,89 @@
+#include "runtime/trace/detail/loop_events.hpp"
+
+#include <algorithm>
+
+namespace talus::trace::detail {
+
+LoopEvents::LoopEvents(Stage& stage, const StepIndex& index, const LoopLayout& layout,
+                       const std::vector<SimEpoch>& epochs)
+    : stage_(stage),
+      index_(index),
+      layout_(layout),
+      epochs_(epochs),
+      ranks_(static_cast<std::size_t>(stage.machine.ranks)),
+      rounds_(epochs.size()),
+      worker_(layout.nodes.size(), 0),
+      arrived_(2 * layout.nodes.size(), 0) {}
+
+void LoopEvents::send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked) {
+  worker_[node] = worker;
+  const std::uint32_t first = layout_.send_begin[node];
+  for (std::uint32_t k = first; k < layout_.send_begin[node + 1]; ++k)
+    agenda_.add(worked + (k - first + 1) * stage_.network.overhead(), message_leaves, k, epoch);
+}
+
+void LoopEvents::send_up(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double now) {
+  const std::uint32_t rank = layout_.nodes[node].rank;
+  if (!layout_.nodes[node].tells || ++ranks_[rank].told < layout_.tellers[rank]) return;
+  ranks_[rank].told = 0;
+  if (layout_.to_centre[rank].bytes > 0)
+    message_left(static_cast<std::uint32_t>(layout_.sends.size() + rank), worker, epoch, now);
+}
+
+void LoopEvents::message_left(std::uint32_t number, std::uint32_t worker, std::uint32_t epoch, double now) {
+  const SimMessage& left = message(number);
+  agenda_.add(
+      stage_.network.arrival(layout_.nodes[left.from].rank, layout_.nodes[left.to].rank, left.bytes, now),
+      message_comes, number, epoch);
+  stage_.log.span(worker, now, now, left.name, static_cast<std::int32_t>(epoch), kind_send);
+}
+
+void LoopEvents::decide(std::uint32_t r, std::uint32_t e, double now) {
+  Rank& rank = ranks_[r];
+  const SimEpoch& epoch = epochs_[e];
+  rank.began = now;
+  rank.decided = now + check_work(stage_, index_, epoch) + epoch.own[r];
+  if (epoch.posts) {
+    double& known = rounds_[epoch.round].known;
+    known = std::max(known, rank.decided + stage_.network.collective());
+    rank.decided += stage_.network.overhead();
+  }
+  const double behind = epoch.meetings + epoch.whole;
+  if (!epoch.waits && !epoch.reads) {
+    agenda_.add(rank.decided + behind, gate_opens, r, e);
+    return;
+  }
+  // The sums of one round after those of the other, each from when all wait for it.
+  double known = 0;
+  const double rest = stage_.network.collective_rest();
+  const std::size_t last_round = epoch.reads ? epoch.late_round : epoch.round;
+  const auto wait_for = [&](std::size_t round, double from) {
+    rounds_[round].known = std::max(rounds_[round].known, from + rest);
+    known = rounds_[round].known;
+  };
+  if (epoch.waits) wait_for(epoch.round, rank.decided);
+  if (epoch.reads) wait_for(epoch.late_round, std::max(known, rank.decided));
+  if (++rounds_[last_round].waiting < static_cast<int>(ranks_.size())) return;
+  for (std::uint32_t other = 0; other < ranks_.size(); ++other)
+    agenda_.add(std::max(ranks_[other].decided, known) + behind, gate_opens, other, e);
+}
+
+bool LoopEvents::open_gate(std::uint32_t r, std::uint32_t e, double now) {
+  Rank& rank = ranks_[r];
+  log_check(stage_, stage_.log.worker(r, 0), static_cast<std::int32_t>(e), epochs_[e], epochs_[e].own[r],
+            rank.began, rank.decided, now);
+  if (e + 1 < epochs_.size()) return true;
+  rank.left = now;
+  return false;
+}
+
+std::vector<double> LoopEvents::ends() const {
+  std::vector<double> end;
+  for (const Rank& rank : ranks_) {
+    if (rank.left < 0) throw TraceError("the loop of a step stands still in replay: its plan has no order");
+    end.push_back(rank.left);
+  }
+  return end;
+}
+
+}  // namespace talus::trace::detail
