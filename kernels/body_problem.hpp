@@ -47,10 +47,10 @@ struct ContactEquation {
   Vec3 normal;  ///< unit, to the first body
   Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
   double mu = 0;
-  double drive = 0;          ///< speed of the driven wall [m/s]; 0 between bodies
   std::int32_t first = -1;   ///< unknown
   std::int32_t second = -1;  ///< unknown; -1 at a driven wall
   std::int32_t place = -1;   ///< in `Contacts`
+  double drive = 0;          ///< speed of the driven wall [m/s]; 0 between bodies
 };
 
 /// The whole problem, or the part of it that one subdomain holds: its contacts and the bodies that stand in

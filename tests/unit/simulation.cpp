@@ -438,7 +438,8 @@ TEST(Simulation, RefusesMomentumOnSchwarz) {
 TEST(Stages, TooShortForAStepAreRefused) {
   talus::Setup setup;
   setup.stages = {stage("blink", 1)};
-  setup.stages[0].end = {.time = 0.4 * setup.stages[0].time_step};
+  setup.stages[0].end.steps.reset();
+  setup.stages[0].end.time = 0.4 * setup.stages[0].time_step;
   EXPECT_THROW(validate(setup), std::invalid_argument);
   setup.stages[0].end.time = 0.5 * setup.stages[0].time_step;
   EXPECT_NO_THROW(validate(setup));

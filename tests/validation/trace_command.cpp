@@ -187,7 +187,7 @@ TEST_F(TraceCommand, RefusesWhatIsNoTrace) {
 
 TEST_F(TraceCommand, ReplacesAFileOnlyWhenForced) {
   const std::string trace = recorded("out", 1);
-  for (const std::string command : {"trace export " + trace + " --format svg", "replay " + trace}) {
+  for (const std::string& command : {"trace export " + trace + " --format svg", "replay " + trace}) {
     write(folder_ / "thesis.tex", "mine");
     const Outcome refused = talus(command + " -o thesis.tex");
     EXPECT_EQ(refused.code, 2) << command;
