@@ -144,11 +144,15 @@ std::string introduction_of(const ScalingReport& report) {
   text +=
       "Measured: medians of runs that took turns, their range in brackets. Predicted: a run on one rank and "
       "thread with as many subdomains was recorded, and its tasks were played on the machine; nothing of it "
-      "was "
-      "measured there, and caches are those of the recording. Networks:";
+      "was measured there. Networks:";
   for (const ScalingNetwork& network : report.networks)
     text += fmt::format(" {}: {}.", network.name, network.description);
   if (report.typical) text += " Tasks that took over three times their median were given the median.";
+  text +=
+      report.own_caches
+          ? " Before a subdomain's tasks were timed its data were read into the cache, as they are in that "
+            "of a core that has no other subdomain; 1 x 1 is as it ran."
+          : " Caches are those of the recording, where one core has all subdomains.";
   if (report.quantile > 0)
     text +=
         fmt::format(" Tasks were given the {:g} quantile of their times in the step: the machine was busy.",

@@ -38,7 +38,7 @@ struct ScalingReport {
   std::vector<OtherSpeedup> beside;
   std::int64_t first = 1, last = 1;
   int record = 1;
-  bool typical = false;
+  bool own_caches = false, typical = false;
   double quantile = 0;
   ScalingCommands commands;
   std::vector<ScalingRow> rows;  ///< related

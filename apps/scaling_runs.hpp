@@ -52,9 +52,10 @@ RunTimes read_times(const std::filesystem::path& steps_csv, std::int64_t first, 
 RunTimes run_once(const ScalingLauncher& launcher, const ScalingSubject& subject,
                   const ScalingMachine& machine);
 
-/// The same on one rank and thread with --trace; the trace is moved to `trace`.
+/// The same on one rank and thread with --trace; the trace is moved to `trace`. `own_caches`: of
+/// trace::RecorderOptions; run times are longer then, times of tasks shorter.
 RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subject, int subdomains,
-                     const std::filesystem::path& trace);
+                     bool own_caches, const std::filesystem::path& trace);
 
 /// How simulated ranks are started: the program built for them (preset smpi) and SimGrid's launcher.
 struct SimulatedLauncher {

@@ -50,7 +50,7 @@ struct ScalingPlan {
   std::vector<OtherSpeedup> beside;
   std::int64_t first = 1, last = 1;
   int cores = 1;
-  bool typical = false;
+  bool own_caches = false, typical = false;
   double quantile = 0;
   int repeat = 5, record = 1;
 };
@@ -118,6 +118,7 @@ ScalingPlan plan_of(const StudyScalingOptions& options) {
   if (!options.beside.empty()) plan.beside = read_speedups(options.beside);
   plan.record = options.record;
   plan.typical = options.typical;
+  plan.own_caches = options.own_caches;
   plan.quantile = options.quantile;
   const std::string mpirun = options.mpirun.empty() ? "mpirun" : split_words(options.mpirun).front();
   if (plan.repeat > 0 && plan.cores > 1 && !program_exists(mpirun))
@@ -242,6 +243,9 @@ class Study {
     add({row});
   }
 
+  /// One core has the whole sample in its caches, or has not.
+  bool own_caches(const ScalingTraces& traces) const { return plan_.own_caches && traces.subdomains > 1; }
+
   /// Recordings take turns as runs do.
   void record(std::vector<ScalingTraces>& all) {
     for (int k = 1; k <= plan_.record; ++k)
@@ -251,8 +255,8 @@ class Study {
         if (!subject.variant.empty())
           variant = fmt::format(
               "-variant{}", std::ranges::find(plan_.variants, subject.variant) - plan_.variants.begin() + 1);
-        const std::string name =
-            fmt::format("{}-{}{}-{}.h5", name_of(subject.kind), traces.subdomains, variant, k);
+        const std::string name = fmt::format("{}-{}{}{}-{}.h5", name_of(subject.kind), traces.subdomains,
+                                             variant, own_caches(traces) ? "-own" : "", k);
         const fs::path file = directory_ / "traces" / name;
         traces.times.push_back(recorded(name, file, traces));
         traces.files.push_back(file);
@@ -268,7 +272,8 @@ class Study {
       say(fmt::format("{} was of steps {}{}: recorded anew", name, there.steps,
                       there.variant.empty() ? "" : ", " + there.variant));
     }
-    const RunTimes times = record_once(launcher_, traces.subject, traces.subdomains, file);
+    const RunTimes times =
+        record_once(launcher_, traces.subject, traces.subdomains, own_caches(traces), file);
     say(fmt::format("recorded {}: {:.4g} s a step, {:.1f} iterations", name, times.seconds,
                     times.iterations));
     std::erase_if(recordings_, [&](const RecordedTrace& there) { return there.file == name; });
@@ -403,6 +408,7 @@ int run_study(const StudyScalingOptions& options) {
   report.record = plan.record;
   report.typical = plan.typical;
   report.quantile = plan.quantile;
+  report.own_caches = plan.own_caches;
   let_root_run_ranks();
   Study study(options, plan, directory, std::move(recordings), [&](const std::vector<ScalingRow>& rows) {
     report.rows = rows;
@@ -494,6 +500,8 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
+  app->add_flag("--own-caches", options.own_caches,
+                "record subdomains as on cores of their own, each of whose caches holds no other");
   app->add_flag("--typical", options.typical,
                 "tasks that took over three times their median take the median: for noisy recordings");
   app->add_option(

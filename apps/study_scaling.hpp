@@ -29,6 +29,7 @@ struct StudyScalingOptions {
   std::optional<int> ranks_per_node;
   int repeat = 5;            ///< real runs of each machine; 0: none
   int record = 1;            ///< traces of each number of subdomains
+  bool own_caches = false;   ///< record several subdomains as on cores of their own (RecorderOptions)
   bool typical = false;      ///< Machine::typical
   double quantile = 0;       ///< Machine::quantile
   std::optional<int> cores;  ///< for real runs [all]

@@ -174,6 +174,16 @@ TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
   EXPECT_EQ(files_below(at("s")), files);
 }
 
+TEST_F(StudyScaling, RecordsSeveralSubdomainsAsOnCoresOfTheirOwn) {
+  const Outcome outcome =
+      run("study scaling scene.toml --out s --steps 2:3 --subdomains 2 --repeat 0 --no-weak --own-caches");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  EXPECT_TRUE(fs::exists(at("s/traces/strong-1-1.h5")));
+  EXPECT_TRUE(fs::exists(at("s/traces/strong-2-own-1.h5")));
+  EXPECT_FALSE(fs::exists(at("s/traces/strong-2-1.h5"))) << "one for the other would be taken up by --reuse";
+  EXPECT_NE(content(at("s/report.html")).find("no other subdomain"), std::string::npos);
+}
+
 // The program itself on simulated ranks, where that build is.
 TEST_F(StudyScaling, PredictsBySimulatedRanksToo) {
   if (!fs::exists(TALUS_SMPI_COMMAND)) GTEST_SKIP() << "there is no " << TALUS_SMPI_COMMAND;

@@ -185,6 +185,30 @@ TEST_F(TraceCommand, RefusesWhatIsNoTrace) {
   EXPECT_EQ(talus("trace show " + trace).code, 2);
 }
 
+// A subdomain's data are brought in between two records, never within one, and change no bit.
+TEST_F(TraceCommand, RecordsSubdomainsAsOnCoresOfTheirOwn) {
+  const auto follows_at_once = [&](const std::string& file) {
+    const trace::Trace trace = io::read_trace(folder_ / file);
+    const std::vector<trace::Record>& records = trace.lanes.front().records;
+    int pairs = 0;
+    for (std::size_t k = 1; k < records.size(); ++k) {
+      const trace::Record &before = records[k - 1], &now = records[k];
+      const trace::Plan* const plan = trace::plan_of(trace, 0, now.step());
+      const auto of_loop = [&](const trace::Record& r) {
+        return r.epoch >= 0 && plan && r.node < plan->size() && trace.info(r.kind()).name != "check" &&
+               plan->group[r.node] != trace::centre_group;
+      };
+      if (before.step() == now.step() && before.epoch == now.epoch && of_loop(before) && of_loop(now) &&
+          plan->group[before.node] != plan->group[now.node] && before.end() == static_cast<double>(now.begin))
+        ++pairs;
+    }
+    return pairs;
+  };
+  EXPECT_GT(follows_at_once(recorded("plain", 1)), 10);
+  EXPECT_EQ(follows_at_once(recorded("own", 1, "--trace-own-caches")), 0);
+  EXPECT_EQ(summary(folder_ / "own").at("digest"), summary(folder_ / "plain").at("digest"));
+}
+
 TEST_F(TraceCommand, ReplacesAFileOnlyWhenForced) {
   const std::string trace = recorded("out", 1);
   for (const std::string& command : {"trace export " + trace + " --format svg", "replay " + trace}) {
