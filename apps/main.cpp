@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include "apps/exit_codes.hpp"
+#include "apps/options.hpp"
 #include "apps/partition_command.hpp"
 #include "apps/plan.hpp"
 #include "apps/replay_command.hpp"
@@ -28,14 +29,6 @@ namespace {
 
 /// Beyond it a typing error is likelier than a machine.
 constexpr int most_threads = 4096;
-
-/// CLI11's own says the largest of all doubles when it refuses.
-const CLI::Validator above_zero(
-    [](std::string& text) {
-      double value = 0;
-      return CLI::detail::lexical_cast(text, value) && value > 0 ? "" : "must be above 0, got " + text;
-    },
-    "POSITIVE");
 
 void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "threads [one per core]")
@@ -165,7 +158,7 @@ int main(int argc, char** argv) {
           "repeated")
       ->type_name("STEP")
       ->allow_extra_args(false)
-      ->check(above_zero);
+      ->check(above_zero());
   CLI::Option* const trace_flag = run_app->add_flag(
       "--trace", run.trace, "record every task into trace.h5 (`talus trace`, `talus replay`)");
   run_app->add_option("--trace-steps", run.trace_steps, "record these steps only")
@@ -229,7 +222,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   solve_app->add_option("--tol", solve.tol, "tolerance on the error")
       ->capture_default_str()
-      ->check(above_zero);
+      ->check(above_zero());
   solve_app
       ->add_option(
           "--measure", solve.measure,
@@ -239,11 +232,11 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   solve_app->add_option("--max-seconds", solve.max_seconds, "give a solve up after so many seconds")
       ->capture_default_str()
-      ->check(above_zero);
+      ->check(above_zero());
   solve_app->add_option("--repeat", solve.repeat, "solve each problem so often and tell the median time")
       ->type_name("N")
       ->capture_default_str()
-      ->check(above_zero);
+      ->check(above_zero());
   solve_app->add_option("--out", solve.out, "write /solution into a copy of the file")->type_name("FILE");
   solve_app->add_option("--csv", solve.csv, "write the table to a file")->type_name("FILE");
   solve_app->add_option("--profile", solve.profile, "write the performance profile of the methods to a file")
@@ -296,11 +289,11 @@ int main(int argc, char** argv) {
       ->add_option("--tolerance", stability.settings.tolerance,
                    "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
       ->type_name("T")
-      ->check(above_zero);
+      ->check(above_zero());
   stability_app
       ->add_option("--seconds", stability.settings.seconds, "a scene is stopped after so many seconds")
       ->capture_default_str()
-      ->check(above_zero);
+      ->check(above_zero());
   stability_app->add_option("--out", stability.out, "directory of the files [out/study-stability]")
       ->type_name("DIR");
   stability_app->add_flag("--force", stability.force, "replace earlier results in the directory");

@@ -26,6 +26,7 @@
 #include "io/recorder.hpp"
 #include "io/run_json.hpp"
 #include "io/scene.hpp"
+#include "kernels/larger.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
@@ -136,11 +137,6 @@ class RecorderFeed {
   Stopwatch since_;
 };
 
-/// The larger one; NaN when one of them is, which std::max would hide.
-double worse(double a, double b) {
-  return std::isnan(a) || a >= b ? a : b;
-}
-
 struct Tally {
   std::int64_t unconverged = 0;
   std::int64_t passed = 0;     ///< pairs that went through one another
@@ -163,9 +159,9 @@ struct Tally {
       ++stagnated;
       floor = std::max(floor, report.error_rms);
     }
-    worst_error = worse(worst_error, report.error_rms);
-    worst_balance = worse(worst_balance, report.balance);
-    worst_penetration = worse(worst_penetration, report.penetration_max);
+    worst_error = larger(worst_error, report.error_rms);
+    worst_balance = larger(worst_balance, report.balance);
+    worst_penetration = larger(worst_penetration, report.penetration_max);
   }
 
   void sum_up(const StepReport& last, io::Summary& summary) const {

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "apps/exit_codes.hpp"
+#include "apps/options.hpp"
 #include "apps/study_problem.hpp"
 #include "apps/study_profile.hpp"
 #include "apps/study_report.hpp"
@@ -207,11 +208,11 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
                   "on the residual [0.01,0.001,0.0001; of FCLIB files 1e-4,1e-8]")
       ->type_name("T,..")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--time-steps", options.time_steps, "whole runs: multiples of the scene's time steps [1]")
       ->type_name("F,..")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--subdomains", options.subdomains, "numbers of subdomains [1]")
       ->type_name("N,..")
       ->delimiter(',')
@@ -219,7 +220,7 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
   app->add_option("--threads", options.threads, "numbers of threads [one per core]")
       ->type_name("N,..")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--seeds", options.seeds, "seeds of the sample [the scene's]")
       ->type_name("S,..")
       ->delimiter(',');
@@ -229,19 +230,19 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
   app->add_option("--at-step", options.at_step, "steps before the one that is solved in every way")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   app->add_option("--steps", options.steps, "length of a whole run, in time steps of the first stage")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--max-sweeps", options.max_sweeps, "of a solve of the one step")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--max-seconds", options.max_seconds, "of a solve of the one step, or of an FCLIB problem")
       ->type_name("S")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--set", options.overrides, "override a key of the scene, may be repeated")
       ->type_name("a.b=c")
       ->allow_extra_args(false);

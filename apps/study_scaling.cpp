@@ -19,6 +19,7 @@
 
 #include "apps/child_process.hpp"
 #include "apps/exit_codes.hpp"
+#include "apps/options.hpp"
 #include "apps/scaling_predict.hpp"
 #include "apps/scaling_report.hpp"
 #include "apps/scaling_runs.hpp"
@@ -486,20 +487,20 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
       ->type_name("NAME,..")
       ->delimiter(',');
   app->add_option("--latency", options.latency, "of a message between nodes [s]: makes a network `given`")
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   app->add_option("--bandwidth", options.bandwidth, "of a node's link, each way [B/s], likewise")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_option("--overhead", options.overhead, "of a core per message sent or taken [s], likewise")
-      ->check(CLI::NonNegativeNumber);
-  app->add_option("--ranks-per-node", options.ranks_per_node, "likewise")->check(CLI::PositiveNumber);
+      ->check(not_negative());
+  app->add_option("--ranks-per-node", options.ranks_per_node, "likewise")->check(above_zero());
   app->add_option("--repeat", options.repeat, "real runs of each machine; 0: only predict")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(not_negative());
   app->add_option("--record", options.record, "traces of each number of subdomains")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   app->add_flag("--own-caches", options.own_caches,
                 "record subdomains as on cores of their own, each of whose caches holds no other");
   app->add_flag("--typical", options.typical,
@@ -509,9 +510,7 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
          "tasks take this quantile of their times in the step: for recordings on a busy machine [off]")
       ->type_name("Q")
       ->check(CLI::Range(0.0, 1.0));
-  app->add_option("--cores", options.cores, "cores for real runs [all]")
-      ->type_name("N")
-      ->check(CLI::PositiveNumber);
+  app->add_option("--cores", options.cores, "cores for real runs [all]")->type_name("N")->check(above_zero());
   app->add_option("--mpirun", options.mpirun, "words before -n RANKS [mpirun --bind-to core ...]")
       ->type_name("TEXT");
   app->add_option("--smpi", options.smpi,

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "kernels/body_solver.hpp"
+#include "kernels/larger.hpp"
 
 namespace talus {
 

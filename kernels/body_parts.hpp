@@ -5,7 +5,6 @@
 /// wherever they lie: what happens within a part depends on the part alone, and sums over parts are added in
 /// order of subdomain.
 
-#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <span>
@@ -70,11 +69,6 @@ class BodyParts {
   std::span<const BodyProblem> parts_;
   const PartLink* link_;
 };
-
-/// The larger one; NaN if either is.
-inline double larger(double a, double b) {
-  return a <= b || std::isnan(b) ? b : a;
-}
 
 /// Impulses of all parts: per part, one vector per contact.
 using PartImpulses = std::vector<std::vector<Vec3>>;

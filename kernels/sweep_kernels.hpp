@@ -81,6 +81,10 @@ class SweepKernels {
   void advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
                std::span<SingleVelocity> last, double beta) const;
 
+  /// Reads the code of the kernels, as data, into the caches that hold both. Returns a sum over it, which
+  /// means nothing.
+  std::uint64_t touch_code() const;
+
  private:
   InstructionSet set_;
   const LaneKernels* lanes_[2];  ///< without and with friction; null: the scalar kernels

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "kernels/balance.hpp"
+#include "kernels/larger.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "kernels/balance.hpp"
+#include "kernels/larger.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/detail/gluing_parts.hpp"
 #include "runtime/trace/recorder.hpp"
@@ -314,7 +315,7 @@ std::uint64_t Iteration::touch(std::size_t subdomain) const {
              contacts.rz, contacts.rn);
     }
   read(first, last, state_.single.velocity, state_.single.last_v);
-  return sum + gluing_.touch(subdomain);
+  return sum + kernels_.touch_code() + gluing_.touch(subdomain);
 }
 
 double Iteration::impulse_scale() const {

@@ -14,13 +14,9 @@ namespace talus {
 
 namespace {
 
-bool pushed(const Wall& wall) {
-  return wall.load.drive == WallDrive::pressure || wall.load.drive == WallDrive::force;
-}
-
 /// Kinetic energy of the walls [J] with the given velocities.
 double energy_of(const Wall& wall, const Vec3& velocity) {
-  return pushed(wall) ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0;
+  return wall.load.pushed() ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0;
 }
 
 std::string describe(const Bodies& bodies, Slot slot) {
@@ -95,7 +91,7 @@ struct Simulation::Implementation {
     for (Wall& wall : state.walls) {
       if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
       if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
-      if (pushed(wall)) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+      if (wall.load.pushed()) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
       if (wall.load.drive == WallDrive::pressure)
         face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
     }
