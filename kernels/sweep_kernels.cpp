@@ -107,6 +107,15 @@ bool runs(InstructionSet set) {
   return set == InstructionSet::portable;
 }
 
+/// Half records in lanes of 4 are swept faster than in lanes of 8: 3.5 against 4.2 ns per contact. V afresh
+/// takes few registers: 3.0 against 4.1 ns.
+LaneKernels friction_in_avx512() {
+  LaneKernels kernels = lane_kernels_avx512;
+  kernels.accumulate_grains = lane_kernels_avx2[1].accumulate_grains;
+  kernels.accumulate_wall = lane_kernels_avx2[1].accumulate_wall;
+  return kernels;
+}
+
 }  // namespace
 
 std::string_view name_of(InstructionSet set) {
@@ -132,10 +141,9 @@ SweepKernels::SweepKernels(InstructionSet set)
                                 "': this processor runs at most '" +
                                 std::string(name_of(best_instruction_set())) + "'");
   if (set_ == InstructionSet::portable) return;
-  static const LaneKernelPair avx2 = lane_kernels_avx2(), avx512 = lane_kernels_avx512();
-  const LaneKernelPair& pair = set_ == InstructionSet::avx2 ? avx2 : avx512;
-  lanes_[0] = &pair.frictionless;
-  lanes_[1] = &pair.friction;
+  static const LaneKernels fastest_avx512 = friction_in_avx512();
+  lanes_[0] = &lane_kernels_avx2[0];
+  lanes_[1] = set_ == InstructionSet::avx2 ? &lane_kernels_avx2[1] : &fastest_avx512;
 }
 
 template <bool Friction>

@@ -100,11 +100,9 @@ struct LaneKernels {
   bool (*find_gaps)(const PairView&, const GapRule&, const GapTarget&);
 };
 
-/// Kernels of one instruction set, with and without friction.
-struct LaneKernelPair {
-  LaneKernels friction, frictionless;
-};
-LaneKernelPair lane_kernels_avx2();
-LaneKernelPair lane_kernels_avx512();
+/// Constants, and no functions: whoever called one to see what there is would run instructions that the
+/// processor may not have.
+extern const LaneKernels lane_kernels_avx2[2];  ///< without friction, and with
+extern const LaneKernels lane_kernels_avx512;   ///< with friction
 
 }  // namespace talus

@@ -4,8 +4,6 @@
 
 namespace talus {
 
-LaneKernelPair lane_kernels_avx2() {
-  return {kernels_of_lanes<true, 4>, kernels_of_lanes<false, 4>};
-}
+constinit const LaneKernels lane_kernels_avx2[2] = {kernels_of_lanes<false, 4>, kernels_of_lanes<true, 4>};
 
 }  // namespace talus

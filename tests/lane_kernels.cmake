@@ -1,0 +1,20 @@
+# Objects compiled for an instruction set define tables and no functions that others could call, nor anything that runs
+# before main: a processor without those instructions must not come there.
+#   cmake -D NM=nm -D OBJECTS=A;B -P lane_kernels.cmake
+set(tables 0)
+foreach(object ${OBJECTS})
+  if(NOT object MATCHES "lane_kernels_[a-z0-9]+\\.cpp")
+    continue()
+  endif()
+  execute_process(COMMAND ${NM} --defined-only ${object} OUTPUT_VARIABLE symbols COMMAND_ERROR_IS_FATAL ANY)
+  string(REGEX MATCHALL "[^\n]* [DRV] [^\n]*lane_kernels_[^\n]*" found "${symbols}")
+  list(LENGTH found count)
+  math(EXPR tables "${tables} + ${count}")
+  string(REGEX MATCHALL "[^\n]* ([TWVui] [^\n]*|t _GLOBAL__sub_[^\n]*)" code "${symbols}")
+  if(code)
+    message(FATAL_ERROR "${object} has more than its tables:\n${code}")
+  endif()
+endforeach()
+if(NOT tables EQUAL 2)
+  message(FATAL_ERROR "${tables} tables where 2 are expected")
+endif()
