@@ -26,10 +26,10 @@ std::atomic<pid_t> running{0};
 std::atomic<int> stop_signal{0};
 static_assert(std::atomic<pid_t>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
-/// A terminal interrupts the child too; others end this process only.
-extern "C" void stop_child(int signal) {
+/// What a process sends is for this one alone, so it is passed on; a terminal interrupts the child too.
+extern "C" void stop_child(int signal, siginfo_t* info, void*) {
   stop_signal.store(signal);
-  if (const pid_t child = running.load(); child > 0 && signal == SIGTERM) ::kill(child, signal);
+  if (const pid_t child = running.load(); child > 0 && info->si_code <= 0) ::kill(child, signal);
 }
 
 /// While a child runs, what ends this process waits for the child to end.
@@ -38,7 +38,8 @@ class Attendance {
   Attendance() {
     stop_signal.store(0);
     struct sigaction action {};
-    action.sa_handler = stop_child;
+    action.sa_sigaction = stop_child;
+    action.sa_flags = SA_SIGINFO;
     ::sigaction(SIGINT, &action, &interrupt_);
     ::sigaction(SIGTERM, &action, &terminate_);
   }
@@ -49,10 +50,10 @@ class Attendance {
     ::sigaction(SIGINT, &interrupt_, nullptr);
     ::sigaction(SIGTERM, &terminate_, nullptr);
   }
-  /// One that came before there was a child is passed on too.
+  /// One that came before there was a child is passed on too, whoever sent it.
   void of(pid_t child) {
     running.store(child);
-    if (stop_signal.load() == SIGTERM) ::kill(child, SIGTERM);
+    if (const int signal = stop_signal.load(); signal != 0) ::kill(child, signal);
   }
 
  private:

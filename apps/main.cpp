@@ -27,13 +27,10 @@
 
 namespace {
 
-/// Beyond it a typing error is likelier than a machine.
-constexpr int most_threads = 4096;
-
 void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "threads [one per core]")
       ->type_name("N")
-      ->check(CLI::Range(1, most_threads));
+      ->check(talus::thread_count());
 }
 
 /// The commands of `app` as far as they were recognised, "talus study error", and the last of them.
@@ -74,7 +71,9 @@ void set_speeds(const std::vector<std::string>& given, talus::trace::Machine& ma
 
 void add_machine_options(CLI::App& app, talus::ReplayOptions& replay) {
   app.add_option("--ranks", replay.ranks, "ranks [as recorded]")->type_name("R");
-  app.add_option("--threads", replay.threads, "threads of a rank [as recorded]")->type_name("T");
+  app.add_option("--threads", replay.threads, "threads of a rank [as recorded]")
+      ->type_name("T")
+      ->check(talus::thread_count());
   app.add_option("--map", replay.map, "subdomains to ranks: block, cyclic or weight [as recorded]");
   app.add_option("--schedule", replay.schedule, "fixed, as the program does it, or list")
       ->capture_default_str();

@@ -25,4 +25,9 @@ inline CLI::Validator not_negative() {
           "NOT NEGATIVE"};
 }
 
+/// Beyond 4096 a typing error is likelier than a machine.
+inline CLI::Validator thread_count() {
+  return CLI::Range(1, 4096);
+}
+
 }  // namespace talus

@@ -20,6 +20,7 @@
 #include "partition/load_table.hpp"
 #include "partition/partitioner.hpp"
 #include "runtime/graph/executor.hpp"
+#include "runtime/step/decomposition.hpp"
 
 namespace talus {
 
@@ -70,14 +71,9 @@ struct Cut {
   LoadTable load;
 };
 
-Cut cut_sample(PartitionKind kind, std::int32_t subdomains, const Bodies& bodies,
-               const ContactPairs& contacts, std::size_t walls, const PartitionPoints& points,
-               const std::array<std::int32_t, 3>& boxes) {
-  PartitionOptions options;
-  options.kind = kind;
-  options.subdomains = subdomains;
-  options.boxes = boxes;
-  Cut cut{kind, make_partition(points, options), {}, {}, {}};
+Cut cut_sample(const PartitionOptions& options, const Bodies& bodies, const ContactPairs& contacts,
+               std::size_t walls, const PartitionPoints& points) {
+  Cut cut{options.kind, make_partition(points, options), {}, {}, {}};
   const std::vector<std::int32_t> subdomain = subdomains_of(cut.partition, points.x);
   cut.home = subdomains_of(cut.partition, bodies.x);
   const BodySubdomains grains =
@@ -86,25 +82,24 @@ Cut cut_sample(PartitionKind kind, std::int32_t subdomains, const Bodies& bodies
       wall_subdomains(walls, contacts.walls, std::span(subdomain).subspan(contacts.grains.size()));
   for (std::size_t body = 0; body < bodies.size(); ++body)
     cut.multiplicity.push_back(grains.multiplicity(body));
-  std::vector<std::int32_t> all(static_cast<std::size_t>(subdomains));
+  std::vector<std::int32_t> all(static_cast<std::size_t>(options.subdomains));
   std::iota(all.begin(), all.end(), 0);
-  cut.load = measure_load(subdomains, build_interfaces(grains, bodies.id, all), grains, of_walls, subdomain);
+  cut.load =
+      measure_load(options.subdomains, build_interfaces(grains, bodies.id, all), grains, of_walls, subdomain);
   return cut;
 }
 
-/// Boxes per axis as the scene has them; zeros when it has none. Throws std::invalid_argument when they are
-/// not the subdomains asked for.
-std::array<std::int32_t, 3> boxes_of(const io::Scene& scene, std::int32_t subdomains) {
-  const DecompositionSettings& asked = scene.setup.decomposition;
-  std::array<std::int32_t, 3> boxes{};
-  std::ranges::transform(asked.boxes, boxes.begin(),
-                         [](std::int64_t n) { return static_cast<std::int32_t>(n); });
-  if (boxes[0] > 0 && asked.subdomains != subdomains)
+/// Throws std::invalid_argument when the scene's boxes are not the subdomains asked for, and one of the
+/// `kinds` cuts boxes.
+void check_boxes(const DecompositionSettings& settings, std::int32_t subdomains,
+                 std::span<const PartitionKind> kinds) {
+  const bool cut = std::ranges::any_of(
+      kinds, [](PartitionKind kind) { return kind != PartitionKind::rcb && kind != PartitionKind::metis; });
+  if (cut && settings.boxes[0] > 0 && settings.subdomains != subdomains)
     throw std::invalid_argument(
         fmt::format("--subdomains {}, but the scene's decomposition.boxes are {}: change them "
                     "with --set 'decomposition.boxes=[X, Y, Z]'",
-                    subdomains, asked.subdomains));
-  return boxes;
+                    subdomains, settings.subdomains));
 }
 
 std::vector<PartitionKind> kinds_of(const std::vector<std::string>& names) {
@@ -164,7 +159,6 @@ int partition_command(const PartitionCommandOptions& options) {
   io::Scene scene;
   Bodies bodies;
   std::vector<PartitionKind> kinds;
-  std::array<std::int32_t, 3> boxes{};
   std::string directory = options.out;
   std::optional<io::DirectoryLock> lock;
   try {
@@ -174,7 +168,7 @@ int partition_command(const PartitionCommandOptions& options) {
     io::place_walls(scene, sample);
     append(sample, bodies);
     if (directory.empty()) directory = "out/partition-" + scene.name;
-    boxes = boxes_of(scene, options.subdomains);
+    check_boxes(scene.setup.decomposition, options.subdomains, kinds);
     lock.emplace(io::prepare_output_directory(directory, options.force, io::is_partition_name));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
@@ -187,9 +181,11 @@ int partition_command(const PartitionCommandOptions& options) {
     if (points.x.empty())
       fmt::print(stderr, "talus: warning: no grain touches another: there are no contacts to share out\n");
     std::vector<Cut> cuts;
-    for (PartitionKind kind : kinds)
-      cuts.push_back(
-          cut_sample(kind, options.subdomains, bodies, contacts, scene.setup.walls.size(), points, boxes));
+    PartitionOptions cutting = partition_options(scene.setup.decomposition, options.subdomains);
+    for (const PartitionKind kind : kinds) {
+      cutting.kind = kind;
+      cuts.push_back(cut_sample(cutting, bodies, contacts, scene.setup.walls.size(), points));
+    }
     print_table(scene, bodies.size(), contacts, cuts);
     write_files(directory, scene, bodies, cuts);
     fmt::print(stderr, "talus: .vtp and .svg files in {}\n", directory);

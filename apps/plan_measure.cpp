@@ -11,6 +11,7 @@
 
 #include "apps/sample_builder.hpp"
 #include "apps/study_variants.hpp"
+#include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -116,8 +117,7 @@ class Forms {
   }
   Setup subdomains(bool in) const {
     Setup setup = base_;
-    setup.decomposition.subdomains = in ? several() : 1;
-    if (!in) setup.decomposition.boxes = {};
+    setup.decomposition = with_subdomains(setup.decomposition, in ? several() : 1);
     return setup;
   }
 

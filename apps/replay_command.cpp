@@ -46,11 +46,11 @@ void write_platform(const std::string& file, const std::string& platform, const 
              machine.ranks, hosts, file);
 }
 
-/// Plays, prints, and returns what would have been.
+/// Plays what was recorded on the machine `there`, prints, and returns what would have been.
 trace::Trace report(const ReplayOptions& options, const trace::Timeline& timeline,
-                    const trace::Machine& machine) {
+                    const trace::Machine& there, const trace::Machine& machine) {
   const trace::Trace& recorded = timeline.trace();
-  const char* label = trace::was_recorded_on(recorded, machine) ? "" : "predicted";
+  const char* label = !recorded.predicted && machine == there ? "" : "predicted";
   trace::Replay played = trace::replay(timeline, machine, true);
   trace::Machine chain = machine;
   chain.unbounded = true;
@@ -117,9 +117,16 @@ int replay_command(ReplayOptions options) {
     machine.schedule = trace::schedule_named(options.schedule);
     machine.late_check = !options.blocking_check;
     validate(machine, recorded);
-    if (!options.smpi_platform.empty()) platform = io::smpi_platform(machine);
+    if (!options.smpi_platform.empty()) {
+      if (!options.map.empty() && machine.map != trace::RankMap::block)
+        throw std::invalid_argument(
+            fmt::format("--map {}: a platform for SMPI has no map; it is the program's, see "
+                        "decomposition.mapping",
+                        options.map));
+      platform = io::smpi_platform(machine);
+    }
     const trace::Timeline timeline(recorded);
-    played = report(options, timeline, machine);
+    played = report(options, timeline, there, machine);
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;

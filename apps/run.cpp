@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <functional>
@@ -211,21 +210,13 @@ int signal_of(const graph::Communicator& ranks) {
 }
 
 /// Which of its conditions a stage has come to, and how far it was from rest where that was one.
-void print_stage_end(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+void print_stage_end(const Simulation& simulation) {
   const StageEnd& end = simulation.stage().end;
-  const double unrest = simulation.unrest();
-  const char* met = "time reached";
-  if (end.steps && simulation.steps_of_stage() >= *end.steps) {
-    met = "steps reached";
-  } else if (end.equilibrium && unrest <= *end.equilibrium) {
-    met = "equilibrium reached";
-  } else if (end.strain && triaxial &&
-             std::abs(triaxial->strain[static_cast<std::size_t>(end.strain_axis)]) >= *end.strain) {
-    met = "strain reached";
-  }
-  fmt::print(stderr, "talus: stage '{}' ended after {}: {}{}\n", simulation.stage().name,
-             counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"), met,
-             end.equilibrium ? fmt::format(", unrest {:.2g} (asked {:.2g})", unrest, *end.equilibrium) : "");
+  fmt::print(stderr, "talus: stage '{}' ended after {}: {} reached{}\n", simulation.stage().name,
+             counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"), simulation.end_reached(),
+             end.equilibrium
+                 ? fmt::format(", unrest {:.2g} (asked {:.2g})", simulation.unrest(), *end.equilibrium)
+                 : "");
 }
 
 /// Runs the steps; returns the signal that stopped them, or 0.
@@ -240,8 +231,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
   while (!simulation.finished()) {
     const StepReport& report = simulation.step();
     tally.add(simulation);
-    const std::optional<TriaxialReport> triaxial = simulation.triaxial();
-    feed.row(simulation, triaxial);
+    feed.row(simulation, simulation.triaxial());
     if (std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
       feed.later("dump of a contact problem", fclib_dump(simulation, directory));
     const bool stage_ends = simulation.stage_fraction() >= 1;
@@ -250,7 +240,7 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
     if (progress) progress->update(report, simulation.stage().name, simulation.stage_fraction());
     if (progress && stage_ends) {
       progress->finish();
-      print_stage_end(simulation, triaxial);
+      print_stage_end(simulation);
     }
     if (const int signal = signal_of(ranks); signal != 0) {
       if (progress) progress->finish();
@@ -371,19 +361,36 @@ void run_steps(const RunOptions& options, const io::Scene& scene, Sample sample,
   summary.digest = simulation.digest();
 }
 
-/// The same with all that it throws in the summary.
-io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample, int threads,
-                     const std::string& directory, const Recordings& recordings, io::Recorder& recorder,
-                     const graph::Communicator& ranks) {
+/// The same from the first file of the results to the last, with all that it throws in the summary.
+io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample sample,
+                     const std::string& directory, const io::Provenance& provenance,
+                     const Recordings& recordings, const graph::Communicator& ranks) {
   const Stopwatch watch;
+  const io::RecorderOptions files{.frames = true,
+                                  .fields = scene.output.fields,
+                                  .contacts = scene.output.contacts,
+                                  .pictures = scene.output.pictures};
   io::Summary summary;
   summary.bodies = sample.size();
+  std::optional<io::Recorder> recorder;
   try {
-    run_steps(options, scene, std::move(sample), threads, directory, recordings, recorder, ranks, summary);
+    // Of one rank it writes on the background lane, from where a trace must hear of no call.
+    recorder.emplace(directory, files, scene.setup, provenance,
+                     ranks.ranks() > 1 ? ranks : graph::one_rank());
+    run_steps(options, scene, std::move(sample), provenance.threads, directory, recordings, *recorder, ranks,
+              summary);
   } catch (const std::exception& error) {
     fail(summary, error);
   }
   summary.wall_s = watch.seconds();
+  try {
+    if (recorder)
+      recorder->finish(summary);
+    else if (ranks.rank() == 0)
+      io::write_run_json(directory + "/run.json", provenance, summary);
+  } catch (const std::exception& error) {
+    if (summary.status != "failed") fail(summary, error);  // the first fault is what to mend
+  }
   return summary;
 }
 
@@ -477,10 +484,6 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
   provenance.command_line = options.command_line;
   provenance.seed = scene.setup.seed;
   provenance.scene_file = scene.source_file;
-  const io::RecorderOptions files{.frames = true,
-                                  .fields = scene.output.fields,
-                                  .contacts = scene.output.contacts,
-                                  .pictures = scene.output.pictures};
   std::string refused;
   std::optional<io::DirectoryLock> lock;
   if (ranks.rank() == 0) {
@@ -495,20 +498,8 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
     io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
     print_start(scene, sample.size(), threads, ranks);
   }
-  std::optional<io::Recorder> recorder;
-  try {
-    // Of one rank it writes on the background lane, from where a trace must hear of no call.
-    recorder.emplace(directory, files, scene.setup, provenance,
-                     ranks.ranks() > 1 ? ranks : graph::one_rank());
-  } catch (const std::exception& error) {
-    io::Summary none;
-    fail(none, error);
-    if (ranks.rank() == 0) io::write_run_json(directory + "/run.json", provenance, none);
-    throw;
-  }
   const io::Summary summary =
-      simulate(options, scene, std::move(sample), threads, directory, recordings, *recorder, ranks);
-  recorder->finish(summary);
+      simulate(options, scene, std::move(sample), directory, provenance, recordings, ranks);
   if (ranks.rank() == 0) {
     print_end(summary, scene.setup.solver, directory);
   } else if (summary.status == "failed") {
@@ -540,6 +531,10 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (options.steps && *options.steps < 1)
       throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
     if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
+    if (options.trace_own_caches && (ranks.ranks() > 1 || threads_of(options) > 1))
+      throw std::invalid_argument(
+          "--trace-own-caches: others would wait for what is brought in; record on one rank with --threads "
+          "1");
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());

@@ -20,7 +20,7 @@ struct RunOptions {
   std::vector<std::int64_t> dump_fclib;   ///< steps whose contact problem is dumped (fclib_dump)
   bool trace = false;                     ///< record the tasks into trace.h5
   std::string trace_steps;                ///< "first:last", recorded alone; empty: all
-  bool trace_own_caches = false;          ///< trace::RecorderOptions::own_caches
+  bool trace_own_caches = false;          ///< trace::RecorderOptions::own_caches; of one rank and thread
   std::string replay_order;               ///< a trace whose order of tasks is to be followed; empty: none
   std::string task_times;                 ///< a trace by which tasks take their time; simulated ranks only
   bool dry_run = false;                   ///< read, build, place and check; write nothing

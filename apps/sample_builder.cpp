@@ -28,12 +28,10 @@ Sample make_sample(const io::Scene& scene) {
   if (spec.kind == io::SampleSpec::Kind::bodies)
     return io::read_bodies(spec.file, scene.density, scene.setup.rotation);
 
-  const auto count =
-      static_cast<std::size_t>(spec.count > 0 ? spec.count : spec.cells[0] * spec.cells[1] * spec.cells[2]);
   Sample sample;
   sample.density = scene.density;
   sample.turns = scene.setup.rotation;
-  sample.radius = draw_radii(spec.radii, count, scene.setup.seed);
+  sample.radius = draw_radii(spec.radii, static_cast<std::size_t>(spec.grains()), scene.setup.seed);
   sample.x = spec.kind == io::SampleSpec::Kind::lattice ? lattice_sites(spec, sample.radius)
                                                         : deposit(sample.radius, spec.base[0], spec.base[1]);
   return sample;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <regex>
 #include <string_view>
 
 #include "apps/child_process.hpp"
@@ -268,20 +269,11 @@ StudyReport page_of(ScalingReport report) {
   return page;
 }
 
-/// "weak-12.csv", "traces/strong-4-variant1-2.h5": a stem, numbers and dashes, an ending.
-bool is_numbered(std::string_view name) {
-  for (const std::string_view stem : {"weak-", "traces/strong-", "traces/weak-"}) {
-    if (!name.starts_with(stem)) continue;
-    const std::string_view rest = name.substr(stem.size()),
-                           ending = rest.substr(std::min(rest.find('.'), rest.size()));
-    const bool trace = stem.starts_with("traces/");
-    if (trace ? ending != ".h5" : ending != ".toml" && ending != ".csv") return false;
-    std::string numbers(rest.substr(0, rest.size() - ending.size()));
-    if (const std::size_t at = numbers.find("variant"); trace && at != std::string::npos)
-      numbers.erase(at, 7);
-    return !numbers.empty() && numbers.find_first_not_of("0123456789-") == std::string::npos;
-  }
-  return false;
+/// "weak-12.csv", "traces/strong-4-variant1-own-2.h5".
+bool is_numbered(const std::string& name) {
+  static const std::regex numbered(
+      R"(weak-\d+\.(toml|csv)|traces/(strong|weak)-\d+(-variant\d+)?(-own)?-\d+\.h5)");
+  return std::regex_match(name, numbered);
 }
 
 }  // namespace
@@ -317,14 +309,13 @@ std::vector<OtherSpeedup> read_speedups(const std::string& path) {
   return all;
 }
 
-bool is_study_scaling_name(const std::filesystem::path& relative) {
+bool is_study_scaling_name(const std::string& name) {
   constexpr std::array<std::string_view, 4> tables{"strong_scaling.csv", "weak_scaling.csv", "hybrid.csv",
                                                    "beside.csv"};
   constexpr std::array<std::string_view, 6> charts{
       "speedup", "efficiency", "efficiency_iterations", "efficiency_sweeps", "weak_efficiency", "hybrid"};
   constexpr std::array<std::string_view, 5> others{"commands.sh", "slurm.sh", "strong.toml", "strong.csv",
                                                    "traces/times.csv"};
-  const std::string name = whole_name(relative);
   return is_report_name(name, tables, charts) || std::ranges::find(others, name) != others.end() ||
          is_numbered(name);
 }

@@ -46,7 +46,7 @@ struct ScalingReport {
 
 /// True for the names of files that `talus study scaling` may have written: those of write_scaling_report,
 /// and scenes and traces.
-bool is_study_scaling_name(const std::filesystem::path& relative);
+bool is_study_scaling_name(const std::string& name);
 
 /// Writes commands.sh and slurm.sh, and once there are rows the tables, pictures, plot.gp and report.html.
 /// Throws io::FileError.

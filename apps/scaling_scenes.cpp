@@ -68,6 +68,7 @@ void put_walls(io::Scene& scene, const Frame& frame, const std::string& file) {
 ScalingSample finished(io::Scene scene, Sample grains, const std::string& stage) {
   io::place_walls(scene, grains);
   begin_with(scene, stage);
+  scene.setup.decomposition.boxes = {};  // runs have as many subdomains as the study says
   scene.output = io::OutputSpec{.directory = scene.output.directory,
                                 .every = {},
                                 .every_steps = {},
@@ -103,9 +104,8 @@ std::string range_of_radii(const Sample& grains) {
 std::string other_sample(const io::Scene& scene, const Sample& grains) {
   const io::SampleSpec& spec = scene.sample;
   if (spec.kind == io::SampleSpec::Kind::bodies) return "";
-  const std::int64_t count = spec.count > 0 ? spec.count : spec.cells[0] * spec.cells[1] * spec.cells[2];
-  if (const auto there = static_cast<std::int64_t>(grains.size()); there != count)
-    return fmt::format("{} grains where the scene's sample has {}", there, count);
+  if (const auto there = static_cast<std::int64_t>(grains.size()); there != spec.grains())
+    return fmt::format("{} grains where the scene's sample has {}", there, spec.grains());
   const SizeDistribution& radii = spec.radii;
   const double least = radii.kind == SizeDistribution::Kind::constant ? radii.max : radii.min;
   const auto [smallest, largest] = std::ranges::minmax(grains.radius);

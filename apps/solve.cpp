@@ -98,15 +98,7 @@ Solved solve_one(const DelassusProblem& problem, const std::string& name, Delass
   }
   const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
   std::nth_element(times.begin(), middle, times.end());
-  solved.row = {.problem = name,
-                .contacts = problem.contacts(),
-                .method = std::string(name_of(method)),
-                .error = report.error.siconos,
-                .scaled_error = report.error.scaled,
-                .iterations = report.iterations,
-                .factorisations = report.factorisations,
-                .seconds = *middle,
-                .converged = report.converged};
+  solved.row = solve_row(name, problem.contacts(), method, report, *middle);
   solved.failed_contacts = report.failed_contacts;
   return solved;
 }

@@ -33,6 +33,19 @@ std::map<std::string, double> best_times(std::span<const SolveRow> rows) {
 
 }  // namespace
 
+SolveRow solve_row(const std::string& problem, std::size_t contacts, DelassusMethod method,
+                   const DelassusReport& report, double seconds) {
+  return {.problem = problem,
+          .contacts = contacts,
+          .method = std::string(name_of(method)),
+          .error = report.error.siconos,
+          .scaled_error = report.error.scaled,
+          .iterations = report.iterations,
+          .factorisations = report.factorisations,
+          .seconds = seconds,
+          .converged = report.converged};
+}
+
 std::string solve_table(std::span<const SolveRow> rows) {
   std::size_t width = 7;
   for (const SolveRow& row : rows) width = std::max(width, row.problem.size());

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "kernels/delassus_solve.hpp"
+
 namespace talus {
 
 /// One solve of one problem.
@@ -19,6 +21,10 @@ struct SolveRow {
   double seconds = 0;
   bool converged = false;
 };
+
+/// The row of a solve that took so many `seconds`.
+SolveRow solve_row(const std::string& problem, std::size_t contacts, DelassusMethod method,
+                   const DelassusReport& report, double seconds);
 
 /// For people: aligned columns, with a line of totals per method.
 std::string solve_table(std::span<const SolveRow> rows);

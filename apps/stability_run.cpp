@@ -133,18 +133,18 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
       simulation.stage().law.restitution == 0 && problem.setup.solver.overlap_correction == 0;
   EnergyLedger energy(simulation);
   const Frame at_start = simulation.frame(false);
+  Frame before = at_start;
   bool any_truth = false, stopped = false;
   std::int64_t passed = 0;
   double worst = 0;
   std::string growth;
   while (outcome.steps < problem.steps && !stopped) {
-    const Frame before = simulation.frame(false);
     std::optional<SavedState> saved;
     if (!simulation.state().decomposition.several()) saved = simulation.save();
     const auto start = Clock::now();
     const StepReport& report = simulation.step();
     outcome.seconds += seconds_since(start);
-    const Frame after = simulation.frame();
+    Frame after = simulation.frame();
     ++outcome.steps;
     outcome.iterations += report.iterations;
     outcome.penetration = std::max(outcome.penetration, report.penetration_max);
@@ -181,6 +181,7 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
       return say(outcome, fmt::format("step {} is certified at {:.1e} and its error is {:.1e}", outcome.steps,
                                       certified, *error));
     }
+    before = std::move(after);
     stopped = outcome.seconds > seconds && outcome.steps < problem.steps;
   }
   const bool all_known = outcome.judged == outcome.steps && growth.empty();

@@ -64,7 +64,7 @@ std::vector<Frame> usual_steps(const SolverSettings& solver, int count) {
 /// gives in a step: grains at rest differ by what a solver leaves over, which rounding changes.
 Problem in_units(const Units& unit) {
   Problem made = pressed_pile(unit);
-  made.allowed = 1e-5;  // rounding, after a few steps
+  made.allowed = 1e-5;  // rounding, after a few steps, whatever --tolerance is
   made.truth = {[unit, count = made.steps,
                  usual = std::vector<Frame>()](const StepView& step) mutable -> std::optional<double> {
     if (usual.empty()) usual = usual_steps(step.simulation.setup().solver, count);

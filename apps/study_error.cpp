@@ -132,6 +132,10 @@ int study_scene(const StudyErrorOptions& options) {
     for (const StudySample& sample : samples) study_runs(sample, plan, say, keep, runs);
   keep();
   say(fmt::format("tables, pictures and report.html in {}", directory));
+  if ((options.only != "run" && problem.truth.empty()) || (options.only != "step" && runs.rows.empty())) {
+    fmt::print(stderr, "talus: error: {} could not be solved in any of these ways\n", scene.name);
+    return exit_failure;
+  }
   const bool sound =
       std::ranges::all_of(problem.references, &ProblemReference::converged) &&
       std::ranges::all_of(runs.references, [](const RunReference& r) { return r.missed == 0; });
@@ -220,7 +224,7 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
   app->add_option("--threads", options.threads, "numbers of threads [one per core]")
       ->type_name("N,..")
       ->delimiter(',')
-      ->check(above_zero());
+      ->check(thread_count());
   app->add_option("--seeds", options.seeds, "seeds of the sample [the scene's]")
       ->type_name("S,..")
       ->delimiter(',');
@@ -253,7 +257,7 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
 int study_error_command(const StudyErrorOptions& options) {
   try {
     return fs::is_directory(options.subject) ? study_folder(options) : study_scene(options);
-  } catch (const std::invalid_argument& error) {  // a scene that ends sooner than its stages say
+  } catch (const SceneEnded& error) {  // sooner than its stages say
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;
   } catch (const std::exception& error) {

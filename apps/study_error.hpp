@@ -31,8 +31,9 @@ struct StudyErrorOptions {
 /// do nothing for the subject or with --only.
 CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options);
 
-/// Measures and writes the study (docs/formats.md). Progress and errors go to stderr. Returns an ExitCode;
-/// exit_tolerance_missed when a reference, or an FCLIB problem with every method, missed its tolerance.
+/// Measures and writes the study (docs/formats.md). Progress and errors go to stderr. Returns an ExitCode:
+/// exit_failure when nothing could be solved, exit_tolerance_missed when a reference, or an FCLIB problem
+/// with every method, missed its tolerance.
 int study_error_command(const StudyErrorOptions& options);
 
 }  // namespace talus

@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -58,15 +59,16 @@ class Problem {
       mass_[static_cast<std::int64_t>(sample.bodies.id[k])] = sample.bodies.mass(k);
       total_mass_ += sample.bodies.mass(k);
     }
-    setup_.decomposition.subdomains = 1;
+    Setup alone = setup_;
+    alone.decomposition = with_subdomains(alone.decomposition, 1);
     graph::Executor executor({.threads = threads});
-    Simulation simulation(setup_, sample.bodies, executor);
+    Simulation simulation(alone, sample.bodies, executor);
     while (!simulation.finished() && simulation.report().step < plan.at_step) {
       simulation.step();
       simulation.begin_next_stage();
     }
     if (simulation.finished())
-      throw std::invalid_argument(fmt::format(
+      throw SceneEnded(fmt::format(
           "{}: the scene ends after step {}, so there is no step to solve behind step {}; choose a "
           "smaller --at-step",
           sample.scene.source_file, simulation.report().step, plan.at_step));
@@ -85,7 +87,7 @@ class Problem {
   Solve solve(const StudyVariant& variant, bool warm, int sweeps, const SolverSettings& solver,
               graph::Executor& executor) const {
     Setup setup = setup_;
-    setup.decomposition.subdomains = variant.subdomains;
+    setup.decomposition = with_subdomains(setup.decomposition, variant.subdomains);
     setup.solver = solver;
     setup.solver.method = io::solver_method(variant.method);
     setup.solver.warm_start = warm;

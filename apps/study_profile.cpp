@@ -29,24 +29,15 @@ std::vector<DelassusMethod> methods_named(std::span<const std::string> names) {
   return chosen;
 }
 
-SolveRow solve_once(const DelassusProblem& problem, DelassusMethod method, double tolerance,
-                    double max_seconds) {
+SolveRow solve_once(const DelassusProblem& problem, const std::string& name, DelassusMethod method,
+                    double tolerance, double max_seconds) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
   std::vector<double> r(3 * problem.contacts(), 0.0);
   const DelassusGoal goal{.tolerance = tolerance, .stop = [&] { return elapsed() > max_seconds; }};
   const DelassusReport report = solve_delassus(problem, method, goal, r);
-  SolveRow row;
-  row.seconds = elapsed();
-  row.contacts = problem.contacts();
-  row.method = name_of(method);
-  row.error = report.error.siconos;
-  row.scaled_error = report.error.scaled;
-  row.iterations = report.iterations;
-  row.factorisations = report.factorisations;
-  row.converged = report.converged;
-  return row;
+  return solve_row(name, problem.contacts(), method, report, elapsed());
 }
 
 }  // namespace
@@ -78,12 +69,11 @@ void study_profile(const fs::path& folder, std::span<const std::string> methods,
     }
     for (const DelassusMethod method : chosen)
       for (const double tolerance : tolerances) {
-        SolveRow row = solve_once(problem, method, tolerance, max_seconds);
+        const auto solve = [&] { return solve_once(problem, files[k].name, method, tolerance, max_seconds); };
+        SolveRow row = solve();
         std::vector<double> seconds{row.seconds};
-        while (row.seconds < cheap_solve && seconds.size() < 3)
-          seconds.push_back(solve_once(problem, method, tolerance, max_seconds).seconds);
+        while (row.seconds < cheap_solve && seconds.size() < 3) seconds.push_back(solve().seconds);
         row.seconds = median(seconds);
-        row.problem = files[k].name;
         say(fmt::format("{}/{} {}: {}, tolerance {:.1e}: {} in {:.3g} s, error {:.1e}", k + 1, files.size(),
                         row.problem, row.method, tolerance, row.converged ? "solved" : "NOT solved",
                         row.seconds, row.error));

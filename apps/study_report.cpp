@@ -383,12 +383,6 @@ void write_report(const std::filesystem::path& directory, const StudyReport& rep
                   io::html_page(report.title, report.introduction, report.sections));
 }
 
-std::string whole_name(const std::filesystem::path& relative) {
-  std::string name = relative.generic_string();
-  if (name.ends_with(".part")) name.resize(name.size() - 5);
-  return name;
-}
-
 bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
                     std::span<const std::string_view> charts) {
   const auto is_chart = [&](std::string_view chart) {
@@ -398,14 +392,14 @@ bool is_report_name(std::string_view name, std::span<const std::string_view> tab
          std::ranges::any_of(charts, is_chart);
 }
 
-bool is_study_error_name(const std::filesystem::path& relative) {
+bool is_study_error_name(const std::string& name) {
   constexpr std::array<std::string_view, 5> tables{"residual.csv", "true_error.csv", "runs.csv", "solves.csv",
                                                    "profile.csv"};
   constexpr std::array<std::string_view, 9> charts{
       "residual_seconds",   "residual_sweeps",      "velocity_seconds",
       "velocity_sweeps",    "wall_forces_seconds",  "velocity_residual",
       "run_stress_seconds", "run_position_seconds", "profile"};
-  return is_report_name(whole_name(relative), tables, charts);
+  return is_report_name(name, tables, charts);
 }
 
 }  // namespace talus

@@ -36,15 +36,12 @@ void add_chart(StudyReport& report, io::Chart chart, const std::string& sentence
 /// Writes the tables, NAME.svg for every chart, plot.gp and report.html. Throws io::FileError.
 void write_report(const std::filesystem::path& directory, const StudyReport& report);
 
-/// A name relative to the directory of a study, without the ending of a file that is not finished.
-std::string whole_name(const std::filesystem::path& relative);
-
 /// True for the names of what write_report makes of `tables` (names of files) and `charts` (their names), and
 /// of what its plot.gp draws.
 bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
                     std::span<const std::string_view> charts);
 
 /// True for the names of files that `talus study error` may have written.
-bool is_study_error_name(const std::filesystem::path& relative);
+bool is_study_error_name(const std::string& name);
 
 }  // namespace talus

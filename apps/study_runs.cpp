@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -35,7 +36,7 @@ Outcome run_once(const StudySample& sample, const StudyPlan& plan, const StudyVa
       stage.end.steps =
           std::max<std::int64_t>(1, std::llround(static_cast<double>(*stage.end.steps) / time_step));
   }
-  setup.decomposition.subdomains = variant.subdomains;
+  setup.decomposition = with_subdomains(setup.decomposition, variant.subdomains);
   setup.solver = at_tolerance(setup.solver, tolerance);
   setup.solver.method = io::solver_method(variant.method);
   graph::Executor executor({.threads = variant.threads});
@@ -95,10 +96,10 @@ std::string why_no_step(const io::Scene& scene, const StudyPlan& plan, double ti
         "--time-steps {:g}: a run of {} steps of the scene has no step that long; raise --steps", time_step,
         plan.steps);
   for (const Stage& stage : stages)
-    if (stage.end.time && *stage.end.time < 0.5 * time_step * stage.time_step)
+    if (stage.end.time && steps_in(*stage.end.time, time_step * stage.time_step) < 1)
       return fmt::format(
-          "--time-steps {:g}: stage '{}' ends after {:g} s, before half a step of {:g} s; choose a smaller "
-          "factor",
+          "--time-steps {:g}: stage '{}' ends after {:g} s, no more than half a step of {:g} s; choose a "
+          "smaller factor",
           time_step, stage.name, *stage.end.time, time_step * stage.time_step);
   return "";
 }

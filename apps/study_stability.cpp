@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
 
 #include "apps/exit_codes.hpp"
@@ -23,10 +24,8 @@ using stability::Outcome;
 using stability::Scene;
 using stability::Verdict;
 
-bool is_stability_name(const std::filesystem::path& relative) {
-  const std::string name = relative.string();
-  return name == "stability.csv" || name == "stability.html" || name == "stability.csv.part" ||
-         name == "stability.html.part";
+bool is_stability_name(const std::string& name) {
+  return name == "stability.csv" || name == "stability.html";
 }
 
 struct Row {
@@ -167,13 +166,14 @@ std::string summary_of(const std::vector<Row>& rows, double seconds) {
 int stability_command(const StabilityOptions& options) {
   std::vector<Scene> scenes;
   const std::string directory = options.out.empty() ? "out/study-stability" : options.out;
+  std::optional<io::DirectoryLock> lock;
   try {
     scenes = chosen(options.only);
     if (options.list) {
       for (const Scene& scene : scenes) fmt::print("{:<33} {}\n", scene.name, scene.asks);
       return exit_done;
     }
-    io::prepare_output_directory(directory, options.force, is_stability_name);
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_stability_name));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "apps/sample_builder.hpp"
@@ -32,7 +31,7 @@ double most_steps(std::span<const Stage> stages) {
   for (const Stage& stage : stages) {
     double steps = std::numeric_limits<double>::infinity();
     if (stage.end.steps) steps = static_cast<double>(*stage.end.steps);
-    if (stage.end.time) steps = std::min(steps, std::ceil(*stage.end.time / stage.time_step - 0.5));
+    if (stage.end.time) steps = std::min(steps, steps_in(*stage.end.time, stage.time_step));
     sum += steps;
   }
   return sum;

@@ -49,6 +49,12 @@ bool is_dump(std::string_view name) {
          std::ranges::all_of(process, [](unsigned char c) { return c == '.' || std::isdigit(c) != 0; });
 }
 
+/// The name that a file has when it is whole.
+std::string whole_name(std::string name) {
+  if (name.ends_with(unfinished)) name.resize(name.size() - unfinished.size());
+  return name;
+}
+
 /// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
 std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
   std::vector<fs::path> found;
@@ -57,7 +63,7 @@ std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_
     for (const auto& entry : fs::directory_iterator(folder)) {
       if (entry.is_symlink() || !entry.is_regular_file()) continue;
       const fs::path relative = entry.path().lexically_relative(directory);
-      if (is_ours(relative)) found.push_back(relative);
+      if (is_ours(whole_name(relative.generic_string()))) found.push_back(relative);
     }
   }
   return found;
@@ -65,19 +71,13 @@ std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_
 
 }  // namespace
 
-bool is_output_name(const fs::path& relative) {
-  const std::string text = relative.generic_string();
-  std::string_view name = text;
-  if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
+bool is_output_name(const std::string& name) {
   return std::ranges::find(fixed_names, name) != fixed_names.end() ||
          is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
          is_numbered(name, "trace_rank_", ".h5") || is_dump(name);
 }
 
-bool is_partition_name(const fs::path& relative) {
-  const std::string text = relative.generic_string();
-  std::string_view name = text;
-  if (name.ends_with(unfinished)) name.remove_suffix(unfinished.size());
+bool is_partition_name(const std::string& name) {
   return std::ranges::any_of(partition_kinds, [&](PartitionKind kind) {
     const std::string stem = "partition_" + std::string(name_of(kind));
     return name == stem + ".vtp" || name == stem + ".svg";

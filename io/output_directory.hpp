@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -11,15 +12,14 @@
 
 namespace talus::io {
 
-/// Tells from a name relative to a directory whether a command of Talus wrote the file.
-using IsOutputName = bool (*)(const std::filesystem::path& relative);
+/// Tells from the name of a whole file, relative to a directory, whether a command of Talus wrote it.
+using IsOutputName = bool (*)(const std::string& name);
 
-/// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md), and
-/// for their unfinished forms, which end in ".part".
-bool is_output_name(const std::filesystem::path& relative);
+/// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md).
+bool is_output_name(const std::string& name);
 
 /// The same for the files of `talus partition`: partition_NAME.vtp and partition_NAME.svg.
-bool is_partition_name(const std::filesystem::path& relative);
+bool is_partition_name(const std::string& name);
 
 /// A directory as long as a run writes there. The system takes the lock away when the process ends, however
 /// it ends, and nothing is left in the directory.
@@ -37,11 +37,12 @@ class DirectoryLock {
 
 /// Makes `directory` (and its parents) ready for a run, which holds the lock until it has written all.
 /// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
-/// only files that `is_ours` knows are removed; whatever else the user keeps there stays, and so do symbolic
-/// links and what is behind them. Throws FileError naming the directory when it is refused, when another run
-/// is writing there, or when it is not a directory, or cannot be created or written to.
-DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
-                                       IsOutputName is_ours = is_output_name);
+/// only files that `is_ours` knows are removed, and their unfinished forms, which end in ".part"; whatever
+/// else the user keeps there stays, and so do symbolic links and what is behind them. Throws FileError naming
+/// the directory when it is refused, when another run is writing there, or when it is not a directory, or
+/// cannot be created or written to.
+[[nodiscard]] DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
+                                                     IsOutputName is_ours = is_output_name);
 
 /// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.
 class ScratchFolder {

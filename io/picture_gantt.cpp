@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <tuple>
+#include <unordered_map>
 
 #include "io/detail/svg.hpp"
 #include "runtime/trace/analysis.hpp"
@@ -128,21 +128,17 @@ class Gantt {
   /// From where a message was sent to where it was waited for; of a single step also to where it was found
   /// waiting.
   void draw_messages(Svg& svg) {
-    using Key = std::tuple<std::uint32_t, std::int32_t, std::uint32_t>;
     struct End {
       std::size_t row;
       double time;
     };
-    std::map<Key, End> sent;
-    const auto key = [](const Record& r) { return Key{r.step(), r.epoch, r.node}; };
     const auto each = [&](trace::Kind kind, auto&& use) {
       for (std::size_t k = 0; k < rows_; ++k)
         for (const Record& record : trace_.lanes[k].records)
           if (window_.shows(record) && record.kind() == kind) use(k, record);
     };
-    each(trace::kind_send, [&](std::size_t k, const Record& record) {
-      sent[key(record)] = {k, record.end()};
-    });
+    std::unordered_map<const Record*, End> sent;
+    each(trace::kind_send, [&](std::size_t k, const Record& record) { sent[&record] = {k, record.end()}; });
     const auto arrow = [&](const End& from, const End& to, std::string_view colour) {
       constexpr std::size_t most_arrows = 400;
       if (++arrows_ > most_arrows) {
@@ -153,8 +149,10 @@ class Gantt {
       svg.line(x(from.time), y(from.row) + 0.5 * height_, x(to.time), y2, {.colour = colour, .width = 0.6});
       svg.circle(x(to.time), y2, 1.6, colour);
     };
+    const auto sends = trace::sends_of(trace_);
     each(trace::kind_receive, [&](std::size_t k, const Record& record) {
-      const auto from = sent.find(key(record));
+      const auto send = sends.find(&record);
+      const auto from = send == sends.end() ? sent.end() : sent.find(send->second);
       if (from == sent.end()) return;
       arrow(from->second, {k, record.end()}, style::ink);
       sent.erase(from);
@@ -163,13 +161,15 @@ class Gantt {
     const trace::StepIndex index = timeline_.index(*window_.step);
     const auto turns = later_turns(index);
     const graph::Tree tree = trace::tree_of(index);
-    for (const auto& [name, from] : sent) {
+    each(trace::kind_send, [&](std::size_t, const Record& record) {
+      const auto from = sent.find(&record);
+      if (from == sent.end()) return;
       const trace::Place taken =
-          taker(index, tree, turns, static_cast<std::size_t>(std::get<1>(name)), std::get<2>(name));
-      if (!taken.exists() || taken.lane >= rows_) continue;
+          taker(index, tree, turns, static_cast<std::size_t>(record.epoch), record.node);
+      if (!taken.exists() || taken.lane >= rows_) return;
       const auto found = static_cast<double>(timeline_.record(taken).begin);
-      if (found >= from.time) arrow(from, {taken.lane, found}, style::soft_ink);
-    }
+      if (found >= from->second.time) arrow(from->second, {taken.lane, found}, style::soft_ink);
+    });
   }
 
   /// Of the groups that have one other than the first.

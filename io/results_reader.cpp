@@ -15,7 +15,6 @@ using detail::hold;
 using detail::read_array;
 using detail::read_attribute;
 using detail::read_names;
-using detail::take_texts;
 
 Hdf5Object open_results(const std::string& path) {
   Hdf5Object file = detail::open_file(path);
@@ -65,9 +64,7 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   Frame frame;
   read_attribute({group.id(), name}, "step", H5T_NATIVE_INT64, &frame.step);
   read_attribute({group.id(), name}, "time", H5T_NATIVE_DOUBLE, &frame.time);
-  std::vector<char*> stage(1);
-  read_attribute({group.id(), name}, "stage", detail::text_type(name).id(), stage.data());
-  frame.stage = take_texts(stage).front();
+  frame.stage = detail::read_text({group.id(), name}, "stage");
 
   const hid_t h = group.id();
   frame.id = read_integers<std::int64_t>(h, name, "bodies/id");

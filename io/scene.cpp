@@ -198,9 +198,8 @@ class SceneReader {
       const std::size_t index = scene_.setup.stages.size();
       const std::string path = fmt::format("stage[{}]", index);
       Stage stage = scene_.common;
-      stage.name = fmt::format("stage-{}", index + 1);
       read_table(*table, path, keys_.stage, {"end", "load"}, stage);
-      if (table->get("name")) check_name(*table, path, stage.name);
+      check_name(*table, path, stage.name);
       for (const Stage& earlier : scene_.setup.stages)
         if (earlier.name == stage.name)
           fail_at(*table, path + ".name", fmt::format("another stage is named '{}' already", stage.name));

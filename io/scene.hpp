@@ -32,6 +32,9 @@ struct SampleSpec {
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
   SizeDistribution radii;
   std::string file;  ///< absolute path
+
+  /// Grains of a deposition or a lattice.
+  std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
 };
 
 /// What is written during the run and when. Frames come at the first of `every` and `every_steps`, whichever

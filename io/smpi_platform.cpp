@@ -15,9 +15,8 @@ std::string smpi_platform(const trace::Machine& machine) {
         "a platform for SMPI has no noise and no scale of contacts: SMPI runs the real program");
   if (!machine.speed_of.empty())
     throw std::invalid_argument("a platform for SMPI has one speed for all kinds of tasks");
-  if (machine.map != plain.map || machine.schedule != plain.schedule)
-    throw std::invalid_argument(
-        "a platform for SMPI has no map and no schedule: those are the program's (decomposition.mapping)");
+  if (machine.schedule != plain.schedule)
+    throw std::invalid_argument("a platform for SMPI has no schedule: that is the program's");
   if (machine.threads != 1)
     throw std::invalid_argument(
         fmt::format("simulated ranks have one thread each, and the machine has {}", machine.threads));

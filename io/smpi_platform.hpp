@@ -13,8 +13,8 @@ namespace talus::io {
 /// node, with the latency of the message split between the two; nothing shared inside a node; the overhead as
 /// what a rank waits at each message it sends or takes. Messages leave at once, whether somebody waits for
 /// them or not; MPI's polls cost nothing. The file holds all settings of
-/// SMPI. What SimGrid does not have (noise, contacts, speeds by kind, map, schedule), or several threads:
-/// throws std::invalid_argument.
+/// SMPI; which rank has which subdomain is up to the program (decomposition.mapping). What SimGrid does not
+/// have (noise, contacts, speeds by kind, schedule), or several threads: throws std::invalid_argument.
 std::string smpi_platform(const trace::Machine& machine);
 
 /// For smpirun's -hostfile: the nodes of consecutive ranks, one line a rank.

@@ -56,13 +56,6 @@ constexpr std::uint32_t event_names = 2, name_iid = 1, name_name = 2, default_ev
 constexpr std::uint64_t slice_begin = 1, slice_end = 2;
 constexpr std::uint64_t state_cleared = 1, needs_state = 2;
 
-/// Names a message of one exchange, on both sides.
-std::uint64_t flow_of(const Record& record) {
-  return (std::uint64_t{record.step()} << 40) ^
-         (std::uint64_t{static_cast<std::uint32_t>(record.epoch)} << 24) ^
-         (std::uint64_t{record.node} * 0x9e3779b97f4a7c15ULL);
-}
-
 /// Names of the records of one lane, with a look at the plan per step only.
 class Namer {
  public:
@@ -118,26 +111,17 @@ void in_order(const trace::Lane& lane, const TraceWindow& window, Begin begin, E
   for (; !open.empty(); open.pop_back()) end(*open.back());
 }
 
-/// Numbers the messages that somebody waited for, by their records at both ends: of several of one name in an
-/// epoch the last that was sent by the end of the wait. Others have no end that is known, which the format
-/// wants.
+/// Numbers the messages that somebody waited for, by their records at both ends. Others have no end that is
+/// known, which the formats want.
 std::unordered_map<const Record*, std::size_t> links_of(const trace::Trace& trace,
                                                         const TraceWindow& window) {
-  const auto each = [&](trace::Kind kind, const auto& use) {
-    for (const trace::Lane& lane : trace.lanes)
-      for (const Record& record : lane.records)
-        if (record.kind() == kind && window.shows(record)) use(record);
-  };
-  std::unordered_map<std::uint64_t, std::vector<const Record*>> sent;
-  each(trace::kind_send, [&](const Record& record) { sent[flow_of(record)].push_back(&record); });
+  const auto sends = trace::sends_of(trace);
   std::unordered_map<const Record*, std::size_t> links;
-  each(trace::kind_receive, [&](const Record& record) {
-    const Record* last = nullptr;
-    for (const Record* const send : sent[flow_of(record)])
-      if (static_cast<double>(send->begin) <= record.end() && (!last || send->begin >= last->begin))
-        last = send;
-    if (last && links.try_emplace(last, links.size()).second) links[&record] = links[last];
-  });
+  std::size_t count = 0;
+  for (const trace::Lane& lane : trace.lanes)
+    for (const Record& record : lane.records)
+      if (const auto sent = sends.find(&record); sent != sends.end() && window.shows(record))
+        links[&record] = links[sent->second] = ++count;
   return links;
 }
 
@@ -172,6 +156,7 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
     add(packet);
   }
   const std::int64_t start = first_begin(trace, window);
+  const std::unordered_map<const Record*, std::size_t> links = links_of(trace, window);
   for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
     const trace::Lane& lane = trace.lanes[k];
     const std::uint64_t uuid = std::uint64_t{2} << 32 | k, sequence = k + 1;
@@ -210,8 +195,9 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
           data.message(field::event_names, entry);
           made.message(field::interned_data, data);
         }
-        if (record.kind() == trace::kind_send) event.fixed64(field::event_flows, flow_of(record));
-        if (record.kind() == trace::kind_receive) event.fixed64(field::event_last_flows, flow_of(record));
+        if (const auto link = links.find(&record); link != links.end())
+          event.fixed64(record.kind() == trace::kind_send ? field::event_flows : field::event_last_flows,
+                        link->second);
       }
       made.message(field::track_event, event);
       add(made);

@@ -19,7 +19,7 @@ struct TraceWindow {
 
 /// The trace as protocol buffers of Perfetto (ui.perfetto.dev; protos/perfetto/trace of its sources): a
 /// process per rank, a track per thread, a slice per record, named by kind and subdomain, and arrows for
-/// messages between ranks. Some 32 bytes a record. `names` of tasks are interned per thread.
+/// messages that somebody waited for. Some 32 bytes a record. `names` of tasks are interned per thread.
 std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window);
 
 /// The trace as text in the format of Paje, for ViTE and pj_dump: a container per rank and thread, states,

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <stdexcept>
-#include <type_traits>
+#include <utility>
 
 #include "io/detail/hdf5_read.hpp"
 #include "io/detail/hdf5_write.hpp"
@@ -13,6 +14,9 @@
 #include "io/version.hpp"
 
 namespace talus::io {
+
+namespace fs = std::filesystem;
+
 namespace {
 
 using detail::demand;
@@ -99,43 +103,10 @@ void write_plan(Place place, const trace::Plan& plan) {
   write_array(place, "messages", "1, 1, byte", messages);
 }
 
-/// Numbers of a machine by name, for both ways: use(name, member).
-template <class Machine, class Use>
-void each_number(Machine& machine, const Use& use) {
-  use("latency", machine.latency);
-  use("bandwidth", machine.bandwidth);
-  use("overhead", machine.overhead);
-  use("ranks_per_node", machine.ranks_per_node);
-  use("node_latency", machine.node_latency);
-  use("node_bandwidth", machine.node_bandwidth);
-  use("line", machine.line);
-  use("noise", machine.noise);
-  use("seed", machine.seed);
-  use("speed", machine.speed);
-  use("contacts", machine.contacts);
-  use("typical", machine.typical);
-  use("quantile", machine.quantile);
-  use("late_check", machine.late_check);
-  use("unbounded", machine.unbounded);
-}
-
 void write_machine(Place place, const trace::Machine& machine) {
   write_attribute(place, "map", name_of(machine.map));
-  write_attribute(place, "schedule", name_of(machine.schedule));
-  each_number(machine, [&](const char* name, auto value) {
-    if constexpr (std::is_floating_point_v<decltype(value)>)
-      write_attribute(place, name, value);
-    else
-      write_attribute(place, name, static_cast<std::int64_t>(value));
-  });
-  std::vector<std::string> kinds;
-  std::vector<double> speeds;
-  for (const auto& [kind, speed] : machine.speed_of) {
-    kinds.push_back(kind);
-    speeds.push_back(speed);
-  }
-  detail::write_names(place, "kind", kinds);
-  write_array(place, "speed_of", "1", speeds);
+  write_attribute(place, "ranks_per_node", std::int64_t{machine.ranks_per_node});
+  write_attribute(place, "node_latency", machine.node_latency);
 }
 
 [[noreturn]] void damaged(const std::string& file, const std::string& what) {
@@ -168,21 +139,11 @@ trace::Machine read_machine(Place place) {
   trace::Machine machine;
   try {
     machine.map = trace::rank_map_named(detail::read_text(place, "map"));
-    machine.schedule = trace::schedule_named(detail::read_text(place, "schedule"));
   } catch (const std::invalid_argument& error) {
     damaged(place.file, error.what());
   }
-  each_number(machine, [&](const char* name, auto& value) {
-    using Value = std::remove_reference_t<decltype(value)>;
-    if constexpr (std::is_floating_point_v<Value>)
-      detail::read_attribute(place, name, H5T_NATIVE_DOUBLE, &value);
-    else
-      value = static_cast<Value>(read_integer(place, name));
-  });
-  const auto kinds = detail::read_names(place, "kind");
-  const auto speeds = read_array<double>(place, "speed_of");
-  demand_length(place.file, "/machine/speed_of", speeds.size(), kinds.size());
-  for (std::size_t k = 0; k < kinds.size(); ++k) machine.speed_of[kinds[k]] = speeds[k];
+  machine.ranks_per_node = static_cast<int>(read_integer(place, "ranks_per_node"));
+  detail::read_attribute(place, "node_latency", H5T_NATIVE_DOUBLE, &machine.node_latency);
   return machine;
 }
 
@@ -248,7 +209,7 @@ RankClock read_clock(Place root, const std::string& name) {
 
 /// A trace file, opened and known to be one.
 Hdf5Object open_trace(const std::string& path) {
-  if (!std::filesystem::exists(path)) throw FileError(path, "there is no such file");
+  if (!fs::exists(path)) throw FileError(path, "there is no such file");
   Hdf5Object file = detail::open_file(path);
   const std::string format = detail::read_text({file.id(), path}, "format");
   if (format != "talus-trace")
@@ -271,16 +232,80 @@ void turn_clock(const RankClock& clock, trace::Lane& lane) {
     record.begin += std::llround(first.offset + drift * (static_cast<double>(record.begin) - first.time));
 }
 
+/// What a trace says before its blocks, with lanes for these.
+trace::Trace read_head(Place root) {
+  trace::Trace trace;
+  const std::int64_t ranks = read_integer(root, "ranks"), threads = read_integer(root, "threads");
+  const auto most = static_cast<std::int64_t>(largest_machine);
+  if (ranks < 1 || threads < 1 || ranks > most || threads > most || ranks * threads > most)
+    damaged(root.file, fmt::format("{} ranks with {} threads", ranks, threads));
+  trace.ranks = static_cast<int>(ranks);
+  trace.threads = static_cast<int>(threads);
+  trace.predicted = read_integer(root, "predicted") != 0;
+  trace.kinds = read_kinds({open_group(root, "/kinds").id(), root.file});
+  if (H5Lexists(root.group, "machine", H5P_DEFAULT) > 0) {
+    trace.machine = read_machine({open_group(root, "/machine").id(), root.file});
+    trace.machine->ranks = trace.ranks;
+    trace.machine->threads = trace.threads;
+  }
+  trace.tasks.resize(static_cast<std::size_t>(ranks));
+  for (std::int32_t rank = 0; rank < trace.ranks; ++rank)
+    for (std::int32_t thread = 0; thread < trace.threads; ++thread) trace.lanes.push_back({rank, thread, {}});
+  return trace;
+}
+
+trace::Lane& lane_of(const std::string& file, trace::Trace& trace, std::int64_t rank, std::int64_t thread) {
+  if (rank < 0 || rank >= trace.ranks || thread < 0 || thread >= trace.threads)
+    damaged(file, fmt::format("records of rank {}, thread {}", rank, thread));
+  return trace.lanes[static_cast<std::size_t>(rank * trace.threads + thread)];
+}
+
+/// Adds the blocks of those ranks for which `wanted(rank)`, each on its own clock.
+template <class Wanted>
+void add_blocks(Place root, const Wanted& wanted, trace::Trace& trace) {
+  for (const std::string& tasks : detail::names_in(root, "/tasks")) {
+    const Hdf5Object group = open_group(root, "/tasks/" + tasks);
+    const std::int64_t rank = read_integer({group.id(), root.file}, "rank");
+    lane_of(root.file, trace, rank, 0);
+    if (wanted(rank)) trace.tasks[static_cast<std::size_t>(rank)] = read_tasks({group.id(), root.file});
+  }
+  for (const std::string& name : detail::names_in(root, "/plans"))
+    if (trace::Plan plan = read_plan({open_group(root, "/plans/" + name).id(), root.file}); wanted(plan.rank))
+      trace.plans.push_back(std::move(plan));
+  for (const std::string& block : detail::names_in(root, "/records")) {
+    const trace::Block read = read_records(root, "/records/" + block);
+    std::vector<trace::Record>& records = lane_of(root.file, trace, read.rank, read.thread).records;
+    if (wanted(read.rank)) records.insert(records.end(), read.records.begin(), read.records.end());
+  }
+}
+
+/// Of the ranks that are in the file as a whole.
+std::map<std::int64_t, RankClock> clocks_in(Place root) {
+  std::map<std::int64_t, RankClock> clocks;
+  for (const std::string& name : detail::names_in(root, "/clocks")) {
+    const RankClock clock = read_clock(root, "/clocks/" + name);
+    clocks.emplace(clock.rank, clock);
+  }
+  return clocks;
+}
+
+/// Whose file it was before those of others came to it: that rank has no other. None: of no rank.
+std::optional<std::int64_t> owner_of(Place root) {
+  const std::vector<std::string> tasks = detail::names_in(root, "/tasks");
+  if (tasks.empty()) return std::nullopt;
+  return read_integer({open_group(root, "/tasks/" + tasks.front()).id(), root.file}, "rank");
+}
+
 /// What a killed run leaves: of ranks without a clock, steps that all of their threads have gone on from.
 /// Throws FileError when there is none.
-void drop_cut_steps(const std::string& file, const std::vector<char>& has_clock, trace::Trace& trace) {
+void drop_cut_steps(const std::string& file, const std::map<std::int64_t, RankClock>& clocks,
+                    trace::Trace& trace) {
   std::uint32_t whole = trace::largest_step;
   for (const trace::Lane& lane : trace.lanes) {
-    const auto rank = static_cast<std::size_t>(lane.rank);
-    if (has_clock[rank] != 0) continue;
+    if (clocks.contains(lane.rank)) continue;
     std::uint32_t last = 0;
     for (const trace::Record& record : lane.records) last = std::max(last, record.step());
-    if (trace.tasks[rank].empty()) last = 0;
+    if (trace.tasks[static_cast<std::size_t>(lane.rank)].empty()) last = 0;
     whole = std::min(whole, last > 0 ? last - 1 : 0);
   }
   for (trace::Lane& lane : trace.lanes)
@@ -294,7 +319,11 @@ void drop_cut_steps(const std::string& file, const std::vector<char>& has_clock,
 
 }  // namespace
 
-TraceWriter::TraceWriter(const std::filesystem::path& path, int ranks, int threads, bool predicted,
+fs::path trace_file_of(const fs::path& directory, int rank) {
+  return directory / (rank == 0 ? "trace.h5" : fmt::format("trace_rank_{:06}.h5", rank));
+}
+
+TraceWriter::TraceWriter(const fs::path& path, int ranks, int threads, bool predicted,
                          const std::vector<trace::KindInfo>& kinds,
                          const std::optional<trace::Machine>& machine)
     : path_(path.string()) {
@@ -380,7 +409,7 @@ void TraceWriter::append(const RankClock& clock) {
   });
 }
 
-void TraceWriter::append_file(const std::filesystem::path& other) {
+void TraceWriter::append_file(const fs::path& other) {
   const std::string name = other.string();
   const detail::QuietHdf5 quiet;
   const Hdf5Object file = open_trace(name);
@@ -398,7 +427,7 @@ void TraceWriter::append_file(const std::filesystem::path& other) {
     append(read_clock(root, "/clocks/" + clock));
 }
 
-void write_trace(const std::filesystem::path& path, const trace::Trace& trace) {
+void write_trace(const fs::path& path, const trace::Trace& trace) {
   TraceWriter writer(path, trace.ranks, trace.threads, trace.predicted, trace.kinds, trace.machine);
   for (const trace::Lane& lane : trace.lanes)
     writer.append(trace::Block{lane.rank, lane.thread, lane.records, std::nullopt});
@@ -408,61 +437,47 @@ void write_trace(const std::filesystem::path& path, const trace::Trace& trace) {
   for (std::int32_t rank = 0; rank < trace.ranks; ++rank) writer.append(RankClock{rank, {}});
 }
 
-trace::Trace read_trace(const std::filesystem::path& path) {
+trace::Trace read_trace(const fs::path& path) {
   const std::string name = path.string();
   const detail::QuietHdf5 quiet;
   const Hdf5Object file = open_trace(name);
   const Place root{file.id(), name};
-  trace::Trace trace;
-  const std::int64_t ranks = read_integer(root, "ranks"), threads = read_integer(root, "threads");
-  const auto most = static_cast<std::int64_t>(largest_machine);
-  if (ranks < 1 || threads < 1 || ranks > most || threads > most || ranks * threads > most)
-    damaged(name, fmt::format("{} ranks with {} threads", ranks, threads));
-  trace.ranks = static_cast<int>(ranks);
-  trace.threads = static_cast<int>(threads);
-  trace.predicted = read_integer(root, "predicted") != 0;
-  trace.kinds = read_kinds({open_group(root, "/kinds").id(), name});
-  if (H5Lexists(root.group, "machine", H5P_DEFAULT) > 0) {
-    trace.machine = read_machine({open_group(root, "/machine").id(), name});
-    trace.machine->ranks = trace.ranks;
-    trace.machine->threads = trace.threads;
+  trace::Trace trace = read_head(root);
+  std::map<std::int64_t, RankClock> clocks = clocks_in(root);
+  // A killed run left what is not here as a whole in the files of the ranks.
+  std::map<std::int64_t, fs::path> elsewhere;
+  const std::optional<std::int64_t> owner = owner_of(root);
+  for (std::int32_t rank = 0; rank < trace.ranks && !trace.predicted; ++rank)
+    if (!clocks.contains(rank) && rank != owner)
+      elsewhere.emplace(rank, trace_file_of(path.parent_path(), rank));
+  add_blocks(
+      root, [&](std::int64_t rank) { return !elsewhere.contains(rank); }, trace);
+  for (const auto& [rank, beside] : elsewhere) {
+    const std::string part = beside.string();
+    if (!fs::exists(beside))
+      throw FileError(name, fmt::format("is of a run of {} ranks that was killed, and {} of rank {} is not "
+                                        "beside it: put it there, or record the run again",
+                                        trace.ranks, beside.filename().string(), rank));
+    const Hdf5Object other = open_trace(part);
+    const Place there{other.id(), part};
+    const trace::Trace head = read_head(there);
+    if (head.ranks != trace.ranks || head.threads != trace.threads || head.kinds != trace.kinds)
+      throw FileError(part, "is of another run than " + name);
+    add_blocks(
+        there, [rank = rank](std::int64_t r) { return r == rank; }, trace);
+    clocks.merge(clocks_in(there));
   }
-  trace.tasks.resize(static_cast<std::size_t>(ranks));
-  for (std::int32_t rank = 0; rank < trace.ranks; ++rank)
-    for (std::int32_t thread = 0; thread < trace.threads; ++thread) trace.lanes.push_back({rank, thread, {}});
-  const auto lane_of = [&](std::int64_t rank, std::int64_t thread) -> trace::Lane& {
-    if (rank < 0 || rank >= ranks || thread < 0 || thread >= threads)
-      damaged(name, fmt::format("records of rank {}, thread {}", rank, thread));
-    return trace.lanes[static_cast<std::size_t>(rank * threads + thread)];
-  };
-  for (const std::string& tasks : detail::names_in(root, "/tasks")) {
-    const Hdf5Object group = open_group(root, "/tasks/" + tasks);
-    const std::int64_t rank = read_integer({group.id(), name}, "rank");
-    lane_of(rank, 0);
-    trace.tasks[static_cast<std::size_t>(rank)] = read_tasks({group.id(), name});
-  }
-  for (const std::string& plan : detail::names_in(root, "/plans"))
-    trace.plans.push_back(read_plan({open_group(root, "/plans/" + plan).id(), name}));
   std::stable_sort(trace.plans.begin(), trace.plans.end(), [](const trace::Plan& a, const trace::Plan& b) {
     return a.rank != b.rank ? a.rank < b.rank : a.step < b.step;
   });
-  for (const std::string& block : detail::names_in(root, "/records")) {
-    const trace::Block read = read_records(root, "/records/" + block);
-    std::vector<trace::Record>& records = lane_of(read.rank, read.thread).records;
-    records.insert(records.end(), read.records.begin(), read.records.end());
-  }
   if (trace.record_count() == 0)
     throw FileError(name,
                     "holds no tasks: the run ended before a step of --trace-steps was done, or was killed");
-  std::vector<char> has_clock(static_cast<std::size_t>(ranks), trace.predicted ? 1 : 0);
-  for (const std::string& clock : detail::names_in(root, "/clocks")) {
-    const RankClock offsets = read_clock(root, "/clocks/" + clock);
-    lane_of(offsets.rank, 0);
-    has_clock[static_cast<std::size_t>(offsets.rank)] = 1;
-    for (std::int64_t thread = 0; thread < threads; ++thread)
-      turn_clock(offsets, lane_of(offsets.rank, thread));
-  }
-  if (std::ranges::find(has_clock, 0) != has_clock.end()) drop_cut_steps(name, has_clock, trace);
+  for (const auto& [rank, clock] : clocks)
+    for (std::int32_t thread = 0; thread < trace.threads; ++thread)
+      turn_clock(clock, lane_of(name, trace, rank, thread));
+  if (!trace.predicted && clocks.size() < static_cast<std::size_t>(trace.ranks))
+    drop_cut_steps(name, clocks, trace);
   try {
     trace::sort_lanes(trace);
     trace::validate(trace);

@@ -26,13 +26,17 @@ struct RankClock {
   std::array<ClockOffset, 2> offsets{};
 };
 
+/// The file that a rank writes to while the run goes on; in the end that of rank 0 has all.
+std::filesystem::path trace_file_of(const std::filesystem::path& directory, int rank);
+
 /// Writes the file of one rank, or one for all. The file is closed between blocks, and a block gets its name
 /// when it is whole, so that a killed run leaves a file that can be read, if the tasks came first (as
 /// trace::Recorder hands them over). The clock of a rank comes last, and says that all of it is there. Blocks
 /// are written by one thread at a time.
 class TraceWriter {
  public:
-  /// Starts an empty file; of a prediction for `machine` if there is one. Throws FileError.
+  /// Starts an empty file; of a prediction with what recorded_machine() says of its `machine`. Throws
+  /// FileError.
   TraceWriter(const std::filesystem::path& path, int ranks, int threads, bool predicted,
               const std::vector<trace::KindInfo>& kinds,
               const std::optional<trace::Machine>& machine = std::nullopt);
@@ -55,8 +59,10 @@ class TraceWriter {
 void write_trace(const std::filesystem::path& path, const trace::Trace& trace);
 
 /// The whole trace, with all clocks turned to that of rank 0. Of a run that was killed the steps that are
-/// there of all threads: each writes when its buffer is full. Throws FileError when the file is not a trace,
-/// is damaged, or lacks what it refers to, or when no step is whole.
+/// there of all threads: each writes when its buffer is full. What it lacks of other ranks stands in their
+/// files (trace_file_of) beside it; clocks that are not known count from where each rank began to record.
+/// Throws FileError when a file is not a trace, is damaged, is of another run, or lacks what it refers to, or
+/// when no step is whole.
 trace::Trace read_trace(const std::filesystem::path& path);
 
 }  // namespace talus::io

@@ -4,10 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "kernels/body_solver.hpp"
-#include "kernels/larger.hpp"
 
 namespace talus {
 
@@ -92,22 +90,22 @@ void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
     row[heavies] = static_cast<double>(heavy[p].size());
     for (std::int32_t b : heavy[p]) {
       const double own = (made[p][at(b)].u - problem.bodies[at(b)].free.u).norm();
-      if (own != 0) row[worst] = larger(row[worst], (made[p][at(b)].u - V[p][at(b)].u).norm() / own);
+      if (own > 0) row[worst] = std::max(row[worst], (made[p][at(b)].u - V[p][at(b)].u).norm() / own);
     }
   });
   std::array<double, width> sum{};
   double most = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     sum[k % width] += rows[k];
-    if (k % width == worst) most = larger(most, rows[k]);
+    if (k % width == worst) most = std::max(most, rows[k]);
   }
-  // NaN stays NaN: it must not pass for solved.
+  // Of all bodies: NaN, of whichever, stays NaN, and must not pass for solved.
   result.momentum_defect = sum[gained2] != 0 ? std::sqrt(sum[defect2] / sum[gained2]) : 0;
   // Each body counts alike: the heaviest would hide the rest.
   const double speed = std::sqrt(sum[speed2] / sum[count]);
-  result.contact_defect = speed != 0 ? std::sqrt(sum[gap2] / sum[weight]) / speed : 0;
+  result.contact_defect = speed > 0 ? std::sqrt(sum[gap2] / sum[weight]) / speed : 0;
   result.balance_defect = most;
-  if (sum[heavies] == 0 && sum[scale] != 0)
+  if (sum[heavies] == 0 && sum[scale] > 0)
     result.balance_defect = Vec3(sum[sample], sum[sample + 1], sum[sample + 2]).norm() / sum[scale];
 }
 
@@ -160,7 +158,7 @@ BodyAdmmResult solve_admm(std::span<BodyProblem> problems, const PartLink& link,
     parts.each([&](std::size_t p) { states[p].update(parts[p], V[p], settings.relaxation, kappa, r[p]); });
     measure(parts, V, r, states, heavy, result);
     worst[static_cast<std::size_t>(result.iterations) % worst.size()] = result.balance_defect;
-    result.balance_defect = std::accumulate(worst.begin(), worst.end(), 0.0, larger);
+    result.balance_defect = *std::max_element(worst.begin(), worst.end());
     const bool balanced = has_heavy && result.balance_defect <= settings.balance_tolerance &&
                           !std::isnan(result.momentum_defect);
     if (balanced ||

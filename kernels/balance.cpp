@@ -175,9 +175,13 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   const double scale = std::max({std::min(distance(parts, V, free), sound),
                                  all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed],
                                  rounding * most(all[incoming])});
-  if (scale == 0) return {};  // nothing moves, and nothing is asked for
-
   VelocityError error;
+  if (scale == 0) {  // nothing moves: overlaps may still ask for it
+    if (fit_of(parts, parts.field(), wishes, kappa).missed > 0)
+      error.relative = std::numeric_limits<double>::infinity();
+    return error;
+  }
+
   // Two motions to begin from: none; and the stop of everything, which is the answer of a sample at rest.
   PartField motion = parts.field(), stop = V;
   parts.each([&](std::size_t p) {

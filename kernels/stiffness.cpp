@@ -126,7 +126,7 @@ void each_unreached(const Layers& here, const Visit& visit) {
 }
 
 /// The heaviest body of every cluster of every part that no walk has come to. What stands in several parts
-/// may get several: few, where it was small in all of them.
+/// gets one in each.
 void mark_rest(Graph& graph, PartField& mark) {
   graph.each([&](std::size_t p) {
     each_unreached(graph.parts[p], [&](std::size_t, std::int32_t heaviest) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels/detail/contact_view.hpp"
+#include "kernels/fetch_lines.hpp"
 
 extern "C" const char etext;  // the linker's: the end of all code
 
@@ -288,21 +289,16 @@ template ErrorSums SweepKernels::error_grains<false>(const Contacts&, ContactRan
 template ErrorSums SweepKernels::error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>,
                                                    double, const WallCopy&, double, Multiplicities) const;
 
-std::uint64_t SweepKernels::touch_code() const {
-  std::uint64_t sum = 0;
-  const auto read = [&sum](auto*... kernels) {
+void SweepKernels::fetch_code(bool friction) const {
+  const auto fetch = [](auto*... kernels) {
     constexpr std::size_t longest = 14 << 10;  // a sweep with friction (AVX-512) [byte]
-    for (const auto* begin : {reinterpret_cast<const char*>(kernels)...}) {
-      const auto left = static_cast<std::size_t>(&etext - begin);
-      for (std::size_t k = 0; k < std::min(longest, left); k += 64)
-        sum += static_cast<unsigned char>(begin[k]);
-    }
+    for (const auto* begin : {reinterpret_cast<const char*>(kernels)...})
+      fetch_lines(std::span(begin, std::min(longest, static_cast<std::size_t>(&etext - begin))));
   };
-  if (const LaneKernels* const k = lanes_[1])
-    read(k->accumulate_grains, k->accumulate_wall, k->error_grains, k->error_wall, k->sweep_grains,
-         k->sweep_wall, k->momentum_grains, k->momentum_wall, k->single_wall, k->single_grains,
-         k->advance_single);
-  return sum;
+  if (const LaneKernels* const k = lanes_[friction ? 1 : 0])
+    fetch(k->accumulate_grains, k->accumulate_wall, k->error_grains, k->error_wall, k->sweep_grains,
+          k->sweep_wall, k->momentum_grains, k->momentum_wall, k->single_wall, k->single_grains,
+          k->advance_bodies, k->advance_single);
 }
 
 }  // namespace talus

@@ -81,9 +81,8 @@ class SweepKernels {
   void advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
                std::span<SingleVelocity> last, double beta) const;
 
-  /// Reads the code of the kernels, as data, into the caches that hold both. Returns a sum over it, which
-  /// means nothing.
-  std::uint64_t touch_code() const;
+  /// Brings the code of the kernels with or without friction into the caches that hold code and data.
+  void fetch_code(bool friction) const;
 
  private:
   InstructionSet set_;

@@ -66,13 +66,22 @@ toml::node& insert(toml::table& table, const std::string& key, toml::table&& par
   return *table.get(key);
 }
 
-/// Stages without a name, which alone need none, have that of their number.
+/// Stages need no name: those without have that of their number.
+void name_stages(toml::table& root) {
+  toml::array* stages = root["stage"].as_array();
+  if (!stages) return;
+  for (std::size_t k = 0; k < stages->size(); ++k)
+    if (toml::table* stage = (*stages)[k].as_table(); stage && !stage->contains("name"))
+      stage->insert("name", fmt::format("stage-{}", k + 1));
+}
+
+/// "" when it has none.
 std::string name_of(const toml::array& array, std::size_t k) {
   const toml::table* table = array[k].as_table();
   if (!table) return "";
   for (const char* key : {"name", "wall"})
     if (const auto name = (*table)[key].value<std::string>()) return *name;
-  return fmt::format("stage-{}", k + 1);
+  return "";
 }
 
 /// Place in `array` of the element with this number or name.
@@ -143,7 +152,11 @@ toml::table parse_document(const std::string& text, const std::string& file,
                            const std::vector<std::string>& overrides) {
   try {
     toml::table root = toml::parse(text, file);
-    for (const std::string& override : overrides) apply(root, take_apart(override));
+    name_stages(root);
+    for (const std::string& override : overrides) {
+      apply(root, take_apart(override));
+      name_stages(root);
+    }
     return root;
   } catch (const toml::parse_error& error) {
     throw SceneError(file, static_cast<int>(error.source().begin.line), "",

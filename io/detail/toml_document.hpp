@@ -8,7 +8,7 @@ namespace talus::io::detail {
 
 /// Parses TOML and applies overrides "a.b=c" in order (load_scene in io/scene.hpp says how paths are read).
 /// Every node knows where it stands: source().path is `file`, or "--set a.b=c" for what an override brought
-/// in. Throws SceneError.
+/// in. Stages without a name are named stage-1, stage-2, ... by their number. Throws SceneError.
 toml::table parse_document(const std::string& text, const std::string& file,
                            const std::vector<std::string>& overrides);
 

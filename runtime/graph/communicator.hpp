@@ -94,9 +94,9 @@ class Communicator {
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   void progress() const;
-  /// True when all ranks have called it; false when some have not come after `seconds`, since they are dead
-  /// or wait for one that has failed. Nothing but abort() is left then.
-  bool meet(double seconds) const;
+  /// Returns when all ranks have called it, or after `seconds` if some have not come, since they are dead or
+  /// wait for one that has failed. Nothing but abort() is left then.
+  void meet(double seconds) const;
   /// Ends all ranks with exit code `code`: what is left when one of several ranks has failed and the others
   /// wait for it.
   [[noreturn]] void abort(int code) const;

@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "kernels/balance.hpp"
-#include "kernels/larger.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -73,9 +71,9 @@ class StepLink final : public PartLink {
 double fastest_of(const BodyParts& parts) {
   const PartField velocity = velocities_of(parts, impulses_of(parts));
   const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
-    for (const Twist& v : velocity[p]) row[0] = larger(row[0], larger(v.u.norm(), v.w.norm()));
+    for (const Twist& v : velocity[p]) row[0] = std::max({row[0], v.u.norm(), v.w.norm()});
   });
-  return std::accumulate(rows.begin(), rows.end(), 0.0, larger);
+  return *std::max_element(rows.begin(), rows.end());
 }
 
 /// The fastest body without contacts, or gap that a contact closes.

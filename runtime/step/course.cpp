@@ -224,17 +224,18 @@ void Iteration::plan_sweeps(int epoch, int sweeps) {
   segment_ = epoch + 1 + sweeps;
 }
 
+/// To plain sweeps. What the course before has made worse is not held against them.
+void Iteration::give_way() {
+  begin_course(SolverMethod::nlgs, 0);
+  first_residual2_ = std::max(first_residual2_, total_.residual2);
+}
+
 /// After a check: momentum that ADMM has interrupted is taken up again; what has made it worse begins anew
 /// with less, which also ends what it swings by; when little is left, `automatic` takes conjugate gradients.
 /// What fails altogether gives way to plain sweeps.
 void Iteration::choose_course() {
   const Check* const before = check_before();
   if (!before) return;
-  // What momentum has made worse is not held against the sweeps that follow.
-  const auto give_way = [this] {
-    begin_course(SolverMethod::nlgs, 0);
-    first_residual2_ = std::max(first_residual2_, total_.residual2);
-  };
   if (course_.method == SolverMethod::nlgs && course_.most > 0) {
     begin_course(SolverMethod::momentum, course_.most);
     return;

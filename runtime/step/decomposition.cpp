@@ -122,6 +122,12 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
   return gathered;
 }
 
+/// 0: none are given. A double: the product may be beyond all integers.
+double count_boxes(const DecompositionSettings& settings) {
+  const auto& [x, y, z] = settings.boxes;
+  return static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
+}
+
 }  // namespace
 
 bool counts(const Decomposition& decomposition, std::size_t slot) {
@@ -164,6 +170,12 @@ PartitionOptions partition_options(const DecompositionSettings& settings, std::i
   return options;
 }
 
+DecompositionSettings with_subdomains(DecompositionSettings settings, int n) {
+  settings.subdomains = n;
+  if (count_boxes(settings) != n) settings.boxes = {};
+  return settings;
+}
+
 Decomposition make_decomposition(const DecompositionSettings& settings, const graph::Communicator& ranks) {
   Decomposition decomposition;
   const std::int32_t subdomains = settings.subdomains > 0 ? settings.subdomains : ranks.ranks();
@@ -173,7 +185,7 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
         "set decomposition.subdomains to {} or more",
         ranks.ranks(), subdomains, ranks.ranks()));
   const auto& [x, y, z] = settings.boxes;
-  const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
+  const double boxes = count_boxes(settings);
   if (settings.partitioner != PartitionKind::rcb && settings.partitioner != PartitionKind::metis &&
       boxes > 0 && boxes != subdomains)
     throw std::invalid_argument(

@@ -59,6 +59,9 @@ bool counts(const Decomposition& decomposition, std::size_t slot);
 /// Velocity of a slot with the masses of the whole body.
 Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies, std::size_t slot);
 
+/// The same settings for `n` > 0 subdomains. Boxes per axis that make another number are left to be chosen.
+DecompositionSettings with_subdomains(DecompositionSettings settings, int n);
+
 /// One subdomain per rank unless the settings say more, laid on the ranks by settings.mapping.
 /// Throws std::invalid_argument when there are more ranks than subdomains.
 Decomposition make_decomposition(const DecompositionSettings& settings, const graph::Communicator& ranks);

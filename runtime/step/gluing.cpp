@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "kernels/fetch_lines.hpp"
 #include "runtime/step/detail/gluing_parts.hpp"
 
 namespace talus {
@@ -402,29 +403,16 @@ auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<cons
   return added;
 }
 
-std::uint64_t Gluing::touch(std::size_t e) const {
-  if (!needed_) return 0;
-  std::uint64_t sum = 0;
-  const auto read = [&sum](const auto& values) {
-    sum += detail::sum_of_lines(std::span(std::as_const(values)));
-  };
+void Gluing::fetch(std::size_t e) const {
+  if (!needed_) return;
+  const auto fetch = [](const auto&... lists) { (fetch_lines(std::span(std::as_const(lists))), ...); };
   const Subdomain& mine = subdomains_[e];
   for (const Side& side : mine.sides) {
-    read(side.slots);
-    read(side.pairs);
-    read(side.given);
-    read(side.taken);
-    read(side.link.out);
-    // As long as what goes there; of a neighbour on another rank it has come in.
-    read(std::span(side.source, side.source ? side.link.out.size() * sizeof(double) : 0));
+    fetch(side.slots, side.pairs, side.given, side.taken, side.link.out);
+    // As long as what goes there.
+    if (side.source) fetch_lines(std::span(side.source, side.link.out.size() * sizeof(double)));
   }
-  read(mine.shared);
-  read(mine.taken);
-  read(mine.corners);
-  read(mine.taken_corners);
-  read(mine.base);
-  read(mine.partial);
-  return sum;
+  fetch(mine.shared, mine.taken, mine.corners, mine.taken_corners, mine.base, mine.partial);
 }
 
 template <std::size_t Width, class Record>

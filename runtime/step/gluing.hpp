@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -84,6 +85,14 @@ class Gluing {
   std::span<const std::uint32_t> tellers() const { return tellers_; }
   /// Tasks between publish and glue: the centre, behind collect where there is one.
   std::size_t tasks_of_rank() const;
+  enum class Task : std::uint8_t { publish, collect, centre, glue, take, tell };
+  /// What the loop's node behind the chunks is, `number` from 0: publish of all subdomains here, the rank's
+  /// tasks, glue of all, take of the followers, tell of the tellers. Those of the rank have no subdomain.
+  struct Node {
+    Task task;
+    std::optional<std::size_t> subdomain;
+  };
+  Node node(std::size_t number) const;
 
   enum class Mode {
     fresh,     ///< velocities were made afresh from the impulses
@@ -106,9 +115,9 @@ class Gluing {
   void take(std::size_t e, bool single);
   void glue(std::size_t e, Mode mode, bool single = false);
 
-  /// Reads what publish, take and glue of e read, messages of its neighbours here included: into the cache of
-  /// the core that calls. Returns a sum over it, which means nothing.
-  std::uint64_t touch(std::size_t e) const;
+  /// Brings what publish, take and glue of e read, messages of its neighbours included, into the cache of the
+  /// core that calls.
+  void fetch(std::size_t e) const;
 
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
   void forget_jumps() { jumps_.assign(jumps_.size(), {}); }

@@ -129,6 +129,17 @@ std::size_t Gluing::tasks_of_rank() const {
   return centre_ && centre_->up && !centre_->links.empty() ? 2 : 1;
 }
 
+Gluing::Node Gluing::node(std::size_t number) const {
+  const std::size_t here = subdomains_.size(), of_rank = tasks_of_rank();
+  if (number < here) return {Task::publish, number};
+  if (number < here + of_rank - 1) return {Task::collect, std::nullopt};
+  if (number < here + of_rank) return {Task::centre, std::nullopt};
+  if (number < 2 * here + of_rank) return {Task::glue, number - here - of_rank};
+  const std::size_t rest = number - 2 * here - of_rank;
+  if (rest < followers_.size()) return {Task::take, followers_[rest]};
+  return {Task::tell, tellers_[rest - followers_.size()]};
+}
+
 /// The parts of this rank's subdomains, then the messages of its children as they came.
 void Gluing::send_up() {
   Link& link = *centre_->up;

@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "kernels/balance.hpp"
+#include "kernels/fetch_lines.hpp"
 #include "kernels/larger.hpp"
 #include "runtime/graph/clock.hpp"
-#include "runtime/step/detail/gluing_parts.hpp"
 #include "runtime/trace/recorder.hpp"
 
 namespace talus {
@@ -224,20 +224,21 @@ void Iteration::node(std::uint32_t node, int epoch) {
   }
   if (now == Work::measure) return;
   const Gluing::Mode mode = gluing_mode(epoch);
-  const std::size_t here = state_.decomposition.here.size(), of_rank = gluing_.tasks_of_rank(),
-                    task = node - chunks;
-  if (task < here)
-    gluing_.publish(task, mode, single(epoch));
-  else if (task < here + of_rank - 1)
-    gluing_.collect(mode);
-  else if (task < here + of_rank)
-    gluing_.centre(mode);
-  else if (task < 2 * here + of_rank)
-    gluing_.glue(task - here - of_rank, mode, single(epoch));
-  else if (const auto followers = gluing_.followers(); task < 2 * here + of_rank + followers.size())
-    take(followers[task - 2 * here - of_rank], epoch);
-  else
-    gluing_.tell(gluing_.tellers()[task - 2 * here - of_rank - followers.size()], mode);
+  const auto [task, subdomain] = gluing_.node(node - chunks);
+  switch (task) {
+    case Gluing::Task::publish:
+      return gluing_.publish(*subdomain, mode, single(epoch));
+    case Gluing::Task::collect:
+      return gluing_.collect(mode);
+    case Gluing::Task::centre:
+      return gluing_.centre(mode);
+    case Gluing::Task::glue:
+      return gluing_.glue(*subdomain, mode, single(epoch));
+    case Gluing::Task::take:
+      return take(*subdomain, epoch);
+    case Gluing::Task::tell:
+      return gluing_.tell(*subdomain, mode);
+  }
 }
 
 /// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
@@ -250,16 +251,13 @@ void Iteration::take(std::size_t e, int epoch) {
 
 std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const {
   const Work now = work(epoch);
-  const std::size_t chunks = state_.chunks.size(), here = state_.decomposition.here.size();
+  const std::size_t chunks = state_.chunks.size();
   if (node >= chunks) {
     if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
-    const std::size_t task = node - chunks;
-    const std::size_t of_rank = gluing_.tasks_of_rank();
-    return kind_of(task < here                                              ? TaskKind::publish
-                   : task < here + of_rank                                  ? TaskKind::centre
-                   : task < 2 * here + of_rank                              ? TaskKind::glue
-                   : task < 2 * here + of_rank + gluing_.followers().size() ? TaskKind::take
-                                                                            : TaskKind::tell);
+    // In the order of Gluing::Task.
+    constexpr TaskKind kinds[] = {TaskKind::publish, TaskKind::centre, TaskKind::centre,
+                                  TaskKind::glue,    TaskKind::take,   TaskKind::tell};
+    return kind_of(kinds[static_cast<std::size_t>(gluing_.node(node - chunks).task)]);
   }
   switch (now) {
     case Work::accumulate:
@@ -275,23 +273,16 @@ std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const 
 }
 
 std::optional<std::size_t> Iteration::subdomain_of(std::uint32_t node) const {
-  const std::size_t chunks = state_.chunks.size(), here = state_.decomposition.here.size();
+  const std::size_t chunks = state_.chunks.size();
   if (node < chunks) return static_cast<std::size_t>(state_.chunks.subdomain[node]);
-  const std::size_t task = node - chunks, of_rank = gluing_.tasks_of_rank();
-  if (task < here) return task;
-  if (task < here + of_rank) return std::nullopt;
-  if (task < 2 * here + of_rank) return task - here - of_rank;
-  const std::size_t rest = task - 2 * here - of_rank, followers = gluing_.followers().size();
-  return rest < followers ? gluing_.followers()[rest] : gluing_.tellers()[rest - followers];
+  return gluing_.node(node - chunks).subdomain;
 }
 
-std::uint64_t Iteration::touch(std::size_t subdomain) const {
-  std::uint64_t sum = 0;
-  const auto read = [&sum](std::size_t begin, std::size_t end, const auto&... columns) {
+void Iteration::fetch(std::size_t subdomain) const {
+  const auto fetch = [](std::size_t begin, std::size_t end, const auto&... columns) {
     // A column that this scene has not got is empty.
-    ((sum += columns.size() < end
-                 ? 0
-                 : detail::sum_of_lines(std::span(std::as_const(columns)).subspan(begin, end - begin))),
+    (fetch_lines(std::span(std::as_const(columns))
+                     .subspan(std::min(begin, columns.size()), columns.size() < end ? 0 : end - begin)),
      ...);
   };
   const Contacts& contacts = state_.contacts;
@@ -300,22 +291,23 @@ std::uint64_t Iteration::touch(std::size_t subdomain) const {
   const std::size_t first = all.several() ? all.slot_begin[subdomain] : 0,
                     last = all.several() ? all.slot_begin[subdomain + 1] : state_.bodies.size();
   // What single sweeps want comes last, and is nearest then.
-  read(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, trail_.last_v, trail_.step_v);
+  fetch(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, trail_.last_v, trail_.step_v);
   for (const bool in_single : {false, true})
     for (std::size_t c = 0; c < state_.chunks.size(); ++c) {
       if (static_cast<std::size_t>(state_.chunks.subdomain[c]) != subdomain) continue;
       const auto begin = static_cast<std::size_t>(state_.chunks.begin[c]);
       const std::size_t end = begin + static_cast<std::size_t>(contacts.count[c]);
       if (in_single)
-        read(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
-             single.rn, trail_.steps.x, trail_.steps.y, trail_.steps.z, trail_.steps.n, contacts.first_record,
-             contacts.second_record, contacts.group);
+        fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
+              single.rn, trail_.steps.x, trail_.steps.y, trail_.steps.z, trail_.steps.n,
+              contacts.first_record, contacts.second_record, contacts.group);
       else
-        read(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
-             contacts.rz, contacts.rn);
+        fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
+              contacts.rz, contacts.rn);
     }
-  read(first, last, state_.single.velocity, state_.single.last_v);
-  return sum + kernels_.touch_code() + gluing_.touch(subdomain);
+  fetch(first, last, state_.single.velocity, state_.single.last_v);
+  kernels_.fetch_code(parameters_.friction);
+  gluing_.fetch(subdomain);
 }
 
 double Iteration::impulse_scale() const {
@@ -344,7 +336,7 @@ double Iteration::drift() const {
     return largest / scale;
   };
   // At the first check nothing tells how the change goes on. Where a few sweeps follow warm impulses in a
-  // pile, up to five times as much is still to come (`talus study stability`, time-step-pile).
+  // pile, up to six times as much is still to come (`talus study stability`, time-step-pile).
   constexpr double first_look = 4;
   const std::size_t last = history_.size() - 1;
   // Since ADMM: all that sweeps changed of what it had settled.
@@ -534,7 +526,7 @@ bool Iteration::judge() {
     // Momentum can go in circles about what plain sweeps reach.
     result_.stagnated = false;
     patience_from_ = history_.size() - 1;
-    begin_course(SolverMethod::nlgs, 0);
+    give_way();
   }
   if (result_.converged || std::isnan(result_.error_rms) || last || result_.stagnated) return false;
   choose_course();

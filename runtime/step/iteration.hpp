@@ -78,9 +78,8 @@ class Iteration {
 
   /// Subdomain here that the node works on; none: the centre.
   std::optional<std::size_t> subdomain_of(std::uint32_t node) const;
-  /// Reads all that the loop reads and writes of a subdomain here, so that it is in the cache of the core
-  /// that calls. Returns a sum over it, which means nothing.
-  std::uint64_t touch(std::size_t subdomain) const;
+  /// Brings all that the loop reads and writes of a subdomain here into the cache of the core that calls.
+  void fetch(std::size_t subdomain) const;
 
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();
@@ -144,6 +143,7 @@ class Iteration {
   bool stagnant() const;
   void first_course();
   void begin_course(SolverMethod method, double most);
+  void give_way();
   bool single_will_do(SolverMethod method) const;
   void go_on_in_double();
   bool measured(int epoch);

@@ -18,7 +18,7 @@ void validate_load(const std::string& where, const WallLoad& load) {
   require(std::isfinite(load.pressure),
           fmt::format("{}: pressure must be finite [Pa], got {}", where, load.pressure));
   require(std::isfinite(load.force), fmt::format("{}: force must be finite [N], got {}", where, load.force));
-  if (load.drive != WallDrive::pressure && load.drive != WallDrive::force) return;
+  if (!load.pushed()) return;
   require(load.mass > 0 && std::isfinite(load.mass),
           fmt::format("{}: a pushed wall needs a finite mass > 0 [kg], got {}", where, load.mass));
 }
@@ -58,9 +58,11 @@ void validate(const Setup& setup) {
         fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, stage.law.restitution));
     require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
-    require(!stage.end.time || *stage.end.time >= 0.5 * stage.time_step,
-            fmt::format("stage '{}': end.time = {} s is not half a time step of {} s: no step would be made",
-                        stage.name, stage.end.time.value_or(0), stage.time_step));
+    require(
+        !stage.end.time || steps_in(*stage.end.time, stage.time_step) >= 1,
+        fmt::format(
+            "stage '{}': end.time = {} s is not more than half a time step of {} s: no step would be made",
+            stage.name, stage.end.time.value_or(0), stage.time_step));
     for (const auto& [name, load] : stage.loads) {
       const bool known =
           std::any_of(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
@@ -76,7 +78,7 @@ void validate(const Setup& setup) {
       setup.solver.method != SolverMethod::momentum || setup.decomposition.coupling != Coupling::schwarz,
       "solver.method = \"nlgs+momentum\": Schwarz adds up what all copies of a body carry on, and diverges. "
       "Take \"auto\", or another decomposition.coupling");
-  require(setup.solver.check_every >= 1, "solver.check_every must be >= 1");
+  require(setup.solver.check_every >= 2, "solver.check_every must be >= 2");
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,
       fmt::format("solver.overlap_correction must lie in [0, 1], got {}", setup.solver.overlap_correction));

@@ -3,6 +3,7 @@
 /// What a simulation is made of, once files have been read: no paths, no formats, SI units.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -22,6 +23,12 @@ struct ContactLaw {
   double mu_walls = 0;     ///< Coulomb friction between grains and walls, >= 0
   double restitution = 0;  ///< Newton restitution in [0, 1]
 };
+
+/// Steps of `time_step` in a time, both in s: the nearest number of them, and of half a step none. The sum of
+/// many steps is not their product.
+inline double steps_in(double time, double time_step) {
+  return std::ceil(time / time_step - 0.5);
+}
 
 /// When a stage ends: at the first of the conditions given. At least one is given.
 struct StageEnd {

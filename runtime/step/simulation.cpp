@@ -7,6 +7,7 @@
 #include <limits>
 #include <unordered_map>
 
+#include "kernels/larger.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 
@@ -224,7 +225,7 @@ struct Simulation::Implementation {
     report.iterations = result.iterations;
     report.error_rms = result.error_rms;
     report.error_max = result.error_max;
-    report.balance = std::max(result.unbalance, defect);
+    report.balance = larger(result.unbalance, defect);
     report.jump = result.jump;
     report.migrants = sums.migrants;
     report.imbalance = 1 + state.decomposition.imbalance;
@@ -267,25 +268,25 @@ struct Simulation::Implementation {
                                                            : 0;
   }
 
-  /// Part of the stage done by its nearest end condition; >= 1 when it has ended.
-  double done() const {
+  struct Done {
+    double fraction = 0;  ///< part of the stage done by its nearest end condition; >= 1 when it has ended
+    const char* by = "";  ///< that condition
+  };
+  Done done() const {
     const StageEnd& end = setup.stages[stage_index].end;
-    double fraction = 0;
+    Done nearest;
+    const auto consider = [&](const char* by, double fraction) {
+      if (fraction > nearest.fraction) nearest = {fraction, by};
+    };
     if (end.steps)
-      fraction =
-          std::max(fraction,
-                   *end.steps > 0 ? static_cast<double>(stage_steps) / static_cast<double>(*end.steps) : 1.0);
-    if (end.time) {
-      // Half a step of slack: the sum of many steps is not the product.
-      const double steps = *end.time / parameters.time_step;
-      fraction = std::max(fraction, static_cast<double>(stage_steps) >= steps - 0.5
-                                        ? 1.0
-                                        : static_cast<double>(stage_steps) / steps);
-    }
-    if (stage_steps == 0) return fraction;
-    if (end.strain) fraction = std::max(fraction, std::abs(strain(end.strain_axis)) / *end.strain);
-    if (end.equilibrium && unrest() <= *end.equilibrium) fraction = 1;
-    return fraction;
+      consider("steps",
+               *end.steps > 0 ? static_cast<double>(stage_steps) / static_cast<double>(*end.steps) : 1.0);
+    if (end.time)
+      consider("time", static_cast<double>(stage_steps) / steps_in(*end.time, parameters.time_step));
+    if (stage_steps == 0) return nearest;
+    if (end.strain) consider("strain", std::abs(strain(end.strain_axis)) / *end.strain);
+    if (end.equilibrium && unrest() <= *end.equilibrium) consider("equilibrium", 1);
+    return nearest;
   }
 
   /// Mean number of active contacts of the grains that are no rattlers: those with fewer than 4 without
@@ -319,7 +320,7 @@ struct Simulation::Implementation {
   }
 
   void pass_ended_stages() {
-    while (!over && done() >= 1) {
+    while (!over && done().fraction >= 1) {
       if (stage_index + 1 == setup.stages.size())
         over = true;
       else {
@@ -392,7 +393,10 @@ bool Simulation::finished() const {
   return impl_->over;
 }
 double Simulation::stage_fraction() const {
-  return std::min(1.0, impl_->done());
+  return std::min(1.0, impl_->done().fraction);
+}
+const char* Simulation::end_reached() const {
+  return impl_->done().by;
 }
 const Stage& Simulation::stage() const {
   return impl_->setup.stages[impl_->stage_index];

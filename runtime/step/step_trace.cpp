@@ -68,26 +68,13 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
           static_cast<std::uint32_t>(chunks.bodies[static_cast<std::size_t>(chunks.body_begin[node])]));
       continue;
     }
-    const std::size_t task = node - count;
-    const std::size_t of_rank = iteration_.gluing().tasks_of_rank();
-    const std::size_t glues = here.size() + of_rank, takes = glues + here.size();
-    const auto name = [&](trace::Role role, std::size_t e) {
-      plan.role.push_back(static_cast<std::uint8_t>(role));
-      plan.group.push_back(role == trace::Role::centre ? trace::centre_group
-                                                       : static_cast<std::uint32_t>(here[e]));
-      plan.place.push_back(
-          role == trace::Role::centre ? 0 : static_cast<std::uint32_t>(iteration_.gluing().turn(e)));
-    };
-    if (task < here.size())
-      name(trace::Role::publish, task);
-    else if (task < glues)
-      name(trace::Role::centre, 0);
-    else if (task < takes)
-      name(trace::Role::glue, task - glues);
-    else if (const auto followers = iteration_.gluing().followers(); task < takes + followers.size())
-      name(trace::Role::take, followers[task - takes]);
-    else
-      name(trace::Role::tell, iteration_.gluing().tellers()[task - takes - followers.size()]);
+    using enum trace::Role;
+    // In the order of Gluing::Task.
+    constexpr trace::Role roles[] = {publish, centre, centre, glue, take, tell};
+    const auto [task, e] = iteration_.gluing().node(node - count);
+    plan.role.push_back(static_cast<std::uint8_t>(roles[static_cast<std::size_t>(task)]));
+    plan.group.push_back(e ? static_cast<std::uint32_t>(here[*e]) : trace::centre_group);
+    plan.place.push_back(e ? static_cast<std::uint32_t>(iteration_.gluing().turn(*e)) : 0);
     plan.weight.push_back(0);
   }
   plan.messages = iteration_.gluing().message_plan();

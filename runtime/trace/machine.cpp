@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/trace/layout.hpp"
+#include "runtime/trace/timeline.hpp"
 
 namespace talus::trace {
 namespace {
@@ -29,39 +30,17 @@ void demand_not_negative(double value, const char* name) {
 /// Median time from the start of a message to its arrival, of those that somebody was waiting for: only then
 /// is the arrival seen at once. 0 without any. [ns]
 double median_delay(const Trace& trace) {
-  struct Sent {
-    std::uint64_t step_epoch;
-    std::uint32_t name;
-    double at;
-    bool operator<(const Sent& other) const {
-      return step_epoch != other.step_epoch ? step_epoch < other.step_epoch : name < other.name;
-    }
-  };
-  const auto sent_of = [](const Record& record, double at) {
-    return Sent{std::uint64_t{record.step()} << 32 | static_cast<std::uint32_t>(record.epoch), record.node,
-                at};
-  };
-  std::vector<Sent> sends;
-  for (const Lane& lane : trace.lanes)
-    for (const Record& record : lane.records)
-      if (record.kind() == kind_send) sends.push_back(sent_of(record, record.end()));
-  std::sort(sends.begin(), sends.end());
   std::vector<double> delays;
-  for (const Lane& lane : trace.lanes)
-    for (const Record& record : lane.records) {
-      if (record.kind() != kind_receive) continue;
-      const Sent wanted = sent_of(record, 0);
-      const auto sent = std::lower_bound(sends.begin(), sends.end(), wanted);
-      if (sent == sends.end() || wanted < *sent || sent->at < static_cast<double>(record.begin)) continue;
-      delays.push_back(std::max(0.0, record.end() - sent->at));
-    }
+  for (const auto& [wait, send] : sends_of(trace))
+    if (send->end() >= static_cast<double>(wait->begin))
+      delays.push_back(std::max(0.0, wait->end() - send->end()));
   if (delays.empty()) return 0;
   const auto middle = delays.begin() + static_cast<std::ptrdiff_t>(delays.size() / 2);
   std::nth_element(delays.begin(), middle, delays.end());
   return *middle;
 }
 
-/// Cyclic where the first plans say so and block would not; the program knows no other.
+/// Cyclic where all plans say so and block would not; the program knows no other.
 RankMap recorded_map(const Trace& trace) {
   const std::vector<std::uint32_t> groups = groups_of(trace);
   Machine machine;
@@ -148,10 +127,6 @@ Machine recorded_machine(const Trace& trace) {
   if (const double delay = median_delay(trace); delay > 0) machine.node_latency = 1e-9 * delay;
   machine.map = recorded_map(trace);
   return machine;
-}
-
-bool was_recorded_on(const Trace& trace, const Machine& machine) {
-  return !trace.predicted && machine == recorded_machine(trace);
 }
 
 }  // namespace talus::trace

@@ -72,11 +72,8 @@ void validate(const Machine& machine, const Trace& trace);
 
 /// The machine that a trace was recorded on, its ranks on one node; the latency is the median of the messages
 /// that were waited for, the map that of the recorded ranks. Of a prediction the machine that it was made
-/// for, with what the trace keeps of it. Cost: a search per message.
+/// for, as far as its times do not tell and the next replay needs it: ranks, threads, map, ranks_per_node,
+/// node_latency. Cost: that of sends_of().
 Machine recorded_machine(const Trace& trace);
-
-/// False when a replay on `machine` is a prediction: on another machine than the recorded one, or of what was
-/// predicted itself.
-bool was_recorded_on(const Trace& trace, const Machine& machine);
 
 }  // namespace talus::trace

@@ -55,7 +55,12 @@ class Player {
     out_.trace.ranks = machine.ranks;
     out_.trace.threads = machine.threads;
     out_.trace.predicted = true;
-    out_.trace.machine = machine;
+    Machine& kept = out_.trace.machine.emplace();
+    kept.ranks = machine.ranks;
+    kept.threads = machine.threads;
+    kept.map = machine.map;
+    kept.ranks_per_node = machine.ranks_per_node;
+    kept.node_latency = machine.node_latency;
     out_.trace.kinds = trace_.kinds;
     if (!keep) return;
     for (std::int32_t r = 0; r < machine.ranks; ++r)
@@ -240,64 +245,60 @@ class Player {
       if (rank.epochs != recorded.epochs)
         throw TraceError(fmt::format("step {} has {} epochs on one rank and {} on another", index.step,
                                      recorded.epochs, rank.epochs));
-    const bool late = machine_.ranks > 1 && trace_.ranks == 1 && machine_.late_check;
-    std::vector<SimEpoch> epochs;
-    bool read_next = false;
-    // What follows from the sums of recorded epoch e is done where they are read.
-    const auto read_here = [&](std::size_t e, SimEpoch& epoch) {
-      epoch.gate = epoch.reads = true;
-      do_together(index, e, epoch);
+    const bool alone = machine_.ranks == 1, late = !alone && trace_.ranks == 1 && machine_.late_check;
+    // What called all ranks within is no check of convergence: sums that the next sweep needs.
+    const auto reads_later = [&](std::size_t e) {
+      return late && recorded.check[e].exists() && recorded.settled[e] == 0 && recorded.awaited[e] == 0;
     };
-    bool unread = false;  // posted, not read: of a recording of several ranks
+    std::vector<SimEpoch> epochs;
+    std::size_t exchanged = 0, rounds = 0, unread = 0;
+    const auto add = [&](SimEpoch& epoch, bool posts, bool waits, bool reads) {
+      epoch.posts = posts;
+      epoch.round = rounds;
+      epoch.awaits.clear();
+      if (waits) epoch.awaits.push_back(rounds);
+      if (reads) epoch.awaits.push_back(unread);
+      if (posts && !waits) unread = rounds;
+      rounds += posts ? 1 : 0;
+      epoch.exchanges_before = exchanged;
+      exchanged += epoch.exchange ? 1 : 0;
+      epochs.push_back(std::move(epoch));
+    };
+    bool read_next = false, is_unread = false;  // sums that were posted: as played, as recorded by several
     for (std::size_t e = 0; e < recorded.epochs; ++e) {
       SimEpoch epoch;
       epoch.source = e;
       epoch.gate = recorded.check[e].exists();
       epoch.settles = recorded.settled[e] != 0;
-      // What called all ranks within is no check of convergence: sums that the next sweep needs.
-      const bool later = late && epoch.gate && !epoch.settles && recorded.awaited[e] == 0;
+      const auto awaited = static_cast<std::size_t>(recorded.awaited[e]);
+      if (alone) epoch.calls = awaited;
       do_alone(index, e, epoch);
-      if (!later) do_together(index, e, epoch);
+      if (!reads_later(e)) do_together(index, e, epoch);
       epoch.exchange = exchanges(index, e);
-      if (machine_.ranks > 1 && epoch.gate) {
-        if (trace_.ranks > 1) {
-          // What was posted before is one call; whatever else was awaited the epoch had posted itself.
-          epoch.reads = unread && recorded.awaited[e] > 0;
-          epoch.waits = recorded.awaited[e] > (unread ? 1 : 0);
-          // A gate that waits for nobody posts what the next one that does reads.
-          const bool sets_out = !unread && recorded.awaited[e] == 0 && next_reads(recorded, e);
-          epoch.posts = epoch.waits || sets_out;
-          unread = sets_out;
-        } else {
-          epoch.posts = true;
-          epoch.waits = !later;
-        }
+      bool posts = !alone && epoch.gate, waits = posts && !reads_later(e), reads = read_next;
+      if (posts && trace_.ranks > 1) {
+        // What was posted before is one call; whatever else was awaited the epoch had posted itself.
+        reads = is_unread && awaited > 0;
+        waits = awaited > (is_unread ? 1 : 0);
+        // A gate that waits for nobody posts what the next one that does reads.
+        const bool sets_out = !is_unread && awaited == 0 && next_reads(recorded, e);
+        posts = waits || sets_out;
+        is_unread = sets_out;
       }
-      if (read_next) read_here(e - 1, epoch);
-      read_next = later;
-      epochs.push_back(epoch);
+      // What follows from the sums of a recorded epoch is done where they are read.
+      if (read_next) do_together(index, e - 1, epoch);
+      epoch.gate = epoch.gate || read_next;
+      read_next = reads_later(e);
+      add(epoch, posts, waits, reads);
     }
     if (read_next) {
-      const std::size_t last = epochs.size() - 1;
-      SimEpoch sweep = epochs[last >= 2 ? last - 2 : 0], undo = epochs[last >= 1 ? last - 1 : 0];
-      undo.waits = false;
-      for (SimEpoch* added : {&sweep, &undo}) {
-        added->posts = added->waits;
-        added->reads = false;
-        added->gate = true;
-      }
-      read_here(last, sweep);
-      epochs.push_back(sweep);
-      epochs.push_back(undo);
-    }
-    std::size_t exchanged = 0, posted = 0, unread_round = 0;
-    for (SimEpoch& epoch : epochs) {
-      epoch.exchanges_before = exchanged;
-      epoch.round = posted;
-      epoch.late_round = unread_round;
-      exchanged += epoch.exchange ? 1 : 0;
-      if (epoch.posts && !epoch.waits) unread_round = posted;
-      posted += epoch.posts ? 1 : 0;
+      const std::size_t last = epochs.size() - 1, like = last >= 2 ? last - 2 : 0;
+      SimEpoch sweep = epochs[like], undo = epochs[last >= 1 ? last - 1 : 0];
+      const bool waits = recorded.check[like].exists() && !reads_later(like);
+      sweep.gate = undo.gate = true;
+      do_together(index, last, sweep);
+      add(sweep, waits, waits, true);
+      add(undo, false, false, false);
     }
     return epochs;
   }

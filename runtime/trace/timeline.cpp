@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <queue>
+#include <ranges>
+#include <tuple>
 
 namespace talus::trace {
 namespace {
@@ -58,6 +61,33 @@ std::vector<std::uint32_t> steps_of(const Trace& trace) {
   std::sort(steps.begin(), steps.end());
   steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
   return steps;
+}
+
+std::unordered_map<const Record*, const Record*> sends_of(const Trace& trace) {
+  const auto name = [](const Record* record) {
+    return std::tuple(record->step(), record->epoch, record->node);
+  };
+  const auto in_time = [&](const Record* record) {
+    const bool waits = record->kind() == kind_receive;
+    return std::tuple(name(record), waits ? record->end() : static_cast<double>(record->begin), waits);
+  };
+  std::vector<const Record*> messages;
+  for (const Lane& lane : trace.lanes)
+    for (const Record& record : lane.records)
+      if (record.kind() == kind_send || record.kind() == kind_receive) messages.push_back(&record);
+  std::ranges::sort(messages, {}, in_time);
+  std::unordered_map<const Record*, const Record*> sends;
+  std::queue<const Record*> waits;
+  for (const Record* const record : std::views::reverse(messages)) {
+    if (!waits.empty() && name(waits.front()) != name(record)) waits = {};
+    if (record->kind() == kind_receive) {
+      waits.push(record);
+    } else if (!waits.empty()) {
+      sends[waits.front()] = record;
+      waits.pop();
+    }
+  }
+  return sends;
 }
 
 Timeline::Timeline(const Trace& trace) : trace_(trace), self_(self_times(trace)), steps_(steps_of(trace)) {

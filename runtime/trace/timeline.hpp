@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "runtime/trace/trace.hpp"
@@ -17,6 +18,12 @@ std::vector<std::vector<float>> self_times(const Trace& trace);
 
 /// Steps that hold tasks, ascending.
 std::vector<std::uint32_t> steps_of(const Trace& trace);
+
+/// From the record of a wait for a message to that of its send. Where a name is sent more than once in an
+/// epoch the last wait has the last send before its end, the wait before that one of the sends before, and so
+/// on: messages of a name come in their order, and not all are waited for. Waits without a send are left
+/// out. Cost: a sort of all messages.
+std::unordered_map<const Record*, const Record*> sends_of(const Trace& trace);
 
 /// Where a record stands: trace.lanes[lane].records[record].
 struct Place {

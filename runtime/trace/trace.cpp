@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace talus::trace {
 namespace {
 
 constexpr std::size_t role_count = static_cast<std::size_t>(Role::tell) + 1;
+constexpr std::uint32_t most_turn = std::numeric_limits<signed char>::max();  // graph::loop_colours has chars
 
 [[noreturn]] void refuse(const std::string& reason) {
   throw TraceError("the trace makes no sense: " + reason);
@@ -36,7 +38,7 @@ void check(const Plan& plan, int ranks) {
     const Role role = static_cast<Role>(plan.role[node]);
     if (role == Role::compute || role == Role::centre) continue;
     ++count[plan.group[node]][plan.role[node]];
-    if (plan.place[node] >= most_turns)
+    if (plan.place[node] > most_turn)
       refuse(fmt::format("{}: subdomain {} has turn {}", where, plan.group[node], plan.place[node]));
   }
   for (const auto& [group, of] : count) {

@@ -102,9 +102,6 @@ enum class Role : std::uint8_t {
   tell,  ///< its group's part for the centre leaves, which without one its publish sends
 };
 
-/// Of subdomains whose borders are swept one after the other (talus::choose_turns).
-inline constexpr std::uint32_t most_turns = 4;
-
 /// Names the centre as the end of a message.
 inline constexpr std::uint16_t centre_group = 0xffffU;
 
@@ -173,7 +170,7 @@ struct Lane {
 struct Trace {
   int ranks = 1, threads = 1;
   bool predicted = false;          ///< by replay; else recorded
-  std::optional<Machine> machine;  ///< that a prediction was made for
+  std::optional<Machine> machine;  ///< that a prediction was made for: recorded_machine()
   std::vector<KindInfo> kinds;
   std::vector<std::vector<Task>> tasks;  ///< per rank
   std::vector<Plan> plans;               ///< of every rank, ascending steps within a rank

@@ -33,6 +33,14 @@ class View {
     return false;
   }
   std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
+  /// Nothing: a node of no subdomain, or a program that knows of none.
+  std::optional<std::size_t> subdomain_of(std::uint32_t node) const {
+    if constexpr (requires { program_.subdomain_of(node); }) return program_.subdomain_of(node);
+    return std::nullopt;
+  }
+  void fetch(std::size_t subdomain) {
+    if constexpr (requires { program_.fetch(subdomain); }) program_.fetch(subdomain);
+  }
 
  protected:
   Program& program_;
@@ -75,13 +83,11 @@ class Traced : public View<Program> {
 
  private:
   void bring_in(std::uint32_t node) {
-    if constexpr (requires { program_.subdomain_of(node); }) {
-      const auto subdomain = program_.subdomain_of(node);
-      if (!subdomain || subdomain == at_hand_) return;
-      at_hand_ = subdomain;
-      program_.touch(*subdomain);
-      last_end_ = -1;
-    }
+    const std::optional<std::size_t> subdomain = this->subdomain_of(node);
+    if (!subdomain || subdomain == at_hand_) return;
+    at_hand_ = subdomain;
+    this->fetch(*subdomain);
+    last_end_ = -1;
   }
 
   using View<Program>::program_;

@@ -97,6 +97,26 @@ TEST_F(SimulatedRanks, ShareNodesAsTheReplayDoes) {
   EXPECT_EQ(digest_of("r4"), digest_of("one"));
 }
 
+// Those that wait for rank 0's files must have simulated time pass, or would wait for ever.
+TEST_F(SimulatedRanks, EndARunaway) {
+  const std::string three = machine(3);
+  write(at("scene.toml"), R"(
+time_step = 1e-6
+[material]
+density = 2600
+[sample]
+kind = "bodies"
+file = "grains.csv"
+[[stage]]
+end = { steps = 30 }
+[solver]
+overlap_correction = 1
+)");
+  write(at("grains.csv"), "id,x,y,z,radius\n0,0,0,1,0.01\n7,0.01,0,1,0.01\n");
+  EXPECT_NE(simulate(3, three, "burst"), 0) << file(".", "burst.txt");
+  EXPECT_EQ(summary(at("burst")).at("status"), "failed") << file(".", "burst.txt");
+}
+
 TEST_F(SimulatedRanks, RefuseAMachineThatSimGridHasNot) {
   for (const char* option : {"--noise 0.1", "--threads 2", "--contacts-scale 2"}) {
     const Outcome refused =

@@ -306,6 +306,17 @@ TEST(VelocityError, IsNoneWhereOnlyRoundingIsLeft) {
   }
 }
 
+/// Nothing moves, but an overlap asks to be opened.
+TEST(VelocityError, IsNoneOnlyWhereNothingIsAskedFor) {
+  BodyProblem pair = column_problem(2, 0.35);
+  pair.contacts.erase(pair.contacts.begin());
+  pair.impulse.resize(1);
+  for (BodyUnknown& body : pair.bodies) body.free.u = Vec3::Zero();
+  EXPECT_EQ(velocity_error(pair, 1e-3).relative, 0);
+  pair.contacts[0].offset = Vec3(0, 0, -1e-3);
+  EXPECT_GT(velocity_error(pair, 1e-3).relative, 1);
+}
+
 TEST(VelocityError, ScalesWithTheUnits) {
   const Units units{.mass = 1e6, .length = 1e-6, .time = 1e3};
   BodyProblem plain = column_problem(30, 0.35), scaled = column_problem(30, 0.35, 1, units);

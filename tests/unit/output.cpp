@@ -23,17 +23,22 @@ void touch(const fs::path& path) {
   std::ofstream(path) << "mine";
 }
 
+/// For a run that ends at once.
+void prepare(const std::filesystem::path& directory, bool force) {
+  const DirectoryLock lock = prepare_output_directory(directory, force);
+}
+
 TEST(OutputDirectory, IsCreatedWithItsParents) {
   const ScratchDirectory scratch;
-  prepare_output_directory(scratch / "a/b", false);
+  prepare(scratch / "a/b", false);
   EXPECT_TRUE(fs::is_directory(scratch / "a/b"));
-  prepare_output_directory(scratch / "a/b", false);  // empty: nothing to lose
+  prepare(scratch / "a/b", false);  // empty: nothing to lose
 }
 
 TEST(OutputDirectory, ThatHoldsAnythingIsRefusedAndLeftAlone) {
   const ScratchDirectory scratch;
   touch(scratch / "steps.csv");
-  const std::string message = message_of<FileError>([&] { prepare_output_directory(scratch.path(), false); });
+  const std::string message = message_of<FileError>([&] { prepare(scratch.path(), false); });
   EXPECT_NE(message.find(scratch.path().string()), std::string::npos) << message;
   EXPECT_NE(message.find("--force"), std::string::npos) << message;
   EXPECT_EQ(content_of(scratch / "steps.csv"), "mine");
@@ -58,7 +63,7 @@ TEST(OutputDirectory, ForceRemovesOurFilesAndNeverTheUsers) {
   fs::create_directories(scratch / "walls.csv");  // a directory of that name is not ours
   touch(scratch / "elsewhere");
   fs::create_symlink(scratch / "elsewhere", scratch / "triaxial.csv");
-  prepare_output_directory(scratch.path(), true);
+  prepare(scratch.path(), true);
   for (const auto& name : ours) EXPECT_FALSE(fs::exists(scratch / name)) << name;
   for (const auto& name : users) EXPECT_TRUE(fs::exists(scratch / name)) << name;
   EXPECT_TRUE(fs::is_directory(scratch / "walls.csv"));
@@ -70,7 +75,7 @@ TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
   touch(elsewhere / "grains_000000.vtp");
   touch(scratch / "steps.csv");
   fs::create_directory_symlink(elsewhere.path(), scratch / "fields");
-  prepare_output_directory(scratch.path(), true);
+  prepare(scratch.path(), true);
   EXPECT_FALSE(fs::exists(scratch / "steps.csv"));
   EXPECT_TRUE(fs::is_symlink(scratch / "fields"));
   EXPECT_EQ(content_of(elsewhere / "grains_000000.vtp"), "mine");
@@ -82,13 +87,12 @@ TEST(OutputDirectory, IsRefusedAsLongAsAnotherRunWritesThere) {
     const DirectoryLock lock = prepare_output_directory(scratch / "run", false);
     touch(scratch / "run/steps.csv");
     for (const bool force : {false, true}) {
-      const std::string message =
-          message_of<FileError>([&] { prepare_output_directory(scratch / "run", force); });
+      const std::string message = message_of<FileError>([&] { prepare(scratch / "run", force); });
       EXPECT_NE(message.find("another run is writing there"), std::string::npos) << message;
     }
     EXPECT_EQ(content_of(scratch / "run/steps.csv"), "mine");
   }
-  EXPECT_NO_THROW(prepare_output_directory(scratch / "run", true));
+  EXPECT_NO_THROW(prepare(scratch / "run", true));
   EXPECT_TRUE(fs::is_empty(scratch / "run")) << "the lock leaves nothing behind";
 }
 
@@ -133,8 +137,7 @@ TEST(OutputDirectory, ThatCannotBeMadeIsNamed) {
   const ScratchDirectory scratch;
   touch(scratch / "file");
   for (const char* name : {"file", "file/below"}) {
-    const std::string message =
-        message_of<FileError>([&] { prepare_output_directory(scratch / name, true); });
+    const std::string message = message_of<FileError>([&] { prepare(scratch / name, true); });
     EXPECT_NE(message.find((scratch / "file").string()), std::string::npos) << message;
   }
   EXPECT_EQ(content_of(scratch / "file"), "mine");
@@ -149,7 +152,8 @@ TEST(OutputDirectory, EveryFileOfARecorderIsKnownToForce) {
   std::size_t files = 0;
   for (const auto& entry : fs::recursive_directory_iterator(scratch.path())) {
     if (entry.is_directory()) continue;
-    EXPECT_TRUE(is_output_name(entry.path().lexically_relative(scratch.path()))) << entry.path();
+    EXPECT_TRUE(is_output_name(entry.path().lexically_relative(scratch.path()).generic_string()))
+        << entry.path();
     ++files;
   }
   EXPECT_EQ(files, 12u);

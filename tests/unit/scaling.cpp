@@ -2,19 +2,21 @@
 
 #include <gtest/gtest.h>
 
-#include <signal.h>
-
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 #include "apps/child_process.hpp"
 #include "apps/scaling_runs.hpp"
 #include "apps/scaling_table.hpp"
 #include "io/error.hpp"
+#include "runtime/step/decomposition.hpp"
 #include "tests/unit/output_helpers.hpp"
 
 namespace talus {
 namespace {
+
+namespace fs = std::filesystem;
 
 ScalingRow row(ScalingKind kind, int ranks, double seconds, double iterations, std::size_t grains = 1000) {
   ScalingRow out;
@@ -89,6 +91,15 @@ TEST(Scaling, PredictionsAreNeverHeldAgainstMeasurements) {
   EXPECT_EQ(bound_of(rows[1]), "");
 }
 
+TEST(Scaling, BoxesStayWithTheirNumberOfSubdomainsOnly) {
+  const DecompositionSettings cut{.partitioner = PartitionKind::boxes, .subdomains = 6, .boxes = {1, 2, 3}};
+  EXPECT_EQ(with_subdomains(cut, 6).boxes, cut.boxes);
+  const DecompositionSettings other = with_subdomains(cut, 4);
+  EXPECT_EQ(other.subdomains, 4);
+  EXPECT_EQ(other.boxes, DecompositionSettings().boxes);
+  EXPECT_EQ(other.partitioner, PartitionKind::boxes);
+}
+
 TEST(Scaling, RanksAndThreadsShareTheCoresEvenly) {
   EXPECT_EQ(rank_counts(1), (std::vector<int>{1}));
   EXPECT_EQ(rank_counts(12), (std::vector<int>{1, 2, 3, 4, 6, 12}));
@@ -128,15 +139,14 @@ TEST(ChildProcess, TellsHowItEndedAndWhatItSaid) {
 TEST(ChildProcess, StopsWithThisProcess) {
   const test::ScratchDirectory folder;
   const auto log = folder.path() / "log";
-  EXPECT_THROW(
-      run_child({"sh", "-c", "echo $$ > " + (folder / "pid").string() + "; kill -TERM $PPID; exec sleep 100"},
-                log),
-      std::runtime_error);
-  pid_t child = 0;
-  std::ifstream(folder / "pid") >> child;
-  ASSERT_GT(child, 0);
-  EXPECT_NE(::kill(child, 0), 0) << "it still runs";
-  EXPECT_EQ(run_child({"true"}, log), 0) << "the signal was of the one before";
+  for (const std::string signal : {"TERM", "INT"}) {
+    const fs::path told = folder / signal;
+    const std::string child = "sleep 100 & trap 'kill $!; echo told > " + told.string() + "; exit' " +
+                              signal + "; kill -" + signal + " $PPID; wait";
+    EXPECT_THROW(run_child({"sh", "-c", child}, log), std::runtime_error) << signal;
+    EXPECT_TRUE(fs::exists(told)) << signal << " was not passed on";
+    EXPECT_EQ(run_child({"true"}, log), 0) << "the signal was of the one before";
+  }
 }
 
 TEST(ChildProcess, LinesForAShellSurviveIt) {

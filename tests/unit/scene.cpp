@@ -307,6 +307,10 @@ TEST(Overrides, NameAStageWithoutANameAsTheRunDoes) {
   EXPECT_EQ(scene.setup.stages[0].law.mu_grains, 0);
   EXPECT_NE(std::string(error_of(text, {"stage.shear.friction=1"}).what()).find("0 'stage-1', 1 'stage-2'"),
             std::string::npos);
+  const std::string wall = replaced(scene_with(), "name = \"z+\"", "side = \"z+\"");
+  EXPECT_NE(std::string(error_of(wall, {"wall.stage-1.pressure=1"}).what()).find("no element 'stage-1'"),
+            std::string::npos)
+      << "walls have no such names";
 }
 
 TEST(Decomposition, OfBoxesAloneHasThemAllAndNothingElse) {

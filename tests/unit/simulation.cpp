@@ -426,6 +426,39 @@ TEST(Runaway, IsNotWhatOverlapsOfRoundingSizePartWith) {
   EXPECT_EQ(runaway_message(setup, row, 1), "no error");
 }
 
+/// Speeds that differ by their last bit cannot be made equal: no impulse is small enough.
+TEST(Simulation, RoundingIsNoErrorOfASolver) {
+  talus::Setup setup;
+  setup.stages = {stage("fly", 1)};
+  Bodies pair;
+  for (int k = 0; k < 2; ++k) add_sphere(pair, BodyId{k}, radius * Vec3(2 * k, 0, 0), radius, density);
+  pair.velocity[0].u[0] = 1e-5;
+  pair.velocity[1].u[0] = std::nextafter(1e-5, 0);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, pair, executor);
+  const StepReport& report = simulation.step();
+  EXPECT_GT(report.contacts, 0);
+  EXPECT_TRUE(report.converged) << report.error_rms << " after " << report.iterations;
+}
+
+TEST(Simulation, RefusesSettingsThatMakeNoSense) {
+  const auto refused = [](const auto& change) {
+    talus::Setup setup;
+    setup.stages = {stage("fall", 1)};
+    validate(setup);
+    change(setup);
+    EXPECT_THROW(validate(setup), std::invalid_argument);
+  };
+  refused([](talus::Setup& s) { s.solver.overlap_correction = 1.1; });
+  refused([](talus::Setup& s) { s.solver.overlap_correction = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](talus::Setup& s) { s.solver.check_every = 1; });
+  refused([](talus::Setup& s) { s.decomposition.repartition_every = 0; });
+  refused([](talus::Setup& s) {
+    s.decomposition.coupling = Coupling::nscdd;
+    s.decomposition.sweeps_per_exchange = 0;
+  });
+}
+
 TEST(Simulation, RefusesMomentumOnSchwarz) {
   talus::Setup setup;
   setup.stages = {stage("fall", 1)};
@@ -439,10 +472,14 @@ TEST(Stages, TooShortForAStepAreRefused) {
   talus::Setup setup;
   setup.stages = {stage("blink", 1)};
   setup.stages[0].end.steps.reset();
-  setup.stages[0].end.time = 0.4 * setup.stages[0].time_step;
-  EXPECT_THROW(validate(setup), std::invalid_argument);
-  setup.stages[0].end.time = 0.5 * setup.stages[0].time_step;
+  for (const double part : {0.4, 0.5}) {
+    setup.stages[0].end.time = part * setup.stages[0].time_step;
+    EXPECT_THROW(validate(setup), std::invalid_argument) << part;
+  }
+  setup.stages[0].end.time = 0.51 * setup.stages[0].time_step;
   EXPECT_NO_THROW(validate(setup));
+  graph::Executor executor({.threads = 1});
+  EXPECT_FALSE(Simulation(setup, Bodies{}, executor).finished()) << "a step is to be made";
 }
 
 }  // namespace

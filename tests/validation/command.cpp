@@ -36,7 +36,8 @@ class Command : public testing::Test {
 TEST_F(Command, WithoutWhatItNeedsSaysSoAndReturnsTwo) {
   for (const std::string arguments :
        {"", "run", "plan", "solve", "walk scene.toml", "run a.toml b.toml", "run a.toml --threads many",
-        "run a.toml --step 3", "run a.toml --threads 999999999", "solve a.hdf5 --tol -1"}) {
+        "run a.toml --step 3", "run a.toml --threads 999999999", "study error a.toml --threads 1,999999999",
+        "replay a.h5 --threads 999999999", "solve a.hdf5 --tol -1"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_TRUE(says(outcome, "--help")) << arguments << ": " << outcome.messages;
@@ -101,10 +102,7 @@ TEST_F(Command, RefusesSamplesThatDoNotFitAndWritesNothing) {
   write(at("scene.toml"), pressed_box);
   refuses("--set wall.z+.position=-1", "z+");
   refuses("--set 'sample.base=[0.01, 0.01]'", "0.01");
-  std::string text = pressed_box;
-  const std::size_t begin = text.find("kind = "), end = text.find("[[wall]]");
-  text.replace(begin, end - begin, "kind = \"bodies\"\nfile = \"grains.csv\"\n\n");
-  write(at("scene.toml"), text);
+  write(at("scene.toml"), with_bodies(pressed_box));
   refuses("", "grains.csv");
   write(at("grains.csv"), "id,x,y,z,radius\n0,0,0,0,0.01\n1,0,0,0.02,many\n");
   refuses("", "grains.csv:3:");
@@ -161,10 +159,7 @@ TEST_F(Command, KeepsEarlierResultsWhenABodyHasNoMass) {
   write(at("scene.toml"), column);
   ASSERT_EQ(run("run scene.toml --out results").code, 0);
   const auto before = files_below(at("results"));
-  std::string text = column;
-  const std::size_t begin = text.find("kind = "), end = text.find("[[wall]]");
-  text.replace(begin, end - begin, "kind = \"bodies\"\nfile = \"grains.csv\"\n\n");
-  write(at("scene.toml"), text);
+  write(at("scene.toml"), with_bodies(column));
   const std::vector<std::pair<std::string, std::string>> mistakes = {
       {"radius\n0,0,0,1,0.01\n7,0,0,2,1e-120\n", "1e-120"},
       {"radius\n7,0,0,0,1e120\n", "1e+120"},
@@ -316,13 +311,25 @@ TEST_F(Command, SaysWhyAStageEndedAndHowFarFromRest) {
   double worst = 0;
   for (std::size_t k = 0; k < steps.rows.size(); ++k)
     worst = std::max(worst, steps.number(k, "penetration_max"));
+  EXPECT_GT(worst, 0);
   EXPECT_EQ(summary(at("results")).at("worst_penetration").get<double>(), worst);
 }
 
-TEST_F(Command, WarnsOfGrainsThatBeginDeepInsideOthersOrWalls) {
+// A floor and a lid make no box, but they bound the sample: the lid rises by a sixtieth of its height a step.
+TEST_F(Command, SaysWhenAStrainOrATimeEndedAStage) {
   std::string text = column;
-  const std::size_t begin = text.find("kind = "), end = text.find("[[wall]]");
-  text.replace(begin, end - begin, "kind = \"bodies\"\nfile = \"grains.csv\"\n\n");
+  text.insert(text.find("[[stage]]"),
+              "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"velocity\"\nvelocity = [0, 0, 1]\n\n");
+  text.replace(text.find("steps = 4"), 9, "strain = 0.02, time = 1");
+  write(at("scene.toml"), text + "\n[[stage]]\nname = \"wait\"\nend = { steps = 50, time = 2e-3 }\n");
+  const Outcome outcome = run("run scene.toml --out results");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: strain reached\n")) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "stage 'wait' ended after 2 steps: time reached\n")) << outcome.messages;
+}
+
+TEST_F(Command, WarnsOfGrainsThatBeginDeepInsideOthersOrWalls) {
+  std::string text = with_bodies(column);
   text.replace(text.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
   write(at("scene.toml"), text);
   write(at("grains.csv"), "id,x,y,z,radius\n3,0,0,0.01,0.01\n4,0,0,0.0292,0.01\n9,1,0,0.008,0.01\n");

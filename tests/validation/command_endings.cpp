@@ -80,6 +80,7 @@ TEST_F(Ending, BeforeTheFirstStepIsInRunJson) {
     EXPECT_EQ(outcome.code, 1) << name << ": " << outcome.messages;
     EXPECT_EQ(summary(at("results")).at("status"), "failed") << name;
     EXPECT_EQ(summary(at("results")).at("exit_code"), 1) << name;
+    EXPECT_EQ(summary(at("results")).at("bodies"), 3) << name;
     EXPECT_NE(summary(at("results")).at("message").get<std::string>().find(name), std::string::npos);
     fs::remove_all(at("results"));
   }

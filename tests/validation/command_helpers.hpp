@@ -167,4 +167,10 @@ name = "rest"
 end = { steps = 4 }
 )";
 
+/// The scene with its grains in grains.csv.
+inline std::string with_bodies(std::string scene) {
+  const std::size_t begin = scene.find("kind = "), end = scene.find("[[wall]]");
+  return scene.replace(begin, end - begin, "kind = \"bodies\"\nfile = \"grains.csv\"\n\n");
+}
+
 }  // namespace talus::test

@@ -31,7 +31,7 @@ struct Scene {
     setup.solver.tolerance = 1e-12;
     setup.solver.balance_tolerance = 1e-10;
     setup.solver.max_iterations = 100000;
-    setup.solver.check_every = 1;
+    setup.solver.check_every = 2;
   }
   Stage& stage() { return setup.stages.front(); }
   void friction(double mu) { stage().law.mu_grains = stage().law.mu_walls = mu; }

@@ -136,6 +136,8 @@ TEST_F(PartitionCommand, CutsTheBoxesOfTheScene) {
   const Outcome others = run("partition scene.toml --subdomains 2 --out other");
   EXPECT_EQ(others.code, 2);
   EXPECT_NE(others.messages.find("decomposition.boxes"), std::string::npos) << others.messages;
+  EXPECT_EQ(run("partition scene.toml --subdomains 2 --out other --partitioner rcb").code, 0)
+      << "it cuts no boxes";
 }
 
 TEST_F(PartitionCommand, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {

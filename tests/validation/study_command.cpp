@@ -27,6 +27,16 @@ class StudyError : public testing::Test {
   void SetUp() override { write(at("scene.toml"), pressed_box); }
   Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
   fs::path at(const std::string& name) const { return folder_.path() / name; }
+  /// true_error.csv of the first step of a column of so many grains.
+  Table first_step(const std::string& scene, int grains, const std::string& methods,
+                   const std::string& tolerance) {
+    write(at("column.toml"), scene);
+    const Outcome outcome =
+        run("study error column.toml --out s --threads 1 --only step --at-step 0 --methods " + methods +
+            " --tolerances " + tolerance + " --set sample.cells=[1,1," + std::to_string(grains) + "]");
+    EXPECT_EQ(outcome.code, 0) << outcome.messages;
+    return read_table(at("s/true_error.csv"));
+  }
   ScratchDirectory folder_;
 };
 
@@ -73,12 +83,7 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
 /// The residual of a long column is small long before anything is carried: `auto`, which the reference tries
 /// first, ends on the balance, and the reference must ask more of that than anybody else.
 TEST_F(StudyError, TheReferenceIsTheAnswerInStiffSamplesToo) {
-  write(at("column.toml"), column);
-  ASSERT_EQ(run("study error column.toml --out s --threads 1 --only step --at-step 0 --methods auto,admm "
-                "--tolerances 1e-2 --set sample.cells=[1,1,60]")
-                .code,
-            0);
-  const Table truth = read_table(at("s/true_error.csv"));
+  const Table truth = first_step(column, 60, "auto,admm", "1e-2");
   const auto last = [&](const char* method) {
     return rows_where(truth, [&](const auto& row) { return row.at("method") == method; }).back();
   };
@@ -89,13 +94,22 @@ TEST_F(StudyError, TheReferenceIsTheAnswerInStiffSamplesToo) {
 /// With gravity such a column hangs in the balance of the scene; a variant asked for a hundredth of the
 /// scene's tolerance is asked for a hundredth of its balance as well.
 TEST_F(StudyError, ATighterToleranceTightensTheBalance) {
-  write(at("column.toml"), column);
-  ASSERT_EQ(run("study error column.toml --out s --threads 1 --only step --at-step 0 --methods auto "
-                "--tolerances 1e-5 --set sample.cells=[1,1,60]")
-                .code,
-            0);
-  const Table truth = read_table(at("s/true_error.csv"));
+  const Table truth = first_step(column, 60, "auto", "1e-5");
   EXPECT_LT(truth.number(truth.rows.size() - 1, "wall_force_error"), 5e-3) << "the scene's balance is 5e-2";
+}
+
+/// Likewise for whole runs; what these are held against is found by `auto`, asked for more.
+TEST_F(StudyError, WholeRunsTightenTheBalanceToo) {
+  write(at("column.toml"), column);
+  const auto error = [&](const std::string& method, const std::string& tolerance) {
+    const Outcome outcome =
+        run("study error column.toml --out s --force --threads 1 --only run --steps 1 --methods " + method +
+            " --tolerances " + tolerance + " --set sample.cells=[1,1,60]");
+    EXPECT_EQ(outcome.code, 0) << outcome.messages;
+    return read_table(at("s/runs.csv")).number(0, "position_error");
+  };
+  EXPECT_LT(error("auto", "1e-5"), 1e-6);
+  EXPECT_LT(error("admm", "1e-2"), error("auto", "1e-2")) << "the reference is no more than another `auto`";
 }
 
 /// Velocities are nothing but the solver's noise there, and no measure of its errors.
@@ -104,12 +118,8 @@ TEST_F(StudyError, VelocityErrorsOfASamplePressedAtRestAreThoseOfItsForces) {
   pressed.replace(pressed.find("gravity"), pressed.find("time_step") - pressed.find("gravity"), "");
   pressed.insert(pressed.find("[[stage]]"),
                  "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"force\"\nforce = 1\n\n");
-  write(at("pressed.toml"), pressed);
-  ASSERT_EQ(run("study error pressed.toml --out s --threads 1 --only step --at-step 0 --methods nlgs "
-                "--tolerances 1e-2 --set sample.cells=[1,1,20]")
-                .code,
-            0);
-  const Table truth = read_table(at("s/true_error.csv"));
+  const Table truth = first_step(pressed, 20, "nlgs", "1e-2");
+  ASSERT_FALSE(truth.rows.empty());
   for (std::size_t k = 0; k < truth.rows.size(); ++k) {
     EXPECT_LT(truth.number(k, "velocity_error"), 2 * truth.number(k, "wall_force_error"));
     EXPECT_GT(truth.number(k, "velocity_error"), 0.5 * truth.number(k, "wall_force_error"));
@@ -204,23 +214,57 @@ TEST_F(StudyError, RefusesWhatHasNoMeaningAndWritesNothing) {
         "scene.toml --steps 0", "scene.toml --threads 0", "scene.toml --only both",
         "scene.toml --set solver.tolerances=1", "empty", "", "scene.toml --time-steps 50 --steps 4",
         "scene.toml --only run --time-steps 8 --set 'stage.press.end={time=3e-3}'",
-        // Options that would do nothing.
-        "scene.toml --only run --at-step 1", "scene.toml --only run --max-sweeps 1",
-        "scene.toml --only run --max-seconds 1", "scene.toml --only step --steps 1",
-        "scene.toml --only step --time-steps 1", "empty --set seed=1", "empty --subdomains 1",
-        "empty --threads 1", "empty --seeds 1", "empty --only step", "empty --steps 1",
-        "empty --time-steps 1", "empty --at-step 1", "empty --max-sweeps 1"}) {
+        // A time of exactly half a step, in numbers that are exact.
+        "scene.toml --only run --time-steps 4 --set time_step=0.0009765625 --set "
+        "'stage.press.end={time=0.001953125}'"}) {
     const Outcome outcome = run("study error " + arguments);
     EXPECT_EQ(outcome.code, 2) << arguments << outcome.messages;
     EXPECT_NE(outcome.messages.find("error"), std::string::npos) << arguments << outcome.messages;
     EXPECT_EQ(files_below(folder_.path()).size(), 1U) << arguments;
   }
+  for (const std::string idle :
+       {"scene.toml --only run --at-step 1", "scene.toml --only run --max-sweeps 1",
+        "scene.toml --only run --max-seconds 1", "scene.toml --only step --steps 1",
+        "scene.toml --only step --time-steps 1", "empty --set seed=1", "empty --subdomains 1",
+        "empty --threads 1", "empty --seeds 1", "empty --only step", "empty --steps 1",
+        "empty --time-steps 1", "empty --at-step 1", "empty --max-sweeps 1"}) {
+    const Outcome outcome = run("study error " + idle);
+    EXPECT_EQ(outcome.code, 2) << idle;
+    EXPECT_NE(outcome.messages.find("has no meaning"), std::string::npos) << idle << outcome.messages;
+    EXPECT_EQ(files_below(folder_.path()).size(), 1U) << idle;
+  }
   EXPECT_NE(run("study error scene.toml --methods newtonian").messages.find("nlgs+momentum"),
             std::string::npos)
       << "says what there is";
-  EXPECT_NE(run("study error empty --only step").messages.find("--only"), std::string::npos);
   EXPECT_NE(run("study error scene.toml --time-steps 50 --steps 4").messages.find("--time-steps 50"),
             std::string::npos);
+}
+
+/// Momentum is refused with Schwarz, when the reference is there.
+TEST_F(StudyError, WithoutAResultIsAFailure) {
+  for (const std::string part : {"step --at-step 1", "run --steps 2"}) {
+    const Outcome outcome = run(std::string(brief) +
+                                "--force --methods nlgs+momentum --tolerances 1e-1 --set "
+                                "decomposition.coupling=schwarz --only " +
+                                part);
+    EXPECT_EQ(outcome.code, 1) << part << outcome.messages;
+    EXPECT_NE(outcome.messages.find("Schwarz"), std::string::npos) << outcome.messages;
+    EXPECT_NE(outcome.messages.find("reference"), std::string::npos) << outcome.messages;
+  }
+}
+
+TEST_F(StudyError, CutsTheBoxesOfTheSceneOrOthers) {
+  const Outcome outcome =
+      run(std::string(brief) +
+          "--methods auto --tolerances 1e-1 --at-step 1 --steps 2 --subdomains 1,3,4 --set "
+          "decomposition.boxes=[1,1,3]");
+  EXPECT_NE(outcome.code, 1) << outcome.messages;
+  const Table runs = read_table(at("s/runs.csv")), truth = read_table(at("s/true_error.csv"));
+  for (const std::string subdomains : {"1", "3", "4"}) {
+    const auto of = [&](const auto& row) { return row.at("subdomains") == subdomains; };
+    EXPECT_FALSE(rows_where(runs, of).empty()) << subdomains << outcome.messages;
+    EXPECT_FALSE(rows_where(truth, of).empty()) << subdomains << outcome.messages;
+  }
 }
 
 TEST_F(StudyError, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {

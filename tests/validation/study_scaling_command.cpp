@@ -175,13 +175,29 @@ TEST_F(StudyScaling, PlaysItsTracesAgainOnAnotherNetwork) {
 }
 
 TEST_F(StudyScaling, RecordsSeveralSubdomainsAsOnCoresOfTheirOwn) {
-  const Outcome outcome =
-      run("study scaling scene.toml --out s --steps 2:3 --subdomains 2 --repeat 0 --no-weak --own-caches");
+  const std::string command =
+      "study scaling scene.toml --out s --steps 2:3 --subdomains 2 --repeat 0 --no-weak ";
+  const Outcome outcome = run(command + "--own-caches --variant decomposition.exchange=ccs");
   ASSERT_EQ(outcome.code, 0) << outcome.messages;
   EXPECT_TRUE(fs::exists(at("s/traces/strong-1-1.h5")));
   EXPECT_TRUE(fs::exists(at("s/traces/strong-2-own-1.h5")));
   EXPECT_FALSE(fs::exists(at("s/traces/strong-2-1.h5"))) << "one for the other would be taken up by --reuse";
+  EXPECT_TRUE(fs::exists(at("s/traces/strong-2-variant1-own-1.h5")));
   EXPECT_NE(content(at("s/report.html")).find("no other subdomain"), std::string::npos);
+
+  write(at("s/traces/strong-2-mine-1.h5"), "mine");
+  ASSERT_EQ(run(command + "--force").code, 0);
+  EXPECT_FALSE(fs::exists(at("s/traces/strong-2-own-1.h5"))) << "of the earlier study";
+  EXPECT_FALSE(fs::exists(at("s/traces/strong-2-variant1-own-1.h5"))) << "of the earlier study";
+  EXPECT_TRUE(fs::exists(at("s/traces/strong-2-mine-1.h5")));
+}
+
+TEST_F(StudyScaling, ChoosesItsOwnBoxesWhereTheSceneHasSome) {
+  const Outcome outcome =
+      run("study scaling scene.toml --out s --steps 2:2 --subdomains 2 --repeat 0 --weak 2 --set "
+          "decomposition.boxes=[1,1,3]");
+  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+  EXPECT_EQ(read_table(at("s/strong_scaling.csv")).rows.at(1).at("subdomains"), "2");
 }
 
 // The program itself on simulated ranks, where that build is.
@@ -217,6 +233,7 @@ TEST_F(StudyScaling, RefusesNonsenseAndWritesNothing) {
   refused("--hybrid 7", "--hybrid 7");
   refused("--network carrier-pigeon", "today");
   refused("--variant decomposition.subdomains=3", "--subdomains");
+  refused("--variant decomposition.boxes=[1,1,3]", "--subdomains");
   refused("--variant decomposition.exchnage=ccs", "exchange");
   refused("--cores 2 --mpirun no-such-program", "no-such-program");
   refused("--cores 2", "mpirun is not to be found", "PATH=/nowhere");

@@ -207,6 +207,9 @@ TEST_F(TraceCommand, RecordsSubdomainsAsOnCoresOfTheirOwn) {
   EXPECT_GT(follows_at_once(recorded("plain", 1)), 10);
   EXPECT_EQ(follows_at_once(recorded("own", 1, "--trace-own-caches")), 0);
   EXPECT_EQ(summary(folder_ / "own").at("digest"), summary(folder_ / "plain").at("digest"));
+  const Outcome two = talus("run scene.toml --out two --threads 2 --trace --trace-own-caches");
+  EXPECT_EQ(two.code, 2);
+  EXPECT_NE(two.messages.find("--threads 1"), std::string::npos) << two.messages;
 }
 
 TEST_F(TraceCommand, ReplacesAFileOnlyWhenForced) {
@@ -223,6 +226,19 @@ TEST_F(TraceCommand, ReplacesAFileOnlyWhenForced) {
   }
   EXPECT_EQ(talus("replay " + trace + " -o same --smpi-platform same").code, 2);
   EXPECT_FALSE(fs::exists(folder_ / "same"));
+}
+
+// SMPI runs the program, which lays subdomains on ranks itself: as in the recording, whatever that was.
+TEST_F(TraceCommand, APlatformForSmpiHasNoMapOfItsOwn) {
+  const std::string trace = recorded("out", 1);
+  const Outcome mapped = talus("replay " + trace + " --ranks 2 --map cyclic --smpi-platform m.xml");
+  EXPECT_EQ(mapped.code, 2);
+  EXPECT_NE(mapped.messages.find("decomposition.mapping"), std::string::npos) << mapped.messages;
+  EXPECT_FALSE(fs::exists(folder_ / "m.xml"));
+  ASSERT_EQ(talus("replay " + trace + " --ranks 2 --map cyclic -o cyclic.h5").code, 0);
+  const Outcome plain = talus("replay cyclic.h5 --smpi-platform m.xml");
+  EXPECT_EQ(plain.code, 0) << plain.messages;
+  EXPECT_TRUE(fs::exists(folder_ / "m.xml"));
 }
 
 TEST_F(TraceCommand, RefusesMachinesThatMakeNoSense) {

@@ -48,16 +48,6 @@ inline std::byte* bytes_of(std::vector<double>& buffer) {
   return std::as_writable_bytes(std::span(buffer)).data();
 }
 
-/// Reads a byte of each cache line.
-template <class Value>
-std::uint64_t sum_of_lines(std::span<const Value> values) {
-  constexpr std::size_t line = 64;
-  const auto bytes = std::as_bytes(values);
-  std::uint64_t sum = 0;
-  for (std::size_t k = 0; k < bytes.size(); k += line) sum += std::to_integer<std::uint64_t>(bytes[k]);
-  return sum;
-}
-
 /// A body, and the place of its copy in a neighbour's message.
 struct Pair {
   Slot slot;

@@ -49,21 +49,15 @@ void LoopEvents::decide(std::uint32_t r, std::uint32_t e, double now) {
     rank.decided += stage_.network.overhead();
   }
   const double behind = epoch.meetings + epoch.whole;
-  if (!epoch.waits && !epoch.reads) {
+  if (epoch.awaits.empty()) {
     agenda_.add(rank.decided + behind, gate_opens, r, e);
     return;
   }
   // The sums of one round after those of the other, each from when all wait for it.
-  double known = 0;
-  const double rest = stage_.network.collective_rest();
-  const std::size_t last_round = epoch.reads ? epoch.late_round : epoch.round;
-  const auto wait_for = [&](std::size_t round, double from) {
-    rounds_[round].known = std::max(rounds_[round].known, from + rest);
-    known = rounds_[round].known;
-  };
-  if (epoch.waits) wait_for(epoch.round, rank.decided);
-  if (epoch.reads) wait_for(epoch.late_round, std::max(known, rank.decided));
-  if (++rounds_[last_round].waiting < static_cast<int>(ranks_.size())) return;
+  double known = rank.decided;
+  for (const std::size_t round : epoch.awaits)
+    known = rounds_[round].known = std::max(rounds_[round].known, known + stage_.network.collective_rest());
+  if (++rounds_[epoch.awaits.back()].waiting < static_cast<int>(ranks_.size())) return;
   for (std::uint32_t other = 0; other < ranks_.size(); ++other)
     agenda_.add(std::max(ranks_[other].decided, known) + behind, gate_opens, other, e);
 }

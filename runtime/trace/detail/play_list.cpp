@@ -24,10 +24,8 @@ class ListLoop {
         ranks_(start.size()),
         missing_(layout.nodes.size(), 0),
         epoch_(layout.nodes.size(), 0),
-        ready_(layout.nodes.size(), never),
-        last_name_(layout.nodes.size(), 0) {
+        ready_(layout.nodes.size(), never) {
     for (std::uint32_t r = 0; r < ranks_.size(); ++r) {
-      ranks_[r].begin = start[r];
       for (std::uint32_t t = threads_; t-- > 0;) ranks_[r].idle.push_back({stage.log.worker(r, t), start[r]});
       ranks_[r].allowed = last_before_gate(0);
     }
@@ -36,8 +34,8 @@ class ListLoop {
         if (layout.nodes[other].colour < layout.nodes[n].colour) ++missing_[n];
   }
 
-  std::vector<double> run() {
-    for (std::uint32_t r = 0; r < ranks_.size(); ++r) begin_epochs(r, ranks_[r].begin);
+  std::vector<double> run(const std::vector<double>& start) {
+    for (std::uint32_t r = 0; r < ranks_.size(); ++r) begin_epochs(r, start[r]);
     return events_.run(*this);
   }
 
@@ -64,7 +62,7 @@ class ListLoop {
   }
 
   void message_came(const SimMessage& came, std::uint32_t, double now) {
-    last_name_[came.to] = came.name;
+    last_name_ = came.name;
     offer(came.to, now);
     dispatch(layout_.nodes[came.to].rank, now);
   }
@@ -88,7 +86,6 @@ class ListLoop {
     std::vector<Idle> idle;
     std::uint32_t allowed = 0;  ///< last epoch that may be worked on
     std::size_t ended = 0;      ///< nodes that have ended that epoch
-    double begin = 0;
   };
 
   std::uint32_t last_before_gate(std::uint32_t epoch) const {
@@ -151,7 +148,7 @@ class ListLoop {
       const auto number = static_cast<std::int32_t>(e);
       stage_.log.task(thread.worker, now - waited, end, waited, n - layout_.rank_begin[layout_.nodes[n].rank],
                       number, recorded.kind);
-      if (waited > 0) stage_.log.span(thread.worker, now - waited, now, last_name_[n], number, kind_receive);
+      if (waited > 0) stage_.log.span(thread.worker, now - waited, now, last_name_, number, kind_receive);
     }
     ready_[n] = never;
     events_.end_node(n, thread.worker, end);
@@ -169,16 +166,16 @@ class ListLoop {
   /// Per node: conflicting nodes that must end before it begins: those of lower colour in its epoch, the
   /// others in the one before.
   std::vector<std::uint32_t> missing_;
-  std::vector<std::uint32_t> epoch_;      ///< per node: the next
-  std::vector<double> ready_;             ///< per node: when it was, but for messages
-  std::vector<std::uint32_t> last_name_;  ///< per node: of the last message that came
+  std::vector<std::uint32_t> epoch_;  ///< per node: the next
+  std::vector<double> ready_;         ///< per node: when it was, but for messages
+  std::uint32_t last_name_ = 0;       ///< of the last message that came
 };
 
 }  // namespace
 
 std::vector<double> play_list(Stage& stage, const StepIndex& index, const LoopLayout& layout,
                               const std::vector<SimEpoch>& epochs, const std::vector<double>& start) {
-  return ListLoop(stage, index, layout, epochs, start).run();
+  return ListLoop(stage, index, layout, epochs, start).run(start);
 }
 
 }  // namespace talus::trace::detail

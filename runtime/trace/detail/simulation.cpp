@@ -160,9 +160,9 @@ void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const Si
   stage.log.task(worker, begin, end, waited, epoch.settles ? check_settles : 0, number, kind_check);
   if (own > 0) stage.log.span(worker, begin, begin + own, 0, -1, epoch.own_kind);
   // One wait, and what else is read takes no time; where nobody waited it stands where it is within.
-  const int calls = std::max((epoch.waits ? 1 : 0) + (epoch.reads ? 1 : 0), waited > 0 ? 1 : 0);
+  const std::size_t calls = std::max({epoch.calls, epoch.awaits.size(), std::size_t{waited > 0}});
   const double at = waited > 0 ? decided : begin;
-  for (int call = 0; call < calls; ++call)
+  for (std::size_t call = 0; call < calls; ++call)
     stage.log.span(worker, at, waited > 0 && call == 0 ? from : at, 0, number, kind_collective);
   for (const SimEpoch::Span& span : epoch.spans)
     stage.log.span(worker, from + span.begin, from + span.end, span.meetings, -1, span.kind);

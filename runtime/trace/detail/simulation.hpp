@@ -80,10 +80,11 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
 struct SimEpoch {
   std::size_t source = 0;  ///< recorded epoch whose work it has
   bool gate = false;       ///< a decision behind it
-  bool posts = false;      ///< the sums of the rank leave at that decision, as round `round`,
-  bool waits = false;      ///< and it waits for those of all ranks
-  bool reads = false;      ///< it waits for those of an earlier decision, round `late_round`
-  bool settles = false;    ///< its record says so (check_settles)
+  bool posts = false;      ///< the sums of the rank leave at that decision, as round `round`
+  std::size_t round = 0;
+  std::vector<std::size_t> awaits{};  ///< rounds that it waits for, one after the other
+  std::size_t calls = 0;              ///< of all ranks, where the one that there is knows at once
+  bool settles = false;               ///< its record says so (check_settles)
   /// What all ranks do together then: work, and waits where they meet [ns]; its parts, one after the other.
   struct Span {
     double begin = 0, end = 0;  ///< in `whole`
@@ -96,7 +97,6 @@ struct SimEpoch {
   Kind own_kind{};
   bool exchange = false;  ///< copies are glued
   std::size_t exchanges_before = 0;
-  std::size_t round = 0, late_round = 0;
 };
 
 /// The loop of one step: epochs of `layout` from `start` [ns], per rank; returns when each rank has left it.
