@@ -86,7 +86,8 @@ Truth wall_forces(std::vector<Vec3> exact) {
 Truth at_rest(Truth truth) {
   const auto where_it_rests = [error =
                                    std::move(truth.error)](const StepView& step) -> std::optional<double> {
-    const double most = step.time_step() * step.gravity().norm() / 20;
+    const double tolerance = step.simulation.setup().solver.tolerance;
+    const double most = 50 * tolerance * step.time_step() * step.gravity().norm();
     const auto rests = [&](const Vec3& u) { return u.norm() <= most; };
     if (!std::all_of(step.before.u.begin(), step.before.u.end(), rests)) return std::nullopt;
     return error(step);

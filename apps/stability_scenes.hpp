@@ -100,9 +100,9 @@ double sphere_mass(double r);  ///< [kg] at the usual density
 /// Of a sample at rest: largest error of the walls' forces against `exact` [N], over the largest of `exact`.
 Truth wall_forces(std::vector<Vec3> exact);
 
-/// `truth` where a step begins at rest: no body faster than a twentieth of g h. What a light grain keeps of
-/// its velocity under a heavy body is little of the step's impulses and yet opens gaps, into which the heavy
-/// one then rightly falls.
+/// `truth` where a step begins at rest: no body faster than 50 tolerances of g h, a twentieth by default.
+/// What a light grain keeps of its velocity under a heavy body is little of the step's impulses and yet opens
+/// gaps, into which the heavy one then rightly falls.
 Truth at_rest(Truth truth);
 
 /// The velocities that the same step takes when it is solved to 1e-10 with conjugate gradients: the sum of

@@ -131,6 +131,7 @@ void Communicator::exchange(std::span<const std::span<const std::byte>> to,
 }
 
 void Communicator::sum(std::span<std::int64_t> values) const {
+  if (values.empty()) return;  // SimGrid's calls divide by their number
   const auto bytes = static_cast<std::uint32_t>(values.size_bytes());
   if (ranks_ == 1) return note_calls(1, bytes);
   const MpiCall call;
@@ -141,6 +142,7 @@ void Communicator::sum(std::span<std::int64_t> values) const {
 }
 
 void Communicator::max(std::span<double> values) const {
+  if (values.empty()) return;  // SimGrid's calls divide by their number
   const auto bytes = static_cast<std::uint32_t>(values.size_bytes());
   if (ranks_ == 1) return note_calls(1, bytes);
   const MpiCall call;
@@ -171,6 +173,7 @@ std::vector<std::byte> Communicator::gather(std::span<const std::byte> part) con
     bytes.push_back(byte_count(size));
     total += size;
   }
+  if (total == 0) return {};
   std::vector<std::byte> all(static_cast<std::size_t>(byte_count(total)));
   check(MPI_Allgatherv(part.data(), byte_count(own), MPI_BYTE, all.data(), bytes.data(), begin.data(),
                        MPI_BYTE, MPI_COMM_WORLD),

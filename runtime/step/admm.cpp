@@ -67,22 +67,35 @@ class StepLink final : public PartLink {
   trace::Meetings& rounds_;
 };
 
-/// The fastest that impulses make a body.
-double fastest_of(const BodyParts& parts) {
-  const PartField velocity = velocities_of(parts, impulses_of(parts));
-  const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
-    for (const Twist& v : velocity[p]) row[0] = std::max({row[0], v.u.norm(), v.w.norm()});
-  });
-  return *std::max_element(rows.begin(), rows.end());
+/// Kinetic energy of the velocities that impulses make [J]; of a body with infinite mass none.
+double energy_of(const BodyParts& parts, const PartField& velocity) {
+  return 0.5 * parts.total(1, [&](std::size_t p, std::span<double> row) {
+    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
+      if (!parts[p].counted(b)) continue;
+      const BodyUnknown& body = parts[p].bodies[b];
+      row[0] += body.mass * velocity[p][b].u.squaredNorm() + body.spin_mass * velocity[p][b].w.squaredNorm();
+    }
+  })[0];
 }
 
-/// The fastest body without contacts, or gap that a contact closes.
-double fastest_without(const BodyParts& parts) {
-  const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
-    for (const BodyUnknown& body : parts[p].bodies) row[0] = std::max(row[0], body.free.u.norm());
-    for (const ContactEquation& c : parts[p].contacts) row[0] = std::max(row[0], c.offset.norm());
-  });
-  return *std::max_element(rows.begin(), rows.end());
+/// What contacts may leave of it, at most: what there is without them, and what driven walls and overlaps
+/// that part can give if all bodies follow. Gaps that close give nothing [J].
+double energy_without(const BodyParts& parts) {
+  PartField free = parts.field();
+  double mass = 0, fastest = 0;
+  for (double value : parts.total(1, [&](std::size_t p, std::span<double> row) {
+         for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
+           free[p][b] = parts[p].bodies[b].free;
+           if (parts[p].counted(b)) row[0] += parts[p].bodies[b].mass;
+         }
+       }))
+    mass += value;
+  for (double value : parts.rows(1, [&](std::size_t p, std::span<double> row) {
+         for (const ContactEquation& c : parts[p].contacts)
+           row[0] = std::max({row[0], std::abs(c.drive), -c.offset.dot(c.normal)});
+       }))
+    fastest = std::max(fastest, value);
+  return energy_of(parts, free) + 0.5 * mass * fastest * fastest;
 }
 
 }  // namespace
@@ -165,15 +178,15 @@ BodyAdmmResult Admm::improve(double tolerance, int calls) {
   BodyAdmmSettings settings;
   settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
   settings.balance_tolerance = std::ldexp(std::min(settings.balance_tolerance, 0.1 * tolerance), -2 * calls);
-  // Contacts make nothing much faster than what comes in or than the gap that it closes, but what ADMM leaves
-  // of a heavy body to light ones until sweeps follow.
-  constexpr double sound = 1e6;
-  const double fastest = std::max(fastest_of(parts), fastest_without(parts));
+  // Contacts make no energy, but until sweeps follow ADMM leaves light bodies with what heavy ones had.
+  constexpr double sound = 1e8;
+  const double without = energy_without(parts);
   BodyAdmmResult result = solve_admm(problems, *link_, settings);
   // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped.
   // The defect is near 1 where light bodies have yet to follow a heavy one. Comparisons are false for NaN.
   const bool better = result.converged || calls == 0;  // unfinished is better than sweeps, not than ADMM
-  if (better && result.momentum_defect <= 2 && fastest_of(parts) <= sound * fastest)
+  if (better && result.momentum_defect <= 2 &&
+      energy_of(parts, velocities_of(parts, impulses_of(parts))) <= sound * without)
     for (const BodyProblem& problem : problems) scatter_impulses(problem, state_.contacts);
   return result;
 }

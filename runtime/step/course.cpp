@@ -300,6 +300,12 @@ bool Iteration::balanced() {
     return result_.unbalance <= tolerance;
   }
   const bool last = result_.iterations >= settings_.max_iterations;
+  // Behind ADMM sweeps still mend much, and a look costs as much as hundreds of them.
+  constexpr int settling = 50;
+  if (!last && result_.stiff_calls > 0 && result_.iterations - started_at() < settling) {
+    result_.unbalance = std::numeric_limits<double>::infinity();
+    return false;
+  }
   // From a residual of 0 nothing is inferred.
   const double guess =
       looked_.error_rms > 0 ? looked_.error * result_.error_rms / looked_.error_rms : looked_.error;
