@@ -236,13 +236,15 @@ int advance(Simulation& simulation, const RunOptions& options, const io::OutputS
       feed.later("dump of a contact problem", fclib_dump(simulation, directory));
     const bool stage_ends = simulation.stage_fraction() >= 1;
     const bool last = options.steps && report.step >= *options.steps;
-    if (clock.due(report) || ((stage_ends || last) && output.stage_frames)) write_frame();
+    const int signal = signal_of(ranks);
+    const bool ends = stage_ends || last || signal != 0;
+    if (clock.due(report) || (ends && output.stage_frames)) write_frame();
     if (progress) progress->update(report, simulation.stage().name, simulation.stage_fraction());
     if (progress && stage_ends) {
       progress->finish();
       print_stage_end(simulation);
     }
-    if (const int signal = signal_of(ranks); signal != 0) {
+    if (signal != 0) {
       if (progress) progress->finish();
       return signal;
     }

@@ -43,10 +43,10 @@ struct OutputSpec {
   std::string directory;                    ///< out/NAME unless given
   std::optional<double> every;              ///< [s] between frames
   std::optional<std::int64_t> every_steps;  ///< steps between frames
-  bool stage_frames = true;                 ///< a frame at the beginning and at the end of each stage
-  bool fields = true;                       ///< .vtp files for ParaView
-  bool contacts = true;                     ///< contacts with forces in the frames
-  bool pictures = true;                     ///< curves and force network as pictures
+  bool stage_frames = true;  ///< a frame at the ends of each stage, and where the run is stopped
+  bool fields = true;        ///< .vtp files for ParaView
+  bool contacts = true;      ///< contacts with forces in the frames
+  bool pictures = true;      ///< curves and force network as pictures
 };
 
 /// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said

@@ -426,8 +426,10 @@ Section<OutputSpec> output_keys() {
               .or_else("out/NAME"),
           key<OutputSpec>("every", "s", positive, "Time between frames.", &OutputSpec::every),
           key<OutputSpec>("every_steps", "", at_least_one, "Steps between frames.", &OutputSpec::every_steps),
-          key<OutputSpec>("stage_frames", "", any, "A frame at the beginning and at the end of each stage.",
-                          &OutputSpec::stage_frames),
+          key<OutputSpec>(
+              "stage_frames", "", any,
+              "A frame at the beginning and at the end of each stage, and where the run is stopped.",
+              &OutputSpec::stage_frames),
           key<OutputSpec>("fields", "", any, "Write frames as .vtp files for ParaView.", &OutputSpec::fields),
           key<OutputSpec>("contacts", "", any, "Write the contacts and their forces with each frame.",
                           &OutputSpec::contacts),

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <string>
 
+#include "io/results.hpp"
 #include "tests/unit/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
@@ -128,6 +129,9 @@ TEST_F(Ending, BySignalLeavesWholeFiles) {
     EXPECT_EQ(read_table(at("results/steps.csv")).rows.size(), steps);
     EXPECT_EQ(read_table(at("results/walls.csv")).rows.size(), 6 * steps);
     EXPECT_TRUE(content(at("results/steps.csv")).ends_with("\n"));
+    const std::size_t frames = io::frame_count(at("results/results.h5"));
+    EXPECT_EQ(io::read_frame(at("results/results.h5"), frames - 1).step, static_cast<std::int64_t>(steps))
+        << "what was reached is not lost";
   }
 }
 
