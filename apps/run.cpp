@@ -392,6 +392,11 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
       io::write_run_json(directory + "/run.json", provenance, summary);
   } catch (const std::exception& error) {
     if (summary.status != "failed") fail(summary, error);  // the first fault is what to mend
+    summary.digest.reset();
+    try {
+      if (ranks.rank() == 0) io::write_run_json(directory + "/run.json", provenance, summary);
+    } catch (const std::exception&) {  // there is room for nothing
+    }
   }
   return summary;
 }
@@ -535,8 +540,9 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
     if (options.trace_own_caches && (ranks.ranks() > 1 || threads_of(options) > 1))
       throw std::invalid_argument(
-          "--trace-own-caches: others would wait for what is brought in; record on one rank with --threads "
-          "1");
+          "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
+          "with "
+          "--threads 1");
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());

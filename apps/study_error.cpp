@@ -132,8 +132,10 @@ int study_scene(const StudyErrorOptions& options) {
     for (const StudySample& sample : samples) study_runs(sample, plan, say, keep, runs);
   keep();
   say(fmt::format("tables, pictures and report.html in {}", directory));
-  if ((options.only != "run" && problem.truth.empty()) || (options.only != "step" && runs.rows.empty())) {
-    fmt::print(stderr, "talus: error: {} could not be solved in any of these ways\n", scene.name);
+  const bool no_step = options.only != "run" && problem.truth.empty();
+  if (no_step || (options.only != "step" && runs.rows.empty())) {
+    fmt::print(stderr, "talus: error: {} of {} could not be solved in any of these ways\n",
+               no_step ? "the step" : "a run", scene.name);
     return exit_failure;
   }
   const bool sound =
@@ -257,9 +259,6 @@ CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
 int study_error_command(const StudyErrorOptions& options) {
   try {
     return fs::is_directory(options.subject) ? study_folder(options) : study_scene(options);
-  } catch (const SceneEnded& error) {  // sooner than its stages say
-    fmt::print(stderr, "talus: error: {}\n", error.what());
-    return exit_bad_input;
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_failure;

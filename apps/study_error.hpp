@@ -32,8 +32,8 @@ struct StudyErrorOptions {
 CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options);
 
 /// Measures and writes the study (docs/formats.md). Progress and errors go to stderr. Returns an ExitCode:
-/// exit_failure when nothing could be solved, exit_tolerance_missed when a reference, or an FCLIB problem
-/// with every method, missed its tolerance.
+/// exit_failure when the step, or whole runs, could be solved in no way, exit_tolerance_missed when a
+/// reference, or an FCLIB problem with every method, missed its tolerance.
 int study_error_command(const StudyErrorOptions& options);
 
 }  // namespace talus

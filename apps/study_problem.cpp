@@ -68,7 +68,7 @@ class Problem {
       simulation.begin_next_stage();
     }
     if (simulation.finished())
-      throw SceneEnded(fmt::format(
+      throw std::runtime_error(fmt::format(
           "{}: the scene ends after step {}, so there is no step to solve behind step {}; choose a "
           "smaller --at-step",
           sample.scene.source_file, simulation.report().step, plan.at_step));

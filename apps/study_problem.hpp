@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -51,18 +50,12 @@ struct ProblemStudy {
   std::vector<ProblemReference> references;
 };
 
-/// A scene that has ended before the step to solve: nobody knows before when a sample comes to rest.
-class SceneEnded : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// Takes the sample through `plan.at_step` steps as its scene says, and then solves the next step with every
 /// variant of that seed, from no impulses and from those of the step before, to the smallest tolerance. The
 /// same step is solved with doubled numbers of sweeps, so that what a solve has reached is known on its way;
 /// each solve that is cheap is timed three times. Adds its rows to `study`. `say` takes lines of progress;
 /// `keep` is called behind every variant, of which one that fails is said and left out.
-/// Throws SceneEnded; what Simulation throws on the way there;
+/// Throws std::runtime_error when the scene ends before the step; what Simulation throws on the way there;
 /// RunawayError when no method solved the step.
 void study_problem(const StudySample& sample, const StudyPlan& plan,
                    const std::function<void(const std::string&)>& say, const std::function<void()>& keep,

@@ -46,16 +46,12 @@ TraceFeed::TraceFeed(const std::string& directory, StepRange steps, bool own_cac
                        executor_->submit_background(
                            "output of the trace", [this, kept = std::move(block)] { writer_.append(kept); });
                      }}),
-      writer_(path_of(ranks.rank()), ranks.ranks(), threads, false, task_kinds()) {
+      writer_(io::trace_file_of(directory, ranks.rank()), ranks.ranks(), threads, false, task_kinds()) {
   clock_.rank = ranks.rank();
 }
 
 TraceFeed::~TraceFeed() {
   ranks_.record_to(nullptr);
-}
-
-std::filesystem::path TraceFeed::path_of(int rank) const {
-  return directory_ / (rank == 0 ? "trace.h5" : fmt::format("trace_rank_{:06}.h5", rank));
 }
 
 void TraceFeed::start(graph::Executor& executor) {
@@ -76,8 +72,9 @@ void TraceFeed::finish(graph::Executor& executor) {
   ranks_.max(written);  // every rank's file is whole
   if (ranks_.rank() != 0) return;
   for (int rank = 1; rank < ranks_.ranks(); ++rank) {
-    writer_.append_file(path_of(rank));
-    std::filesystem::remove(path_of(rank));
+    const std::filesystem::path part = io::trace_file_of(directory_, rank);
+    writer_.append_file(part);
+    std::filesystem::remove(part);
   }
 }
 

@@ -42,8 +42,6 @@ class TraceFeed {
   void finish(graph::Executor& executor);
 
  private:
-  std::filesystem::path path_of(int rank) const;
-
   const std::filesystem::path directory_;
   const graph::Communicator& ranks_;
   graph::Executor* executor_ = nullptr;

@@ -39,19 +39,12 @@ bool is_numbered(std::string_view name, std::string_view prefix, std::string_vie
   return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-/// fclib_000012.hdf5, or its draft fclib_000012.hdf5.PID.part without the last extension.
-bool is_dump(std::string_view name) {
-  constexpr std::string_view suffix = ".hdf5";
-  const std::size_t end = name.find(suffix);
-  if (end == name.npos) return false;
-  const std::string_view process = name.substr(end + suffix.size());
-  return is_numbered(name.substr(0, end + suffix.size()), "fclib_", suffix) &&
-         std::ranges::all_of(process, [](unsigned char c) { return c == '.' || std::isdigit(c) != 0; });
-}
-
-/// The name that a file has when it is whole.
+/// The name that a file has when it is whole: without ".part", or ".PID.part".
 std::string whole_name(std::string name) {
-  if (name.ends_with(unfinished)) name.resize(name.size() - unfinished.size());
+  if (!name.ends_with(unfinished)) return name;
+  name.resize(name.size() - unfinished.size());
+  const std::size_t digits = name.find_last_not_of("0123456789") + 1;
+  if (digits > 1 && digits < name.size() && name[digits - 1] == '.') name.resize(digits - 1);
   return name;
 }
 
@@ -74,7 +67,7 @@ std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_
 bool is_output_name(const std::string& name) {
   return std::ranges::find(fixed_names, name) != fixed_names.end() ||
          is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
-         is_numbered(name, "trace_rank_", ".h5") || is_dump(name);
+         is_numbered(name, "trace_rank_", ".h5") || is_numbered(name, "fclib_", ".hdf5");
 }
 
 bool is_partition_name(const std::string& name) {

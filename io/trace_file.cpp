@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -260,61 +259,39 @@ trace::Lane& lane_of(const std::string& file, trace::Trace& trace, std::int64_t 
   return trace.lanes[static_cast<std::size_t>(rank * trace.threads + thread)];
 }
 
-/// Adds the blocks of those ranks for which `wanted(rank)`, each on its own clock.
-template <class Wanted>
-void add_blocks(Place root, const Wanted& wanted, trace::Trace& trace) {
+/// Each rank on its own clock.
+void add_blocks(Place root, trace::Trace& trace) {
   for (const std::string& tasks : detail::names_in(root, "/tasks")) {
     const Hdf5Object group = open_group(root, "/tasks/" + tasks);
     const std::int64_t rank = read_integer({group.id(), root.file}, "rank");
     lane_of(root.file, trace, rank, 0);
-    if (wanted(rank)) trace.tasks[static_cast<std::size_t>(rank)] = read_tasks({group.id(), root.file});
+    trace.tasks[static_cast<std::size_t>(rank)] = read_tasks({group.id(), root.file});
   }
   for (const std::string& name : detail::names_in(root, "/plans"))
-    if (trace::Plan plan = read_plan({open_group(root, "/plans/" + name).id(), root.file}); wanted(plan.rank))
-      trace.plans.push_back(std::move(plan));
+    trace.plans.push_back(read_plan({open_group(root, "/plans/" + name).id(), root.file}));
   for (const std::string& block : detail::names_in(root, "/records")) {
     const trace::Block read = read_records(root, "/records/" + block);
     std::vector<trace::Record>& records = lane_of(root.file, trace, read.rank, read.thread).records;
-    if (wanted(read.rank)) records.insert(records.end(), read.records.begin(), read.records.end());
+    records.insert(records.end(), read.records.begin(), read.records.end());
   }
 }
 
-/// Of the ranks that are in the file as a whole.
-std::map<std::int64_t, RankClock> clocks_in(Place root) {
-  std::map<std::int64_t, RankClock> clocks;
-  for (const std::string& name : detail::names_in(root, "/clocks")) {
-    const RankClock clock = read_clock(root, "/clocks/" + name);
-    clocks.emplace(clock.rank, clock);
-  }
-  return clocks;
-}
-
-/// Whose file it was before those of others came to it: that rank has no other. None: of no rank.
-std::optional<std::int64_t> owner_of(Place root) {
-  const std::vector<std::string> tasks = detail::names_in(root, "/tasks");
-  if (tasks.empty()) return std::nullopt;
-  return read_integer({open_group(root, "/tasks/" + tasks.front()).id(), root.file}, "rank");
-}
-
-/// What a killed run leaves: of ranks without a clock, steps that all of their threads have gone on from.
-/// Throws FileError when there is none.
-void drop_cut_steps(const std::string& file, const std::map<std::int64_t, RankClock>& clocks,
-                    trace::Trace& trace) {
+/// What a killed run of one rank leaves: steps that all threads have gone on from. Throws FileError when
+/// there is none.
+void drop_cut_steps(const std::string& file, trace::Trace& trace) {
   std::uint32_t whole = trace::largest_step;
   for (const trace::Lane& lane : trace.lanes) {
-    if (clocks.contains(lane.rank)) continue;
     std::uint32_t last = 0;
     for (const trace::Record& record : lane.records) last = std::max(last, record.step());
-    if (trace.tasks[static_cast<std::size_t>(lane.rank)].empty()) last = 0;
     whole = std::min(whole, last > 0 ? last - 1 : 0);
   }
   for (trace::Lane& lane : trace.lanes)
     std::erase_if(lane.records, [&](const trace::Record& record) { return record.step() > whole; });
   std::erase_if(trace.plans, [&](const trace::Plan& plan) { return plan.step > whole; });
-  if (trace.record_count() == 0)
-    throw FileError(file, fmt::format("is of a run of {} ranks that was stopped before a step of "
-                                      "--trace-steps was written by all threads: record it again",
-                                      trace.ranks));
+  if (trace.record_count() == 0 || trace.tasks.front().empty())
+    throw FileError(file,
+                    "is of a run that was stopped before a step of --trace-steps was written by all "
+                    "threads: record it again");
 }
 
 }  // namespace
@@ -443,41 +420,25 @@ trace::Trace read_trace(const fs::path& path) {
   const Hdf5Object file = open_trace(name);
   const Place root{file.id(), name};
   trace::Trace trace = read_head(root);
-  std::map<std::int64_t, RankClock> clocks = clocks_in(root);
-  // A killed run left what is not here as a whole in the files of the ranks.
-  std::map<std::int64_t, fs::path> elsewhere;
-  const std::optional<std::int64_t> owner = owner_of(root);
-  for (std::int32_t rank = 0; rank < trace.ranks && !trace.predicted; ++rank)
-    if (!clocks.contains(rank) && rank != owner)
-      elsewhere.emplace(rank, trace_file_of(path.parent_path(), rank));
-  add_blocks(
-      root, [&](std::int64_t rank) { return !elsewhere.contains(rank); }, trace);
-  for (const auto& [rank, beside] : elsewhere) {
-    const std::string part = beside.string();
-    if (!fs::exists(beside))
-      throw FileError(name, fmt::format("is of a run of {} ranks that was killed, and {} of rank {} is not "
-                                        "beside it: put it there, or record the run again",
-                                        trace.ranks, beside.filename().string(), rank));
-    const Hdf5Object other = open_trace(part);
-    const Place there{other.id(), part};
-    const trace::Trace head = read_head(there);
-    if (head.ranks != trace.ranks || head.threads != trace.threads || head.kinds != trace.kinds)
-      throw FileError(part, "is of another run than " + name);
-    add_blocks(
-        there, [rank = rank](std::int64_t r) { return r == rank; }, trace);
-    clocks.merge(clocks_in(there));
-  }
+  const std::vector<std::string> clocks = detail::names_in(root, "/clocks");
+  const bool cut = !trace.predicted && clocks.size() < static_cast<std::size_t>(trace.ranks);
+  if (cut && trace.ranks > 1)
+    throw FileError(name, fmt::format("is of a run on {} ranks that was killed before their traces were put "
+                                      "together: record it again",
+                                      trace.ranks));
+  add_blocks(root, trace);
   std::stable_sort(trace.plans.begin(), trace.plans.end(), [](const trace::Plan& a, const trace::Plan& b) {
     return a.rank != b.rank ? a.rank < b.rank : a.step < b.step;
   });
   if (trace.record_count() == 0)
     throw FileError(name,
                     "holds no tasks: the run ended before a step of --trace-steps was done, or was killed");
-  for (const auto& [rank, clock] : clocks)
+  for (const std::string& of_rank : clocks) {
+    const RankClock clock = read_clock(root, "/clocks/" + of_rank);
     for (std::int32_t thread = 0; thread < trace.threads; ++thread)
-      turn_clock(clock, lane_of(name, trace, rank, thread));
-  if (!trace.predicted && clocks.size() < static_cast<std::size_t>(trace.ranks))
-    drop_cut_steps(name, clocks, trace);
+      turn_clock(clock, lane_of(name, trace, clock.rank, thread));
+  }
+  if (cut) drop_cut_steps(name, trace);
   try {
     trace::sort_lanes(trace);
     trace::validate(trace);

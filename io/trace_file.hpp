@@ -59,10 +59,9 @@ class TraceWriter {
 void write_trace(const std::filesystem::path& path, const trace::Trace& trace);
 
 /// The whole trace, with all clocks turned to that of rank 0. Of a run that was killed the steps that are
-/// there of all threads: each writes when its buffer is full. What it lacks of other ranks stands in their
-/// files (trace_file_of) beside it; clocks that are not known count from where each rank began to record.
-/// Throws FileError when a file is not a trace, is damaged, is of another run, or lacks what it refers to, or
-/// when no step is whole.
+/// there of all threads: each writes when its buffer is full. Throws FileError when the file is not a trace,
+/// is damaged, or lacks what it refers to, when no step is whole, or when a run of several ranks was killed:
+/// their clocks were never compared.
 trace::Trace read_trace(const std::filesystem::path& path);
 
 }  // namespace talus::io

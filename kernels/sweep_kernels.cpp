@@ -9,8 +9,6 @@
 #include "kernels/detail/contact_view.hpp"
 #include "kernels/fetch_lines.hpp"
 
-extern "C" const char etext;  // the linker's: the end of all code
-
 namespace talus {
 
 namespace {
@@ -293,7 +291,7 @@ void SweepKernels::fetch_code(bool friction) const {
   const auto fetch = [](auto*... kernels) {
     constexpr std::size_t longest = 14 << 10;  // a sweep with friction (AVX-512) [byte]
     for (const auto* begin : {reinterpret_cast<const char*>(kernels)...})
-      fetch_lines(std::span(begin, std::min(longest, static_cast<std::size_t>(&etext - begin))));
+      fetch_lines(std::span(begin, longest));
   };
   if (const LaneKernels* const k = lanes_[friction ? 1 : 0])
     fetch(k->accumulate_grains, k->accumulate_wall, k->error_grains, k->error_wall, k->sweep_grains,

@@ -1,6 +1,7 @@
 #include "runtime/step/admm.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -67,35 +68,34 @@ class StepLink final : public PartLink {
   trace::Meetings& rounds_;
 };
 
-/// Kinetic energy of the velocities that impulses make [J]; of a body with infinite mass none.
-double energy_of(const BodyParts& parts, const PartField& velocity) {
-  return 0.5 * parts.total(1, [&](std::size_t p, std::span<double> row) {
-    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
-      if (!parts[p].counted(b)) continue;
-      const BodyUnknown& body = parts[p].bodies[b];
-      row[0] += body.mass * velocity[p][b].u.squaredNorm() + body.spin_mass * velocity[p][b].w.squaredNorm();
-    }
+/// Kinetic energy of the velocities that impulses make, twice [J].
+double energy_of(const BodyParts& parts) {
+  const PartField velocity = velocities_of(parts, impulses_of(parts));
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    const BodyProblem& problem = parts[p];
+    for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+      if (problem.counted(b)) row[0] += kinetic2(problem.bodies[b], velocity[p][b].u, velocity[p][b].w);
   })[0];
 }
 
-/// What contacts may leave of it, at most: what there is without them, and what driven walls and overlaps
-/// that part can give if all bodies follow. Gaps that close give nothing [J].
+/// The same as it is without contacts, and what driven walls and overlaps that part give if all bodies
+/// follow; speeds of overlaps do not add up here, as they do along a chain. Gaps that close give nothing [J].
 double energy_without(const BodyParts& parts) {
-  PartField free = parts.field();
-  double mass = 0, fastest = 0;
-  for (double value : parts.total(1, [&](std::size_t p, std::span<double> row) {
-         for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
-           free[p][b] = parts[p].bodies[b].free;
-           if (parts[p].counted(b)) row[0] += parts[p].bodies[b].mass;
-         }
-       }))
-    mass += value;
-  for (double value : parts.rows(1, [&](std::size_t p, std::span<double> row) {
-         for (const ContactEquation& c : parts[p].contacts)
-           row[0] = std::max({row[0], std::abs(c.drive), -c.offset.dot(c.normal)});
-       }))
-    fastest = std::max(fastest, value);
-  return energy_of(parts, free) + 0.5 * mass * fastest * fastest;
+  enum { energy, mass, fastest, width };
+  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
+    const BodyProblem& problem = parts[p];
+    for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+      if (!problem.counted(b)) continue;
+      row[energy] += kinetic2(problem.bodies[b], problem.bodies[b].free.u, problem.bodies[b].free.w);
+      row[mass] += problem.bodies[b].mass;
+    }
+    for (const ContactEquation& c : problem.contacts)
+      row[fastest] = std::max({row[fastest], std::abs(c.drive), -c.offset.dot(c.normal)});
+  });
+  std::array<double, width> all{};
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    all[k % width] = k % width == fastest ? std::max(all[fastest], rows[k]) : all[k % width] + rows[k];
+  return all[energy] + all[mass] * all[fastest] * all[fastest];
 }
 
 }  // namespace
@@ -185,8 +185,7 @@ BodyAdmmResult Admm::improve(double tolerance, int calls) {
   // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped.
   // The defect is near 1 where light bodies have yet to follow a heavy one. Comparisons are false for NaN.
   const bool better = result.converged || calls == 0;  // unfinished is better than sweeps, not than ADMM
-  if (better && result.momentum_defect <= 2 &&
-      energy_of(parts, velocities_of(parts, impulses_of(parts))) <= sound * without)
+  if (better && result.momentum_defect <= 2 && energy_of(parts) <= sound * without)
     for (const BodyProblem& problem : problems) scatter_impulses(problem, state_.contacts);
   return result;
 }

@@ -300,7 +300,7 @@ bool Iteration::balanced() {
     return result_.unbalance <= tolerance;
   }
   const bool last = result_.iterations >= settings_.max_iterations;
-  // Behind ADMM sweeps still mend much, and a look costs as much as hundreds of them.
+  // Behind ADMM sweeps still mend much, and a look costs as much as a hundred.
   constexpr int settling = 50;
   if (!last && result_.stiff_calls > 0 && result_.iterations - started_at() < settling) {
     result_.unbalance = std::numeric_limits<double>::infinity();

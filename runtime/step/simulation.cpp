@@ -184,14 +184,15 @@ struct Simulation::Implementation {
     for (const Wall& wall : state.walls)
       fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
     const double energy = motion.energy.translation + motion.energy.rotation;
-    // So fast part grains whose overlap is opened within the step; deep ones are no supply that anybody
-    // wants.
+    // So fast part two grains whose overlap is opened within the step, and the faster the more of them stand
+    // in a row; deep ones are no supply that anybody wants.
     constexpr double deep = 1e-2;  // of the smallest radius
     const double opened = setup.solver.overlap_correction *
                           std::min(graph.sums().contacts.penetration_max, deep * size.smallest) /
                           parameters.time_step;
     const double supplied =
-        motion.energy_free + wall_energy_free + size.total_mass * (fastest_wall2 + 0.5 * opened * opened);
+        motion.energy_free + wall_energy_free +
+        size.total_mass * (fastest_wall2 + 0.5 * opened * opened * static_cast<double>(size.bodies));
     if (energy > 100 * supplied && energy > 0)
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. "
@@ -396,7 +397,8 @@ double Simulation::stage_fraction() const {
   return std::min(1.0, impl_->done().fraction);
 }
 const char* Simulation::end_reached() const {
-  return impl_->done().by;
+  const auto [fraction, by] = impl_->done();
+  return fraction >= 1 ? by : "";
 }
 const Stage& Simulation::stage() const {
   return impl_->setup.stages[impl_->stage_index];

@@ -78,7 +78,7 @@ class Simulation {
   bool finished() const;
   /// Part of the current stage that is done, in [0, 1], by its nearest end condition.
   double stage_fraction() const;
-  /// That condition: "steps", "time", "strain" or "equilibrium"; "" at the beginning of a stage.
+  /// That condition, when the stage has ended: "steps", "time", "strain" or "equilibrium"; else "".
   const char* end_reached() const;
   const Stage& stage() const;
   std::size_t stage_index() const;

@@ -271,7 +271,7 @@ class Player {
       epoch.gate = recorded.check[e].exists();
       epoch.settles = recorded.settled[e] != 0;
       const auto awaited = static_cast<std::size_t>(recorded.awaited[e]);
-      if (alone) epoch.calls = awaited;
+      if (alone && trace_.ranks == 1) epoch.calls = awaited;
       do_alone(index, e, epoch);
       if (!reads_later(e)) do_together(index, e, epoch);
       epoch.exchange = exchanges(index, e);

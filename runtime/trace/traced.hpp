@@ -93,7 +93,7 @@ class Traced : public View<Program> {
   using View<Program>::program_;
   Recorder& recorder_;
   Recorder::Lane& lane_;
-  std::optional<std::size_t> at_hand_;  ///< subdomain whose data were read last
+  std::optional<std::size_t> at_hand_;  ///< subdomain whose data were fetched last
   std::int64_t last_end_ = -1;  ///< [ns] of a node with nothing between it and what comes next; else -1
 };
 

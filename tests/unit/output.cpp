@@ -55,9 +55,13 @@ TEST(OutputDirectory, ForceRemovesOurFilesAndNeverTheUsers) {
                                       "fields/forces_1000000.vtp",
                                       "fields.pvd",
                                       "run.json.part",
+                                      "fclib_000012.hdf5",
+                                      "fclib_000012.hdf5.4711.part",
                                       "triaxial.svg"};
-  const std::vector<std::string> users{"notes.txt",     "fields/mine.vtp",          "fields/grains_12.vtp",
-                                       "steps.csv.bak", "fields/grains_final1.vtp", "fields/steps.csv"};
+  const std::vector<std::string> users{
+      "notes.txt",          "fields/mine.vtp",          "fields/grains_12.vtp",
+      "steps.csv.bak",      "fields/grains_final1.vtp", "fields/steps.csv",
+      "fclib_000012.hdf5.1"};
   for (const auto& name : ours) touch(scratch / name);
   for (const auto& name : users) touch(scratch / name);
   fs::create_directories(scratch / "walls.csv");  // a directory of that name is not ours

@@ -426,6 +426,19 @@ TEST(Runaway, IsNotWhatOverlapsOfRoundingSizePartWith) {
   EXPECT_EQ(runaway_message(setup, row, 1), "no error");
 }
 
+/// Speeds with which overlaps open add up along a row: the last of 60 has 60 times that of the first.
+TEST(Runaway, IsNotARowThatOpensItsOverlaps) {
+  talus::Setup setup;
+  setup.walls = {box(1, 1, 1).front()};
+  Bodies row;
+  for (int k = 0; k < 60; ++k)
+    add_sphere(row, BodyId{k}, radius * Vec3(0.99 * (2 * k + 1), 0, 0), radius, density);
+  setup.stages = {stage("release", 1)};
+  setup.solver.overlap_correction = 0.1;
+  setup.solver.tolerance = 1e-5;
+  EXPECT_EQ(runaway_message(setup, row, 1), "no error");
+}
+
 /// Speeds that differ by their last bit cannot be made equal: no impulse is small enough.
 TEST(Simulation, RoundingIsNoErrorOfASolver) {
   talus::Setup setup;

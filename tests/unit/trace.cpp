@@ -193,42 +193,21 @@ TEST_F(CutTraceFile, OfAKilledRunHasTheStepsThatAllThreadsWereThrough) {
   EXPECT_NO_THROW(timeline.index(2));
 }
 
-/// Two ranks with a file each; of a killed run, so that nobody has put them together, and no clock is known.
-class CutTraceFiles : public TraceFile {
- protected:
-  CutTraceFiles() {
-    const Trace trace = test::two_subdomains(2);
-    for (const int rank : {0, 1}) {
-      io::TraceWriter writer(io::trace_file_of(folder_.path(), rank), 2, 1, false, trace.kinds);
-      writer.append(Block{rank, 0, {}, std::nullopt, trace.tasks[static_cast<std::size_t>(rank)]});
-      writer.append(Block{rank, 0, {}, trace.plans[static_cast<std::size_t>(rank)]});
-      std::vector<Record> records;
-      for (const std::uint32_t step : {1U, 2U})
-        for (Record record : trace.lanes[static_cast<std::size_t>(rank)].records) {
-          record.begin += 10000 * step;
-          record.step_and_kind = pack(step, record.kind());
-          records.push_back(record);
-        }
-      writer.append(Block{rank, 0, records, std::nullopt});
-    }
+// The ranks' own clocks cannot be compared any more.
+TEST_F(TraceFile, OfAKilledRunOfSeveralRanksIsRefused) {
+  const Trace trace = test::two_subdomains(2);
+  for (const int rank : {0, 1}) {
+    io::TraceWriter writer(io::trace_file_of(folder_.path(), rank), 2, 1, false, trace.kinds);
+    writer.append(Block{rank, 0, {}, std::nullopt, trace.tasks[static_cast<std::size_t>(rank)]});
+    writer.append(Block{rank, 0, {}, trace.plans[static_cast<std::size_t>(rank)]});
+    writer.append(Block{rank, 0, trace.lanes[static_cast<std::size_t>(rank)].records, std::nullopt});
   }
-  const fs::path other_ = io::trace_file_of(folder_.path(), 1);
-};
-
-TEST_F(CutTraceFiles, OfAKilledRunStandBesideEachOther) {
-  const Trace back = io::read_trace(path_);
-  EXPECT_EQ(steps_of(back), (std::vector<std::uint32_t>{1}));
-  EXPECT_FALSE(back.lanes[1].records.empty());
-  const Timeline timeline(back);
-  EXPECT_NO_THROW(timeline.index(1));
-  EXPECT_NO_THROW(io::read_trace(other_)) << "whichever is asked for";
+  EXPECT_NE(complaint().find("was killed"), std::string::npos) << complaint();
 }
 
-TEST_F(CutTraceFiles, AreRefusedAloneOrWithThoseOfAnotherRun) {
-  fs::remove(other_);
-  EXPECT_NE(complaint().find(other_.filename().string()), std::string::npos) << complaint();
-  io::TraceWriter(other_, 3, 1, false, test::two_subdomains(2).kinds);
-  EXPECT_NE(complaint().find("another run"), std::string::npos) << complaint();
+TEST_F(CutTraceFile, BeforeItsFirstBlockHoldsNothing) {
+  { io::TraceWriter(path_, 1, 2, false, test::two_subdomains(1).kinds); }
+  EXPECT_NE(complaint().find("holds no tasks"), std::string::npos) << complaint();
 }
 
 TEST_F(CutTraceFile, SaysThatAKilledRunCameToNothing) {

@@ -135,6 +135,19 @@ TEST_F(Ending, BySignalLeavesWholeFiles) {
   }
 }
 
+TEST_F(Ending, OnAFullDiskIsInRunJson) {
+  write(at("scene.toml"), pressed_box);
+  const Outcome outcome =
+      test::run(folder_.path(),
+                "run scene.toml --out results --threads 1 --set 'stage.press.end={steps=300}' --set "
+                "output.stage_frames=false --set output.fields=false --set output.pictures=false",
+                "trap '' XFSZ; ulimit -f 32;");
+  EXPECT_EQ(outcome.code, 1) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("too large"), std::string::npos) << outcome.messages;
+  EXPECT_EQ(summary(at("results")).at("status"), "failed") << outcome.messages;
+  EXPECT_TRUE(summary(at("results")).at("digest").is_null());
+}
+
 TEST_F(Ending, OfAPlanIsAListOfWhatIsLeftOut) {
   write(at("scene.toml"), pressed_box);
   const Outcome outcome = run("plan scene.toml");

@@ -293,7 +293,7 @@ TEST_F(StudyError, SaysWhenTheSceneEndsBeforeTheStep) {
   const Outcome late =
       run("study error scene.toml --out t --only step --at-step 12 --set "
           "'stage.press.end={equilibrium=1e9}'");
-  EXPECT_EQ(late.code, 2);
+  EXPECT_EQ(late.code, 1);
   EXPECT_NE(late.messages.find("--at-step"), std::string::npos) << late.messages;
 }
 
