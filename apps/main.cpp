@@ -166,8 +166,8 @@ int main(int argc, char** argv) {
   run_app
       ->add_flag("--trace-own-caches", run.trace_own_caches,
                  "of one rank, --threads 1: bring in a subdomain's data before its tasks, so that they take "
-                 "as long as on a core that "
-                 "has no other subdomain: for replay on as many cores as there are subdomains")
+                 "as long as on a core that has no other subdomain: for replay on as many cores as there "
+                 "are subdomains")
       ->needs(trace_flag);
   run_app->add_option("--replay-order", run.replay_order, "begin the loop's tasks in the order of this trace")
       ->type_name("FILE");
