@@ -93,9 +93,7 @@ Cut cut_sample(const PartitionOptions& options, const Bodies& bodies, const Cont
 /// `kinds` cuts boxes.
 void check_boxes(const DecompositionSettings& settings, std::int32_t subdomains,
                  std::span<const PartitionKind> kinds) {
-  const bool cut = std::ranges::any_of(
-      kinds, [](PartitionKind kind) { return kind != PartitionKind::rcb && kind != PartitionKind::metis; });
-  if (cut && settings.boxes[0] > 0 && settings.subdomains != subdomains)
+  if (std::ranges::any_of(kinds, cuts_boxes) && settings.boxes[0] > 0 && settings.subdomains != subdomains)
     throw std::invalid_argument(
         fmt::format("--subdomains {}, but the scene's decomposition.boxes are {}: change them "
                     "with --set 'decomposition.boxes=[X, Y, Z]'",

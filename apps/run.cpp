@@ -313,6 +313,7 @@ void fail(io::Summary& summary, const std::exception& error) {
   summary.status = "failed";
   summary.message = error.what();
   summary.exit_code = exit_failure;
+  summary.digest.reset();
 }
 
 /// Takes the run to its end, or to what breaks it off; the summary says which. Throws what the beginning and
@@ -375,29 +376,27 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
   io::Summary summary;
   summary.bodies = sample.size();
   std::optional<io::Recorder> recorder;
-  try {
+  // The first fault is what to mend.
+  const auto attempt = [&](const auto& work) {
+    try {
+      work();
+    } catch (const std::exception& error) {
+      if (summary.status != "failed") fail(summary, error);
+    }
+  };
+  attempt([&] {
     // Of one rank it writes on the background lane, from where a trace must hear of no call.
     recorder.emplace(directory, files, scene.setup, provenance,
                      ranks.ranks() > 1 ? ranks : graph::one_rank());
     run_steps(options, scene, std::move(sample), provenance.threads, directory, recordings, *recorder, ranks,
               summary);
-  } catch (const std::exception& error) {
-    fail(summary, error);
-  }
+    recorder->close();
+  });
   summary.wall_s = watch.seconds();
-  try {
-    if (recorder)
-      recorder->finish(summary);
-    else if (ranks.rank() == 0)
-      io::write_run_json(directory + "/run.json", provenance, summary);
-  } catch (const std::exception& error) {
-    if (summary.status != "failed") fail(summary, error);  // the first fault is what to mend
-    summary.digest.reset();
-    try {
-      if (ranks.rank() == 0) io::write_run_json(directory + "/run.json", provenance, summary);
-    } catch (const std::exception&) {  // there is room for nothing
-    }
-  }
+  if (recorder) summary.frames = recorder->frames();
+  attempt([&] {
+    if (ranks.rank() == 0) io::write_run_json(directory + "/run.json", provenance, summary);
+  });
   return summary;
 }
 
@@ -541,8 +540,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (options.trace_own_caches && (ranks.ranks() > 1 || threads_of(options) > 1))
       throw std::invalid_argument(
           "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
-          "with "
-          "--threads 1");
+          "with --threads 1");
     if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
     scene = io::load_scene(options.scene, options.overrides);
     if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());

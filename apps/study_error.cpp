@@ -135,7 +135,7 @@ int study_scene(const StudyErrorOptions& options) {
   const bool no_step = options.only != "run" && problem.truth.empty();
   if (no_step || (options.only != "step" && runs.rows.empty())) {
     fmt::print(stderr, "talus: error: {} of {} could not be solved in any of these ways\n",
-               no_step ? "the step" : "a run", scene.name);
+               no_step ? "the step" : "whole runs", scene.name);
     return exit_failure;
   }
   const bool sound =

@@ -102,15 +102,13 @@ void Recorder::record_frame(Frame&& frame) {
   ++frames_;
 }
 
-void Recorder::finish(Summary summary) {
+void Recorder::close() {
   if (ranks_.rank() != 0) return;
   steps_->close();
   wall_rows_->close();
   if (triaxial_) triaxial_->close();
   if (errors_) errors_->close();
   draw_triaxial_picture();
-  summary.frames = frames_;
-  write_run_json(directory_ / "run.json", provenance_, summary);
 }
 
 void Recorder::write_fields(const Frame& frame) {

@@ -6,7 +6,8 @@
 ///     recorder.record_step(report, wall_reports, triaxial);  // every step: a line in each table
 ///     recorder.flush();                                      // now and then: the lines go to the system
 ///     recorder.record_frame(std::move(frame));               // now and then: results.h5, fields, pictures
-///     recorder.finish(summary);                              // run.json says what came of it
+///     recorder.close();
+///     write_run_json(...);                                   // says what came of it, however it ended
 ///
 /// Not locked: calls come one after the other, from one thread at a time (the service lane of the graph runs
 /// beside the steps and is such a thread). HDF5 allows no other thread in it meanwhile.
@@ -80,9 +81,9 @@ class Recorder {
   /// its arrays do not fit together.
   void record_frame(Frame&& frame);
 
-  /// Completes the tables and pictures and writes run.json with the summary (`frames` is filled in here).
-  /// Call once; also when the run failed, so that run.json does not stay at "running".
-  void finish(Summary summary);
+  /// Completes the tables and pictures. Throws FileError; what is destroyed unclosed writes what it can.
+  void close();
+  std::size_t frames() const { return frames_; }  ///< recorded
 
  private:
   void write_fields(const Frame& frame);

@@ -32,6 +32,11 @@ inline constexpr std::array<PartitionKind, 5> partition_kinds{PartitionKind::aut
                                                               PartitionKind::fitted, PartitionKind::rcb,
                                                               PartitionKind::metis};
 
+/// Whether it makes boxes per axis, whose numbers may be given.
+constexpr bool cuts_boxes(PartitionKind kind) {
+  return kind != PartitionKind::rcb && kind != PartitionKind::metis;
+}
+
 /// "auto", "boxes", "fitted", "rcb", "metis". `partition_kind` throws std::invalid_argument naming the five.
 std::string_view name_of(PartitionKind kind);
 PartitionKind partition_kind(std::string_view name);

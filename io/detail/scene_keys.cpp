@@ -355,9 +355,7 @@ Section<SolverSettings> solver_keys() {
 Section<DecompositionSettings> decomposition_keys() {
   using D = DecompositionSettings;
   const auto schwarz = [](const D& d) { return d.coupling == Coupling::schwarz; };
-  const auto cuts_boxes = [](const D& d) {
-    return d.partitioner != PartitionKind::rcb && d.partitioner != PartitionKind::metis;
-  };
+  const auto in_boxes = [](const D& d) { return cuts_boxes(d.partitioner); };
   return {
       "[decomposition]",
       "How the sample is cut into subdomains, and how these act on one another.",
@@ -374,7 +372,7 @@ Section<DecompositionSettings> decomposition_keys() {
           key<D>("boxes", "", countable,
                  "Boxes along x, y and z; their product is `subdomains`, which need not be given.", &D::boxes)
               .blank_when_zero()
-              .only("partitioner = auto, boxes or fitted", cuts_boxes),
+              .only("partitioner = auto, boxes or fitted", in_boxes),
           choice<D>(
               "coupling", {"nscdd", "alternating", "schwarz"},
               "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "

@@ -186,8 +186,7 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
         ranks.ranks(), subdomains, ranks.ranks()));
   const auto& [x, y, z] = settings.boxes;
   const double boxes = count_boxes(settings);
-  if (settings.partitioner != PartitionKind::rcb && settings.partitioner != PartitionKind::metis &&
-      boxes > 0 && boxes != subdomains)
+  if (cuts_boxes(settings.partitioner) && boxes > 0 && boxes != subdomains)
     throw std::invalid_argument(
         fmt::format("decomposition.boxes: {} x {} x {} boxes are not {} subdomains", x, y, z, subdomains));
   decomposition.partition.subdomains = subdomains;

@@ -298,15 +298,23 @@ TEST_F(Command, SaysWhatAStepOptionAskedForAndDidNotGet) {
   EXPECT_EQ(summary(at("results")).at("exit_code"), 1);
 }
 
-TEST_F(Command, SaysWhyAStageEndedAndHowFarFromRest) {
-  std::string text = column;
-  text.replace(text.find("steps = 4"), 9, "steps = 2, equilibrium = 1e-12");
-  write(at("scene.toml"), text + "\n[[stage]]\nname = \"long\"\nend = { steps = 50, equilibrium = 0.1 }\n");
-  const Outcome outcome = run("run scene.toml --out results");
-  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+/// A run of the scene with other ends of its stage 'rest' and of a stage 'then' behind it.
+class StageEnds : public Command {
+ protected:
+  Outcome of(std::string scene, const std::string& first, const std::string& then) {
+    scene.replace(scene.find("steps = 4"), 9, first);
+    write(at("scene.toml"), scene + "\n[[stage]]\nname = \"then\"\nend = { " + then + " }\n");
+    const Outcome outcome = run("run scene.toml --out results");
+    EXPECT_EQ(outcome.code, 0) << outcome.messages;
+    return outcome;
+  }
+};
+
+TEST_F(StageEnds, AreSaidWithHowFarFromRest) {
+  const Outcome outcome = of(column, "steps = 2, equilibrium = 1e-12", "steps = 50, equilibrium = 0.1");
   EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: steps reached, unrest ")) << outcome.messages;
   EXPECT_TRUE(says(outcome, "(asked 1e-12)")) << outcome.messages;
-  EXPECT_TRUE(says(outcome, "stage 'long' ended after 1 step: equilibrium reached")) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "stage 'then' ended after 1 step: equilibrium reached")) << outcome.messages;
   const Table steps = read_table(at("results/steps.csv"));
   double worst = 0;
   for (std::size_t k = 0; k < steps.rows.size(); ++k)
@@ -316,16 +324,13 @@ TEST_F(Command, SaysWhyAStageEndedAndHowFarFromRest) {
 }
 
 // A floor and a lid make no box, but they bound the sample: the lid rises by a sixtieth of its height a step.
-TEST_F(Command, SaysWhenAStrainOrATimeEndedAStage) {
-  std::string text = column;
-  text.insert(text.find("[[stage]]"),
-              "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"velocity\"\nvelocity = [0, 0, 1]\n\n");
-  text.replace(text.find("steps = 4"), 9, "strain = 0.02, time = 1");
-  write(at("scene.toml"), text + "\n[[stage]]\nname = \"wait\"\nend = { steps = 50, time = 2e-3 }\n");
-  const Outcome outcome = run("run scene.toml --out results");
-  ASSERT_EQ(outcome.code, 0) << outcome.messages;
+TEST_F(StageEnds, MayBeAStrainOrATime) {
+  std::string lidded = column;
+  lidded.insert(lidded.find("[[stage]]"),
+                "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"velocity\"\nvelocity = [0, 0, 1]\n\n");
+  const Outcome outcome = of(lidded, "strain = 0.02, time = 1", "steps = 50, time = 2e-3");
   EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: strain reached\n")) << outcome.messages;
-  EXPECT_TRUE(says(outcome, "stage 'wait' ended after 2 steps: time reached\n")) << outcome.messages;
+  EXPECT_TRUE(says(outcome, "stage 'then' ended after 2 steps: time reached\n")) << outcome.messages;
 }
 
 TEST_F(Command, WarnsOfGrainsThatBeginDeepInsideOthersOrWalls) {
