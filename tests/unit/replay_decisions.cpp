@@ -143,15 +143,6 @@ TEST(ReplayDecisions, SumsThatAreReadLaterHideNoOthers) {
   }
 }
 
-// Sums that several ranks read a sweep later are known at once on one, and stay so when that is played again.
-TEST(ReplayDecisions, SumsReadLaterAreNoCallsOfOneRank) {
-  Machine machine = bare(2, 1);
-  machine.late_check = true;
-  const Trace two = replay(Timeline(test::two_subdomains(1)), machine, true).trace;
-  const Trace one = replay(Timeline(two), bare(1, 1), true).trace;
-  EXPECT_EQ(std::ranges::count(one.lanes[0].records, kind_collective, &Record::kind), 0);
-}
-
 TEST(ReplayDecisions, ACheckThatSettlesIsReadAtOnce) {
   Trace trace = test::two_subdomains(1);
   std::vector<Record>& records = trace.lanes[0].records;
