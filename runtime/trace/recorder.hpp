@@ -12,12 +12,11 @@
 ///     recorder.finish();                            // hands over what is left
 ///
 /// Each thread writes to a buffer of its own; a full one goes to the sink, on the thread that filled it, and
-/// the sink may block: memory stays bounded, nothing is lost. Cost (bench_trace): 20-30 ns a task, of which
-/// a look at the clock is most; a second one where it had to wait.
+/// the sink may block: memory stays bounded, nothing is lost. Cost (bench_trace, bench_tracing): a look at
+/// the clock a task, a second one where it had to wait.
 
 #include <omp.h>
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -26,7 +25,7 @@
 #include <optional>
 #include <vector>
 
-#include "runtime/graph/clock.hpp"
+#include "runtime/trace/ticks.hpp"
 #include "runtime/trace/trace.hpp"
 
 namespace talus::trace {
@@ -44,7 +43,7 @@ struct RecorderOptions {
   int rank = 0;
   int threads = 1;
   std::uint32_t first_step = 1, last_step = largest_step;  ///< the steps that are recorded
-  std::size_t block = 1U << 15;                            ///< records in a buffer
+  std::size_t block = 1U << 16;                            ///< records in a buffer
   /// Before a thread begins with the nodes of another subdomain it reads what they will, outside of all
   /// records: times are those of a core whose caches hold one subdomain.
   bool own_caches = false;
@@ -103,9 +102,7 @@ class Recorder {
   /// False outside the steps that are wanted: then nothing is to be recorded.
   bool active() const { return active_; }
   /// [ns] since the recorder was made.
-  std::int64_t now() const {
-    return std::chrono::duration_cast<std::chrono::nanoseconds>(graph::Clock::now() - start_).count();
-  }
+  std::int64_t now() const { return ticks_.now(); }
   Lane& lane(int thread) { return lanes_[static_cast<std::size_t>(thread)]; }
   /// Of the calling thread of the team.
   Lane& lane() { return lane(omp_get_thread_num()); }
@@ -121,7 +118,7 @@ class Recorder {
   void report_failure();
 
   const RecorderOptions options_;
-  const graph::Clock::time_point start_ = graph::Clock::now();
+  const Ticks ticks_;
   std::vector<Task> tasks_;
   std::vector<Lane> lanes_;
   std::optional<Plan> pending_;  ///< made while nothing was recorded

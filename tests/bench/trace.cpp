@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   if (argc < 2) {
     const std::filesystem::path file = std::filesystem::temp_directory_path() / "talus_bench_trace.h5";
     fmt::print("record {:.1f} ns\n", 1e9 * record_time());
-    for (std::size_t records : {std::size_t{1}, std::size_t{1} << 15, std::size_t{1} << 17})
+    for (std::size_t records : {std::size_t{1}, std::size_t{1} << 16, std::size_t{1} << 17})
       fmt::print("block of {} records {:.3f} ms\n", records, 1e3 * block_time(file, records));
     std::filesystem::remove(file);
     fmt::print("for the replay of a trace: bench_trace FILE [RANKS THREADS]\n");

@@ -1,4 +1,5 @@
-/// What recording a trace costs a run: two simulations of one scene, one of which records, step by step in turn.
+/// What recording a trace costs a run: two simulations of one scene, one of which records, step by step in
+/// turn.
 ///
 ///   bench_tracing SCENE.toml [THREADS, default 1] [STEPS, default 40] [SUBDOMAINS, default 8] [FRICTION]
 ///

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -265,6 +266,29 @@ TEST(Analysis, TheCriticalPathOfOneThreadIsAllOfIt) {
   const Trace trace = test::two_subdomains(1);
   const Summary sum = analyse(trace);
   EXPECT_NEAR(sum.path_time, sum.makespan, 1e-9 * sum.makespan);
+}
+
+/// Both clocks are read from the inside or from the outside, so that a pause between two readings cannot make
+/// the test fail.
+TEST(Recording, ItsClockKeepsTheTimeOfTheSystem) {
+  const auto system = [] { return graph::Clock::now().time_since_epoch(); };
+  const auto ns = [](auto d) { return std::chrono::duration<double, std::nano>(d).count(); };
+  const Ticks ticks;
+  const auto outer = system();
+  const std::int64_t first = ticks.now();
+  const auto inner = system();
+  EXPECT_GE(first, 0);
+  std::int64_t last = first;
+  while (system() - inner < std::chrono::milliseconds(30)) {
+    const std::int64_t now = ticks.now();
+    ASSERT_GE(now, last);
+    last = now;
+  }
+  const auto inner_end = system();
+  const std::int64_t end = ticks.now();
+  const auto outer_end = system();
+  EXPECT_GE(static_cast<double>(end - first), 0.999 * ns(inner_end - inner));
+  EXPECT_LE(static_cast<double>(end - first), 1.001 * ns(outer_end - outer));
 }
 
 TEST(Recording, LosesNothingWhenBuffersAreFull) {
