@@ -1,13 +1,10 @@
 #include "kernels/body_system.hpp"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 
 namespace talus {
 
 namespace {
-
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
@@ -19,23 +16,25 @@ Eigen::Matrix3d cross_matrix(const Vec3& n) {
   return N;
 }
 
-/// rho H_i H_i^T of one contact.
-Eigen::Matrix<double, 6, 6> own_block(const Vec3& m, double rho, bool slick) {
-  Eigen::Matrix<double, 3, 6> transposed;
-  transposed << Eigen::Matrix3d::Identity(), cross_matrix(m);
-  if (slick) transposed = (m * (m.transpose() * transposed)).eval();
-  return rho * transposed.transpose() * transposed;
-}
-
-void restrict_all(const BodyProblem& problem, std::span<Twist> f) {
-  for (std::size_t b = 0; b < f.size(); ++b) restrict_to_freedoms(problem.bodies[b], f[b]);
+/// rho H_i H_i^T of one contact, m = +-n.
+void add_own_block(const Vec3& m, double rho, bool slick, Eigen::Matrix<double, 6, 6>& block) {
+  if (slick) {
+    block.topLeftCorner<3, 3>() += rho * m * m.transpose();
+    return;
+  }
+  const Eigen::Matrix3d N = cross_matrix(m);
+  block.diagonal().head<3>().array() += rho;
+  block.topRightCorner<3, 3>() += rho * N;
+  block.bottomLeftCorner<3, 3>() -= rho * N;
+  block.bottomRightCorner<3, 3>() -= rho * N * N;
 }
 
 }  // namespace
 
 /// f less the row's part from the other body.
-inline void BodySystem::take(const Edge& edge, const Twist& x, Twist& f) {
-  Vec3 v = edge.m.cross(x.w) - x.u;
+inline void BodySystem::take(const Edge& edge, std::span<const Twist> x, Twist& f) {
+  const Twist& other = x[at(edge.other)];
+  Vec3 v = edge.m.cross(other.w) - other.u;
   if (edge.slick) v = edge.m.dot(v) * edge.m;
   v *= -edge.rho;
   f.u += v;
@@ -43,53 +42,52 @@ inline void BodySystem::take(const Edge& edge, const Twist& x, Twist& f) {
 }
 
 void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
-  for (const Tie& tie : ties_) {
-    const Edge back{-tie.edge.m, tie.edge.rho, tie.first, tie.edge.slick};
-    take(tie.edge, x[at(tie.edge.other)], f[at(tie.first)]);
-    take(back, x[at(tie.first)], f[at(tie.edge.other)]);
+  for (const std::uint32_t tie : ties_) {
+    const Link& link = links_[tie];
+    take({link.n, link.rho, link.second, link.slick}, x, f[at(link.first)]);
+    take({-link.n, link.rho, link.first, link.slick}, x, f[at(link.second)]);
   }
 }
 
 BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     : problem_(problem),
-      rho_(rho.begin(), rho.end()),
       begin_(problem.bodies.size() + 1, 0),
       middle_(problem.bodies.size(), 0),
       diagonal_(problem.bodies.size(), Matrix6::Zero()),
       inverse_(problem.bodies.size(), Matrix6::Zero()) {
-  const auto& contacts = problem.contacts;
+  inertia_.reserve(problem.bodies.size());
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+    const BodyUnknown& body = problem.bodies[b];
+    inertia_.push_back(problem.counted(b) ? Inertia{body.mass, body.spin_mass} : Inertia{0, 0});
+  }
   const auto row = [&](std::int32_t body) { return at(body) < problem.grains && problem.counted(at(body)); };
-  const auto edge = [&](const ContactEquation& c) { return c.second >= 0 && row(c.first) && row(c.second); };
-  std::size_t ties = 0;
-  for (const ContactEquation& c : contacts) {
-    if (!edge(c)) {
-      ties += c.second >= 0 ? 1 : 0;
-      continue;
+  links_.reserve(problem.contacts.size());
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const auto link = static_cast<std::uint32_t>(k);
+    links_.push_back({c.normal, rho[k], c.first, c.second, c.mu == 0});
+    add_own_block(c.normal, rho[k], c.mu == 0, diagonal_[at(c.first)]);
+    if (c.second < 0) continue;
+    add_own_block(-c.normal, rho[k], c.mu == 0, diagonal_[at(c.second)]);
+    if (row(c.first) && row(c.second)) {
+      ++begin_[at(c.first) + 1];
+      ++begin_[at(c.second) + 1];
+    } else {
+      ties_.push_back(link);
     }
-    ++begin_[at(c.first) + 1];
-    ++begin_[at(c.second) + 1];
   }
   for (std::size_t b = 0; b < size(); ++b) begin_[b + 1] += begin_[b];
   edges_.resize(begin_.back());
-  ties_.reserve(ties);
   // Lower unknowns first, in order of contact: two passes.
   std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
   for (const bool lower : {true, false}) {
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-      const ContactEquation& c = contacts[k];
-      if (!edge(c)) continue;
-      const std::int32_t slick = c.mu == 0 ? 1 : 0;
-      if ((c.second < c.first) == lower) edges_[next[at(c.first)]++] = {c.normal, rho[k], c.second, slick};
-      if ((c.first < c.second) == lower) edges_[next[at(c.second)]++] = {-c.normal, rho[k], c.first, slick};
+    for (const Link& link : links_) {
+      const auto [n, weight, first, second, slick] = link;
+      if (second < 0 || !row(first) || !row(second)) continue;
+      if ((second < first) == lower) edges_[next[at(first)]++] = {n, weight, second, slick};
+      if ((first < second) == lower) edges_[next[at(second)]++] = {-n, weight, first, slick};
     }
     if (lower) middle_ = next;
-  }
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const ContactEquation& c = contacts[k];
-    if (c.second >= 0 && !edge(c))
-      ties_.push_back({{c.normal, rho[k], c.second, c.mu == 0 ? 1 : 0}, c.first});
-    diagonal_[at(c.first)] += own_block(c.normal, rho[k], c.mu == 0);
-    if (c.second >= 0) diagonal_[at(c.second)] += own_block(-c.normal, rho[k], c.mu == 0);
   }
 }
 
@@ -119,29 +117,42 @@ void BodySystem::close() {
 
 namespace {
 
-inline Vector6 vector_of(const Twist& t) {
-  Vector6 v;
-  v << t.u, t.w;
-  return v;
-}
-
 inline Twist times(const Eigen::Matrix<double, 6, 6>& A, const Twist& x) {
-  const Vector6 v = A * vector_of(x);
+  Eigen::Matrix<double, 6, 1> v;
+  v << x.u, x.w;
+  v = A * v;
   return {v.head<3>(), v.tail<3>()};
 }
 
 }  // namespace
 
+void BodySystem::restrict_all(std::span<Twist> f) const {
+  for (std::size_t b = 0; b < problem_.grains; ++b)
+    if (inertia_[b].spin_mass == 0) restrict_to_freedoms(problem_.bodies[b], f[b]);
+  for (std::size_t b = problem_.grains; b < size(); ++b) restrict_to_freedoms(problem_.bodies[b], f[b]);
+}
+
 void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
-  for (std::size_t b = 0; b < size(); ++b) {
-    const BodyUnknown& body = problem_.bodies[b];
-    y[b] = problem_.counted(b) ? Twist{body.mass * x[b].u, body.spin_mass * x[b].w} : Twist{};
+  for (std::size_t b = 0; b < size(); ++b) y[b] = {inertia_[b].mass * x[b].u, inertia_[b].spin_mass * x[b].w};
+  for (const Link& link : links_) {
+    const Twist& a = x[at(link.first)];
+    Vec3 v = link.n.cross(a.w) + a.u;
+    if (link.second >= 0) {
+      const Twist& b = x[at(link.second)];
+      v = a.u - b.u + link.n.cross(a.w + b.w);
+    }
+    if (link.slick) v = link.n.dot(v) * link.n;
+    v *= link.rho;
+    const Vec3 turn = link.n.cross(v);
+    Twist& f = y[at(link.first)];
+    f.u += v;
+    f.w -= turn;
+    if (link.second < 0) continue;
+    Twist& g = y[at(link.second)];
+    g.u -= v;
+    g.w -= turn;
   }
-  for (std::size_t k = 0; k < rho_.size(); ++k) {
-    const ContactEquation& c = problem_.contacts[k];
-    add_force(c, rho_[k] * constrained(c, relative_velocity(c, x)), y);
-  }
-  restrict_all(problem_, y);
+  restrict_all(y);
 }
 
 void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) const {
@@ -149,7 +160,7 @@ void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) co
     x[b] = Twist{};
     if (!problem_.counted(b)) continue;
     Twist sum = f[b];
-    for (std::size_t e = begin_[b]; e < middle_[b]; ++e) take(edges_[e], x[at(edges_[e].other)], sum);
+    for (std::size_t e = begin_[b]; e < middle_[b]; ++e) take(edges_[e], x, sum);
     x[b] = times(inverse_[b], sum);
   }
 }
@@ -158,11 +169,11 @@ void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) co
 void BodySystem::rest_of_forward(std::span<const Twist> x, std::span<Twist> rest) const {
   for (std::size_t b = 0; b < size(); ++b) {
     Twist sum;
-    for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x[at(edges_[e].other)], sum);
+    for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x, sum);
     rest[b] = sum;
   }
   take_ties(x, rest);
-  restrict_all(problem_, rest);
+  restrict_all(rest);
 }
 
 void BodySystem::take_ties(std::span<const Twist> f, std::span<const Twist> x, std::span<Twist> rest) const {
@@ -177,7 +188,7 @@ void BodySystem::smooth_backward(std::span<const Twist> rest, std::span<Twist> x
       continue;
     }
     Twist sum = rest[b];
-    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x[at(edges_[e].other)], sum);
+    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x, sum);
     x[b] = times(inverse_[b], sum);
   }
 }
