@@ -5,13 +5,16 @@
 
 namespace talus {
 
-/// Asks for all cache lines of `values`, without waiting for them.
+/// Brings all cache lines of `values` in by reading them. Prefetches would do without the atomic loads, which
+/// only keep a compiler from leaving the reads out, but processors drop many of so many: with 96 subdomains
+/// of 2083 grains sweeps then took 545 - 630 ms where they take 390 - 480.
 template <class Value>
 void fetch_lines(std::span<const Value> values) {
   constexpr std::size_t line = 64;
   const auto bytes = std::as_bytes(values);
-  for (std::size_t k = 0; k < bytes.size(); k += line) __builtin_prefetch(&bytes[k]);
-  if (!bytes.empty()) __builtin_prefetch(&bytes.back());  // where the first does not begin a line
+  const auto read = [&](std::size_t k) { __atomic_load_n(&bytes[k], __ATOMIC_RELAXED); };
+  for (std::size_t k = 0; k < bytes.size(); k += line) read(k);
+  if (!bytes.empty()) read(bytes.size() - 1);  // where the first does not begin a line
 }
 
 }  // namespace talus
