@@ -91,7 +91,7 @@ void Iteration::begin_course(SolverMethod method, double most) {
 bool Iteration::single_will_do(SolverMethod method) const {
   constexpr double least_error = 1e-5, many = 1000;
   const bool schwarz = decomposition_.coupling == Coupling::schwarz && state_.decomposition.several();
-  return method == SolverMethod::momentum && settings_.precision == Precision::mixed && !schwarz && alike_ &&
+  return method == SolverMethod::momentum && settings_.precision == Precision::mixed && !schwarz && alike() &&
          candidates_everywhere_ >= many && (history_.empty() || history_.back().error_rms > least_error);
 }
 
@@ -254,21 +254,30 @@ void Iteration::choose_course() {
   }
 }
 
-std::vector<bool> Iteration::carrying_walls() const {
-  std::vector<bool> carrying;
-  for (const Vec3& impulse : impulses_.back()) carrying.push_back(impulse != Vec3::Zero());
+std::vector<double> Iteration::carrying_walls() const {
+  std::vector<double> carrying;
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    carrying.push_back(impulses_.back()[w] != Vec3::Zero() ? state_.walls[w].inv_mass() : -1);
   return carrying;
+}
+
+/// Whether what an earlier step has found out of how stiff it is goes for this one too: far from stiff, as
+/// many contacts, at the same walls. A grain that has got new neighbours since may have landed, which changes
+/// the answer by no more than the ratio of masses; when all have moved on ten times, nothing is known.
+bool Iteration::stiffness_holds() const {
+  constexpr int most_renewals = 10;
+  const std::int64_t then = stiffness_.contacts, now = result_.contacts;
+  const double could = stiffness_.sweeps_needed * (stiffness_.renewals > 0 ? spread_ : 1);
+  return alike() && stiffness_.renewals <= most_renewals && stiffness_.sweeps_needed >= 0 &&
+         2 * could < stiff_for(now) && 20 * std::abs(now - then) <= then &&
+         stiffness_.carrying == carrying_walls();
 }
 
 /// About the sweeps of the present course that this step's problem takes. Collective.
 double Iteration::sweeps_needed() {
   if (sweeps_needed_ < 0) {
     // To find out takes as long as ten sweeps, and two messages for each layer of grains.
-    const std::int64_t then = stiffness_.contacts, now = result_.contacts;
-    const bool holds = alike_ && stiffness_.sweeps_needed >= 0 &&
-                       2 * stiffness_.sweeps_needed < stiff_for(now) && 20 * std::abs(now - then) <= then &&
-                       stiffness_.carrying == carrying_walls();
-    if (!holds) stiffness_ = {admm_.sweeps_needed(), now, carrying_walls()};
+    if (!stiffness_holds()) stiffness_ = {admm_.sweeps_needed(), result_.contacts, carrying_walls(), 0};
     sweeps_needed_ = stiffness_.sweeps_needed;
   }
   // A column of 100: 37,912 sweeps, with momentum 1/19 = (1 - beta)/(1 + beta) of it, with NNCG 964.

@@ -44,7 +44,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
 
 void Iteration::plan() {
   gluing_.plan(parameters_.turns);
-  stiffness_ = {};
+  ++stiffness_.renewals;
   struct Row {
     double least, most, candidates;
   };
@@ -60,8 +60,7 @@ void Iteration::plan() {
     all.most = std::max(all.most, row.most);
     all.candidates += row.candidates;
   }
-  constexpr double much_heavier = 1000;
-  alike_ = all.most < much_heavier * all.least;
+  spread_ = all.most / all.least;
   candidates_everywhere_ = all.candidates;
   state_.single.contacts.unit = all.most > 0 ? unit_of_mass(all.most) : 1;
   busy_.assign(decomposition_.balance == BalanceBy::time ? state_.chunks.size() : 0, 0.0);

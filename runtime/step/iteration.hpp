@@ -160,7 +160,10 @@ class Iteration {
   double impulse_scale() const;
   double drift() const;
   double sweeps_needed();
-  std::vector<bool> carrying_walls() const;
+  std::vector<double> carrying_walls() const;
+  bool stiffness_holds() const;
+  /// No grain is much heavier than another: none would change everything where it lands.
+  bool alike() const { return spread_ < 1000; }
   bool looks_at_all();
   bool balanced();
   bool ask_admm();
@@ -198,10 +201,11 @@ class Iteration {
   struct Stiffness {
     double sweeps_needed = -1;
     std::int64_t contacts = 0;
-    std::vector<bool> carrying;  ///< per wall
+    std::vector<double> carrying;  ///< per wall 1/M [1/kg] where it carries, else -1
+    int renewals = 0;              ///< of the candidates since
   };
   Stiffness stiffness_;
-  bool alike_ = false;  ///< no grain is much heavier than another, whose landing would change the answer
+  double spread_ = 1;                 ///< the heaviest grain over the lightest
   double candidates_everywhere_ = 0;  ///< of all ranks
   /// The last look at the error of all velocities.
   struct Look {

@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
   graph::Executor plain({.threads = threads}), traced({.threads = threads, .trace = &feed.recorder()});
   feed.start(traced);
   const auto deal = [&] { return deal_out(sample, scene.setup.decomposition, ranks); };
-  Simulation without(scene.setup, deal(), plain), with(scene.setup, deal(), traced);
+  Simulation without(scene.setup, deal(), plain), with(scene.setup, deal(), traced, ranks);
 
   std::vector<double> ratio;
   for (int k = 0; k < steps && !without.finished(); ++k) {
