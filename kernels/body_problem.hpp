@@ -126,8 +126,10 @@ void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
 /// V = V_free + M^-1 H r, one entry per unknown, summed in order of contact.
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse);
 
-/// v - offset: the relative velocity at a contact before drives and bias.
-inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
+/// v - offset: the relative velocity at a contact before drives and bias. `c` is a ContactEquation, or has
+/// its normal, first and second.
+template <class Contact>
+Vec3 relative_velocity(const Contact& c, std::span<const Twist> V) {
   const Twist& a = V[static_cast<std::size_t>(c.first)];
   if (c.second < 0) return a.u + c.normal.cross(a.w);
   const Twist& b = V[static_cast<std::size_t>(c.second)];
@@ -152,7 +154,8 @@ inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
 }
 
 /// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_freedoms`.
-inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
+template <class Contact>
+void add_force(const Contact& c, const Vec3& r, std::span<Twist> F) {
   Twist& a = F[static_cast<std::size_t>(c.first)];
   const Vec3 turn = c.normal.cross(r);
   a.u += r;

@@ -44,8 +44,8 @@ inline void BodySystem::take(const Edge& edge, std::span<const Twist> x, Twist& 
 void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
   for (const std::uint32_t tie : ties_) {
     const Link& link = links_[tie];
-    take({link.n, link.rho, link.second, link.slick}, x, f[at(link.first)]);
-    take({-link.n, link.rho, link.first, link.slick}, x, f[at(link.second)]);
+    take({link.normal, link.rho, link.second, link.slick}, x, f[at(link.first)]);
+    take({-link.normal, link.rho, link.first, link.slick}, x, f[at(link.second)]);
   }
 }
 
@@ -135,22 +135,9 @@ void BodySystem::restrict_all(std::span<Twist> f) const {
 void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
   for (std::size_t b = 0; b < size(); ++b) y[b] = {inertia_[b].mass * x[b].u, inertia_[b].spin_mass * x[b].w};
   for (const Link& link : links_) {
-    const Twist& a = x[at(link.first)];
-    Vec3 v = link.n.cross(a.w) + a.u;
-    if (link.second >= 0) {
-      const Twist& b = x[at(link.second)];
-      v = a.u - b.u + link.n.cross(a.w + b.w);
-    }
-    if (link.slick) v = link.n.dot(v) * link.n;
-    v *= link.rho;
-    const Vec3 turn = link.n.cross(v);
-    Twist& f = y[at(link.first)];
-    f.u += v;
-    f.w -= turn;
-    if (link.second < 0) continue;
-    Twist& g = y[at(link.second)];
-    g.u -= v;
-    g.w -= turn;
+    Vec3 v = relative_velocity(link, x);
+    if (link.slick) v = link.normal.dot(v) * link.normal;
+    add_force(link, link.rho * v, y);
   }
   restrict_all(y);
 }

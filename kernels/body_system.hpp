@@ -58,7 +58,7 @@ class BodySystem {
  private:
   /// What the product needs of a contact.
   struct Link {
-    Vec3 n;
+    Vec3 normal;
     double rho;
     std::int32_t first, second;  ///< unknowns; second -1 at a driven wall
     bool slick;                  ///< normal part only

@@ -15,7 +15,7 @@ namespace talus::trace {
 /// the last sums of the one before are out: with tasks of 2 us that was half of what a trace costs.
 class Ticks {
  public:
-  /// A millisecond, for the length of a tick: known to some 1e-4 of it.
+  /// Takes a millisecond to measure a tick, to 1e-4 of it or better.
   Ticks();
   /// [ns]
   std::int64_t now() const {
