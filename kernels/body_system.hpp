@@ -19,7 +19,7 @@ namespace talus {
 /// contacts of a body, and T the ties, D - T = M + sum rho |H_i^T x_i - H_j^T x_j|^2 > 0.
 /// A product goes over the links, 48 bytes and 2 twists read and written each, about 70 flop. Passes go over
 /// the rows, in a stream of 48 bytes and a gathered twist each: indices of links instead, a third of the
-/// bytes, took 1.8 times as long. 310 bytes a body, 144 a contact.
+/// bytes, took 1.8 times as long. 320 bytes a body, 144 a contact.
 ///
 /// With m = +-n pointing to the body of the row, seen from there the relative velocity is
 /// v = (u_i - u_j) + m x (w_i + w_j), and the row gains rho (v, -m x v). Where a contact has no friction only
@@ -68,7 +68,7 @@ class BodySystem {
     Vec3 m;
     double rho;
     std::int32_t other;  ///< unknown
-    std::int32_t slick;  ///< 1: normal part only
+    bool slick;          ///< normal part only
   };
   struct Inertia {
     double mass, spin_mass;  ///< [kg]; 0 where the body counts elsewhere

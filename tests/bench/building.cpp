@@ -18,7 +18,7 @@
 #include "kernels/sweep_kernels.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
-#include "tests/bench/cpu_time.hpp"
+#include "tests/bench/clocks.hpp"
 
 namespace {
 

@@ -16,7 +16,7 @@
 #include "kernels/narrow_phase.hpp"
 #include "kernels/single_precision.hpp"
 #include "runtime/step/decomposition.hpp"
-#include "tests/bench/cpu_time.hpp"
+#include "tests/bench/clocks.hpp"
 #include "tests/bench/packing.hpp"
 
 namespace {

@@ -23,7 +23,7 @@
 #include "kernels/sample.hpp"
 #include "kernels/sweep.hpp"
 #include "runtime/step/simulation.hpp"
-#include "tests/bench/cpu_time.hpp"
+#include "tests/bench/clocks.hpp"
 #include "tests/bench/packing.hpp"
 #include "tests/unit/dense_sample.hpp"
 

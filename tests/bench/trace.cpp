@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -13,14 +12,12 @@
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/analysis.hpp"
 #include "runtime/trace/replay.hpp"
+#include "tests/bench/clocks.hpp"
 
 namespace {
 
 using namespace talus;
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+using bench::wall_now;
 
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
@@ -35,14 +32,14 @@ double record_time() {
     trace::Recorder recorder({.sink = [](trace::Block&&) {}});
     recorder.begin_step(1);
     constexpr int count = 1 << 17;
-    const double start = now();
+    const double start = wall_now();
     std::int64_t begin = recorder.now();
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::int64_t end = recorder.now();
       recorder.lane(0).add(begin, end, i, 0, trace::kind_check);
       begin = end;
     }
-    times.push_back((now() - start) / count);
+    times.push_back((wall_now() - start) / count);
   }
   return median(times);
 }
@@ -53,9 +50,9 @@ double block_time(const std::filesystem::path& path, std::size_t records) {
   const trace::Block block{0, 0, std::vector<trace::Record>(records), std::nullopt};
   std::vector<double> times;
   for (int repeat = 0; repeat < 31; ++repeat) {
-    const double start = now();
+    const double start = wall_now();
     writer.append(block);
-    times.push_back(now() - start);
+    times.push_back(wall_now() - start);
   }
   return median(times);
 }
@@ -72,25 +69,26 @@ int main(int argc, char** argv) {
     fmt::print("for the replay of a trace: bench_trace FILE [RANKS THREADS]\n");
     return 0;
   }
-  double start = now();
+  double start = wall_now();
   const trace::Trace trace = io::read_trace(argv[1]);
   fmt::print(
-      "read {:.2f} s, {} records, {:.1f} bytes a record in the file\n", now() - start, trace.record_count(),
+      "read {:.2f} s, {} records, {:.1f} bytes a record in the file\n", wall_now() - start,
+      trace.record_count(),
       static_cast<double>(std::filesystem::file_size(argv[1])) / static_cast<double>(trace.record_count()));
   trace::Machine machine = trace::recorded_machine(trace);
   if (argc > 3) {
     machine.ranks = std::atoi(argv[2]);
     machine.threads = std::atoi(argv[3]);
   }
-  start = now();
+  start = wall_now();
   const trace::Timeline timeline(trace);
   const trace::Replay replay = trace::replay(timeline, machine, true);
-  const double took = now() - start;
+  const double took = wall_now() - start;
   fmt::print("replay {:.2f} s, {} tasks, {:.2f} us a task, {:.0f} MB held\n", took, replay.tasks,
              1e6 * took / static_cast<double>(replay.tasks),
              1e-6 * static_cast<double>(memory_used(trace) + memory_used(replay.trace)));
-  start = now();
+  start = wall_now();
   trace::analyse(replay.trace);
-  fmt::print("analysis {:.2f} s\n", now() - start);
+  fmt::print("analysis {:.2f} s\n", wall_now() - start);
   return 0;
 }

@@ -17,19 +17,12 @@
 #include "apps/sample_builder.hpp"
 #include "apps/trace_feed.hpp"
 #include "io/scene.hpp"
-#include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
-
-namespace {
+#include "tests/bench/clocks.hpp"
 
 using namespace talus;
-
-double now() {
-  return std::chrono::duration<double>(graph::Clock::now().time_since_epoch()).count();
-}
-
-}  // namespace
+using bench::wall_now;
 
 int main(int argc, char** argv) {
   if (argc < 2) {
@@ -57,10 +50,10 @@ int main(int argc, char** argv) {
   for (int k = 0; k < steps && !without.finished(); ++k) {
     double took[2];
     for (const bool records : {k % 2 == 0, k % 2 != 0}) {
-      const double start = now();
+      const double start = wall_now();
       (records ? with : without).step();
       traced.drain();
-      took[records] = now() - start;
+      took[records] = wall_now() - start;
     }
     ratio.push_back(took[1] / took[0]);
     for (Simulation* simulation : {&with, &without}) simulation->begin_next_stage();
