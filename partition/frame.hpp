@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "kernels/types.hpp"
+#include "kernels/bodies/types.hpp"
 #include "partition/reduction.hpp"
 
 namespace talus {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/types.hpp"
+#include "kernels/bodies/types.hpp"
 #include "partition/partitioner.hpp"
 
 namespace talus {

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "kernels/broad_phase.hpp"
-#include "kernels/chunks.hpp"
-#include "kernels/types.hpp"
+#include "kernels/bodies/types.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/chunks.hpp"
 
 namespace talus {
 

@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "kernels/broad_phase.hpp"
-#include "kernels/chunks.hpp"
-#include "kernels/types.hpp"
+#include "kernels/bodies/types.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/chunks.hpp"
 #include "partition/frame.hpp"
 #include "partition/reduction.hpp"
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "kernels/balance.hpp"
+#include "kernels/global/balance.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 

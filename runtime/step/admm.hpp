@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "kernels/admm.hpp"
+#include "kernels/global/admm.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/crew.hpp"
 #include "runtime/step/gluing.hpp"
@@ -12,10 +12,10 @@
 
 namespace talus {
 
-/// ADMM (kernels/admm.hpp) on the contacts of a step. Each subdomain is a part of the problem: it holds its
-/// own contacts and bodies, masses whole; what copies have to agree on goes the way of the gluing, and sums
-/// are gathered as rows by subdomain. So the bits depend on the partition alone, and a rank holds no more
-/// than its own subdomains and the coarse level.
+/// ADMM (kernels/global/admm.hpp) on the contacts of a step. Each subdomain is a part of the problem: it
+/// holds its own contacts and bodies, masses whole; what copies have to agree on goes the way of the gluing,
+/// and sums are gathered as rows by subdomain. So the bits depend on the partition alone, and a rank holds no
+/// more than its own subdomains and the coarse level.
 ///
 ///   between two epochs, at a gate of all ranks:  admm.improve();  next epoch: V afresh from r, then sweeps
 ///   threads that wait at the gate:               admm.assist()
@@ -33,7 +33,7 @@ class Admm {
   double sweeps_needed() const;
 
   /// Relative error of the velocities that the impulses of the last check give, with several ranks those that
-  /// the candidates keep (kernels/balance.hpp); what is below `enough` is not told apart.
+  /// the candidates keep (kernels/global/balance.hpp); what is below `enough` is not told apart.
   double velocity_error(double enough) const;
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kernels/balance.hpp"
+#include "kernels/global/balance.hpp"
 #include "runtime/step/iteration.hpp"
 
 namespace talus {

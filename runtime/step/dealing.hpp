@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
-#include "kernels/bodies.hpp"
-#include "kernels/sample.hpp"
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/samples/sample.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/setup.hpp"
 

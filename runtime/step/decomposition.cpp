@@ -8,8 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "kernels/morton.hpp"
-#include "kernels/release.hpp"
+#include "kernels/bodies/morton.hpp"
+#include "kernels/bodies/release.hpp"
 #include "partition/halo.hpp"
 
 namespace talus {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "kernels/bodies.hpp"
-#include "kernels/chunks.hpp"
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/detection/chunks.hpp"
 #include "partition/interface.hpp"
 #include "partition/partitioner.hpp"
 #include "runtime/graph/communicator.hpp"

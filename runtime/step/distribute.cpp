@@ -6,7 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "kernels/release.hpp"
+#include "kernels/bodies/release.hpp"
 #include "partition/turns.hpp"
 #include "runtime/step/decomposition.hpp"
 

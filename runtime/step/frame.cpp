@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
-#include "kernels/permute.hpp"
-#include "kernels/release.hpp"
+#include "kernels/bodies/permute.hpp"
+#include "kernels/bodies/release.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/types.hpp"
+#include "kernels/bodies/types.hpp"
 #include "runtime/graph/communicator.hpp"
 
 namespace talus {

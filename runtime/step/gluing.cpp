@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "kernels/fetch_lines.hpp"
+#include "kernels/sweeps/fetch_lines.hpp"
 #include "runtime/step/detail/gluing_parts.hpp"
 
 namespace talus {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "kernels/body_problem.hpp"
+#include "kernels/global/body_problem.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/tree.hpp"
 #include "runtime/step/state.hpp"

@@ -8,9 +8,9 @@
 #include <limits>
 #include <utility>
 
-#include "kernels/balance.hpp"
-#include "kernels/fetch_lines.hpp"
-#include "kernels/larger.hpp"
+#include "kernels/bodies/larger.hpp"
+#include "kernels/global/balance.hpp"
+#include "kernels/sweeps/fetch_lines.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/trace/recorder.hpp"
 

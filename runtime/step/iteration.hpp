@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "kernels/momentum.hpp"
-#include "kernels/sweep_kernels.hpp"
+#include "kernels/sweeps/momentum.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
 #include "runtime/step/admm.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "kernels/sweep_kernels.hpp"
-#include "kernels/types.hpp"
-#include "kernels/walls.hpp"
+#include "kernels/bodies/types.hpp"
+#include "kernels/bodies/walls.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
 
 namespace talus {
@@ -63,7 +63,7 @@ enum class SolverMethod {
   nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
   momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
   nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
-  admm,       ///< one call of ADMM in body space (kernels/admm.hpp), then sweeps as they are
+  admm,       ///< one call of ADMM in body space (kernels/global/admm.hpp), then sweeps as they are
 };
 
 /// Numbers of the sweeps. All that is judged and written is in double precision.
@@ -77,7 +77,7 @@ struct SolverSettings {
   SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
-      5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/balance.hpp)
+      5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
       10;  ///< sweeps between the first checks; later ones stand where the tolerance is expected, >= 1

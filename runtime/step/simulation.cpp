@@ -7,7 +7,7 @@
 #include <limits>
 #include <unordered_map>
 
-#include "kernels/larger.hpp"
+#include "kernels/bodies/larger.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 

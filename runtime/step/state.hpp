@@ -3,14 +3,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/bodies.hpp"
-#include "kernels/chunks.hpp"
-#include "kernels/contacts.hpp"
-#include "kernels/measures.hpp"
-#include "kernels/motion.hpp"
-#include "kernels/single_precision.hpp"
-#include "kernels/sweep.hpp"
-#include "kernels/walls.hpp"
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/motion.hpp"
+#include "kernels/bodies/walls.hpp"
+#include "kernels/detection/chunks.hpp"
+#include "kernels/detection/contacts.hpp"
+#include "kernels/detection/measures.hpp"
+#include "kernels/sweeps/single_precision.hpp"
+#include "kernels/sweeps/sweep.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/setup.hpp"
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/narrow_phase.hpp"
-#include "kernels/release.hpp"
+#include "kernels/bodies/release.hpp"
+#include "kernels/detection/narrow_phase.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/leavers.hpp"
+#include "kernels/detection/leavers.hpp"
 #include "runtime/graph/epoch_loop.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/graph/graph.hpp"

@@ -13,9 +13,9 @@
 #include <cstdlib>
 #include <vector>
 
-#include "apps/sample_builder.hpp"
-#include "io/scene.hpp"
-#include "kernels/sweep_kernels.hpp"
+#include "apps/shared/sample_builder.hpp"
+#include "io/scene/scene.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/clocks.hpp"

@@ -18,8 +18,8 @@
 #include <string>
 #include <vector>
 
-#include "io/results.hpp"
-#include "io/scene.hpp"
+#include "io/results/results.hpp"
+#include "io/scene/scene.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/packed_scene.hpp"
 

@@ -11,7 +11,7 @@
 #include <numeric>
 #include <vector>
 
-#include "kernels/sample.hpp"
+#include "kernels/samples/sample.hpp"
 
 namespace {
 

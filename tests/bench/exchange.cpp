@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/sample_builder.hpp"
-#include "io/scene.hpp"
+#include "apps/shared/sample_builder.hpp"
+#include "io/scene/scene.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 

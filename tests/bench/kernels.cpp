@@ -12,9 +12,9 @@
 #include <functional>
 #include <numeric>
 
-#include "kernels/broad_phase.hpp"
-#include "kernels/narrow_phase.hpp"
-#include "kernels/single_precision.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/narrow_phase.hpp"
+#include "kernels/sweeps/single_precision.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "tests/bench/clocks.hpp"
 #include "tests/bench/packing.hpp"

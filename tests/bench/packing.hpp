@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "kernels/bodies.hpp"
+#include "kernels/bodies/bodies.hpp"
 
 namespace talus::bench {
 

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "io/results.hpp"
-#include "kernels/broad_phase.hpp"
-#include "kernels/sample.hpp"
+#include "io/results/results.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/samples/sample.hpp"
 #include "partition/interface.hpp"
 #include "partition/load_table.hpp"
 #include "partition/partitioner.hpp"

@@ -19,9 +19,9 @@
 #include <functional>
 #include <numeric>
 
-#include "kernels/admm.hpp"
-#include "kernels/sample.hpp"
-#include "kernels/sweep.hpp"
+#include "kernels/global/admm.hpp"
+#include "kernels/samples/sample.hpp"
+#include "kernels/sweeps/sweep.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/clocks.hpp"
 #include "tests/bench/packing.hpp"

@@ -18,8 +18,8 @@
 #include <functional>
 #include <stdexcept>
 
-#include "kernels/broad_phase.hpp"
-#include "kernels/narrow_phase.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/narrow_phase.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/packing.hpp"
 

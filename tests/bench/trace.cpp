@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/trace_file.hpp"
+#include "io/trace/trace_file.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/analysis.hpp"
 #include "runtime/trace/replay.hpp"

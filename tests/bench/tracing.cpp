@@ -14,9 +14,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "apps/sample_builder.hpp"
-#include "apps/trace_feed.hpp"
-#include "io/scene.hpp"
+#include "apps/shared/sample_builder.hpp"
+#include "apps/shared/trace_feed.hpp"
+#include "io/scene/scene.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/clocks.hpp"

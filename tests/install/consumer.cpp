@@ -1,7 +1,7 @@
 #include <cstdio>
 
-#include "kernels/bodies.hpp"
-#include "kernels/sample.hpp"
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/samples/sample.hpp"
 
 int main() {
   talus::Bodies bodies;

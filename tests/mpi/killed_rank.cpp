@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "io/results.hpp"
+#include "io/results/results.hpp"
 #include "tests/mpi/launcher.hpp"
 
 namespace talus::test {
@@ -107,7 +107,7 @@ TEST_P(KilledRank, EndsTheOthersAndLeavesNothingHalfWritten) {
   // Whatever has its final name can be read.
   const fs::path results = at("results");
   EXPECT_TRUE(nlohmann::json::parse(content(results / "run.json")).contains("summary"));
-  // Rank 0 may have died in the milliseconds that io/results.hpp excepts.
+  // Rank 0 may have died in the milliseconds that io/results/results.hpp excepts.
   if (GetParam() != 0) {
     const std::size_t frames = io::frame_count(results / "results.h5");
     EXPECT_GE(frames, 1U);

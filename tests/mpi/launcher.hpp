@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "tests/unit/output_helpers.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::test {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "io/results.hpp"
+#include "io/results/results.hpp"
 #include "runtime/graph/tree.hpp"
 #include "tests/mpi/launcher.hpp"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "io/trace_file.hpp"
+#include "io/trace/trace_file.hpp"
 #include "runtime/trace/analysis.hpp"
 #include "tests/mpi/launcher.hpp"
 

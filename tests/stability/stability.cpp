@@ -20,8 +20,8 @@
 #include <utility>
 #include <vector>
 
-#include "apps/exit_codes.hpp"
-#include "apps/stability_run.hpp"
+#include "apps/shared/exit_codes.hpp"
+#include "apps/study_stability/stability_run.hpp"
 
 namespace talus::stability {
 

@@ -9,14 +9,14 @@
 #include <utility>
 #include <vector>
 
-#include "kernels/bodies.hpp"
-#include "kernels/broad_phase.hpp"
-#include "kernels/chunks.hpp"
-#include "kernels/detail/scalar_sweeps.hpp"
-#include "kernels/narrow_phase.hpp"
-#include "kernels/sweep.hpp"
-#include "kernels/sweep_kernels.hpp"
-#include "kernels/walls.hpp"
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/walls.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/chunks.hpp"
+#include "kernels/detection/narrow_phase.hpp"
+#include "kernels/sweeps/detail/scalar_sweeps.hpp"
+#include "kernels/sweeps/sweep.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::test {

@@ -7,8 +7,8 @@
 #include <csignal>
 #include <string>
 
-#include "io/results.hpp"
-#include "tests/unit/output_helpers.hpp"
+#include "io/results/results.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus {

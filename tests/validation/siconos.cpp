@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "io/fclib.hpp"
-#include "kernels/delassus_solve.hpp"
+#include "io/fclib/fclib.hpp"
+#include "kernels/delassus/delassus_solve.hpp"
 
 namespace talus {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "tests/unit/output_helpers.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus {

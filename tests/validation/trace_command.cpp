@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "io/trace_file.hpp"
+#include "io/trace/trace_file.hpp"
 #include "runtime/trace/timeline.hpp"
 #include "tests/validation/command_helpers.hpp"
 

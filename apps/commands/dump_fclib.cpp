@@ -1,0 +1,56 @@
+#include "apps/commands/dump_fclib.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "io/fclib/fclib.hpp"
+#include "io/results/version.hpp"
+#include "kernels/delassus/step_problem.hpp"
+
+namespace talus {
+
+void check_dump(const Setup& setup, int ranks) {
+  if (ranks > 1)
+    throw std::invalid_argument(
+        fmt::format("--dump-fclib works on one rank, this run has {}; run the step on one", ranks));
+  if (setup.decomposition.subdomains > 1)
+    throw std::invalid_argument(
+        fmt::format("--dump-fclib works with one subdomain, this scene has {}; add --set "
+                    "decomposition.subdomains=1",
+                    setup.decomposition.subdomains));
+}
+
+std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory) {
+  const StepState& state = simulation.state();
+  const StepParameters& parameters = simulation.parameters();
+  const StepReport& report = simulation.report();
+  std::vector<Vec3> wall_free;
+  for (const WallState& wall : state.wall_states) wall_free.push_back(wall.free_velocity);
+  StepProblem step = assemble_step({.bodies = state.bodies.velocity,
+                                    .free = state.free,
+                                    .contacts = state.contacts,
+                                    .chunks = state.chunks,
+                                    .walls = state.walls,
+                                    .wall_free = wall_free,
+                                    .mu_grains = parameters.law.mu_grains,
+                                    .mu_walls = parameters.law.mu_walls});
+  io::FclibInfo info{
+      .title =
+          fmt::format("Talus {}, stage {}, step {}", io::version(), simulation.stage().name, report.step),
+      .description = fmt::format(
+          "{} grains, {} contacts, time {:.9g} s, time step {:.9g} s; /solution is what "
+          "the step found, error {:.2e}",
+          state.bodies.size(), step.problem.contacts(), report.time, parameters.time_step, report.error_rms),
+      .math_info =
+          "u = W r + q: velocities in m/s at the end of the step, impulses in N s, normal first; q has "
+          "the gap and restitution terms in it"};
+  return [problem = io::FclibProblem{.contact = std::move(step.problem), .global = {}}, r = std::move(step.r),
+          info = std::move(info), path = directory / fmt::format("fclib_{:06}.hdf5", report.step)] {
+    io::write_fclib(problem.contact, io::fclib_solution(problem, r), info, path);
+  };
+}
+
+}  // namespace talus

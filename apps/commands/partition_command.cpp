@@ -1,0 +1,197 @@
+#include "apps/commands/partition_command.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+
+#include "apps/shared/exit_codes.hpp"
+#include "apps/shared/sample_builder.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/pictures/picture.hpp"
+#include "io/results/vtk.hpp"
+#include "io/scene/scene.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "partition/interface.hpp"
+#include "partition/load_table.hpp"
+#include "partition/partitioner.hpp"
+#include "runtime/graph/executor.hpp"
+#include "runtime/step/decomposition.hpp"
+
+namespace talus {
+
+namespace {
+
+struct ContactPairs {
+  double alert = 0;  ///< [m] pairs with a smaller gap
+  std::vector<GrainPair> grains;
+  std::vector<WallPair> walls;
+};
+
+/// The contacts that a first step of the sample at rest would have: the step's candidates without the skin
+/// that spares it later broad phases, since Table 4 counts contacts.
+ContactPairs find_contacts(const io::Scene& scene, const Bodies& bodies, int threads) {
+  ContactPairs contacts;
+  const double smallest = *std::min_element(bodies.radius.begin(), bodies.radius.end());
+  contacts.alert = scene.setup.detection.alert > 0 ? scene.setup.detection.alert : 0.1 * smallest;
+  std::vector<double> reach;
+  for (double radius : bodies.radius) reach.push_back(radius + 0.5 * contacts.alert);
+
+  const CellGrid cells = build_cells(bodies.x, reach);
+  const auto lanes = static_cast<std::size_t>(threads);
+  std::vector<std::vector<GrainPair>> parts(lanes);
+  graph::Executor executor({.threads = threads});
+  graph::Graph detection;
+  for (std::size_t lane = 0; lane < lanes; ++lane)
+    detection.task("find pairs", {}, [&, lane] {
+      find_pairs(cells, cells.cells.size() * lane / lanes, cells.cells.size() * (lane + 1) / lanes,
+                 parts[lane]);
+    });
+  executor.run(detection);
+  contacts.grains = sort_pairs(parts, bodies.size());
+
+  for (std::size_t w = 0; w < scene.setup.walls.size(); ++w) {
+    const Wall& wall = scene.setup.walls[w];
+    for (std::size_t s = 0; s < bodies.size(); ++s)
+      if (wall.normal.dot(bodies.x[s] - wall.point) < bodies.radius[s] + contacts.alert)
+        contacts.walls.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
+  }
+  return contacts;
+}
+
+struct Cut {
+  PartitionKind kind;
+  Partition partition;
+  std::vector<std::int32_t> home;          ///< per grain: subdomain of its centre
+  std::vector<std::int32_t> multiplicity;  ///< per grain
+  LoadTable load;
+};
+
+Cut cut_sample(const PartitionOptions& options, const Bodies& bodies, const ContactPairs& contacts,
+               std::size_t walls, const PartitionPoints& points) {
+  Cut cut{options.kind, make_partition(points, options), {}, {}, {}};
+  const std::vector<std::int32_t> subdomain = subdomains_of(cut.partition, points.x);
+  cut.home = subdomains_of(cut.partition, bodies.x);
+  const BodySubdomains grains =
+      grain_subdomains(bodies.size(), contacts.grains, contacts.walls, subdomain, cut.home);
+  const BodySubdomains of_walls =
+      wall_subdomains(walls, contacts.walls, std::span(subdomain).subspan(contacts.grains.size()));
+  for (std::size_t body = 0; body < bodies.size(); ++body)
+    cut.multiplicity.push_back(grains.multiplicity(body));
+  std::vector<std::int32_t> all(static_cast<std::size_t>(options.subdomains));
+  std::iota(all.begin(), all.end(), 0);
+  cut.load =
+      measure_load(options.subdomains, build_interfaces(grains, bodies.id, all), grains, of_walls, subdomain);
+  return cut;
+}
+
+/// Throws std::invalid_argument when the scene's boxes are not the subdomains asked for, and one of the
+/// `kinds` cuts boxes.
+void check_boxes(const DecompositionSettings& settings, std::int32_t subdomains,
+                 std::span<const PartitionKind> kinds) {
+  if (std::ranges::any_of(kinds, cuts_boxes) && settings.boxes[0] > 0 && settings.subdomains != subdomains)
+    throw std::invalid_argument(
+        fmt::format("--subdomains {}, but the scene's decomposition.boxes are {}: change them "
+                    "with --set 'decomposition.boxes=[X, Y, Z]'",
+                    subdomains, settings.subdomains));
+}
+
+std::vector<PartitionKind> kinds_of(const std::vector<std::string>& names) {
+  std::vector<PartitionKind> kinds;
+  for (const std::string& name : names) {
+    const PartitionKind kind = partition_kind(name);
+    if (std::ranges::find(kinds, kind) == kinds.end()) kinds.push_back(kind);
+  }
+  if (kinds.empty()) kinds.assign(partition_kinds.begin() + 1, partition_kinds.end());
+  return kinds;
+}
+
+Frame frame_of(const Bodies& bodies) {
+  Frame frame;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    frame.id.push_back(static_cast<std::int64_t>(bodies.id[k]));
+    frame.u.push_back(Eigen::Map<const Vec3>(bodies.velocity[k].u));
+  }
+  frame.x = bodies.x;
+  frame.radius = bodies.radius;
+  return frame;
+}
+
+void print_table(const io::Scene& scene, std::size_t grains, const ContactPairs& contacts,
+                 std::span<const Cut> cuts) {
+  fmt::print("{}: {} grains, {} contacts ({} at walls; gap below {:.4g} m), {} subdomains\n\n", scene.name,
+             grains, contacts.grains.size() + contacts.walls.size(), contacts.walls.size(), contacts.alert,
+             cuts.front().partition.subdomains);
+  std::vector<std::string_view> names;
+  std::vector<LoadTable> tables;
+  for (const Cut& cut : cuts) {
+    names.push_back(name_of(cut.kind));
+    tables.push_back(cut.load);
+  }
+  fmt::print("{}", load_text(names, tables));
+  for (const Cut& cut : cuts)
+    if (cut.kind == PartitionKind::automatic) fmt::print("\nauto is {}\n", name_of(cut.partition.kind));
+}
+
+void write_files(const std::string& directory, const io::Scene& scene, const Bodies& bodies,
+                 std::span<const Cut> cuts) {
+  const Frame frame = frame_of(bodies);
+  for (const Cut& cut : cuts) {
+    const std::string stem = fmt::format("{}/partition_{}", directory, name_of(cut.kind));
+    const std::array<io::GrainField, 2> fields{{{"subdomain", cut.home}, {"multiplicity", cut.multiplicity}}};
+    io::write_whole(stem + ".vtp", io::grains_vtp(frame, fields));
+    const io::PartitionPicture picture{
+        .title = fmt::format("{}, partitioner \u201c{}\u201d", scene.name, name_of(cut.kind)),
+        .subdomains = cut.partition.subdomains};
+    io::write_whole(stem + ".svg", io::draw_partition(frame, cut.home, cut.multiplicity, picture));
+  }
+}
+
+}  // namespace
+
+int partition_command(const PartitionCommandOptions& options) {
+  io::Scene scene;
+  Bodies bodies;
+  std::vector<PartitionKind> kinds;
+  std::string directory = options.out;
+  std::optional<io::DirectoryLock> lock;
+  try {
+    kinds = kinds_of(options.partitioners);
+    scene = io::load_scene(options.scene, options.overrides);
+    const Sample sample = build_sample(scene);
+    io::place_walls(scene, sample);
+    append(sample, bodies);
+    if (directory.empty()) directory = "out/partition-" + scene.name;
+    check_boxes(scene.setup.decomposition, options.subdomains, kinds);
+    lock.emplace(io::prepare_output_directory(directory, options.force, io::is_partition_name));
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
+  try {
+    const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
+    const ContactPairs contacts = find_contacts(scene, bodies, threads);
+    const PartitionPoints points = candidate_points(bodies.x, contacts.grains, contacts.walls);
+    if (points.x.empty())
+      fmt::print(stderr, "talus: warning: no grain touches another: there are no contacts to share out\n");
+    std::vector<Cut> cuts;
+    PartitionOptions cutting = partition_options(scene.setup.decomposition, options.subdomains);
+    for (const PartitionKind kind : kinds) {
+      cutting.kind = kind;
+      cuts.push_back(cut_sample(cutting, bodies, contacts, scene.setup.walls.size(), points));
+    }
+    print_table(scene, bodies.size(), contacts, cuts);
+    write_files(directory, scene, bodies, cuts);
+    fmt::print(stderr, "talus: .vtp and .svg files in {}\n", directory);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "talus: error: {}\n", error.what());
+    return exit_failure;
+  }
+  return exit_done;
+}
+
+}  // namespace talus

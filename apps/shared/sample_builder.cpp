@@ -1,0 +1,111 @@
+#include "apps/shared/sample_builder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "io/files/csv.hpp"
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/samples/sample.hpp"
+
+namespace talus {
+
+namespace {
+
+std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<double>& radii) {
+  const double spacing = sample.spacing * 2 * *std::max_element(radii.begin(), radii.end());
+  Lattice sites;
+  sites.spacing = spacing;
+  sites.length_x = sample.cells[0] > 0 ? static_cast<double>(sample.cells[0]) * spacing : sample.base[0];
+  sites.length_y = sample.cells[1] > 0 ? static_cast<double>(sample.cells[1]) * spacing : sample.base[1];
+  return lattice(radii, sites);
+}
+
+Sample make_sample(const io::Scene& scene) {
+  const io::SampleSpec& spec = scene.sample;
+  if (spec.kind == io::SampleSpec::Kind::bodies)
+    return io::read_bodies(spec.file, scene.density, scene.setup.rotation);
+
+  Sample sample;
+  sample.density = scene.density;
+  sample.turns = scene.setup.rotation;
+  sample.radius = draw_radii(spec.radii, static_cast<std::size_t>(spec.grains()), scene.setup.seed);
+  sample.x = spec.kind == io::SampleSpec::Kind::lattice ? lattice_sites(spec, sample.radius)
+                                                        : deposit(sample.radius, spec.base[0], spec.base[1]);
+  return sample;
+}
+
+/// What Simulation would refuse (validate of Bodies), while the file that says it is at hand.
+void check(const io::Scene& scene, const Sample& sample) {
+  const std::string& file =
+      scene.sample.kind == io::SampleSpec::Kind::bodies ? scene.sample.file : scene.source_file;
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const auto refuse = [&](const std::string& what) {
+      throw io::SceneError(file, 0, "",
+                           fmt::format("body {}: {}", static_cast<std::int64_t>(sample.id_of(k)), what));
+    };
+    const double m = mass(sample, k), mobility = 2.5 / m;
+    if (!(mobility > 0) || !std::isfinite(mobility))
+      refuse(fmt::format(
+          "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg; mass and 1/mass must be "
+          "positive and finite",
+          sample.radius[k], sample.density, m));
+    if (!sample.velocity.empty() &&
+        !std::ranges::all_of(sample.velocity[k], [](double v) { return std::isfinite(v); }))
+      refuse("radius times angular velocity is not finite");
+  }
+}
+
+struct Overlaps {
+  std::size_t count = 0;
+  double worst = 0.1;  ///< depth over the smaller radius; less is none
+  std::string between;
+
+  void add(double depth, double radius, const auto& describe) {
+    if (depth <= 0.1 * radius) return;
+    ++count;
+    if (depth <= worst * radius) return;
+    worst = depth / radius;
+    between = describe();
+  }
+};
+
+}  // namespace
+
+Sample build_sample(const io::Scene& scene) {
+  Sample sample = make_sample(scene);
+  check(scene, sample);
+  return sample;
+}
+
+std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
+  Overlaps overlaps;
+  const auto id = [&](std::size_t k) { return static_cast<std::int64_t>(sample.id_of(k)); };
+  // Samples that are made have none between grains.
+  if (scene.sample.kind == io::SampleSpec::Kind::bodies) {
+    const CellGrid grid = build_cells(sample.x, sample.radius);
+    std::vector<GrainPair> pairs;
+    find_pairs(grid, 0, grid.cells.size(), pairs);
+    for (const GrainPair& pair : pairs) {
+      const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
+      overlaps.add(sample.radius[a] + sample.radius[b] - (sample.x[a] - sample.x[b]).norm(),
+                   std::min(sample.radius[a], sample.radius[b]),
+                   [&] { return fmt::format("grains {} and {}", id(a), id(b)); });
+    }
+  }
+  for (const Wall& wall : scene.setup.walls)
+    for (std::size_t k = 0; k < sample.size(); ++k)
+      overlaps.add(sample.radius[k] - wall.normal.dot(sample.x[k] - wall.point), sample.radius[k],
+                   [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
+  if (overlaps.count == 0) return "";
+  return fmt::format(
+      "{} overlap{} of more than 10 % of the smaller radius, the deepest of {:.0f} % between {}; {}",
+      overlaps.count, overlaps.count == 1 ? "" : "s", 100 * overlaps.worst, overlaps.between,
+      scene.setup.solver.overlap_correction > 0
+          ? "solver.overlap_correction parts them, and gives them the speed that this takes"
+          : "they stay as they are: set solver.overlap_correction to 0.1, or begin from another sample");
+}
+
+}  // namespace talus

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+#include "io/scene/scene.hpp"
+#include "kernels/samples/sample.hpp"
+
+namespace talus {
+
+/// The grains that a scene asks for, at rest unless its file gives velocities; ids 0..n-1, or those of the
+/// file. Throws io::SceneError when the file is missing or damaged, or when a grain has no mass or speed that
+/// is finite, std::invalid_argument when grains do not fit their base.
+Sample build_sample(const io::Scene& scene);
+
+/// How many grains overlap others or walls (placed, io::place_walls) by more than a tenth of the smaller
+/// radius, the worst of them, and what to do; "" when none does.
+std::string describe_overlaps(const io::Scene& scene, const Sample& sample);
+
+}  // namespace talus

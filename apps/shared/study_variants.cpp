@@ -1,0 +1,61 @@
+#include "apps/shared/study_variants.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "apps/shared/sample_builder.hpp"
+
+namespace talus {
+
+StudySample study_sample(const std::string& path, const std::vector<std::string>& overrides,
+                         std::uint64_t seed) {
+  std::vector<std::string> all = overrides;
+  all.push_back(fmt::format("seed={}", seed));
+  StudySample sample{io::load_scene(path, all), {}};
+  const Sample grains = build_sample(sample.scene);
+  io::place_walls(sample.scene, grains);
+  append(grains, sample.bodies);
+  return sample;
+}
+
+SolverSettings at_tolerance(SolverSettings solver, double tolerance) {
+  solver.balance_tolerance *= std::min(1.0, tolerance / solver.tolerance);
+  solver.tolerance = tolerance;
+  return solver;
+}
+
+double most_steps(std::span<const Stage> stages) {
+  double sum = 0;
+  for (const Stage& stage : stages) {
+    double steps = std::numeric_limits<double>::infinity();
+    if (stage.end.steps) steps = static_cast<double>(*stage.end.steps);
+    if (stage.end.time) steps = std::min(steps, steps_in(*stage.end.time, stage.time_step));
+    sum += steps;
+  }
+  return sum;
+}
+
+std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> all) {
+  std::string label = variant.method;
+  const auto add = [&](const char* what, auto member) {
+    const auto own = variant.*member;
+    if (std::ranges::all_of(all, [&](const StudyVariant& other) { return other.*member == own; })) return;
+    label += what == std::string_view("seed") ? fmt::format(", seed {}", own)
+                                              : fmt::format(", {} {}{}", own, what, own == 1 ? "" : "s");
+  };
+  add("subdomain", &StudyVariant::subdomains);
+  add("thread", &StudyVariant::threads);
+  add("seed", &StudyVariant::seed);
+  return label;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::ranges::sort(values);
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+}  // namespace talus

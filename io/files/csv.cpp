@@ -1,0 +1,150 @@
+#include "io/files/csv.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <string_view>
+#include <unordered_map>
+
+#include "io/files/detail/csv_cell.hpp"
+#include "io/files/output_directory.hpp"
+
+#include "io/scene/scene_error.hpp"
+
+namespace talus::io {
+
+namespace {
+
+constexpr std::array<std::string_view, 11> columns = {"id", "x",  "y",  "z",  "radius", "vx",
+                                                      "vy", "vz", "wx", "wy", "wz"};
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
+    text.remove_suffix(1);
+  return text;
+}
+
+/// Fields of a line, at most one more than there are columns: enough to see that there are too many.
+std::size_t split(std::string_view line, std::array<std::string_view, columns.size() + 1>& fields) {
+  std::size_t count = 0;
+  while (count < fields.size()) {
+    const std::size_t comma = line.find(',');
+    fields[count++] = trimmed(line.substr(0, comma));
+    if (comma == std::string_view::npos) break;
+    line.remove_prefix(comma + 1);
+  }
+  return count;
+}
+
+/// A line of the file being read, with what an error needs to say where it is.
+struct Place {
+  const std::string& file;
+  int line;
+  [[noreturn]] void fail(std::string_view column, const std::string& message) const {
+    throw SceneError(file, line, std::string(column), message);
+  }
+};
+
+template <class Number>
+Number number(std::string_view field, std::string_view column, const Place& place) {
+  Number value{};
+  const char* const first = field.data() + (field.starts_with('+') ? 1 : 0);  // from_chars takes no plus sign
+  const char* const last = field.data() + field.size();
+  const auto [end, error] = std::from_chars(first, last, value);
+  if (error == std::errc::result_out_of_range && end == last)
+    place.fail(column, fmt::format("{} is out of the range of numbers", field));
+  if (error != std::errc{} || end != last)
+    place.fail(column,
+               fmt::format("'{}' is not {}", field, std::is_integral_v<Number> ? "an integer" : "a number"));
+  if constexpr (std::is_floating_point_v<Number>)
+    if (!std::isfinite(value)) place.fail(column, fmt::format("must be finite, got {}", field));
+  return value;
+}
+
+/// Number of columns that the header announces.
+std::size_t read_header(std::string_view line, const Place& place) {
+  std::array<std::string_view, columns.size() + 1> fields;
+  const std::size_t count = split(line, fields);
+  bool known = count == 5 || count == 8 || count == 11;
+  for (std::size_t k = 0; known && k < count; ++k) known = fields[k] == columns[k];
+  if (!known)
+    place.fail("",
+               fmt::format("the first line must be id,x,y,z,radius[,vx,vy,vz[,wx,wy,wz]], got '{}'", line));
+  return count;
+}
+
+}  // namespace
+
+Sample read_bodies(const std::string& path, double density, bool turns) {
+  std::ifstream in(path);
+  if (!in) throw SceneError(path, 0, "", "cannot open the file of bodies");
+  Sample sample;
+  sample.density = density;
+  sample.turns = turns;
+  std::unordered_map<std::int64_t, int> line_of_id;
+  std::array<std::string_view, columns.size() + 1> fields;
+  std::size_t count = 0;
+  Place place{path, 0};
+  for (std::string text; std::getline(in, text);) {
+    ++place.line;
+    // Spreadsheets mark a text as UTF-8 by three bytes before it.
+    constexpr std::string_view mark = "\xef\xbb\xbf";
+    if (place.line == 1 && text.starts_with(mark)) text.erase(0, mark.size());
+    const std::string_view line = trimmed(text);
+    if (line.empty() || line.front() == '#') continue;
+    if (count == 0) {
+      count = read_header(line, place);
+      continue;
+    }
+    if (const std::size_t found = split(line, fields); found != count)
+      place.fail("", fmt::format("{} fields expected as in the header, got {}{}", count,
+                                 found > count ? "more than " : "", found > count ? count : found));
+    const auto id = number<std::int64_t>(fields[0], columns[0], place);
+    if (id < 0) place.fail("id", fmt::format("must be >= 0, got {}", id));
+    if (const auto [first, inserted] = line_of_id.emplace(id, place.line); !inserted)
+      place.fail("id", fmt::format("{} stands already on line {}", id, first->second));
+    std::array<double, columns.size()> value{};
+    for (std::size_t k = 1; k < count; ++k) value[k] = number<double>(fields[k], columns[k], place);
+    const double radius = value[4];
+    if (radius <= 0) place.fail("radius", fmt::format("must be > 0 m, got {}", radius));
+    sample.id.push_back(BodyId{id});
+    sample.x.emplace_back(value[1], value[2], value[3]);
+    sample.radius.push_back(radius);
+    if (count > 5)  // columns that the header lacks are 0
+      sample.velocity.push_back(
+          {value[5], value[6], value[7], radius * value[8], radius * value[9], radius * value[10]});
+  }
+  if (sample.size() == 0) throw SceneError(path, place.line, "", "no bodies in the file");
+  return sample;
+}
+
+void write_bodies(const std::filesystem::path& path, const Sample& sample) {
+  write_whole(path, [&](const WriteText& out) {
+    const std::size_t count = sample.velocity.empty() ? 5 : columns.size();
+    std::string text;
+    for (std::size_t k = 0; k < count; ++k) text += fmt::format("{}{}", k > 0 ? "," : "", columns[k]);
+    text += '\n';
+    for (std::size_t k = 0; k < sample.size(); ++k) {
+      detail::put(text, static_cast<std::int64_t>(sample.id_of(k)));
+      const auto add = [&](double value) {
+        text += ',';
+        detail::put(text, value);
+      };
+      for (Eigen::Index axis = 0; axis < 3; ++axis) add(sample.x[k][axis]);
+      add(sample.radius[k]);
+      if (count > 5)
+        for (std::size_t i = 0; i < 6; ++i)
+          add(i < 3 ? sample.velocity[k][i] : sample.velocity[k][i] / sample.radius[k]);
+      text += '\n';
+      if (text.size() > (1U << 16)) {
+        out(text);
+        text.clear();
+      }
+    }
+    out(text);
+  });
+}
+
+}  // namespace talus::io

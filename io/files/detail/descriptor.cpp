@@ -1,0 +1,45 @@
+#include "io/files/detail/descriptor.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "io/files/error.hpp"
+
+namespace talus::io::detail {
+
+std::string last_error() {
+  return std::generic_category().message(errno);
+}
+
+Descriptor::Descriptor(const std::filesystem::path& path, int flags)
+    : path_(path), descriptor_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {
+  if (descriptor_ < 0) throw FileError(path_.string(), "cannot be opened for writing: " + last_error());
+}
+
+Descriptor::~Descriptor() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void Descriptor::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      throw FileError(path_.string(), "cannot be written: " + last_error());
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void Descriptor::close() {
+  if (descriptor_ < 0) return;
+  if (::close(std::exchange(descriptor_, -1)) != 0) {
+    throw FileError(path_.string(), "cannot be completed: " + last_error());
+  }
+}
+
+}  // namespace talus::io::detail

@@ -1,0 +1,185 @@
+#include "io/files/output_directory.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstdlib>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "io/files/detail/descriptor.hpp"
+#include "io/files/error.hpp"
+#include "partition/partitioner.hpp"
+
+namespace talus::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view unfinished = ".part";
+
+constexpr std::array<std::string_view, 13> fixed_names{
+    "error_history.csv", "run.json",          "scene.resolved.toml", "steps.csv",
+    "walls.csv",         "triaxial.csv",      "results.h5",          "fields.pvd",
+    "fields/grains.pvd", "fields/forces.pvd", "triaxial.svg",        "forces.svg",
+    "trace.h5"};
+
+/// prefix, six digits or more, suffix
+bool is_numbered(std::string_view name, std::string_view prefix, std::string_view suffix) {
+  if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
+  if (name.size() < prefix.size() + suffix.size() + 6) return false;
+  const auto digits = name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
+  return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+/// The name that a file has when it is whole: without ".part", or ".PID.part".
+std::string whole_name(std::string name) {
+  if (!name.ends_with(unfinished)) return name;
+  name.resize(name.size() - unfinished.size());
+  const std::size_t digits = name.find_last_not_of("0123456789") + 1;
+  if (digits > 1 && digits < name.size() && name[digits - 1] == '.') name.resize(digits - 1);
+  return name;
+}
+
+/// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
+std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
+  std::vector<fs::path> found;
+  for (const fs::path& folder : {directory, directory / "fields", directory / "traces"}) {
+    if (!fs::is_directory(folder) || (folder != directory && fs::is_symlink(folder))) continue;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (entry.is_symlink() || !entry.is_regular_file()) continue;
+      const fs::path relative = entry.path().lexically_relative(directory);
+      if (is_ours(whole_name(relative.generic_string()))) found.push_back(relative);
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+bool is_output_name(const std::string& name) {
+  return std::ranges::find(fixed_names, name) != fixed_names.end() ||
+         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
+         is_numbered(name, "trace_rank_", ".h5") || is_numbered(name, "fclib_", ".hdf5");
+}
+
+bool is_partition_name(const std::string& name) {
+  return std::ranges::any_of(partition_kinds, [&](PartitionKind kind) {
+    const std::string stem = "partition_" + std::string(name_of(kind));
+    return name == stem + ".vtp" || name == stem + ".svg";
+  });
+}
+
+DirectoryLock::DirectoryLock(const fs::path& directory)
+    : descriptor_(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ < 0 || ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  ::close(descriptor_);
+  throw FileError(directory.string(),
+                  "another run is writing there; wait for its end, or choose another directory with --out");
+}
+
+DirectoryLock::DirectoryLock(DirectoryLock&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+DirectoryLock::~DirectoryLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+DirectoryLock prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours) {
+  try {
+    if (fs::exists(directory) && !fs::is_directory(directory)) {
+      throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
+    }
+    fs::create_directories(directory);
+    DirectoryLock lock(directory);
+    if (!fs::is_empty(directory)) {
+      if (!force) {
+        throw FileError(
+            directory.string(),
+            "exists and is not empty; choose another directory with --out, or replace the results in "
+            "it with --force");
+      }
+      for (const fs::path& relative : former_outputs(directory, is_ours)) fs::remove(directory / relative);
+    }
+    // Asked before the run starts, not an hour later when the first file is written.
+    if (::access(directory.c_str(), W_OK | X_OK) != 0)
+      throw FileError(directory.string(), "cannot write into this directory: " + detail::last_error());
+    return lock;
+  } catch (const fs::filesystem_error& error) {
+    const fs::path& culprit = error.path1().empty() ? directory : error.path1();
+    throw FileError(culprit.string(), "cannot prepare the directory of the run: " + error.code().message());
+  }
+}
+
+ScratchFolder::ScratchFolder(const fs::path& prefix) {
+  std::error_code error;
+  if (prefix.has_parent_path()) fs::create_directories(prefix.parent_path(), error);
+  std::string name = prefix.string() + "-XXXXXX";
+  if (error || !::mkdtemp(name.data()))
+    throw FileError(name, "cannot make this folder: " + (error ? error.message() : detail::last_error()));
+  path_ = name;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+void check_output_files(const std::vector<fs::path>& inputs, const std::vector<fs::path>& outs, bool force) {
+  std::error_code error;
+  std::vector<fs::path> places;
+  for (const fs::path& out : outs) {
+    if (out.empty()) continue;
+    for (const fs::path& input : inputs)
+      if (fs::equivalent(input, out, error))
+        throw FileError(out.string(), "is what is read, and would be overwritten; give another name");
+    if (fs::is_directory(out, error)) throw FileError(out.string(), "is a folder; give the name of a file");
+    const fs::path folder = fs::absolute(out).parent_path();
+    if (!fs::is_directory(folder, error))
+      throw FileError(out.string(),
+                      "cannot be written, there is no folder " + folder.string() + "; make it first");
+    if (fs::exists(out, error) && !fs::is_regular_file(out, error))
+      throw FileError(out.string(), "is no regular file; give the name of a file");
+    if (!force && fs::exists(out, error))
+      throw FileError(out.string(), "exists; give another name, or replace it with --force");
+    places.push_back(fs::weakly_canonical(out, error));
+    if (std::ranges::count(places, places.back()) > 1)
+      throw FileError(out.string(), "is asked for twice; give every output a name of its own");
+  }
+}
+
+void write_whole(const fs::path& path, const std::function<void(const WriteText&)>& content) {
+  fs::path temporary = path;
+  temporary += unfinished;
+  const auto discard = [&] {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+  };
+  try {
+    detail::Descriptor file(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+    content([&](std::string_view text) { file.write(text); });
+    file.close();
+  } catch (...) {
+    discard();
+    throw;
+  }
+  std::error_code error;
+  fs::rename(temporary, path, error);
+  if (error) {
+    discard();
+    throw FileError(path.string(), "cannot be replaced: " + error.message());
+  }
+}
+
+void write_whole(const fs::path& path, std::string_view content) {
+  write_whole(path, [&](const WriteText& out) { out(content); });
+}
+
+}  // namespace talus::io

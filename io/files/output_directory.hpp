@@ -1,0 +1,75 @@
+#pragma once
+
+/// The directory of a run: who may be overwritten, and how files appear in it.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/files/write_text.hpp"
+
+namespace talus::io {
+
+/// Tells from the name of a whole file, relative to a directory, whether a command of Talus wrote it.
+using IsOutputName = bool (*)(const std::string& name);
+
+/// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md).
+bool is_output_name(const std::string& name);
+
+/// The same for the files of `talus partition`: partition_NAME.vtp and partition_NAME.svg.
+bool is_partition_name(const std::string& name);
+
+/// A directory as long as a run writes there. The system takes the lock away when the process ends, however
+/// it ends, and nothing is left in the directory.
+class DirectoryLock {
+ public:
+  /// Throws FileError when another holds the lock. Where a file system has no such locks there is none.
+  explicit DirectoryLock(const std::filesystem::path& directory);
+  DirectoryLock(DirectoryLock&& other) noexcept;
+  DirectoryLock& operator=(DirectoryLock&&) = delete;
+  ~DirectoryLock();
+
+ private:
+  int descriptor_ = -1;
+};
+
+/// Makes `directory` (and its parents) ready for a run, which holds the lock until it has written all.
+/// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
+/// only files that `is_ours` knows are removed, and their unfinished forms, which end in ".part"; whatever
+/// else the user keeps there stays, and so do symbolic links and what is behind them. Throws FileError naming
+/// the directory when it is refused, when another run is writing there, or when it is not a directory, or
+/// cannot be created or written to.
+[[nodiscard]] DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
+                                                     IsOutputName is_ours = is_output_name);
+
+/// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.
+class ScratchFolder {
+ public:
+  /// Makes the folder's parents too. Throws FileError.
+  explicit ScratchFolder(const std::filesystem::path& prefix);
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Throws FileError when one of `outs` cannot be meant as a file to write: it is one of the inputs or of the
+/// other outs (under whatever name), no regular file, or a file that is there already and `force` is false,
+/// or its folder is not there. Empty names are passed over. To be asked before long work.
+void check_output_files(const std::vector<std::filesystem::path>& inputs,
+                        const std::vector<std::filesystem::path>& outs, bool force);
+
+/// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
+/// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.
+void write_whole(const std::filesystem::path& path, std::string_view content);
+
+/// The same for content that is made piece by piece: `content` calls its argument with the text in order.
+/// What it throws goes on, and the unfinished file is removed.
+void write_whole(const std::filesystem::path& path, const std::function<void(const WriteText&)>& content);
+
+}  // namespace talus::io

@@ -1,0 +1,42 @@
+#include "io/pictures/detail/slab.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace talus::io::detail {
+
+Slab cut_slab(const Frame& frame, double thickness) {
+  Slab slab;
+  if (frame.id.empty()) return slab;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::size_t k = 0; k < frame.id.size(); ++k) {
+    low = std::min(low, frame.x[k].y());
+    high = std::max(high, frame.x[k].y());
+    slab.mean_radius += frame.radius[k];
+  }
+  slab.mean_radius /= static_cast<double>(frame.id.size());
+  slab.middle = (low + high) / 2;
+  slab.half = thickness > 0 ? thickness / 2 : 2 * slab.mean_radius;
+
+  for (std::size_t k = 0; k < frame.id.size(); ++k) {
+    if (slab.holds(frame.x[k])) slab.grains.push_back(k);
+  }
+  return slab;
+}
+
+View view_of(const Frame& frame, const Slab& slab, double side, double left, double top) {
+  double x_low = std::numeric_limits<double>::infinity(), x_high = -x_low, z_low = x_low, z_high = -x_low;
+  for (const std::size_t k : slab.grains) {
+    x_low = std::min(x_low, frame.x[k].x() - frame.radius[k]);
+    x_high = std::max(x_high, frame.x[k].x() + frame.radius[k]);
+    z_low = std::min(z_low, frame.x[k].z() - frame.radius[k]);
+    z_high = std::max(z_high, frame.x[k].z() + frame.radius[k]);
+  }
+  if (slab.grains.empty()) x_low = z_low = 0, x_high = z_high = 1;
+  const double border = slab.grains.empty() ? 0 : slab.mean_radius;
+  x_low -= border, z_low -= border, x_high += border, z_high += border;
+  const double scale = side / std::max(x_high - x_low, z_high - z_low);
+  return {x_low, z_low, x_high, z_high, scale, left, top};
+}
+
+}  // namespace talus::io::detail

@@ -1,0 +1,52 @@
+#pragma once
+
+/// Pictures of a run as SVG text, for those who want to see at once whether it makes sense.
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "kernels/bodies/walls.hpp"
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/frame.hpp"
+
+namespace talus::io {
+
+struct TriaxialPicture {
+  std::string stage;  ///< rows of other stages are left out; "" takes all rows
+  int axis = 2;       ///< axial direction: 0, 1, 2 = x, y, z
+};
+
+/// Two diagrams over a common axis, the axial strain in per cent, positive in compression: q/p, and the
+/// volume strain (29) in per cent, positive where the sample dilates. Rows with a value that is not finite
+/// are left out; without any row the picture says so.
+std::string draw_triaxial(std::span<const TriaxialReport> reports, const TriaxialPicture& options);
+
+struct ForcePicture {
+  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+};
+
+/// Grains whose centre lies in a slab about the middle of the sample, normal to y, seen along y, and the
+/// forces between them: a line between the centres (or to the contact point at a wall), as wide and as dark
+/// as its normal force is large. `walls` give the normals of frame.walls, in the same order; those parallel
+/// to y are drawn where they cut the picture. Throws std::invalid_argument when a contact names a body or
+/// wall that is not there.
+std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options);
+
+/// Collective: what draw_forces needs of a frame of which each rank has a part, on rank 0: all bodies, but of
+/// the contacts only those about the slab. Empty on others; rows travel in bounded pieces.
+Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, const ForcePicture& options);
+
+struct PartitionPicture {
+  std::string title;
+  std::int32_t subdomains = 1;
+  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+};
+
+/// The grains of such a slab twice: coloured by `subdomain`, and in greys by `multiplicity` as in Figure 6 of
+/// Visseq, Alart and Dureisseix (2013), white for inner grains (m = 1). Both have one entry per body of the
+/// frame. Throws std::invalid_argument when they have not.
+std::string draw_partition(const Frame& frame, std::span<const std::int32_t> subdomain,
+                           std::span<const std::int32_t> multiplicity, const PartitionPicture& options);
+
+}  // namespace talus::io

@@ -1,0 +1,170 @@
+#include "io/results/csv_writer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include <iterator>
+#include <span>
+#include <utility>
+
+#include "io/files/detail/csv_cell.hpp"
+#include "io/files/error.hpp"
+
+namespace talus::io {
+namespace {
+
+using detail::put;
+
+/// One column: its name and how a row's value is written. The tables below drive both the header and the
+/// rows.
+template <class Row>
+struct Column {
+  std::string_view name;
+  void (*append)(std::string&, const Row&);
+};
+
+struct WallRow {
+  const StepReport& step;
+  const WallReport& wall;
+};
+
+struct ErrorRow {
+  std::int64_t step;
+  const Iteration::Check& check;
+};
+
+constexpr Column<StepReport> steps_columns[] = {
+    {"step", [](std::string& t, const StepReport& r) { put(t, r.step); }},
+    {"time", [](std::string& t, const StepReport& r) { put(t, r.time); }},
+    {"candidates", [](std::string& t, const StepReport& r) { put(t, r.candidates); }},
+    {"contacts", [](std::string& t, const StepReport& r) { put(t, r.contacts); }},
+    {"active", [](std::string& t, const StepReport& r) { put(t, r.active); }},
+    {"iterations", [](std::string& t, const StepReport& r) { put(t, r.iterations); }},
+    {"error_rms", [](std::string& t, const StepReport& r) { put(t, r.error_rms); }},
+    {"error_max", [](std::string& t, const StepReport& r) { put(t, r.error_max); }},
+    {"balance", [](std::string& t, const StepReport& r) { put(t, r.balance); }},
+    {"jump", [](std::string& t, const StepReport& r) { put(t, r.jump); }},
+    {"penetration_mean", [](std::string& t, const StepReport& r) { put(t, r.penetration_mean); }},
+    {"penetration_max", [](std::string& t, const StepReport& r) { put(t, r.penetration_max); }},
+    {"kinetic_translation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_translation); }},
+    {"kinetic_rotation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_rotation); }},
+    {"solid_fraction", [](std::string& t, const StepReport& r) { put(t, r.solid_fraction); }},
+    {"migrants", [](std::string& t, const StepReport& r) { put(t, r.migrants); }},
+    {"imbalance", [](std::string& t, const StepReport& r) { put(t, r.imbalance); }},
+    {"wall_s", [](std::string& t, const StepReport& r) { put(t, r.wall_s); }},
+    {"converged", [](std::string& t, const StepReport& r) { put(t, r.converged); }},
+};
+
+constexpr Column<WallRow> walls_columns[] = {
+    {"step", [](std::string& t, const WallRow& r) { put(t, r.step.step); }},
+    {"time", [](std::string& t, const WallRow& r) { put(t, r.step.time); }},
+    {"wall", [](std::string& t, const WallRow& r) { put(t, r.wall.name); }},
+    {"position", [](std::string& t, const WallRow& r) { put(t, r.wall.position); }},
+    {"velocity", [](std::string& t, const WallRow& r) { put(t, r.wall.velocity); }},
+    {"force_x", [](std::string& t, const WallRow& r) { put(t, r.wall.force.x()); }},
+    {"force_y", [](std::string& t, const WallRow& r) { put(t, r.wall.force.y()); }},
+    {"force_z", [](std::string& t, const WallRow& r) { put(t, r.wall.force.z()); }},
+};
+
+constexpr Column<TriaxialReport> triaxial_columns[] = {
+    {"step", [](std::string& t, const TriaxialReport& r) { put(t, r.step); }},
+    {"time", [](std::string& t, const TriaxialReport& r) { put(t, r.time); }},
+    {"stage", [](std::string& t, const TriaxialReport& r) { put(t, r.stage); }},
+    {"strain_x", [](std::string& t, const TriaxialReport& r) { put(t, r.strain[0]); }},
+    {"strain_y", [](std::string& t, const TriaxialReport& r) { put(t, r.strain[1]); }},
+    {"strain_z", [](std::string& t, const TriaxialReport& r) { put(t, r.strain[2]); }},
+    {"strain_volume", [](std::string& t, const TriaxialReport& r) { put(t, r.strain_volume); }},
+    {"strain_shear", [](std::string& t, const TriaxialReport& r) { put(t, r.strain_shear); }},
+    {"solid_fraction", [](std::string& t, const TriaxialReport& r) { put(t, r.solid_fraction); }},
+    {"stress_x", [](std::string& t, const TriaxialReport& r) { put(t, r.stress[0]); }},
+    {"stress_y", [](std::string& t, const TriaxialReport& r) { put(t, r.stress[1]); }},
+    {"stress_z", [](std::string& t, const TriaxialReport& r) { put(t, r.stress[2]); }},
+    {"p", [](std::string& t, const TriaxialReport& r) { put(t, r.p); }},
+    {"q", [](std::string& t, const TriaxialReport& r) { put(t, r.q); }},
+    {"q_over_p", [](std::string& t, const TriaxialReport& r) { put(t, r.q_over_p); }},
+    {"coordination", [](std::string& t, const TriaxialReport& r) { put(t, r.coordination); }},
+};
+
+constexpr Column<ErrorRow> error_history_columns[] = {
+    {"step", [](std::string& t, const ErrorRow& r) { put(t, r.step); }},
+    {"iterations", [](std::string& t, const ErrorRow& r) { put(t, r.check.iterations); }},
+    {"seconds", [](std::string& t, const ErrorRow& r) { put(t, r.check.seconds); }},
+    {"error_rms", [](std::string& t, const ErrorRow& r) { put(t, r.check.error_rms); }},
+};
+
+template <class Row>
+std::string header_line(std::span<const Column<Row>> columns) {
+  std::string text;
+  for (const auto& column : columns) {
+    if (!text.empty()) text += ',';
+    text += column.name;
+  }
+  return text + '\n';
+}
+
+template <class Row>
+void append_line(std::string& text, std::span<const Column<Row>> columns, const Row& row) {
+  for (const auto& column : columns) {
+    column.append(text, row);
+    text += ',';
+  }
+  text.back() = '\n';
+}
+
+}  // namespace
+
+std::string steps_csv_header() {
+  return header_line<StepReport>(steps_columns);
+}
+std::string walls_csv_header() {
+  return header_line<WallRow>(walls_columns);
+}
+std::string triaxial_csv_header() {
+  return header_line<TriaxialReport>(triaxial_columns);
+}
+std::string error_history_csv_header() {
+  return header_line<ErrorRow>(error_history_columns);
+}
+
+void append_steps_row(std::string& text, const StepReport& report) {
+  append_line<StepReport>(text, steps_columns, report);
+}
+
+void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall) {
+  append_line<WallRow>(text, walls_columns, WallRow{report, wall});
+}
+
+void append_triaxial_row(std::string& text, const TriaxialReport& report) {
+  append_line<TriaxialReport>(text, triaxial_columns, report);
+}
+
+void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check) {
+  append_line<ErrorRow>(text, error_history_columns, ErrorRow{step, check});
+}
+
+CsvFile::CsvFile(const std::filesystem::path& path, std::string_view header)
+    : file_(path, O_WRONLY | O_CREAT | O_TRUNC), pending_(header) {
+  flush();
+}
+
+CsvFile::~CsvFile() {
+  try {
+    close();
+  } catch (const FileError&) {
+    // Nobody is left to be told; close() is the way to know.
+  }
+}
+
+void CsvFile::flush() {
+  if (pending_.empty()) return;
+  // Emptied first: lines that failed are not tried again, lest half of them appear twice.
+  const std::string lines = std::exchange(pending_, {});
+  file_.write(lines);
+}
+
+void CsvFile::close() {
+  flush();
+  file_.close();
+}
+
+}  // namespace talus::io

@@ -1,0 +1,50 @@
+#pragma once
+
+/// The tables of a run: steps.csv, walls.csv, triaxial.csv, error_history.csv (columns and units:
+/// docs/formats.md).
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "io/files/detail/descriptor.hpp"
+#include "runtime/step/frame.hpp"
+#include "runtime/step/iteration.hpp"
+
+namespace talus::io {
+
+/// Header lines, with line end.
+std::string steps_csv_header();
+std::string walls_csv_header();
+std::string triaxial_csv_header();
+std::string error_history_csv_header();
+
+/// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true
+/// and false are 1 and 0; names are quoted only where they must be (RFC 4180).
+void append_steps_row(std::string& text, const StepReport& report);
+void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall);
+void append_triaxial_row(std::string& text, const TriaxialReport& report);
+void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check);
+
+/// A file that grows by whole lines: what a killed run leaves lacks those that were not flushed (a kill in
+/// the middle of a write may cut one).
+class CsvFile {
+ public:
+  /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.
+  CsvFile(const std::filesystem::path& path, std::string_view header);
+  /// Writes what is left. A failure cannot be told from here: call close() to hear of it.
+  ~CsvFile();
+
+  /// Place to append whole lines.
+  std::string& pending() { return pending_; }
+  /// Hands the pending lines to the system. Throws FileError.
+  void flush();
+  /// Flushes and closes. Throws FileError.
+  void close();
+
+ private:
+  detail::Descriptor file_;
+  std::string pending_;
+};
+
+}  // namespace talus::io

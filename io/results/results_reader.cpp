@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "io/files/detail/hdf5_read.hpp"
+#include "io/files/error.hpp"
+#include "io/results/results.hpp"
+
+namespace talus::io {
+namespace {
+
+using detail::demand;
+using detail::Hdf5Object;
+using detail::hold;
+using detail::read_array;
+using detail::read_attribute;
+using detail::read_names;
+
+Hdf5Object open_results(const std::string& path) {
+  Hdf5Object file = detail::open_file(path);
+  if (H5Lexists(file.id(), "frames", H5P_DEFAULT) <= 0) {
+    throw FileError(path, "has no group /frames; it is not a results.h5 of talus");
+  }
+  return file;
+}
+
+std::size_t count_frames(hid_t file, const std::string& path) {
+  H5G_info_t info{};
+  demand(H5Gget_info_by_name(file, "frames", &info, H5P_DEFAULT), path, "counting the frames");
+  return info.nlinks;
+}
+
+template <class T>
+constexpr std::size_t numbers_in = sizeof(T) / 8;
+
+template <class T>
+std::vector<T> read_doubles(hid_t file, const std::string& path, const std::string& name) {
+  return read_array<T>({file, path}, name, H5T_NATIVE_DOUBLE, numbers_in<T>);
+}
+
+template <class T>
+std::vector<T> read_integers(hid_t file, const std::string& path, const std::string& name) {
+  return read_array<T>({file, path}, name, H5T_NATIVE_INT64, numbers_in<T>);
+}
+
+}  // namespace
+
+std::size_t frame_count(const std::filesystem::path& path) {
+  const detail::QuietHdf5 quiet;
+  const Hdf5Object file = open_results(path.string());
+  return count_frames(file.id(), path.string());
+}
+
+Frame read_frame(const std::filesystem::path& path, std::size_t index) {
+  const detail::QuietHdf5 quiet;
+  const std::string name = path.string();
+  const Hdf5Object file = open_results(name);
+  const std::size_t count = count_frames(file.id(), name);
+  if (index >= count) throw FileError(name, fmt::format("has no frame {}; it holds {}", index, count));
+
+  const std::string prefix = fmt::format("/frames/{:06}", index);
+  const Hdf5Object group =
+      hold(H5Gopen2(file.id(), prefix.c_str(), H5P_DEFAULT), H5Gclose, name, "opening " + prefix);
+  Frame frame;
+  read_attribute({group.id(), name}, "step", H5T_NATIVE_INT64, &frame.step);
+  read_attribute({group.id(), name}, "time", H5T_NATIVE_DOUBLE, &frame.time);
+  frame.stage = detail::read_text({group.id(), name}, "stage");
+
+  const hid_t h = group.id();
+  frame.id = read_integers<std::int64_t>(h, name, "bodies/id");
+  frame.x = read_doubles<Vec3>(h, name, "bodies/x");
+  frame.radius = read_doubles<double>(h, name, "bodies/radius");
+  frame.u = read_doubles<Vec3>(h, name, "bodies/u");
+  if (H5Lexists(h, "bodies/omega", H5P_DEFAULT) > 0)
+    frame.omega = read_doubles<Vec3>(h, name, "bodies/omega");
+  if (H5Lexists(h, "bodies/orientation", H5P_DEFAULT) > 0) {
+    frame.orientation = read_doubles<std::array<double, 4>>(h, name, "bodies/orientation");
+  }
+  frame.contact_bodies = read_integers<std::array<std::int64_t, 2>>(h, name, "contacts/bodies");
+  frame.contact_point = read_doubles<Vec3>(h, name, "contacts/point");
+  frame.contact_normal = read_doubles<Vec3>(h, name, "contacts/normal");
+  frame.contact_gap = read_doubles<double>(h, name, "contacts/gap");
+  frame.contact_force = read_doubles<Vec3>(h, name, "contacts/force");
+
+  const auto names = read_names({file.id(), name}, "/walls/name");
+  const auto position = read_doubles<double>(h, name, "walls/position");
+  const auto velocity = read_doubles<double>(h, name, "walls/velocity");
+  const auto force = read_doubles<Vec3>(h, name, "walls/force");
+  if (position.size() != names.size() || velocity.size() != names.size() || force.size() != names.size()) {
+    throw FileError(name, prefix + "/walls does not fit the number of names in /walls/name");
+  }
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    frame.walls.push_back({names[k], position[k], velocity[k], force[k]});
+  }
+  try {
+    validate(frame);
+  } catch (const std::invalid_argument& error) {
+    throw FileError(name, prefix + " is damaged: " + error.what());
+  }
+  return frame;
+}
+
+}  // namespace talus::io

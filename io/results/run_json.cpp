@@ -1,0 +1,107 @@
+#include "io/results/run_json.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sched.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "io/files/output_directory.hpp"
+#include "io/results/build_info.hpp"
+#include "io/results/version.hpp"
+
+namespace talus::io {
+namespace {
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
+}
+
+int allowed_cores() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  return ::sched_getaffinity(0, sizeof(set), &set) == 0 ? CPU_COUNT(&set) : 0;
+}
+
+}  // namespace
+
+Provenance collect_provenance() {
+  const BuildInfo build = build_info();
+  Provenance p;
+  p.version = version();
+  p.git_hash = build.git_hash;
+  p.git_dirty = build.git_dirty;
+  p.compiler = build.compiler;
+  p.flags = build.flags;
+  p.build_type = build.build_type;
+  p.host = host_name();
+  p.cores_online = static_cast<int>(::sysconf(_SC_NPROCESSORS_ONLN));
+  p.cores_allowed = allowed_cores();
+  p.omp_proc_bind = environment("OMP_PROC_BIND");
+  p.omp_places = environment("OMP_PLACES");
+  p.date_utc = fmt::format(
+      "{:%FT%TZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+  return p;
+}
+
+std::string run_json(const Provenance& p, const Summary& s) {
+  // Ordered, so that people who open the file find things where they expect them.
+  nlohmann::ordered_json root;
+  root["provenance"] = {
+      {"version", p.version},
+      {"git_hash", p.git_hash},
+      {"git_dirty", p.git_dirty},
+      {"compiler", p.compiler},
+      {"flags", p.flags},
+      {"build_type", p.build_type},
+      {"host", p.host},
+      {"cores_online", p.cores_online},
+      {"cores_allowed", p.cores_allowed},
+      {"threads", p.threads},
+      {"simd", p.simd},
+      {"omp_proc_bind", p.omp_proc_bind},
+      {"omp_places", p.omp_places},
+      {"date_utc", p.date_utc},
+      {"command_line", p.command_line},
+      {"seed", p.seed},
+      {"scene_file", p.scene_file},
+  };
+  nlohmann::ordered_json digest;  // null
+  if (s.digest) digest = fmt::format("{:016x}", *s.digest);
+  root["summary"] = {
+      {"status", s.status},
+      {"message", s.message},
+      {"exit_code", s.exit_code},
+      {"steps", s.steps},
+      {"time", s.time},
+      {"digest", digest},
+      {"converged_steps", s.converged_steps},
+      {"unconverged_steps", s.unconverged_steps},
+      {"worst_error_rms", s.worst_error_rms},
+      {"worst_balance", s.worst_balance},
+      {"worst_penetration", s.worst_penetration},
+      {"iterations", s.iterations},
+      {"wall_s", s.wall_s},
+      {"bodies", s.bodies},
+      {"frames", s.frames},
+  };
+  // Names of files and hosts may be anything: bytes that are not UTF-8 are replaced, not a reason to lose the
+  // run.
+  return root.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
+void write_run_json(const std::filesystem::path& path, const Provenance& provenance, const Summary& summary) {
+  write_whole(path, run_json(provenance, summary));
+}
+
+}  // namespace talus::io

@@ -1,0 +1,102 @@
+#include "io/scene/detail/scene_read.hpp"
+
+#include <charconv>
+#include <system_error>
+
+namespace talus::io::detail {
+
+namespace {
+
+std::string found_text(const toml::node& node) {
+  if (const auto* text = node.as_string()) {
+    const std::string& held = text->get();
+    double number = 0;
+    const auto [end, error] = std::from_chars(held.data(), held.data() + held.size(), number);
+    // TOML's reader refuses such a number, so that an override with one is a text.
+    if (error == std::errc::result_out_of_range && end == held.data() + held.size())
+      return held + ", which is out of the range of numbers";
+    return fmt::format("the text '{}'", held);
+  }
+  if (const auto* whole = node.as_integer()) return fmt::format("the integer {}", whole->get());
+  if (const auto* real = node.as_floating_point()) return "the real " + toml_text(real->get());
+  if (const auto* truth = node.as_boolean()) return truth->get() ? "true" : "false";
+  if (const auto* list = node.as_array()) return fmt::format("a list of {}", list->size());
+  return node.is_table() ? "a table" : "a date or time";
+}
+
+struct Reader {
+  const std::string& path;
+  const Range& range;
+  const std::string& expected;
+
+  template <class Number>
+  Number within_range(const toml::node& node, Number value) const {
+    const auto real = static_cast<double>(value);
+    if (!std::isfinite(real)) fail_at(node, path, fmt::format("must be finite, got {}", real));
+    if (!range.holds(real)) fail_at(node, path, fmt::format("must be {}, got {}", range_text(range), value));
+    return value;
+  }
+  [[noreturn]] void wrong_type(const toml::node& node) const {
+    fail_at(node, path, fmt::format("expected {}, got {}", expected, found_text(node)));
+  }
+
+  std::int64_t integer(const toml::node& node) const {
+    if (!node.is_integer()) wrong_type(node);
+    return within_range(node, node.as_integer()->get());
+  }
+  double real(const toml::node& node) const {
+    if (!node.is_number()) wrong_type(node);
+    return within_range(node, *node.value<double>());
+  }
+};
+
+template <class T, class Element>
+std::vector<T> read_list(const toml::node& node, std::size_t length, const Reader& reader, Element element) {
+  const toml::array* array = node.as_array();
+  if (!array || array->size() != length) reader.wrong_type(node);
+  std::vector<T> values;
+  for (const toml::node& entry : *array) values.push_back(element(entry));
+  return values;
+}
+
+}  // namespace
+
+Value read_value(const toml::node& node, const std::string& path, const Value& kind, const Range& range,
+                 const std::string& expected) {
+  const Reader reader{path, range, expected};
+  if (std::holds_alternative<bool>(kind)) {
+    if (!node.is_boolean()) reader.wrong_type(node);
+    return node.as_boolean()->get();
+  }
+  if (std::holds_alternative<std::string>(kind)) {
+    if (!node.is_string()) reader.wrong_type(node);
+    return node.as_string()->get();
+  }
+  if (std::holds_alternative<std::int64_t>(kind)) return reader.integer(node);
+  if (std::holds_alternative<double>(kind)) return reader.real(node);
+  if (const auto* list = std::get_if<std::vector<std::int64_t>>(&kind))
+    return read_list<std::int64_t>(node, list->size(), reader,
+                                   [&](const toml::node& n) { return reader.integer(n); });
+  return read_list<double>(node, std::get<std::vector<double>>(kind).size(), reader,
+                           [&](const toml::node& n) { return reader.real(n); });
+}
+
+void refuse_unknown(const toml::table& table, const std::string& path,
+                    const std::vector<std::string>& known) {
+  for (const auto& [key, node] : table) {
+    const std::string name(key.str());
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    std::vector<std::string> elsewhere;
+    for_each_section(scene_keys(), [&](const auto& section) {
+      for (const auto& other : section.keys)
+        if (other.name == name)
+          elsewhere.push_back(section.header.empty() ? "the top of the file" : section.header);
+    });
+    const std::string meant = nearest(name, known);
+    const std::string help =
+        meant.empty() && !elsewhere.empty() ? "; it belongs in " + listed(elsewhere) : hint(name, known);
+    fail_at(node, joined(path, name), "unknown key" + help);
+  }
+}
+
+}  // namespace talus::io::detail

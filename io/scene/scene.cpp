@@ -1,0 +1,310 @@
+#include "io/scene/scene.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "io/scene/detail/scene_read.hpp"
+#include "io/scene/detail/wall_conflict.hpp"
+
+namespace talus::io {
+
+namespace {
+
+using namespace detail;
+
+/// Reads the tables of one document into a Scene. Checks between keys stand where the nodes are at hand, for
+/// their lines.
+class SceneReader {
+ public:
+  SceneReader(const toml::table& root, const std::string& file) : root_(root), folder_(folder_of(file)) {
+    scene_.source_file = file;
+    scene_.name = std::filesystem::path(file).stem().string();
+    for (char& c : scene_.name)
+      if (!may_be_in_name(c)) c = '_';
+  }
+
+  Scene read() && {
+    read_table(root_, "", keys_.top,
+               {"material", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
+               scene_);
+    if (root_.get("name")) check_name(root_, "", scene_.name);
+    read_table(table_at(root_, "material"), "material", keys_.material, {}, scene_);
+    read_sample();
+    read_walls();
+    read_stages();
+    read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
+    read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
+    read_decomposition();
+    read_table(table_at(root_, "output"), "output", keys_.output, {}, scene_.output);
+    if (scene_.output.directory.empty()) scene_.output.directory = "out/" + scene_.name;
+    return std::move(scene_);
+  }
+
+ private:
+  static std::filesystem::path folder_of(const std::string& file) {
+    return std::filesystem::absolute(file).parent_path();
+  }
+
+  /// A table that may be left out: then an empty one, so that missing keys are found all the same.
+  const toml::table& table_at(const toml::table& parent, const std::string& name) {
+    const toml::node* node = parent.get(name);
+    if (!node) {
+      if (required_keys(name)) fail_at(parent, name, fmt::format("missing table [{}]", name));
+      return nothing_;
+    }
+    if (!node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
+    return *node->as_table();
+  }
+  static bool required_keys(const std::string& name) { return name == "material" || name == "sample"; }
+
+  /// Names of walls and stages stand in columns of CSV files, in paths and in overrides.
+  static bool may_be_in_name(char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '+' || c == '-' || c == '_';
+  }
+
+  static void check_name(const toml::table& table, const std::string& path, const std::string& name) {
+    if (name.empty() || !std::all_of(name.begin(), name.end(), may_be_in_name))
+      fail_at(*table.get("name"), joined(path, "name"),
+              fmt::format("must be made of letters, digits, +, - and _, got '{}'", name));
+  }
+
+  /// The elements of an array of tables; none when it is left out.
+  static std::vector<const toml::table*> tables_at(const toml::table& parent, const std::string& name,
+                                                   const std::string& path) {
+    const toml::node* node = parent.get(name);
+    if (!node) return {};
+    const toml::array* array = node->as_array();
+    if (!array)
+      fail_at(*node, path,
+              fmt::format("must be an array of tables: write [[{}]]", name == "load" ? "stage.load" : name));
+    std::vector<const toml::table*> tables;
+    for (const toml::node& element : *array) {
+      if (!element.is_table()) fail_at(element, path, "must hold tables only");
+      tables.push_back(element.as_table());
+    }
+    return tables;
+  }
+
+  void read_sample() {
+    SampleSpec& sample = scene_.sample;
+    const toml::table& table = table_at(root_, "sample");
+    read_table(table, "sample", keys_.sample, {}, sample);
+    const bool on_base = sample.count > 0 && sample.base[0] > 0;
+    const bool by_cells = sample.cells[0] > 0;
+    if (sample.kind == SampleSpec::Kind::deposition && !on_base)
+      fail_at(table, "sample", "a deposition needs count and base");
+    if (sample.kind == SampleSpec::Kind::lattice &&
+        (by_cells ? sample.count > 0 || sample.base[0] > 0 : !on_base))
+      fail_at(table, "sample", "a lattice needs either cells, or count and base");
+    if (const double grains = static_cast<double>(sample.cells[0]) * static_cast<double>(sample.cells[1]) *
+                              static_cast<double>(sample.cells[2]);
+        grains > countable.high)
+      fail_at(*table.get("cells"), "sample.cells",
+              fmt::format("makes {:.3g} grains, more than {:.0f}", grains, countable.high));
+    SizeDistribution& radii = sample.radii;
+    if (radii.kind == SizeDistribution::Kind::constant) radii.min = radii.max;
+    if (radii.min > radii.max)
+      fail_at(*table.get("radius_min"), "sample.radius_min",
+              fmt::format("must not exceed radius_max: {} > {}", radii.min, radii.max));
+    if (sample.kind != SampleSpec::Kind::bodies)
+      for (const double side : sample.base)
+        if (on_base && side < 2 * radii.max)
+          fail_at(*table.get("base"), "sample.base",
+                  fmt::format("a side of {} m is less than the largest diameter, {} m", side, 2 * radii.max));
+    if (sample.kind == SampleSpec::Kind::bodies) {
+      const std::filesystem::path file = (folder_ / sample.file).lexically_normal();
+      if (!std::filesystem::is_regular_file(file))
+        fail_at(*table.get("file"), "sample.file", fmt::format("no such file: {}", file.string()));
+      sample.file = file.string();
+    }
+  }
+
+  void read_walls() {
+    std::vector<Wall>& walls = scene_.setup.walls;
+    std::vector<const toml::table*> place(walls.size(), nullptr);  // of the walls of the box: none yet
+    for (const toml::table* table : tables_at(root_, "wall", "wall")) {
+      const std::string path = fmt::format("wall[{}]", count_++);
+      const auto name = (*table)["name"].value<std::string>();
+      auto found =
+          std::find_if(walls.begin(), walls.end(), [&](const Wall& w) { return name && w.name == *name; });
+      if (found != walls.end() && place[static_cast<std::size_t>(found - walls.begin())])
+        fail_at(*table->get("name"), path + ".name",
+                fmt::format("another wall is named '{}' already", *name));
+      if (found == walls.end()) {
+        Wall wall;
+        wall.normal = Vec3::Zero();
+        wall.point.setConstant(std::nan(""));
+        found = walls.insert(found, wall);
+        place.push_back(nullptr);
+      }
+      read_wall(*table, path, *found);
+      place[static_cast<std::size_t>(found - walls.begin())] = table;
+    }
+    count_ = 0;
+    for (std::size_t k = 0; k < walls.size(); ++k)
+      if (const std::string fault = wall_conflict(walls, k); !fault.empty()) {
+        const toml::table* at = place[k];
+        for (std::size_t j = k; !at && j-- > 0;) at = place[j];
+        fail_at(at ? *at : root_, "wall", fault);
+      }
+    for (std::size_t k = 0; k < walls.size(); ++k)
+      if (walls[k].load.drive == WallDrive::pressure) require_face(k, place[k] ? *place[k] : root_, "wall");
+  }
+
+  void read_wall(const toml::table& table, const std::string& path, Wall& wall) {
+    if (table.get("side") && table.get("normal"))
+      fail_at(*table.get("normal"), path + ".normal", "give side or normal, not both");
+    if (table.get("position") && table.get("point"))
+      fail_at(*table.get("point"), path + ".point", "give position or point, not both");
+    read_table(table, path, keys_.wall, {}, wall);
+    check_name(table, path, wall.name);
+    if (wall.normal.norm() == 0)
+      fail_at(table, path + ".side",
+              fmt::format("wall '{}' needs a side or a normal that is not zero", wall.name));
+    if (const int axis = axis_of(wall); axis >= 0) {
+      const double position = wall.point[axis];
+      wall.point.setZero();
+      wall.point[axis] = position;
+    } else if (!wall.point.allFinite()) {
+      fail_at(table, path + ".point",
+              fmt::format("oblique wall '{}' needs a point of its face [m]", wall.name));
+    }
+    const Vec3 sideways = wall.velocity - wall.velocity.dot(wall.normal) * wall.normal;
+    if (sideways.norm() > 1e-9 * wall.velocity.norm())
+      fail_at(*table.get("initial_velocity"), path + ".initial_velocity",
+              "a wall driven by pressure or force moves along its normal only");
+  }
+
+  void require_face(std::size_t wall, const toml::table& at, const std::string& path) {
+    try {
+      face_area(scene_.setup.walls, wall);
+    } catch (const std::invalid_argument& error) {
+      fail_at(at, path, error.what());
+    }
+  }
+
+  void read_stages() {
+    const std::vector<const toml::table*> tables = tables_at(root_, "stage", "stage");
+    if (tables.empty()) fail_at(root_, "stage", "missing; at least one [[stage]] is needed");
+    std::vector<WallLoad> in_force;
+    for (const Wall& wall : scene_.setup.walls) in_force.push_back(wall.load);
+    for (const toml::table* table : tables) {
+      const std::size_t index = scene_.setup.stages.size();
+      const std::string path = fmt::format("stage[{}]", index);
+      Stage stage = scene_.common;
+      read_table(*table, path, keys_.stage, {"end", "load"}, stage);
+      check_name(*table, path, stage.name);
+      for (const Stage& earlier : scene_.setup.stages)
+        if (earlier.name == stage.name)
+          fail_at(*table, path + ".name", fmt::format("another stage is named '{}' already", stage.name));
+      if (stage.time_step == 0)
+        fail_at(*table, path + ".time_step", "missing; expected: real [s], here or at the top of the scene");
+      read_loads(*table, path, stage, in_force);
+      read_end(*table, path, stage, in_force);
+      scene_.setup.stages.push_back(std::move(stage));
+    }
+  }
+
+  void read_loads(const toml::table& table, const std::string& path, Stage& stage,
+                  std::vector<WallLoad>& in_force) {
+    const std::vector<Wall>& walls = scene_.setup.walls;
+    for (const toml::table* entry : tables_at(table, "load", path + ".load")) {
+      const std::string load_path = fmt::format("{}.load[{}]", path, stage.loads.size());
+      NamedLoad load;
+      read_table(*entry, load_path, keys_.stage_load, {}, load);
+      std::vector<std::string> names;
+      for (const Wall& wall : walls) names.push_back(wall.name);
+      const auto index =
+          static_cast<std::size_t>(std::find(names.begin(), names.end(), load.first) - names.begin());
+      const toml::node& named = *entry->get("wall");
+      if (index == names.size())
+        fail_at(named, load_path + ".wall",
+                fmt::format("no wall is named '{}'{}", load.first, hint(load.first, names)));
+      for (const NamedLoad& earlier : stage.loads)
+        if (earlier.first == load.first)
+          fail_at(named, load_path + ".wall", fmt::format("this stage loads wall '{}' twice", load.first));
+      if (load.second.drive == WallDrive::pressure) require_face(index, *entry, load_path);
+      in_force[index] = load.second;
+      stage.loads.push_back(std::move(load));
+    }
+  }
+
+  void read_decomposition() {
+    DecompositionSettings& settings = scene_.setup.decomposition;
+    const toml::table& table = table_at(root_, "decomposition");
+    read_table(table, "decomposition", keys_.decomposition, {}, settings);
+    const auto& [x, y, z] = settings.boxes;
+    const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
+    if (boxes == 0) return;
+    if (boxes > most_subdomains || (settings.subdomains > 0 && boxes != settings.subdomains))
+      fail_at(*table.get("boxes"), "decomposition.boxes",
+              fmt::format("{} x {} x {} boxes are not {} subdomains", x, y, z,
+                          settings.subdomains > 0 ? fmt::format("{}", settings.subdomains)
+                                                  : fmt::format("at most {}", most_subdomains)));
+    settings.subdomains = static_cast<int>(boxes);
+    if (settings.partitioner == PartitionKind::automatic) settings.partitioner = PartitionKind::boxes;
+  }
+
+  void read_end(const toml::table& table, const std::string& path, Stage& stage,
+                const std::vector<WallLoad>& in_force) {
+    const std::string end_path = path + ".end";
+    const toml::node* node = table.get("end");
+    const std::string conditions = "one of steps, time, strain, equilibrium";
+    if (!node) fail_at(table, end_path, fmt::format("missing; stage '{}' needs {}", stage.name, conditions));
+    if (!node->is_table()) fail_at(*node, end_path, "must be a table, e.g. end = { steps = 100 }");
+    StageEnd& end = stage.end;
+    read_table(*node->as_table(), end_path, keys_.stage_end, {}, end);
+    if (!end.steps && !end.time && !end.strain && !end.equilibrium)
+      fail_at(*node, end_path, fmt::format("stage '{}' never ends: give {}", stage.name, conditions));
+    if (end.strain && !bounded(end.strain_axis))
+      fail_at(*node, end_path + ".strain",
+              fmt::format("no two walls bound the sample along {}", "xyz"[end.strain_axis]));
+    const bool pushed = std::any_of(in_force.begin(), in_force.end(), [](const WallLoad& load) {
+      return (load.drive == WallDrive::pressure && load.pressure > 0) ||
+             (load.drive == WallDrive::force && load.force > 0);
+    });
+    if (end.equilibrium && !pushed && stage.gravity.norm() == 0)
+      fail_at(*node, end_path + ".equilibrium",
+              "neither gravity nor a pushed wall loads the sample in this stage");
+  }
+
+  bool bounded(int axis) const {
+    const auto faces = [&](double direction) {
+      return std::any_of(scene_.setup.walls.begin(), scene_.setup.walls.end(),
+                         [&](const Wall& wall) { return wall.normal[axis] == direction; });
+    };
+    return faces(1) && faces(-1);
+  }
+
+  const toml::table& root_;
+  const toml::table nothing_;
+  std::filesystem::path folder_;
+  const SceneKeys& keys_ = scene_keys();
+  Scene scene_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+Scene parse_scene(const std::string& text, const std::string& file,
+                  const std::vector<std::string>& overrides) {
+  const toml::table root = parse_document(text, file, overrides);
+  return SceneReader(root, file).read();
+}
+
+Scene load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  std::ifstream in(path);
+  if (!in) throw SceneError(path, 0, "", "cannot open the scene: " + std::generic_category().message(errno));
+  if (std::filesystem::is_directory(path)) throw SceneError(path, 0, "", "is a directory, not a scene file");
+  std::ostringstream text;
+  text << in.rdbuf();
+  return parse_scene(text.str(), path, overrides);
+}
+
+}  // namespace talus::io

@@ -1,0 +1,95 @@
+#pragma once
+
+/// Scene files: what a simulation is made of, as a user writes it (docs/scenes.md). One table of keys,
+/// io/scene/detail/scene_keys.cpp, is behind reading, checking, writing and the reference page.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/scene/scene_error.hpp"
+#include "kernels/samples/sample.hpp"
+#include "kernels/samples/size_distribution.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus::io {
+
+/// Where the grains come from. Fields that the kind does not use keep their defaults.
+struct SampleSpec {
+  enum class Kind {
+    deposition,  ///< layer by layer, each grain in the lowest place with three supports, on z = 0 between the
+                 ///< sides of `base`
+    lattice,     ///< simple cubic, not touching unless spacing is 1
+    bodies,      ///< read from `file` (io/files/csv.hpp)
+  };
+  Kind kind = Kind::deposition;
+  std::int64_t count = 0;  ///< grains; 0 for a lattice given by `cells`
+  std::array<double, 2>
+      base{};  ///< [m] the sample stands on [0, base[0]] x [0, base[1]]; 0 for a lattice given by `cells`
+  std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given by `count` and `base`
+  double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
+  SizeDistribution radii;
+  std::string file;  ///< absolute path
+
+  /// Grains of a deposition or a lattice.
+  std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
+};
+
+/// What is written during the run and when. Frames come at the first of `every` and `every_steps`, whichever
+/// are given.
+struct OutputSpec {
+  std::string directory;                    ///< out/NAME unless given
+  std::optional<double> every;              ///< [s] between frames
+  std::optional<std::int64_t> every_steps;  ///< steps between frames
+  bool stage_frames = true;  ///< a frame at the ends of each stage, and where the run is stopped
+  bool fields = true;        ///< .vtp files for ParaView
+  bool contacts = true;      ///< contacts with forces in the frames
+  bool pictures = true;      ///< curves and force network as pictures
+};
+
+/// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said
+/// there.
+struct Scene {
+  std::string name;
+  std::string description;
+  double density = 0;  ///< [kg/m^3]
+  SampleSpec sample;
+  Stage common;  ///< time_step, gravity and law of the stages that give none themselves; its other fields are
+                 ///< not used
+  Setup setup;
+  OutputSpec output;
+  std::string source_file;
+};
+
+/// Reads a scene. `overrides` are texts "a.b=c" applied in order: the value is read as TOML, or taken as a
+/// text if it is none; an element of an array is named by its number or its name (stage.0.time_step,
+/// stage[0].time_step, stage.shear.time_step, wall.z+.pressure). Throws SceneError with file, line and key,
+/// or with the override.
+Scene load_scene(const std::string& path, const std::vector<std::string>& overrides = {});
+
+/// The same from a text; `file` is named in errors, and paths in the scene are relative to its folder.
+Scene parse_scene(const std::string& text, const std::string& file,
+                  const std::vector<std::string>& overrides = {});
+
+/// Resolves what waits for the grains, then checks the setup:
+/// - a wall without position (NaN in `point`) is placed at its side of `sample.base`, else where it touches
+/// the outermost grain;
+/// - a pushed wall, also in the loads of the stages, without mass (0) gets a tenth of the mass of the grains.
+/// Throws SceneError when there are no grains, walls cross, or the centre of a grain lies behind a wall.
+void place_walls(Scene& scene, const Sample& grains);
+
+/// The scene as TOML with every default spelled out; parse_scene gives the same scene back.
+std::string resolved_scene(const Scene& scene);
+
+/// The names that solver.method takes, in the order of the reference.
+std::vector<std::string> solver_methods();
+
+/// The method of that name. Throws std::invalid_argument that lists the names there are.
+SolverMethod solver_method(const std::string& name);
+
+/// docs/scenes.md: every key with type, unit, default, range and meaning.
+std::string scene_reference();
+
+}  // namespace talus::io

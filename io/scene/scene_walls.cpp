@@ -1,0 +1,78 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "io/scene/detail/scene_keys.hpp"
+#include "io/scene/detail/wall_conflict.hpp"
+#include "io/scene/scene.hpp"
+
+namespace talus::io {
+
+namespace detail {
+
+std::string wall_conflict(const std::vector<Wall>& walls, std::size_t k) {
+  constexpr double parallel = 1 - 1e-12;
+  for (std::size_t j = 0; j < k; ++j) {
+    const double cosine = walls[k].normal.dot(walls[j].normal);
+    if (cosine > parallel)
+      return fmt::format("walls '{}' and '{}' overlap: they face the same way", walls[j].name, walls[k].name);
+    const double room = (walls[k].point - walls[j].point).dot(walls[j].normal);
+    if (cosine < -parallel && room <= 0)
+      return fmt::format("walls '{}' and '{}' cross: {} m of room between them", walls[j].name, walls[k].name,
+                         room);
+  }
+  return "";
+}
+
+}  // namespace detail
+
+namespace {
+
+/// Coordinate of the face of an axis-aligned wall that nothing has placed yet.
+double automatic_position(const Wall& wall, int axis, const SampleSpec& sample, const Sample& grains) {
+  const bool low = wall.normal[axis] > 0;
+  if (axis < 2 && sample.base[0] > 0) return low ? 0 : sample.base[static_cast<std::size_t>(axis)];
+  double face = low ? std::numeric_limits<double>::infinity() : -std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < grains.size(); ++k)
+    face = low ? std::min(face, grains.x[k][axis] - grains.radius[k])
+               : std::max(face, grains.x[k][axis] + grains.radius[k]);
+  return face;
+}
+
+void give_mass(WallLoad& load, double mass) {
+  if (load.pushed() && load.mass == 0) load.mass = mass;
+}
+
+}  // namespace
+
+void place_walls(Scene& scene, const Sample& grains) {
+  const auto refuse = [&](const std::string& message) {
+    throw SceneError(scene.source_file, 0, "wall", message);
+  };
+  if (grains.size() == 0) throw SceneError(scene.source_file, 0, "sample", "there are no grains");
+  std::vector<Wall>& walls = scene.setup.walls;
+  for (Wall& wall : walls)
+    if (const int axis = detail::axis_of(wall); axis >= 0 && std::isnan(wall.point[axis]))
+      wall.point[axis] = automatic_position(wall, axis, scene.sample, grains);
+
+  double mass = 0;
+  for (std::size_t k = 0; k < grains.size(); ++k) mass += talus::mass(grains, k);
+  for (Wall& wall : walls) give_mass(wall.load, 0.1 * mass);
+  for (Stage& stage : scene.setup.stages)
+    for (auto& [name, load] : stage.loads) give_mass(load, 0.1 * mass);
+
+  for (std::size_t k = 0; k < walls.size(); ++k)
+    if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);
+  for (const Wall& wall : walls)
+    for (std::size_t k = 0; k < grains.size(); ++k)
+      if (const double depth = wall.normal.dot(wall.point - grains.x[k]); depth > 0)
+        refuse(fmt::format("the centre of grain {} lies {} m behind wall '{}'",
+                           static_cast<std::int64_t>(grains.id_of(k)), depth, wall.name));
+  try {
+    validate(scene.setup);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(scene.source_file, 0, "", error.what());
+  }
+}
+
+}  // namespace talus::io

@@ -1,9 +1,0 @@
-#include "io/version.hpp"
-
-namespace talus::io {
-
-std::string version() {
-  return "0.1.0";
-}
-
-}  // namespace talus::io

@@ -1,0 +1,104 @@
+#include "kernels/bodies/motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace talus {
+
+namespace {
+double square(const double (&v)[3]) {
+  return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+}  // namespace
+
+void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step) {
+  for (std::size_t s = range.begin; s < range.end; ++s)
+    for (std::size_t c = 0; c < 3; ++c)
+      x[s][static_cast<Eigen::Index>(c)] += 0.5 * time_step * velocity[s].u[c];
+}
+
+void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step,
+                     const Vec3& gravity, FreeVelocity& free) {
+  for (std::size_t s = range.begin; s < range.end; ++s)
+    for (std::size_t c = 0; c < 3; ++c) {
+      free.u[s][c] = velocity[s].u[c] + time_step * gravity[static_cast<Eigen::Index>(c)];
+      if (!free.w.empty()) free.w[s][c] = velocity[s].w[c];
+    }
+}
+
+void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity) {
+  for (Slot slot : slots) {
+    const auto s = static_cast<std::size_t>(slot);
+    std::copy_n(free.u[s].begin(), 3, velocity[s].u);
+    if (!free.w.empty()) std::copy_n(free.w[s].begin(), 3, velocity[s].w);
+  }
+}
+
+void MotionSums::add(const MotionSums& other) {
+  energy.translation += other.energy.translation;
+  energy.rotation += other.energy.rotation;
+  energy_free += other.energy_free;
+  impulse += other.impulse;
+  impulse_scale += other.impulse_scale;
+  if (!(other.speed2_max <= speed2_max)) {  // a NaN wins
+    speed2_max = other.speed2_max;
+    fastest = other.fastest;
+  }
+}
+
+MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
+                  const FreeVelocity& free, Multiplicities multiplicity, Multiplicities parts) {
+  MotionSums sums;
+  for (std::size_t s = range.begin; s < range.end; ++s) {
+    const Velocity& v = velocity[s];
+    const Vec3 u(v.u[0], v.u[1], v.u[2]), u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
+    x[s] += 0.5 * time_step * u;
+    const double share = multiplicity.empty() ? 1 : static_cast<double>(parts[s]) / multiplicity[s];
+    const double mass = share / v.inv_mass, u2 = u.squaredNorm();
+    const Vec3 gained = mass * (u - u_free);
+    sums.energy.translation += 0.5 * mass * u2;
+    sums.energy_free += 0.5 * mass * u_free.squaredNorm();
+    if (v.spin_mobility > 0) {
+      const double spin = 0.5 * share * square(v.w) / v.spin_mobility;
+      sums.energy.rotation += spin;
+      sums.energy_free += free.w.empty() ? spin
+                                         : 0.5 * share *
+                                               (free.w[s][0] * free.w[s][0] + free.w[s][1] * free.w[s][1] +
+                                                free.w[s][2] * free.w[s][2]) /
+                                               v.spin_mobility;
+    }
+    sums.impulse += gained;
+    sums.impulse_scale += gained.norm();
+    const double speed2 = u2 + square(v.w);
+    if (!(speed2 <= sums.speed2_max) || sums.fastest < 0) {
+      sums.speed2_max = speed2;
+      sums.fastest = static_cast<Slot>(s);
+      if (std::isnan(speed2)) return sums;
+    }
+  }
+  return sums;
+}
+
+void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
+          std::span<const double> radius, double time_step) {
+  for (std::size_t s = range.begin; s < range.end; ++s) {
+    const double* w = velocity[s].w;
+    const double speed = std::sqrt(square(velocity[s].w));
+    if (speed == 0) continue;
+    const double half = 0.5 * time_step * speed / radius[s];
+    const double c = std::cos(half), k = std::sin(half) / speed;
+    const double x = k * w[0], y = k * w[1], z = k * w[2];
+    const auto [qw, qx, qy, qz] = orientation[s];
+    std::array<double, 4> q = {c * qw - x * qx - y * qy - z * qz, c * qx + x * qw + y * qz - z * qy,
+                               c * qy + y * qw + z * qx - x * qz, c * qz + z * qw + x * qy - y * qx};
+    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (double& component : q) component /= norm;
+    orientation[s] = q;
+  }
+}
+
+double contact_margin(double speed, double time_step, double alert) {
+  return std::max(0.5 * alert, time_step * speed);
+}
+
+}  // namespace talus

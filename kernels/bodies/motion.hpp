@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "kernels/bodies/bodies.hpp"
+
+namespace talus {
+
+/// Slots [begin, end).
+struct SlotRange {
+  std::size_t begin;
+  std::size_t end;
+};
+
+/// Free velocity: what a grain would have at the end of the step without contacts, V- + h g. Only what a
+/// scene needs: `w` is empty without friction or rotation, where the sweeps do not touch it.
+struct FreeVelocity {
+  std::vector<std::array<double, 3>> u;  ///< [m/s]
+  std::vector<std::array<double, 3>> w;  ///< [m/s]
+};
+
+/// First half of Moreau's theta-scheme (theta = 1/2): x += h/2 u-.
+void predict(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step);
+
+/// Free velocity = V- + h g.
+void free_velocities(SlotRange range, std::span<const Velocity> velocity, double time_step,
+                     const Vec3& gravity, FreeVelocity& free);
+
+/// V = free velocity for the given grains.
+void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity);
+
+/// Sums over grains; add them in a fixed order only.
+struct MotionSums {
+  KineticEnergy energy;         ///< at the end of the step [J]
+  double energy_free = 0;       ///< translational and rotational, of the free velocity [J]
+  Vec3 impulse = Vec3::Zero();  ///< sum of m (u - u_free) [N s]: what the contacts gave to the sample
+  double impulse_scale = 0;     ///< sum of m |u - u_free| [N s]
+  double speed2_max = 0;        ///< [m^2/s^2]; NaN if any velocity is
+  Slot fastest = -1;
+
+  void add(const MotionSums& other);
+};
+
+/// Second half: x += h/2 u, with the sums. `multiplicity` and `parts` tell what a copy adds to them where the
+/// masses of a body's copies, M/parts each, are not those of one body together: M/m_i. Both empty elsewhere.
+MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
+                  const FreeVelocity& free, Multiplicities multiplicity = {}, Multiplicities parts = {});
+
+/// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
+void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
+          std::span<const double> radius, double time_step);
+
+/// max(alert/2, h |u|): a pair becomes a contact when its gap is below the alert distance or closes within a
+/// step. To this a grain's reach adds its radius, half the skin, which it may have used up before the
+/// candidates are found anew, and more where it flies (StepGraph::make_cells).
+double contact_margin(double speed, double time_step, double alert);
+
+}  // namespace talus

@@ -1,0 +1,255 @@
+#include "kernels/delassus/newton.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "kernels/delassus/delassus_sweeps.hpp"
+#include "kernels/delassus/detail/block_factorisation.hpp"
+
+namespace talus {
+namespace {
+
+using Vector = Eigen::VectorXd;
+using Mat2 = Eigen::Matrix2d;
+using Vec2 = Eigen::Vector2d;
+
+std::span<double> span_of(Vector& v) {
+  return {v.data(), static_cast<std::size_t>(v.size())};
+}
+std::span<const double> span_of(const Vector& v) {
+  return {v.data(), static_cast<std::size_t>(v.size())};
+}
+
+Eigen::Index first_row(std::size_t contact) {
+  return static_cast<Eigen::Index>(3 * contact);
+}
+
+/// dF = velocity dW_c + impulse dr_c of one contact, W_c its rows of W; for an open one F = r.
+struct Linearised {
+  bool open = true;
+  Mat3 velocity, impulse;
+};
+
+/// The map of Alart and Curnier for one contact; `slope` may be null.
+Vec3 alart_curnier(const Vec3& r, const Vec3& u, double mu, Linearised* slope) {
+  const Vec3 z = r - u;
+  if (slope) slope->open = z[0] <= 0;
+  if (z[0] <= 0) return r;
+  const double length = z.tail<2>().norm(), limit = mu * z[0];
+  if (length <= limit) {
+    if (slope) {
+      slope->velocity.setIdentity();
+      slope->impulse.setZero();
+    }
+    return u;
+  }
+  const Vec2 t = z.tail<2>() / length;
+  Vec3 f;
+  f[0] = u[0];
+  f.tail<2>() = r.tail<2>() - limit * t;
+  if (slope) {
+    const Mat2 turn = limit / length * (Mat2::Identity() - t * t.transpose());
+    slope->velocity.setZero();
+    slope->velocity(0, 0) = 1;
+    slope->velocity.bottomLeftCorner<2, 1>() = mu * t;
+    slope->velocity.bottomRightCorner<2, 2>() = turn;
+    slope->impulse.setZero();
+    slope->impulse.bottomLeftCorner<2, 1>() = -mu * t;
+    slope->impulse.bottomRightCorner<2, 2>() = Mat2::Identity() - turn;
+  }
+  return f;
+}
+
+/// The proximal problem u = W r + q + alpha (r - centre), W with unit mean diagonals.
+class ProximalNewton {
+ public:
+  explicit ProximalNewton(const DelassusProblem& problem)
+      : p_(problem),
+        order_(detail::elimination_order(problem)),
+        slope_(problem.contacts()),
+        place_(problem.contacts()),
+        centre_(first_row(problem.contacts())),
+        u_(centre_.size()),
+        F_(centre_.size()),
+        step_(centre_.size()),
+        sweep_(problem) {}
+
+  void begin(const Vector& centre, double alpha) {
+    centre_ = centre;
+    alpha_ = alpha;
+    sweep_ = ProximalSweep(p_, std::vector<double>(p_.contacts(), alpha));
+  }
+
+  /// |F(r)|, and with `linearise` its slopes.
+  double residual(const Vector& r, bool linearise) {
+    relative_velocity(p_, span_of(r), span_of(u_));
+    u_ += alpha_ * (r - centre_);
+    for (std::size_t c = 0; c < p_.contacts(); ++c) {
+      const Eigen::Index row = first_row(c);
+      F_.segment<3>(row) = alart_curnier(r.segment<3>(row), u_.segment<3>(row), p_.diagonal[c].mu,
+                                         linearise ? &slope_[c] : nullptr);
+    }
+    return F_.norm();
+  }
+
+  /// Newton's step from r, where `residual` linearised last; false when the matrix is singular.
+  bool find_step(const Vector& r) {
+    active_.clear();
+    std::fill(place_.begin(), place_.end(), -1);
+    for (const std::int32_t c : order_) {
+      const auto contact = static_cast<std::size_t>(c);
+      if (slope_[contact].open) {
+        step_.segment<3>(first_row(contact)) = -r.segment<3>(first_row(contact));
+      } else {
+        place_[contact] = static_cast<std::int32_t>(active_.size());
+        active_.push_back(contact);
+      }
+    }
+    if (active_.empty()) return true;
+    entries_.clear();
+    rhs_.resize(first_row(active_.size()));
+    for (std::size_t row = 0; row < active_.size(); ++row) {
+      const std::size_t a = active_[row];
+      const Linearised& slope = slope_[a];
+      Vec3 rhs = -F_.segment<3>(first_row(a));
+      const Mat3 own = p_.diagonal[a].W + alpha_ * Mat3::Identity();
+      entries_.push_back({place_[a], place_[a], slope.velocity * own + slope.impulse});
+      for (auto k = static_cast<std::size_t>(p_.row_begin[a]);
+           k < static_cast<std::size_t>(p_.row_begin[a + 1]); ++k) {
+        const auto b = static_cast<std::size_t>(p_.column[k]);
+        if (place_[b] < 0)
+          rhs -= slope.velocity * (p_.block[k] * step_.segment<3>(first_row(b)));
+        else
+          entries_.push_back({place_[a], place_[b], slope.velocity * p_.block[k]});
+      }
+      rhs_.segment<3>(first_row(row)) = rhs;
+    }
+    if (!factors_.factorise(active_.size(), entries_, false)) return false;
+    factors_.solve(rhs_);
+    if (!rhs_.allFinite()) return false;
+    for (std::size_t row = 0; row < active_.size(); ++row)
+      step_.segment<3>(first_row(active_[row])) = rhs_.segment<3>(first_row(row));
+    return true;
+  }
+
+  const Vector& step() const { return step_; }
+
+  std::int64_t smooth(Vector& r, int sweeps) const {
+    std::int64_t failed = 0;
+    for (int k = 0; k < sweeps; ++k) failed = sweep_(span_of(centre_), span_of(r));
+    return failed;
+  }
+
+ private:
+  const DelassusProblem& p_;
+  std::vector<std::int32_t> order_;
+  std::vector<Linearised> slope_;
+  std::vector<std::int32_t> place_;  ///< row of an active contact, -1 of an open one
+  std::vector<std::size_t> active_;  ///< in the order of elimination
+  std::vector<detail::BlockEntry> entries_;
+  detail::BlockFactorisation factors_;
+  Vector centre_, u_, F_, step_, rhs_;
+  double alpha_ = 0;
+  ProximalSweep sweep_;
+};
+
+}  // namespace
+
+DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& goal,
+                            const NewtonSettings& settings, std::span<double> r) {
+  BestAnswer answer(problem, goal, r);
+  if (answer.done() || problem.contacts() == 0) return answer.hand_back();
+  DelassusReport& report = answer.report();
+  for (const LocalBlock& own : problem.diagonal) {
+    const auto c = static_cast<std::size_t>(&own - problem.diagonal.data());
+    report.failed_contacts += !(own.W(0, 0) > 0) && problem.q[c][0] < 0;
+  }
+  if (report.failed_contacts > 0) return answer.hand_back();
+  const UnitDiagonal scaled = unit_diagonal(problem);
+  Vector x(first_row(problem.contacts())), trial(x.size()), centre(x.size());
+  for (std::size_t k = 0; k < r.size(); ++k) x[static_cast<Eigen::Index>(k)] = r[k] * scaled.root[k / 3];
+  std::vector<double> candidate(r.size());
+  const auto offer = [&](const Vector& of) {
+    for (std::size_t k = 0; k < candidate.size(); ++k)
+      candidate[k] = of[static_cast<Eigen::Index>(k)] / scaled.root[k / 3];
+    answer.offer(report.iterations, candidate);
+  };
+
+  ProximalNewton newton(scaled.problem);
+  double alpha = settings.proximal;
+  constexpr int most_inner = 30;
+  double progress = answer.least();  // error that counted as progress, and when
+  std::int64_t progress_at = 0;
+  const auto over = [&] {
+    if (answer.least() < 0.3 * progress) {
+      progress = answer.least();
+      progress_at = report.iterations;
+    }
+    return report.converged || report.stopped || report.iterations >= goal.max_iterations ||
+           (settings.patience > 0 && report.iterations - progress_at >= settings.patience);
+  };
+  while (!over()) {
+    centre = x;
+    newton.begin(centre, alpha);
+    const double first = newton.residual(x, true);
+    std::array<double, 3> past{first, 0, 0};
+    int inner = 0;
+    bool solved = false, failed = false;
+    while (!solved && !failed && inner < most_inner && !over()) {
+      ++report.iterations;
+      ++report.factorisations;
+      if (!newton.find_step(x)) {
+        failed = true;
+        break;
+      }
+      const double reference = *std::max_element(past.begin(), past.end());
+      double now = std::numeric_limits<double>::infinity();
+      bool accepted = false;
+      double part = 1;
+      for (int k = 0; k < 4 && !accepted; ++k, part *= 0.25) {
+        trial = x + part * newton.step();
+        report.failed_contacts = newton.smooth(trial, settings.smoothing);
+        now = newton.residual(trial, false);
+        accepted = now < 0.9 * reference;
+      }
+      if (!accepted) {
+        trial = x;
+        report.failed_contacts = newton.smooth(trial, 20 * settings.smoothing);
+        now = newton.residual(trial, false);
+        failed = !(now < 2 * reference);
+      }
+      if (!failed) x = trial;
+      past[static_cast<std::size_t>(++inner) % past.size()] = now;
+      offer(x);
+      report.stopped = goal.stop && goal.stop();
+      solved = now <= 0.1 * std::min(1.0, alpha) * first;
+      if (!solved && !failed) newton.residual(x, true);
+    }
+    if (failed || (!solved && inner >= most_inner)) {
+      alpha = std::min(10 * alpha, 10.0);
+      x = centre;
+    } else if (inner <= 4) {
+      alpha = std::max(0.1 * alpha, 1e-12);
+    } else if (inner > 10) {
+      alpha = std::min(3 * alpha, 1.0);
+    }
+  }
+  return answer.hand_back();
+}
+
+double newton_cost(const DelassusProblem& problem) {
+  // Not all contacts are active, and a multiplication of the sparse LU takes about 6 times as long as one of
+  // the dense LU or of a sweep; beside it assembly, smoothing and checks. Good to a factor of 2 on FCLIB's
+  // problems.
+  const double factor = detail::factorisation_cost(problem, detail::elimination_order(problem));
+  const bool sparse = problem.contacts() > detail::dense_contacts;
+  return (sparse ? 3 : 0.5) * factor + (sparse ? 20 : 10) * sweep_cost(problem);
+}
+
+double sweep_cost(const DelassusProblem& problem) {
+  return 9.0 * static_cast<double>(problem.column.size()) + 150.0 * static_cast<double>(problem.contacts());
+}
+
+}  // namespace talus

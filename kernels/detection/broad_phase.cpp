@@ -1,0 +1,229 @@
+#include "kernels/detection/broad_phase.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace talus {
+
+namespace {
+
+constexpr int x_shift = 38, y_shift = 19, level_shift = 57;
+constexpr std::int32_t cells_an_axis = 1 << 19;
+/// Where the origin stands: a sample around it varies in the low bits of its coordinates only, and what does
+/// not vary takes no pass of the sort.
+constexpr std::int32_t middle_cell = cells_an_axis / 2 + 512;
+/// Cells are wider than the widest pair by more than the rounding of a place up to cells_an_axis, so that
+/// a pair is never two cells apart.
+constexpr double rounding_margin = 1 + 1e-9;
+
+/// Key of the cell of a point in a level. Far coordinates are clamped, which keeps neighbours neighbours, to
+/// the outermost cells but one: every cell has neighbours whose keys are near its own.
+std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, double size) {
+  std::uint64_t key = std::uint64_t{level} << level_shift;
+  constexpr int shift[3] = {x_shift, y_shift, 0};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double at = (x[axis] - origin[axis]) / size + middle_cell;
+    // Above 0, where to cut off digits is to round down. A NaN goes to 1.
+    const double inside = std::min<double>(cells_an_axis - 2, std::max<double>(1, at));
+    key |= static_cast<std::uint64_t>(static_cast<std::int32_t>(inside)) << shift[axis];
+  }
+  return key;
+}
+
+/// Medians of the coordinates, of a thousand bodies at most: a few that fly far away must not push all others
+/// into one clamped cell.
+Vec3 middle_of(std::span<const Vec3> x) {
+  const std::size_t stride = (x.size() + 999) / 1000;
+  std::vector<double> values;
+  Vec3 result;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    values.clear();
+    for (std::size_t k = 0; k < x.size(); k += stride) values.push_back(x[k][axis]);
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    result[axis] = *middle;
+  }
+  return result;
+}
+
+struct Entry {
+  std::uint64_t key;
+  Slot slot;
+};
+
+/// By key, equals in the order in which they stand: by counting digits, from the lowest that varies on.
+void sort_by_key(std::vector<Entry>& entries) {
+  constexpr int digit = 11;
+  constexpr std::size_t values = std::size_t{1} << digit;
+  std::uint64_t varies = 0;
+  for (const Entry& entry : entries) varies |= entry.key ^ entries[0].key;
+  std::vector<Entry> sorted(entries.size());
+  for (int shift = 0; shift < 64; shift += digit) {
+    if ((varies >> shift) % values == 0) continue;
+    std::array<std::size_t, values + 1> next{};
+    for (const Entry& entry : entries) ++next[(entry.key >> shift) % values + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (const Entry& entry : entries) sorted[next[(entry.key >> shift) % values]++] = entry;
+    entries.swap(sorted);
+  }
+}
+
+/// Appends pairs to a list whose length is known at the end only: testing takes no jump.
+class PairList {
+ public:
+  explicit PairList(std::vector<GrainPair>& pairs) : pairs_(pairs), size_(pairs.size()) {}
+  ~PairList() { pairs_.resize(size_); }
+  PairList(const PairList&) = delete;
+  PairList& operator=(const PairList&) = delete;
+
+  /// Those of body a of `grid` with its bodies [begin, end) that are near enough.
+  void add(const CellGrid& grid, std::size_t a, std::size_t begin, std::size_t end) {
+    if (size_ + (end - begin) > pairs_.size()) pairs_.resize(2 * (size_ + end - begin));
+    const CellGrid::Member one = grid.members[a];
+    const Slot slot = grid.slots[a];
+    GrainPair* next = pairs_.data() + size_;
+    for (std::size_t b = begin; b < end; ++b) {
+      const CellGrid::Member& other = grid.members[b];
+      const double dx = one.x[0] - other.x[0], dy = one.x[1] - other.x[1], dz = one.x[2] - other.x[2];
+      const double distance = one.reach + other.reach;
+      *next = {std::min(slot, grid.slots[b]), std::max(slot, grid.slots[b])};
+      next += dx * dx + dy * dy + dz * dz < distance * distance ? 1 : 0;
+    }
+    size_ = static_cast<std::size_t>(next - pairs_.data());
+  }
+
+ private:
+  std::vector<GrainPair>& pairs_;
+  std::size_t size_;
+};
+
+/// Bodies side by side.
+struct Row {
+  std::size_t begin = 0, end = 0;
+};
+/// Those of the cells whose keys are within 1 of `key`. `cell` is the first of these cells, or any before it,
+/// and becomes the first.
+Row row_at(const CellGrid& grid, std::uint64_t key, std::size_t& cell) {
+  while (cell < grid.cells.size() && grid.cells[cell].key + 1 < key) ++cell;
+  std::size_t last = cell;
+  while (last < grid.cells.size() && grid.cells[last].key <= key + 1) ++last;
+  if (last == cell) return {};
+  return {static_cast<std::size_t>(grid.cells[cell].begin),
+          static_cast<std::size_t>(grid.cells[last - 1].end)};
+}
+
+std::size_t first_cell(const CellGrid& grid, std::uint64_t key) {
+  const auto at = std::lower_bound(grid.cells.begin(), grid.cells.end(), key,
+                                   [](const CellGrid::Cell& cell, std::uint64_t k) { return cell.key < k; });
+  return static_cast<std::size_t>(at - grid.cells.begin());
+}
+
+constexpr std::uint64_t one_x = std::uint64_t{1} << x_shift, one_y = std::uint64_t{1} << y_shift;
+/// Of the 9 rows of 3 cells around a cell, the 4 behind its own.
+constexpr std::array<std::uint64_t, 4> rows_behind = {one_y, one_x - one_y, one_x, one_x + one_y};
+constexpr std::array<std::uint64_t, 9> rows_around = {
+    0 - one_x - one_y, 0 - one_x, one_y - one_x, 0 - one_y, 0, one_y, one_x - one_y, one_x, one_x + one_y};
+
+/// The rows around the cell of a level in which the last body asked for lies: neighbours often share it.
+struct Around {
+  std::uint64_t key = 0;  ///< of no cell
+  std::array<Row, rows_around.size()> rows;
+};
+
+}  // namespace
+
+CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
+  CellGrid grid;
+  const std::size_t n = x.size();
+  if (n == 0) return grid;
+  double smallest = reach[0], largest = reach[0];
+  grid.origin = middle_of(x);
+  for (double r : reach) {
+    smallest = std::min(smallest, r);
+    largest = std::max(largest, r);
+  }
+  // The coarsest level is fitted to the largest body; even samples then have one level and cells that are not
+  // too large.
+  // In floating point up to the bound: a reach may be infinite in a step that ends as a runaway.
+  const int levels = 1 + static_cast<int>(std::min(31.0, std::floor(std::log2(largest / smallest))));
+  grid.cell_size.resize(static_cast<std::size_t>(levels));
+  for (int level = 0; level < levels; ++level)
+    grid.cell_size[static_cast<std::size_t>(level)] =
+        2 * largest * std::exp2(level - levels + 1) * rounding_margin;
+
+  std::vector<Entry> entries(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    std::size_t level = 0;
+    while (grid.cell_size[level] < 2 * reach[k] * rounding_margin) ++level;
+    entries[k] = {key_of(x[k].data(), grid.origin, level, grid.cell_size[level]), static_cast<Slot>(k)};
+  }
+  sort_by_key(entries);
+
+  grid.slots.resize(n);
+  grid.members.resize(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const Slot slot = entries[k].slot;
+    const auto s = static_cast<std::size_t>(slot);
+    grid.slots[k] = slot;
+    grid.members[k] = {{x[s][0], x[s][1], x[s][2]}, reach[s]};
+    const auto at = static_cast<std::int32_t>(k);
+    if (k == 0 || entries[k].key != entries[k - 1].key) grid.cells.push_back({entries[k].key, at, at});
+    grid.cells.back().end = at + 1;
+  }
+  return grid;
+}
+
+void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs) {
+  if (begin == end) return;
+  PairList list(pairs);
+  // Keys ascend, and so do those of the rows: each is followed from where it was.
+  std::array<std::size_t, rows_behind.size()> cell;
+  for (std::size_t r = 0; r < cell.size(); ++r)
+    cell[r] = first_cell(grid, grid.cells[begin].key + rows_behind[r] - 1);
+  std::vector<Around> around(grid.cell_size.size());
+  for (std::size_t c = begin; c < end; ++c) {
+    const std::uint64_t key = grid.cells[c].key;
+    const auto from = static_cast<std::size_t>(grid.cells[c].begin),
+               to = static_cast<std::size_t>(grid.cells[c].end);
+    const bool next = c + 1 < grid.cells.size() && grid.cells[c + 1].key == key + 1;
+    const std::size_t own = next ? static_cast<std::size_t>(grid.cells[c + 1].end) : to;
+    for (std::size_t a = from; a < to; ++a) list.add(grid, a, a + 1, own);
+    for (std::size_t r = 0; r < cell.size(); ++r) {
+      const Row row = row_at(grid, key + rows_behind[r], cell[r]);
+      for (std::size_t a = from; a < to && row.begin < row.end; ++a) list.add(grid, a, row.begin, row.end);
+    }
+    for (std::size_t level = (key >> level_shift) + 1; level < grid.cell_size.size(); ++level)
+      for (std::size_t a = from; a < to; ++a) {
+        Around& there = around[level];
+        const std::uint64_t centre = key_of(grid.members[a].x, grid.origin, level, grid.cell_size[level]);
+        if (there.key != centre) {
+          there.key = centre;
+          for (std::size_t r = 0; r < rows_around.size(); ++r) {
+            std::size_t first = first_cell(grid, centre + rows_around[r] - 1);
+            there.rows[r] = row_at(grid, centre + rows_around[r], first);
+          }
+        }
+        for (const Row& row : there.rows) list.add(grid, a, row.begin, row.end);
+      }
+  }
+}
+
+std::vector<GrainPair> sort_pairs(std::span<const std::vector<GrainPair>> parts, std::size_t bodies) {
+  std::vector<std::int32_t> offset(bodies + 1, 0);
+  for (const auto& part : parts)
+    for (const GrainPair& pair : part) ++offset[static_cast<std::size_t>(pair.first) + 1];
+  for (std::size_t k = 0; k < bodies; ++k) offset[k + 1] += offset[k];
+  std::vector<GrainPair> sorted(static_cast<std::size_t>(offset[bodies]));
+  std::vector<std::int32_t> next(offset.begin(), offset.end() - 1);
+  for (const auto& part : parts)
+    for (const GrainPair& pair : part)
+      sorted[static_cast<std::size_t>(next[static_cast<std::size_t>(pair.first)]++)] = pair;
+  for (std::size_t k = 0; k < bodies; ++k)
+    std::sort(sorted.begin() + offset[k], sorted.begin() + offset[k + 1],
+              [](const GrainPair& a, const GrainPair& b) { return a.second < b.second; });
+  return sorted;
+}
+
+}  // namespace talus

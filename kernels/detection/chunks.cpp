@@ -1,0 +1,303 @@
+#include "kernels/detection/chunks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace talus {
+
+namespace {
+
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
+  for (const CandidateGroup& group : groups) {
+    // Pieces of equal length: a short last piece would be a poor task.
+    const std::int32_t pieces = (group.end - group.begin + group.target - 1) / group.target;
+    for (std::int32_t k = 0; k < pieces; ++k) {
+      const auto part = static_cast<std::int64_t>(group.end - group.begin) * k / pieces;
+      chunks.begin.push_back(group.begin + static_cast<std::int32_t>(part));
+      chunks.wall.push_back(group.wall);
+      chunks.subdomain.push_back(group.subdomain);
+      chunks.side.push_back(group.side);
+    }
+  }
+  chunks.begin.push_back(groups.empty() ? 0 : groups.back().end);
+}
+
+void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunks) {
+  const std::size_t grains = candidates.grain_pairs.size();
+  std::vector<std::int32_t> seen_in(bodies, -1);
+  std::vector<std::uint16_t> place(bodies);
+  chunks.local.resize(2 * candidates.size());
+  chunks.body_begin.push_back(0);
+  for (std::size_t c = 0; c < chunks.wall.size(); ++c) {
+    const auto first_of_chunk = chunks.bodies.size();
+    const auto local = [&](Slot slot) {
+      const auto s = static_cast<std::size_t>(slot);
+      if (seen_in[s] != static_cast<std::int32_t>(c)) {
+        seen_in[s] = static_cast<std::int32_t>(c);
+        place[s] = static_cast<std::uint16_t>(chunks.bodies.size() - first_of_chunk);
+        chunks.bodies.push_back(slot);
+      }
+      return place[s];
+    };
+    for (std::size_t k = index(chunks.begin[c]); k < index(chunks.begin[c + 1]); ++k) {
+      if (k < grains) {
+        chunks.local[2 * k] = local(candidates.grain_pairs[k].first);
+        chunks.local[2 * k + 1] = local(candidates.grain_pairs[k].second);
+      } else {
+        chunks.local[2 * k] = local(candidates.wall_pairs[k - grains].body);
+      }
+    }
+    chunks.body_begin.push_back(static_cast<std::int32_t>(chunks.bodies.size()));
+  }
+}
+
+/// Candidates of grains with many candidates first: left to the end they would need groups of their own. By
+/// counting, so that equals keep their order. At walls the order is that of the candidates.
+void order_candidates(const Candidates& candidates, Chunks& chunks) {
+  constexpr std::size_t ranks = 64;
+  chunks.order.resize(candidates.grain_pairs.size());
+  std::vector<std::uint16_t> degree;
+  for (std::size_t c = 0; c < chunks.wall.size() && chunks.wall[c] < 0; ++c) {
+    const std::size_t begin = index(chunks.begin[c]), end = index(chunks.begin[c + 1]);
+    degree.assign(index(chunks.body_begin[c + 1] - chunks.body_begin[c]), 0);
+    for (std::size_t k = 2 * begin; k < 2 * end; ++k) ++degree[chunks.local[k]];
+    std::array<std::size_t, ranks + 1> next{};
+    const auto rank = [&](std::size_t k) {
+      const std::size_t both =
+          std::size_t{degree[chunks.local[2 * k]]} + std::size_t{degree[chunks.local[2 * k + 1]]};
+      return ranks - 1 - std::min(ranks - 1, both);
+    };
+    for (std::size_t k = begin; k < end; ++k) ++next[rank(k) + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (std::size_t k = begin; k < end; ++k)
+      chunks.order[begin + next[rank(k)]++] = static_cast<std::uint16_t>(k - begin);
+  }
+}
+
+/// Body -> chunks, as offsets and lists.
+struct Incidence {
+  std::vector<std::int32_t> begin;
+  std::vector<std::uint32_t> chunk;
+};
+
+Incidence chunks_of_bodies(const Chunks& chunks, std::size_t bodies) {
+  Incidence incidence;
+  incidence.begin.assign(bodies + 1, 0);
+  for (Slot s : chunks.bodies) ++incidence.begin[index(s) + 1];
+  std::partial_sum(incidence.begin.begin(), incidence.begin.end(), incidence.begin.begin());
+  incidence.chunk.resize(chunks.bodies.size());
+  std::vector<std::int32_t> next(incidence.begin.begin(), incidence.begin.end() - 1);
+  for (std::size_t c = 0; c < chunks.wall.size(); ++c)
+    for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1]; ++k)
+      incidence.chunk[index(next[index(chunks.bodies[index(k)])]++)] = static_cast<std::uint32_t>(c);
+  return incidence;
+}
+
+void find_conflicts(const Incidence& incidence, Chunks& chunks) {
+  const std::size_t count = chunks.wall.size();
+  std::vector<std::uint32_t> met(count, ~0u);
+  chunks.conflict_begin.push_back(0);
+  for (std::size_t c = 0; c < count; ++c) {
+    const auto from = chunks.conflicts.size();
+    met[c] = static_cast<std::uint32_t>(c);
+    for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1]; ++k) {
+      const auto s = index(chunks.bodies[index(k)]);
+      for (auto m = incidence.begin[s]; m < incidence.begin[s + 1]; ++m) {
+        const std::uint32_t other = incidence.chunk[index(m)];
+        if (met[other] == c) continue;
+        met[other] = static_cast<std::uint32_t>(c);
+        chunks.conflicts.push_back(other);
+      }
+    }
+    std::sort(chunks.conflicts.begin() + static_cast<std::ptrdiff_t>(from), chunks.conflicts.end());
+    chunks.conflict_begin.push_back(static_cast<std::int32_t>(chunks.conflicts.size()));
+  }
+}
+
+/// Greedily, one side above the other.
+void colour_chunks(Chunks& chunks) {
+  const std::size_t count = chunks.wall.size();
+  chunks.colour.assign(count, -1);
+  std::vector<std::uint32_t> taken_by(count + 1, ~0u);  // colour -> last chunk that found it taken
+  using enum ChunkSide;
+  for (const ChunkSide side : {wall, border, inside, late}) {
+    const std::int32_t lowest = chunks.colours;
+    for (std::size_t c = 0; c < count; ++c) {
+      if (chunks.side[c] != side) continue;
+      for (auto k = chunks.conflict_begin[c]; k < chunks.conflict_begin[c + 1]; ++k) {
+        const std::int32_t colour = chunks.colour[chunks.conflicts[index(k)]];
+        if (colour >= 0) taken_by[index(colour)] = static_cast<std::uint32_t>(c);
+      }
+      std::int32_t colour = lowest;
+      while (taken_by[index(colour)] == c) ++colour;
+      chunks.colour[c] = colour;
+      chunks.colours = std::max(chunks.colours, colour + 1);
+    }
+  }
+}
+
+void assign_resets(const Incidence& incidence, std::size_t bodies, std::span<const char> taken,
+                   Chunks& chunks) {
+  const std::size_t count = chunks.wall.size();
+  std::vector<std::int32_t> owner(bodies, -1);
+  chunks.owned_begin.assign(count + 1, 0);
+  for (std::size_t s = 0; s < bodies; ++s) {
+    if (!taken.empty() && taken[s] != 0) continue;
+    for (auto m = incidence.begin[s]; m < incidence.begin[s + 1]; ++m) {
+      const auto c = static_cast<std::int32_t>(incidence.chunk[index(m)]);
+      if (owner[s] < 0 || chunks.colour[index(c)] < chunks.colour[index(owner[s])]) owner[s] = c;
+    }
+    if (owner[s] < 0)
+      chunks.untouched.push_back(static_cast<Slot>(s));
+    else
+      ++chunks.owned_begin[index(owner[s]) + 1];
+  }
+  std::partial_sum(chunks.owned_begin.begin(), chunks.owned_begin.end(), chunks.owned_begin.begin());
+  chunks.owned.resize(index(chunks.owned_begin.back()));
+  std::vector<std::int32_t> next(chunks.owned_begin.begin(), chunks.owned_begin.end() - 1);
+  for (std::size_t s = 0; s < bodies; ++s)
+    if (owner[s] >= 0) chunks.owned[index(next[index(owner[s])]++)] = static_cast<Slot>(s);
+}
+
+/// Walks two sorted lists together and calls same(k_old, k_fresh) where they meet.
+template <class Pair, class Less, class Same>
+void merge_walk(const std::vector<Pair>& old, const std::vector<Pair>& fresh, Less less, Same same) {
+  for (std::size_t a = 0, b = 0; a < old.size() && b < fresh.size();) {
+    if (less(old[a], fresh[b]))
+      ++a;
+    else if (less(fresh[b], old[a]))
+      ++b;
+    else
+      same(a++, b++);
+  }
+}
+
+bool before(const GrainPair& a, const GrainPair& b) {
+  return a.first != b.first ? a.first < b.first : a.second < b.second;
+}
+bool before(const WallPair& a, const WallPair& b) {
+  return a.wall != b.wall ? a.wall < b.wall : a.body < b.body;
+}
+
+}  // namespace
+
+std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates, std::span<const char> glued,
+                                                    int target) {
+  const auto grains = static_cast<std::int32_t>(candidates.grain_pairs.size());
+  const auto all = static_cast<std::int32_t>(candidates.size());
+  std::vector<CandidateGroup> groups;
+  if (grains > 0) groups.push_back({0, grains, -1, 0, ChunkSide::inside, target});
+  for (std::int32_t from = grains; from < all;) {
+    const std::int32_t wall = candidates.wall_pairs[index(from - grains)].wall;
+    std::int32_t to = from;
+    while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall) ++to;
+    const bool at_glued = !glued.empty() && glued[index(wall)] != 0;
+    groups.push_back({from, to, wall, 0, at_glued ? ChunkSide::wall : ChunkSide::inside, target});
+    from = to;
+  }
+  return groups;
+}
+
+Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies,
+                  std::span<const char> taken) {
+  if (bodies > most_bodies_of_a_process)
+    throw std::runtime_error(std::to_string(bodies) + " bodies in one process, of at most " +
+                             std::to_string(most_bodies_of_a_process) + "; use more ranks");
+  Chunks chunks;
+  place_boundaries(groups, chunks);
+  list_bodies(candidates, bodies, chunks);
+  order_candidates(candidates, chunks);
+  const Incidence incidence = chunks_of_bodies(chunks, bodies);
+  find_conflicts(incidence, chunks);
+  colour_chunks(chunks);
+  assign_resets(incidence, bodies, taken, chunks);
+  return chunks;
+}
+
+Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target) {
+  return cut_chunks(candidates, groups_of_one_subdomain(candidates, {}, target), bodies);
+}
+
+void match_impulses(const Candidates& old, Candidates& fresh) {
+  const auto components = static_cast<std::size_t>(fresh.components);
+  fresh.impulse.assign(fresh.size() * components, 0.0);
+  if (old.components != fresh.components) return;
+  const auto carry = [&](std::size_t from, std::size_t to) {
+    std::copy_n(old.impulse.begin() + static_cast<std::ptrdiff_t>(from * components), components,
+                fresh.impulse.begin() + static_cast<std::ptrdiff_t>(to * components));
+  };
+  merge_walk(
+      old.grain_pairs, fresh.grain_pairs, [](const auto& a, const auto& b) { return before(a, b); }, carry);
+  merge_walk(
+      old.wall_pairs, fresh.wall_pairs, [](const auto& a, const auto& b) { return before(a, b); },
+      [&](std::size_t a, std::size_t b) { carry(old.grain_pairs.size() + a, fresh.grain_pairs.size() + b); });
+}
+
+void renumber(Candidates& candidates, std::span<const Slot> place) {
+  const auto components = static_cast<std::size_t>(candidates.components);
+  const std::size_t grains = candidates.grain_pairs.size();
+  for (std::size_t k = 0; k < grains; ++k) {
+    GrainPair& pair = candidates.grain_pairs[k];
+    pair = {place[index(pair.first)], place[index(pair.second)]};
+    if (pair.first < pair.second) continue;
+    std::swap(pair.first, pair.second);
+    if (components == 3)  // a normal part alone does not know which body comes first
+      for (std::size_t c = 0; c < 3; ++c) candidates.impulse[3 * k + c] = -candidates.impulse[3 * k + c];
+  }
+  for (WallPair& pair : candidates.wall_pairs) pair.body = place[index(pair.body)];
+
+  std::vector<std::size_t> order(candidates.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto split = order.begin() + static_cast<std::ptrdiff_t>(grains);
+  // A body is first in a few pairs only: counting by the first leaves short runs.
+  std::vector<std::size_t> begin(place.size() + 2, 0);
+  for (const GrainPair& pair : candidates.grain_pairs) ++begin[index(pair.first) + 2];
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  for (std::size_t k = 0; k < grains; ++k) order[begin[index(candidates.grain_pairs[k].first) + 1]++] = k;
+  for (std::size_t body = 0; body < place.size(); ++body)
+    std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin[body]),
+              order.begin() + static_cast<std::ptrdiff_t>(begin[body + 1]),
+              [&](std::size_t a, std::size_t b) {
+                return candidates.grain_pairs[a].second < candidates.grain_pairs[b].second;
+              });
+  std::sort(split, order.end(), [&](std::size_t a, std::size_t b) {
+    return before(candidates.wall_pairs[a - grains], candidates.wall_pairs[b - grains]);
+  });
+  Candidates sorted;
+  sorted.components = candidates.components;
+  sorted.grain_pairs.reserve(grains);
+  sorted.wall_pairs.reserve(candidates.wall_pairs.size());
+  sorted.impulse.reserve(candidates.impulse.size());
+  for (std::size_t k : order) {
+    if (k < grains)
+      sorted.grain_pairs.push_back(candidates.grain_pairs[k]);
+    else
+      sorted.wall_pairs.push_back(candidates.wall_pairs[k - grains]);
+    for (std::size_t c = 0; c < components; ++c)
+      sorted.impulse.push_back(candidates.impulse[components * k + c]);
+  }
+  candidates = std::move(sorted);
+}
+
+std::size_t memory_used(const Candidates& candidates) {
+  return candidates.grain_pairs.capacity() * sizeof(GrainPair) +
+         candidates.wall_pairs.capacity() * sizeof(WallPair) + candidates.impulse.capacity() * sizeof(double);
+}
+
+std::size_t memory_used(const Chunks& chunks) {
+  return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.subdomain.capacity() +
+          chunks.colour.capacity() + chunks.body_begin.capacity() + chunks.bodies.capacity() +
+          chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
+          chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
+             4 +
+         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.side.capacity();
+}
+
+}  // namespace talus

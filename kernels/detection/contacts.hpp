@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/walls.hpp"
+#include "kernels/detection/chunks.hpp"
+
+namespace talus {
+
+/// Where the record of a body begins, in numbers (VelocityOf). Of most_bodies_of_a_process, which cut_chunks
+/// sees to.
+inline std::uint32_t record_of(Slot slot) {
+  constexpr std::uint32_t numbers = sizeof(Velocity) / sizeof(double);
+  static_assert(most_bodies_of_a_process * numbers <= std::size_t{1} << 32);
+  return numbers * static_cast<std::uint32_t>(slot);
+}
+
+/// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
+/// chunks.begin[c] + count[c]), in groups of at most 16, most of them full. No grain stands twice in a
+/// group, so that a group can be swept at once. Behind them, between grains, stand the candidates that are
+/// no contacts, so that the next step finds all of them where they were (kernels/detection/narrow_phase.hpp).
+struct Contacts {
+  std::vector<double> nx, ny, nz;   ///< normal, unit, from the second body (or the wall) to the first
+  std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
+  std::vector<double> rx, ry, rz;   ///< impulse on the first body [N s]; empty without friction
+  std::vector<double> rn;           ///< normal impulse [N s]; empty with friction
+  std::vector<Slot> first, second;  ///< second is -1 at a wall
+  /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.
+  std::vector<std::uint32_t> first_record, second_record;
+  std::vector<std::int32_t> candidate;
+  std::vector<std::int32_t> count;   ///< per chunk
+  std::vector<std::int32_t> passed;  ///< per chunk: pairs that went through one another on their way to x, or
+                                     ///< in by more than half the smaller radius: the time step is too long
+  std::vector<std::uint8_t> group;   ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
+};
+
+/// Contacts in the same places, as sweeps in single precision know them (single_precision.hpp).
+struct SingleContacts {
+  double unit = 1;                ///< [kg] of impulses and of bodies' mobilities, a power of two
+  std::vector<float> nx, ny, nz;  ///< normal
+  std::vector<float> bias;        ///< b [m/s]
+  std::vector<float> rx, ry, rz;  ///< impulse on the first body over `unit` [m/s]; empty without friction
+  std::vector<float> rn;          ///< normal impulse over `unit` [m/s]; empty with friction
+};
+
+/// Room for the contacts of `chunks`, of which there are none yet: the candidates stand in their order, with
+/// their bodies between grains. `friction` decides which impulses exist.
+void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
+
+/// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.
+void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                    Candidates& candidates);
+
+/// The other way: the impulses of a chunk's contacts are those that store_impulses wrote.
+void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
+                      Contacts& contacts);
+
+/// Gives the impulses `components` (3 or 1) when a stage brings friction or drops it: normal parts become
+/// vectors along today's normals, and vectors their normal parts, so that forces outlive the change. x [m] of
+/// all grains.
+void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
+                      std::span<const Wall> walls);
+
+std::size_t memory_used(const Contacts& contacts);
+
+}  // namespace talus

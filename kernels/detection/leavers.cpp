@@ -1,0 +1,114 @@
+#include "kernels/detection/leavers.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/detection/narrow_phase.hpp"
+
+namespace talus {
+
+namespace {
+
+double need_of(const Bodies& bodies, std::size_t s, const Margins& margins) {
+  const double* u = bodies.velocity[s].u;
+  return bodies.radius[s] +
+         contact_margin(std::sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]), margins.time_step, margins.alert);
+}
+
+constexpr double rounding = 1e-12;
+
+/// Body s with the leavers, which need `widest` at most.
+void compare(std::span<const Leaver* const> leavers, const Bodies& bodies, std::size_t s,
+             const Margins& margins, double widest, char& left, std::vector<Encounter>& needed) {
+  using Map = Eigen::Map<const Vec3>;
+  const Vec3& x = bodies.x[s];
+  const double most = std::max(margins.reach_then[s], widest);
+  for (const Leaver* leaver : leavers) {
+    const double dx = x[0] - leaver->x[0], dy = x[1] - leaver->x[1], dz = x[2] - leaver->x[2];
+    const double d2 = dx * dx + dy * dy + dz * dz, near = leaver->need + most;
+    if (d2 >= near * near) continue;
+    const auto id = static_cast<std::int64_t>(bodies.id[s]);
+    if (id == leaver->id) {
+      left = 1;
+      continue;
+    }
+    const double distance = std::sqrt(d2), gap = distance - leaver->radius - bodies.radius[s];
+    const Vec3 v = Map(bodies.velocity[s].u) - Map(leaver->u);
+    const double v_n = distance > 0 ? Vec3(dx, dy, dz).dot(v) / distance : 0;
+    // Rounded otherwise than in the narrow phase: a little more than it asks for.
+    if (may_touch(gap - rounding * distance, v_n, margins.time_step, margins.alert))
+      needed.push_back({std::min(id, leaver->id), std::max(id, leaver->id)});
+  }
+}
+
+}  // namespace
+
+void find_leavers(SlotRange range, const Bodies& bodies, const Margins& margins,
+                  std::vector<Leaver>& leavers) {
+  for (std::size_t s = range.begin; s < range.end; ++s) {
+    const Vec3& x = bodies.x[s];
+    const double need = need_of(bodies, s, margins);
+    if (need + (x - margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
+    const double* u = bodies.velocity[s].u;
+    leavers.push_back({static_cast<std::int64_t>(bodies.id[s]),
+                       bodies.radius[s],
+                       need,
+                       {x[0], x[1], x[2]},
+                       {u[0], u[1], u[2]}});
+  }
+}
+
+void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, const Candidates& candidates,
+                     const Margins& margins, std::vector<Encounter>& needed, std::vector<Encounter>& known) {
+  using Map = Eigen::Map<const Vec3>;
+  const double h = margins.time_step;
+  double widest = 0;
+  for (const Leaver& leaver : leavers) widest = std::max(widest, leaver.need);
+  std::vector<char> left(bodies.size(), 0);
+  std::vector<const Leaver*> near;
+  constexpr std::size_t block = 64;  // in Morton order, side by side: most leavers are far from all of them
+  for (std::size_t begin = 0; begin < bodies.size(); begin += block) {
+    const std::size_t end = std::min(begin + block, bodies.size());
+    const auto x = std::span(bodies.x).subspan(begin, end - begin);
+    Vec3 low = x[0], high = x[0];
+    for (const Vec3& p : x) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    // Who has not left needs less than the reach of then.
+    const auto reach = margins.reach_then.subspan(begin, end - begin);
+    const double most = std::max(widest, *std::max_element(reach.begin(), reach.end()));
+    near.clear();
+    for (const Leaver& leaver : leavers) {
+      const Map at(leaver.x);
+      const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = leaver.need + most;
+      if (!(d2 * (1 - rounding) >= reached * reached)) near.push_back(&leaver);
+    }
+    for (std::size_t s = begin; s < end; ++s) compare(near, bodies, s, margins, widest, left[s], needed);
+  }
+  for (const Leaver& leaver : leavers)
+    for (std::size_t w = 0; w < margins.walls.size(); ++w) {
+      const Wall& wall = margins.walls[w];
+      const double distance = wall.normal.dot(Map(leaver.x) - wall.point);
+      const double v_n = wall.normal.dot(Map(leaver.u) - wall.velocity - wall.gain + h * margins.gravity);
+      if (may_touch(distance - leaver.radius - rounding * std::abs(distance), v_n, h, margins.alert))
+        needed.push_back({-1 - static_cast<std::int64_t>(w), leaver.id});
+    }
+  const auto id = [&](Slot s) { return static_cast<std::int64_t>(bodies.id[static_cast<std::size_t>(s)]); };
+  for (const GrainPair& pair : candidates.grain_pairs)
+    if (left[static_cast<std::size_t>(pair.first)] != 0 || left[static_cast<std::size_t>(pair.second)] != 0)
+      known.push_back({std::min(id(pair.first), id(pair.second)), std::max(id(pair.first), id(pair.second))});
+  for (const WallPair& pair : candidates.wall_pairs)
+    if (left[static_cast<std::size_t>(pair.body)] != 0)
+      known.push_back({-1 - std::int64_t{pair.wall}, id(pair.body)});
+}
+
+bool all_known(std::vector<Encounter> needed, std::vector<Encounter> known) {
+  std::sort(needed.begin(), needed.end());
+  needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
+  std::sort(known.begin(), known.end());
+  known.erase(std::unique(known.begin(), known.end()), known.end());
+  return std::includes(known.begin(), known.end(), needed.begin(), needed.end());
+}
+
+}  // namespace talus

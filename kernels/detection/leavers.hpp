@@ -1,0 +1,60 @@
+#pragma once
+
+/// Grains that have used up their margin since the last broad phase, and whether the candidates still hold
+/// every contact of this step. A grain that was struck needs a wide margin for its speed, but in a dense
+/// sample the grains that it can reach are its candidates already: then nothing has to be found anew.
+///
+/// Between grains within their margins every contact is a candidate (kernels/bodies/motion.hpp); those that
+/// have left are compared with all grains and walls, in every step, by the rule of the narrow phase itself.
+
+#include <compare>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/motion.hpp"
+#include "kernels/bodies/walls.hpp"
+#include "kernels/detection/chunks.hpp"
+
+namespace talus {
+
+struct Leaver {
+  std::int64_t id;
+  double radius;  ///< [m]
+  double need;    ///< [m] radius + contact_margin: within it, and another's, lies whatever it can touch
+  double x[3];    ///< at the middle of the step [m]
+  double u[3];    ///< at its beginning [m/s]
+  auto operator<=>(const Leaver&) const = default;
+};
+
+/// Two grains by their ids, the smaller first; or wall w, as -1 - w, and a grain.
+struct Encounter {
+  std::int64_t a, b;
+  auto operator<=>(const Encounter&) const = default;
+};
+
+/// What the candidates were found with, and what makes contacts of them now.
+struct Margins {
+  std::span<const Vec3> x_then;        ///< centres at the last broad phase [m]
+  std::span<const double> reach_then;  ///< [m]
+  double time_step;                    ///< [s]
+  double alert;                        ///< [m]
+  Vec3 gravity = Vec3::Zero();         ///< [m/s^2]
+  std::span<const Wall> walls = {};    ///< at the middle of the step
+};
+
+/// Appends the grains of the range that are no longer within their reach of then.
+void find_leavers(SlotRange range, const Bodies& bodies, const Margins& margins,
+                  std::vector<Leaver>& leavers);
+
+/// Appends to `needed` the contacts of a leaver with a grain here or a wall, and to `known` the candidates
+/// here of the leavers. Over all ranks, which are to have the same leavers, the candidates hold if
+/// all_known(needed, known). `leavers` are in order of id, each once; cheap where slots that follow one
+/// another are near in space.
+void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, const Candidates& candidates,
+                     const Margins& margins, std::vector<Encounter>& needed, std::vector<Encounter>& known);
+
+bool all_known(std::vector<Encounter> needed, std::vector<Encounter> known);
+
+}  // namespace talus

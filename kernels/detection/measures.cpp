@@ -1,0 +1,80 @@
+#include "kernels/detection/measures.hpp"
+
+#include <algorithm>
+
+namespace talus {
+
+namespace {
+
+/// Contacts between asking for the bodies of one and looking at it.
+constexpr std::size_t ahead = 16;
+
+}  // namespace
+
+void ContactSums::add(const ContactSums& other) {
+  overlapping += other.overlapping;
+  passed += other.passed;
+  penetration += other.penetration;
+  penetration_max = std::max(penetration_max, other.penetration_max);
+  moment += other.moment;
+  normal_impulse += other.normal_impulse;
+}
+
+ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                             std::span<const Vec3> x, std::span<const double> radius,
+                             std::span<const Wall> walls) {
+  ContactSums sums;
+  sums.passed = contacts.passed[chunk];
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
+  const std::size_t end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  double penetration = 0, moment[9] = {}, normal_impulse = 0;  // apart, so that they stay in registers
+  const auto add = [&](std::size_t k, const Vec3& branch, double gap) {
+    // Without a jump: nobody can predict which contacts overlap.
+    const double overlap = std::max(0.0, -gap);
+    sums.overlapping += gap < 0 ? 1 : 0;
+    penetration += overlap;
+    sums.penetration_max = std::max(sums.penetration_max, overlap);
+    const Vec3 r = contact_impulse(contacts, k);
+    for (Eigen::Index c = 0; c < 9; ++c) moment[c] += r[c % 3] * branch[c / 3];
+    normal_impulse += r.dot(contact_normal(contacts, k));
+  };
+  if (chunks.wall[chunk] >= 0) {
+    const Wall& wall = walls[static_cast<std::size_t>(chunks.wall[chunk])];
+    for (std::size_t k = begin; k < end; ++k) {
+      const auto i = static_cast<std::size_t>(contacts.first[k]);
+      const double distance = wall.normal.dot(x[i] - wall.point);
+      add(k, distance * wall.normal, distance - radius[i]);
+    }
+  } else {
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::size_t next = std::min(k + ahead, end - 1);
+      for (const Slot slot : {contacts.first[next], contacts.second[next]}) {
+        __builtin_prefetch(&x[static_cast<std::size_t>(slot)]);
+        __builtin_prefetch(&radius[static_cast<std::size_t>(slot)]);
+      }
+      const auto i = static_cast<std::size_t>(contacts.first[k]),
+                 j = static_cast<std::size_t>(contacts.second[k]);
+      const Vec3 branch = x[i] - x[j];
+      add(k, branch, branch.norm() - radius[i] - radius[j]);
+    }
+  }
+  sums.penetration = penetration;
+  sums.moment = Eigen::Map<const Eigen::Matrix3d>(moment);
+  sums.normal_impulse = normal_impulse;
+  return sums;
+}
+
+std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies) {
+  std::vector<std::int32_t> touching(bodies, 0);
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    const auto begin = static_cast<std::size_t>(chunks.begin[c]);
+    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(contacts.count[c]); ++k) {
+      if (contact_impulse(contacts, k).dot(contact_normal(contacts, k)) <= 0) continue;
+      ++touching[static_cast<std::size_t>(contacts.first[k])];
+      if (contacts.second[k] >= 0) ++touching[static_cast<std::size_t>(contacts.second[k])];
+    }
+  }
+  return touching;
+}
+
+}  // namespace talus

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/detection/contacts.hpp"
+
+namespace talus {
+
+/// Sums over the contacts of some chunks at the end of the step; add them in a fixed order only.
+struct ContactSums {
+  std::int64_t overlapping = 0;  ///< contacts with gap < 0
+  std::int64_t passed = 0;       ///< pairs that went through one another (Contacts::passed)
+  double penetration = 0;        ///< sum of -gap over them [m]
+  double penetration_max = 0;    ///< [m]
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  ///< sum of r (x) l [N s m], l the branch vector: h V
+                                                     ///< times the Love-Weber stress
+  double normal_impulse = 0;                         ///< sum of r_n [N s]
+
+  void add(const ContactSums& other);
+};
+
+/// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the
+/// plane to the centre.
+ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
+                             std::span<const Vec3> x, std::span<const double> radius,
+                             std::span<const Wall> walls);
+
+/// Its normal, and its impulse on the first body [N s], whatever the storage.
+inline Vec3 contact_normal(const Contacts& contacts, std::size_t k) {
+  return {contacts.nx[k], contacts.ny[k], contacts.nz[k]};
+}
+inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
+  if (contacts.rn.empty()) return {contacts.rx[k], contacts.ry[k], contacts.rz[k]};
+  return contacts.rn[k] * contact_normal(contacts, k);
+}
+
+/// Active contacts (r_n > 0) of each grain: one entry per slot.
+std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies);
+
+}  // namespace talus

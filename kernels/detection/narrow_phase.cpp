@@ -1,0 +1,146 @@
+#include "kernels/detection/narrow_phase.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/detection/detail/contact_groups.hpp"
+#include "kernels/simd/contact_view.hpp"
+
+namespace talus {
+
+namespace {
+
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// Bias of a contact, or false when it constrains nothing in this step. `v_n` is the normal velocity at the
+/// beginning of the step, `v_n_free` the one at its end without contacts.
+bool constrain(const GapRule& in, double gap, double v_n, double v_n_free, double& bias) {
+  bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
+  if (!may_touch(gap, v_n_free, in.time_step, in.alert)) return false;
+  // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
+  // between both would gain energy.
+  if (in.restitution > 0 && std::abs(v_n) > in.slow) {
+    bias = in.restitution * v_n;
+    if (gap > 0) return false;
+  }
+  return true;
+}
+
+struct Pairing {
+  Vec3 d;  ///< x_i - x_j
+  Vec3 v;  ///< u_i - u_j
+  double radius_i, radius_j;
+};
+Pairing meet(const PairView& pairs, std::size_t k) {
+  const std::size_t i = index(pairs.first[k]), j = index(pairs.second[k]);
+  using Map = Eigen::Map<const Vec3>;
+  return {Map(pairs.x + 3 * i) - Map(pairs.x + 3 * j),
+          Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
+}
+
+/// Whether two bodies came so far on their way `way` here that they may have passed.
+bool came_far(const Vec3& way, double small) {
+  return !(way.squaredNorm() < 0.25 * small * small);
+}
+
+/// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
+/// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
+/// From the middle of one step to that of the next it moves by h V-, V- being what the first has ended with.
+bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
+  if (!came_far(way, small)) return false;
+  const Vec3 start = d - way;
+  const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const double overlap = touching - (start + nearest * way).norm();
+  return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
+}
+
+std::int32_t count_passed(const PairView& pairs, double time_step) {
+  std::int32_t through = 0;
+  for (std::size_t k = 0; k < pairs.count; ++k) {
+    const Pairing pair = meet(pairs, k);
+    through += passed(pair.d, time_step * pair.v, pair.radius_i + pair.radius_j,
+                      std::min(pair.radius_i, pair.radius_j));
+  }
+  return through;
+}
+
+/// The kernel find_gaps without lanes.
+bool find_gaps(const PairView& pairs, const GapRule& rule, const GapTarget& out) {
+  bool far = false;
+  for (std::size_t k = 0; k < pairs.count; ++k) {
+    const Pairing pair = meet(pairs, k);
+    const double distance = pair.d.norm();
+    const Vec3 normal = distance > 0 ? Vec3(pair.d / distance) : Vec3::UnitZ();
+    const double v_n = normal.dot(pair.v);  // gravity moves both alike
+    out.nx[k] = normal[0];
+    out.ny[k] = normal[1];
+    out.nz[k] = normal[2];
+    out.contact[k] =
+        constrain(rule, distance - pair.radius_i - pair.radius_j, v_n, v_n, out.bias[k]) ? -1 : 0;
+    far |= came_far(rule.time_step * pair.v, std::min(pair.radius_i, pair.radius_j));
+  }
+  return far;
+}
+
+void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chunks, std::size_t chunk,
+                   const SweepKernels& kernels, Contacts& contacts) {
+  const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
+  Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
+  std::vector<std::int64_t> contact(count);
+  static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
+  const PairView pairs{in.x.data()->data(), in.radius.data(), in.velocity.data()->u, first, second, count};
+  const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
+                         contacts.bias.data() + begin, contact.data()};
+  const bool far =
+      kernels.lanes() ? kernels.lanes()->find_gaps(pairs, rule, target) : find_gaps(pairs, rule, target);
+  contacts.passed[chunk] = far ? count_passed(pairs, in.time_step) : 0;
+  const detail::ChunkPlaces places{chunks, chunk, contacts, contact};
+  if (!detail::repair_groups(places)) detail::deal_groups(places);
+}
+
+/// At a wall: a grain meets it once, so that any contacts may share a group.
+void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
+                 const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
+  const Wall& wall = in.walls[index(chunks.wall[chunk])];
+  const double fall = wall.normal.dot(in.time_step * in.gravity - wall.gain);
+  std::int32_t through = 0;
+  std::size_t at = begin;
+  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+    const Slot body = candidates.wall_pairs[k - grains].body;
+    const std::size_t i = index(body);
+    const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
+    const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
+    through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
+    if (!constrain(rule, gap, v_n, v_n + fall, contacts.bias[at])) continue;
+    contacts.nx[at] = wall.normal[0];
+    contacts.ny[at] = wall.normal[1];
+    contacts.nz[at] = wall.normal[2];
+    contacts.first[at] = body;
+    contacts.first_record[at] = record_of(body);
+    contacts.second[at] = -1;
+    contacts.candidate[at++] = static_cast<std::int32_t>(k);
+  }
+  contacts.passed[chunk] = through;
+  contacts.count[chunk] = static_cast<std::int32_t>(at - begin);
+  std::uint8_t* size = contacts.group.data() + begin;
+  for (std::size_t k = begin; k < at; k += group_size)
+    *size++ = static_cast<std::uint8_t>(std::min(group_size, at - k));
+}
+
+}  // namespace
+
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                  std::size_t chunk, const SweepKernels& kernels, Contacts& contacts) {
+  const GapRule rule{in.time_step, in.alert, in.restitution, in.overlap_correction,
+                     2 * in.time_step * in.gravity.norm()};
+  if (chunks.wall[chunk] < 0)
+    narrow_grains(in, rule, chunks, chunk, kernels, contacts);
+  else
+    narrow_wall(in, rule, candidates, chunks, chunk, contacts);
+  restore_impulses(candidates, chunks, chunk, contacts);
+}
+
+}  // namespace talus

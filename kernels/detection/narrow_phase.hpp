@@ -1,0 +1,43 @@
+#pragma once
+
+#include <span>
+
+#include "kernels/detection/contacts.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
+
+namespace talus {
+
+/// What the narrow phase looks at; x at the middle of the step (theta = 1/2), velocities those of its
+/// beginning.
+struct NarrowPhase {
+  std::span<const Vec3> x;             ///< [m]
+  std::span<const double> radius;      ///< [m]
+  std::span<const Velocity> velocity;  ///< V-
+  std::span<const Wall> walls;         ///< points at the middle of the step
+  double time_step;                    ///< h [s]
+  double alert;                        ///< [m]
+  double restitution;                  ///< e in [0, 1]
+  Vec3 gravity;                        ///< [m/s^2]
+  double overlap_correction = 0;       ///< in [0, 1]
+};
+
+/// Whether a pair may be a contact of this step: nearer than the alert distance, or to be closed within the
+/// step. `v_n` [m/s] is that at its end without contacts.
+inline bool may_touch(double gap, double v_n, double time_step, double alert) {
+  return !(gap >= alert && gap >= -time_step * v_n);
+}
+
+/// Finds the contacts of one chunk and starts them from the candidates' impulses.
+/// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
+/// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
+/// approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once g <= 0, and no constraint before.
+/// A resting overlap is undone at the rate of b = overlap_correction x g/h. Coincident centres get the normal
+/// +z.
+///
+/// A chunk whose contacts are the candidates that they were keeps their places and groups; where a few came
+/// or went these are repaired, else dealt anew (kernels/detection/detail/contact_groups.hpp). So groups
+/// follow from the steps since allocate(), the first of which deals.
+void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
+                  std::size_t chunk, const SweepKernels& kernels, Contacts& contacts);
+
+}  // namespace talus

@@ -1,0 +1,71 @@
+#pragma once
+
+/// Global balance: do the impulses carry what they must? The natural map looks at one contact at a time; on
+/// long chains and under heavy bodies each contact can be nearly satisfied while hardly anything of the load
+/// is carried (docs/decisions/0012-stiff.md).
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/global/body_parts.hpp"
+
+namespace talus {
+
+/// Problems of fewer sweeps are none that sweeps cannot see through.
+constexpr double stiff = 1000;
+
+/// What is left of a change when it goes on as it went: the larger of `change`, over the second half of the
+/// sweeps, and its extrapolation from the change `before`, over the second quarter. An error that decays as
+/// exp(-k/t) changes by s (1 + s) as much over the second half as over the quarter before, with s =
+/// exp(-n/4t); what is left is s^2/(1 - s^2) of the last change. Where changes still grow nothing has
+/// settled, and `unsettled` times the change is taken.
+inline double left_over(double change, double before) {
+  constexpr double unsettled = 20;
+  if (!(change < 2 * before)) return unsettled * change;
+  const double s = (std::sqrt(1 + 4 * change / before) - 1) / 2;
+  return change * std::clamp(s * s / (1 - s * s), 1.0, unsettled);
+}
+
+/// Estimate of the relative error of the forces that the walls carry, from their relative `change` over the
+/// second half of `sweeps` sweeps in a problem that takes about `sweeps_needed` of them (estimate_stiffness).
+/// What converges in k sweeps changes by about half of its error over k/2; over fewer it changes by that part
+/// of it only, and a plate that sweeps leave falling looks still: 10^6 grain masses on a pile, k = 8e4; after
+/// 1000 sweeps the force is 0.7 % of the weight, its change 0.5, and the estimate 80.
+inline double unbalance(double change, int sweeps, double sweeps_needed) {
+  if (sweeps == 0 || sweeps >= sweeps_needed) return change;
+  return change * std::max(1.0, 2 * sweeps_needed / sweeps);
+}
+
+/// How far the velocities that a step's impulses give are from those of its answer.
+struct VelocityError {
+  double relative = 0;        ///< sum m |V(r) - V*| over the scale of the step
+  int linear_iterations = 0;  ///< conjugate gradients
+};
+
+/// Estimate of it, from the impulses of the problem, whose contacts it uses up; `enough`: what need not be
+/// known more exactly. It is the momentum that bodies have still to gain or lose: force carried against force
+/// due, for every wall, every heavy body and through every cut of the sample. In sum m |u| + (I/R^2) |w|.
+///
+/// The contacts ask for changes of their velocities: y - v, with (r', y) the complementary pair next to (r,
+/// v), one projection away. Without friction, and with r and y complementary, any motion d of the bodies that
+/// grants the wishes of those that carry and closes the others at most, H^T d = y - v, bounds the error:
+///
+///   |V(r) - V*|_M^2 = (r - r*).(v - v*) <= (r - r*).(v - y) = -d.M (V(r) - V*) <= |d|_M |V(r) - V*|_M
+///
+/// since (r - r*).(y - v*) = -r.v* - r*.y <= 0. The smallest one is sought: min |d|_M^2 + sum rho |H^T d - (y
+/// - v)|^2 over the contacts that carry, along the normal where they slide, rho far above what the problem
+/// needs: a linear solve (body_solver.hpp), which sees through chains where sweeps do not. Open contacts that
+/// d would push in are added and it is solved again. Wishes that no motion
+/// grants, as of a grain between driven walls that close, count as they are. What is heuristic: friction,
+/// that rho and the rounds are finite, and that the momentum of d, whose kinetic norm is bounded, is taken
+/// for that of the error.
+///
+/// The scale is sum m |V(r) - V_free|, what the contacts do, as far as what comes in explains it; or the
+/// speed of driven walls times the whole mass, if that is more; where no wall is driven, at least a hundredth
+/// of the impulses between walls, as grains pressed at rest gain nothing; never less than what rounding
+/// leaves of the sample's own momentum. Takes about as long as a hundred sweeps.
+VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough);
+/// The whole problem in one part.
+VelocityError velocity_error(BodyProblem problem, double enough);
+
+}  // namespace talus

@@ -1,0 +1,98 @@
+#include "kernels/global/body_parts.hpp"
+
+#include <utility>
+
+namespace talus {
+
+namespace {
+
+std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+}  // namespace
+
+void PartLink::each(std::size_t parts, const std::function<void(std::size_t)>& work) const {
+  for (std::size_t p = 0; p < parts; ++p) work(p);
+}
+
+void PartLink::sum_copies(PartField& /*field*/) const {}
+
+std::vector<double> PartLink::gather(std::vector<std::vector<double>> rows) const {
+  return std::move(rows.front());
+}
+
+PartField BodyParts::field() const {
+  PartField field(size());
+  for (std::size_t p = 0; p < size(); ++p) field[p].resize(parts_[p].bodies.size());
+  return field;
+}
+
+std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill) {
+  std::vector<std::vector<double>> rows(parts, std::vector<double>(width, 0.0));
+  link.each(parts, [&](std::size_t p) { fill(p, rows[p]); });
+  return link.gather(std::move(rows));
+}
+
+std::vector<double> total_of(const PartLink& link, std::size_t parts, std::size_t width,
+                             const PartRow& fill) {
+  const std::vector<double> all = rows_of(link, parts, width, fill);
+  std::vector<double> sum(width, 0.0);
+  for (std::size_t k = 0; k < all.size(); ++k) sum[k % width] += all[k];
+  return sum;
+}
+
+double BodyParts::dot(const PartField& a, const PartField& b) const {
+  return total(1, [&](std::size_t p, std::span<double> row) {
+    double sum = 0;
+    for (std::size_t k = 0; k < a[p].size(); ++k)
+      if (parts_[p].counted(k)) sum += talus::dot(a[p][k], b[p][k]);
+    row[0] = sum;
+  })[0];
+}
+
+PartImpulses impulses_of(const BodyParts& parts) {
+  PartImpulses impulse;
+  for (std::size_t p = 0; p < parts.size(); ++p) impulse.push_back(parts[p].impulse);
+  return impulse;
+}
+
+PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse) {
+  PartField V = parts.field();
+  parts.each([&](std::size_t p) {
+    const auto& contacts = parts[p].contacts;
+    for (std::size_t k = 0; k < contacts.size(); ++k) add_force(contacts[k], impulse[p][k], V[p]);
+  });
+  parts.link().sum_copies(V);
+  parts.each([&](std::size_t p) {
+    for (std::size_t b = 0; b < V[p].size(); ++b) velocity_from_force(parts[p].bodies[b], V[p][b]);
+  });
+  return V;
+}
+
+std::vector<std::vector<std::int32_t>> heavy_unknowns(const BodyParts& parts, double ratio) {
+  // Mass of the neighbours, and their number.
+  PartField around = parts.field();
+  parts.each([&](std::size_t p) {
+    const BodyProblem& problem = parts[p];
+    for (const ContactEquation& c : problem.contacts) {
+      if (c.second < 0) continue;
+      around[p][at(c.first)].u += Vec3(problem.bodies[at(c.second)].mass, 1, 0);
+      around[p][at(c.second)].u += Vec3(problem.bodies[at(c.first)].mass, 1, 0);
+    }
+  });
+  parts.link().sum_copies(around);
+  std::vector<std::vector<std::int32_t>> heavy(parts.size());
+  parts.each([&](std::size_t p) {
+    const BodyProblem& problem = parts[p];
+    for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+      const double mass = around[p][b].u[0], neighbours = around[p][b].u[1];
+      if (problem.counted(b) && neighbours > 0 &&
+          (problem.bodies[b].wall || problem.bodies[b].mass * neighbours > ratio * mass))
+        heavy[p].push_back(static_cast<std::int32_t>(b));
+    }
+  });
+  return heavy;
+}
+
+}  // namespace talus

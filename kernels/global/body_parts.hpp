@@ -1,0 +1,84 @@
+#pragma once
+
+/// The contact problem over bodies in parts, one per subdomain, and what holds the parts together. Copies of
+/// a body stand in several parts; of each exactly one counts. A solver written over parts gives the same bits
+/// wherever they lie: what happens within a part depends on the part alone, and sums over parts are added in
+/// order of subdomain.
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "kernels/global/body_problem.hpp"
+
+namespace talus {
+
+/// Per part, a twist per unknown. Of velocities all copies of a body hold the same bits.
+using PartField = std::vector<std::vector<Twist>>;
+
+/// What the parts of this process do with one another and with those of others. Every process makes the same
+/// calls in the same order. As it stands: one part, nothing to do.
+class PartLink {
+ public:
+  virtual ~PartLink() = default;
+
+  /// Calls work(p) for each of `parts` parts here; perhaps several at a time.
+  virtual void each(std::size_t parts, const std::function<void(std::size_t)>& work) const;
+
+  /// Each copy of a shared unknown gets the sum of all copies, added in order of subdomain; w only where
+  /// grains turn.
+  virtual void sum_copies(PartField& field) const;
+
+  /// From a row of each part here, all equally long, everywhere: the rows of all parts of all processes, in
+  /// order of subdomain, one after the other.
+  virtual std::vector<double> gather(std::vector<std::vector<double>> rows) const;
+};
+
+/// Of each of `parts` parts here `fill(part, row)` fills a row of `width` numbers: all rows, as
+/// PartLink::gather.
+using PartRow = std::function<void(std::size_t, std::span<double>)>;
+std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill);
+/// The same, added up in order of subdomain.
+std::vector<double> total_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill);
+
+/// The parts here, ascending by subdomain, and their link. What it refers to must outlive it.
+class BodyParts {
+ public:
+  BodyParts(std::span<const BodyProblem> parts, const PartLink& link) : parts_(parts), link_(&link) {}
+
+  std::size_t size() const { return parts_.size(); }
+  const BodyProblem& operator[](std::size_t part) const { return parts_[part]; }
+  const PartLink& link() const { return *link_; }
+  void each(const std::function<void(std::size_t)>& work) const { link_->each(size(), work); }
+
+  /// A zero for every unknown.
+  PartField field() const;
+
+  std::vector<double> rows(std::size_t width, const PartRow& fill) const {
+    return rows_of(*link_, size(), width, fill);
+  }
+  std::vector<double> total(std::size_t width, const PartRow& fill) const {
+    return total_of(*link_, size(), width, fill);
+  }
+
+  /// Sum of a.b over all bodies, each once.
+  double dot(const PartField& a, const PartField& b) const;
+
+ private:
+  std::span<const BodyProblem> parts_;
+  const PartLink* link_;
+};
+
+/// Impulses of all parts: per part, one vector per contact.
+using PartImpulses = std::vector<std::vector<Vec3>>;
+PartImpulses impulses_of(const BodyParts& parts);
+
+/// V = V_free + M^-1 H r.
+PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse);
+
+/// Per part, the unknowns that count there and are much heavier than what they touch: walls of finite mass,
+/// and bodies of more than `ratio` times the mean mass of their neighbours; ascending.
+std::vector<std::vector<std::int32_t>> heavy_unknowns(const BodyParts& parts, double ratio = 10);
+
+}  // namespace talus

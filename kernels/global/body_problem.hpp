@@ -1,0 +1,182 @@
+#pragma once
+
+/// The contact problem of one step over bodies, each once: what solvers in body space see.
+///
+///   min 1/2 (V - V_free)^T M (V - V_free),   H^T V + b n + mu |v_t| n  in  K_mu*  at every contact
+///
+/// (docs/theory.md). Unknowns are the grains, 6 numbers each, then the walls of finite mass, 1 each along its
+/// normal. Driven walls are data. With several subdomains each holds a part of the problem (body_parts.hpp).
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/motion.hpp"
+#include "kernels/detection/chunks.hpp"
+#include "kernels/detection/contacts.hpp"
+
+namespace talus {
+
+/// Velocity u [m/s] and R omega [m/s] of a body; or momentum [N s] and its dual.
+struct Twist {
+  Vec3 u = Vec3::Zero();
+  Vec3 w = Vec3::Zero();
+};
+
+inline double dot(const Twist& a, const Twist& b) {
+  return a.u.dot(b.u) + a.w.dot(b.w);
+}
+
+/// One body. A wall turns never and moves along `axis` only; its part of a Twist is (velocity x axis, 0).
+struct BodyUnknown {
+  double mass = 0;           ///< [kg] > 0
+  double spin_mass = 0;      ///< I/R^2 [kg]; 0: does not turn
+  Vec3 x = Vec3::Zero();     ///< centre [m]
+  double radius = 0;         ///< [m]
+  Vec3 axis = Vec3::Zero();  ///< of a wall: its normal, unit
+  bool wall = false;
+  Twist free;  ///< velocity without contacts
+};
+
+/// One contact: v = u_first - u_second + n x (w_first + w_second) - drive, the second missing at a driven
+/// wall.
+struct ContactEquation {
+  Vec3 normal;  ///< unit, to the first body
+  Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
+  double mu = 0;
+  std::int32_t first = -1;   ///< unknown
+  std::int32_t second = -1;  ///< unknown; -1 at a driven wall
+  std::int32_t place = -1;   ///< in `Contacts`
+  double drive = 0;          ///< speed of the driven wall [m/s]; 0 between bodies
+};
+
+/// The whole problem, or the part of it that one subdomain holds: its contacts and the bodies that stand in
+/// it, masses whole, and in every part all walls of finite mass.
+struct BodyProblem {
+  std::vector<BodyUnknown> bodies;
+  std::vector<ContactEquation> contacts;
+  std::vector<Vec3> impulse;         ///< r on the first body [N s], one per contact
+  std::size_t grains = 0;            ///< unknowns before the first wall
+  std::int32_t subdomain = 0;        ///< of all, whose part it is
+  std::vector<char> counts;          ///< per unknown: of its copies this one counts; empty: all do
+  std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
+
+  bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
+};
+
+/// Who touches whom in a problem or its part, and how heavy they are; unknowns as there.
+struct ContactGraph {
+  std::vector<double> mass;                        ///< per unknown [kg]
+  std::vector<std::array<std::int32_t, 2>> pairs;  ///< per contact its unknowns; second -1 at a driven wall
+  std::int32_t subdomain = 0;
+  std::vector<char> counts;
+  std::vector<std::int32_t> shared;
+
+  bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
+};
+ContactGraph graph_of(const BodyProblem& problem);
+
+/// A wall as the problem sees it; `inv_mass` [1/kg] is 0 when it is driven.
+struct WallMotion {
+  Vec3 normal;
+  Vec3 free_velocity;  ///< [m/s]
+  double inv_mass = 0;
+};
+
+/// Where the problem stands in the arrays of a step.
+struct BodyProblemSource {
+  std::span<const Vec3> x;             ///< [m]
+  std::span<const double> radius;      ///< [m]
+  std::span<const Velocity> velocity;  ///< masses and spin mobilities; velocities are not read
+  const FreeVelocity& free;
+  std::span<const WallMotion> walls;
+  const Chunks& chunks;
+  const Contacts& contacts;
+  double mu_grains = 0;
+  double mu_walls = 0;
+  Multiplicities parts;  ///< of the slots: copies carry M/parts
+};
+
+/// The slots and chunks of one subdomain among those of a step.
+struct BodyProblemPart {
+  std::int32_t subdomain = 0;      ///< of all
+  std::int32_t local = 0;          ///< the same as in Chunks
+  std::size_t begin = 0, end = 0;  ///< its slots
+  std::span<const char> counts;    ///< per slot of the step: of the body's copies this one counts
+  std::span<const std::uint16_t> multiplicity;  ///< per slot of the step: in how many subdomains it stands
+};
+
+/// The graph of the problem gathered below, all of it or of one subdomain: spares what only solvers read.
+ContactGraph gather_graph(const BodyProblemSource& source);
+ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart& part);
+
+/// Gathers the problem, contacts in order of chunk, with the impulses that `contacts` hold. Unknowns are the
+/// slots, then the walls.
+BodyProblem gather_problem(const BodyProblemSource& source);
+
+/// The same for one subdomain. The walls count in the first of all.
+BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part);
+
+/// Writes the impulses back.
+void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
+
+/// V = V_free + M^-1 H r, one entry per unknown, summed in order of contact.
+std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse);
+
+/// v - offset: the relative velocity at a contact before drives and bias. `c` is a ContactEquation, or has
+/// its normal, first and second.
+template <class Contact>
+Vec3 relative_velocity(const Contact& c, std::span<const Twist> V) {
+  const Twist& a = V[static_cast<std::size_t>(c.first)];
+  if (c.second < 0) return a.u + c.normal.cross(a.w);
+  const Twist& b = V[static_cast<std::size_t>(c.second)];
+  return a.u - b.u + c.normal.cross(a.w + b.w);
+}
+
+/// What counts of a vector at a contact: without friction its normal part.
+inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
+  return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
+}
+
+inline Vec3 tangential(const ContactEquation& c, const Vec3& v) {
+  return v - c.normal.dot(v) * c.normal;
+}
+
+/// Projection of z on the Coulomb cone of the contact.
+Vec3 project_on_cone(const ContactEquation& c, const Vec3& z);
+
+/// m |u|^2 + (I/R^2) |w|^2 [J].
+inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
+  return body.mass * u.squaredNorm() + body.spin_mass * w.squaredNorm();
+}
+
+/// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_freedoms`.
+template <class Contact>
+void add_force(const Contact& c, const Vec3& r, std::span<Twist> F) {
+  Twist& a = F[static_cast<std::size_t>(c.first)];
+  const Vec3 turn = c.normal.cross(r);
+  a.u += r;
+  a.w -= turn;
+  if (c.second < 0) return;
+  Twist& b = F[static_cast<std::size_t>(c.second)];
+  b.u -= r;
+  b.w -= turn;
+}
+
+/// Drops what cannot move a body: of walls all but the part along the axis, of bodies that do not turn w.
+inline void restrict_to_freedoms(const BodyUnknown& body, Twist& f) {
+  if (body.wall) f.u = body.axis.dot(f.u) * body.axis;
+  if (body.wall || body.spin_mass == 0) f.w.setZero();
+}
+
+/// In place, from the sum of forces on a body: V = V_free + M^-1 F.
+inline void velocity_from_force(const BodyUnknown& body, Twist& f) {
+  restrict_to_freedoms(body, f);
+  f.u = body.free.u + f.u / body.mass;
+  f.w = body.spin_mass > 0 ? Vec3(body.free.w + f.w / body.spin_mass) : Vec3::Zero();
+}
+
+}  // namespace talus

@@ -1,0 +1,183 @@
+#include "kernels/global/body_system.hpp"
+
+#include <Eigen/Cholesky>
+
+namespace talus {
+
+namespace {
+
+std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+Eigen::Matrix3d cross_matrix(const Vec3& n) {
+  Eigen::Matrix3d N;
+  N << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
+  return N;
+}
+
+/// rho H_i H_i^T of one contact, m = +-n.
+void add_own_block(const Vec3& m, double rho, bool slick, Eigen::Matrix<double, 6, 6>& block) {
+  if (slick) {
+    block.topLeftCorner<3, 3>() += rho * m * m.transpose();
+    return;
+  }
+  const Eigen::Matrix3d N = cross_matrix(m);
+  block.diagonal().head<3>().array() += rho;
+  block.topRightCorner<3, 3>() += rho * N;
+  block.bottomLeftCorner<3, 3>() -= rho * N;
+  block.bottomRightCorner<3, 3>() -= rho * N * N;
+}
+
+}  // namespace
+
+/// f less the row's part from the other body.
+inline void BodySystem::take(const Edge& edge, std::span<const Twist> x, Twist& f) {
+  const Twist& other = x[at(edge.other)];
+  Vec3 v = edge.m.cross(other.w) - other.u;
+  if (edge.slick) v = edge.m.dot(v) * edge.m;
+  v *= -edge.rho;
+  f.u += v;
+  f.w -= edge.m.cross(v);
+}
+
+void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
+  for (const std::uint32_t tie : ties_) {
+    const Link& link = links_[tie];
+    take({link.normal, link.rho, link.second, link.slick}, x, f[at(link.first)]);
+    take({-link.normal, link.rho, link.first, link.slick}, x, f[at(link.second)]);
+  }
+}
+
+BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
+    : problem_(problem),
+      begin_(problem.bodies.size() + 1, 0),
+      middle_(problem.bodies.size(), 0),
+      diagonal_(problem.bodies.size(), Matrix6::Zero()),
+      inverse_(problem.bodies.size(), Matrix6::Zero()) {
+  inertia_.reserve(problem.bodies.size());
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+    const BodyUnknown& body = problem.bodies[b];
+    inertia_.push_back(problem.counted(b) ? Inertia{body.mass, body.spin_mass} : Inertia{0, 0});
+  }
+  const auto row = [&](std::int32_t body) { return at(body) < problem.grains && problem.counted(at(body)); };
+  links_.reserve(problem.contacts.size());
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const auto link = static_cast<std::uint32_t>(k);
+    links_.push_back({c.normal, rho[k], c.first, c.second, c.mu == 0});
+    add_own_block(c.normal, rho[k], c.mu == 0, diagonal_[at(c.first)]);
+    if (c.second < 0) continue;
+    add_own_block(-c.normal, rho[k], c.mu == 0, diagonal_[at(c.second)]);
+    if (row(c.first) && row(c.second)) {
+      ++begin_[at(c.first) + 1];
+      ++begin_[at(c.second) + 1];
+    } else {
+      ties_.push_back(link);
+    }
+  }
+  for (std::size_t b = 0; b < size(); ++b) begin_[b + 1] += begin_[b];
+  edges_.resize(begin_.back());
+  // Lower unknowns first, in order of contact: two passes.
+  std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+  for (const bool lower : {true, false}) {
+    for (const Link& link : links_) {
+      const auto [n, weight, first, second, slick] = link;
+      if (second < 0 || !row(first) || !row(second)) continue;
+      if ((second < first) == lower) edges_[next[at(first)]++] = {n, weight, second, slick};
+      if ((first < second) == lower) edges_[next[at(second)]++] = {-n, weight, first, slick};
+    }
+    if (lower) middle_ = next;
+  }
+}
+
+void BodySystem::close() {
+  for (std::size_t b = 0; b < size(); ++b) {
+    touched_.push_back(diagonal_[b].trace() > 0 ? 1 : 0);
+    if (!problem_.counted(b)) continue;
+    const BodyUnknown& body = problem_.bodies[b];
+    Matrix6 inverse = Matrix6::Zero();
+    if (body.wall) {
+      const double stiffness = body.mass + body.axis.dot(diagonal_[b].topLeftCorner<3, 3>() * body.axis);
+      inverse.topLeftCorner<3, 3>() = body.axis * body.axis.transpose() / stiffness;
+    } else if (body.spin_mass == 0) {
+      Eigen::Matrix3d block = diagonal_[b].topLeftCorner<3, 3>();
+      block.diagonal().array() += body.mass;
+      inverse.topLeftCorner<3, 3>() = block.llt().solve(Eigen::Matrix3d::Identity());
+    } else {
+      Matrix6 block = diagonal_[b];
+      block.diagonal().head<3>().array() += body.mass;
+      block.diagonal().tail<3>().array() += body.spin_mass;
+      inverse = block.llt().solve(Matrix6::Identity());
+    }
+    inverse_[b] = 0.5 * (inverse + inverse.transpose());
+  }
+  diagonal_ = {};
+}
+
+namespace {
+
+inline Twist times(const Eigen::Matrix<double, 6, 6>& A, const Twist& x) {
+  Eigen::Matrix<double, 6, 1> v;
+  v << x.u, x.w;
+  v = A * v;
+  return {v.head<3>(), v.tail<3>()};
+}
+
+}  // namespace
+
+void BodySystem::restrict_all(std::span<Twist> f) const {
+  for (std::size_t b = 0; b < problem_.grains; ++b)
+    if (inertia_[b].spin_mass == 0) restrict_to_freedoms(problem_.bodies[b], f[b]);
+  for (std::size_t b = problem_.grains; b < size(); ++b) restrict_to_freedoms(problem_.bodies[b], f[b]);
+}
+
+void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
+  for (std::size_t b = 0; b < size(); ++b) y[b] = {inertia_[b].mass * x[b].u, inertia_[b].spin_mass * x[b].w};
+  for (const Link& link : links_) {
+    Vec3 v = relative_velocity(link, x);
+    if (link.slick) v = link.normal.dot(v) * link.normal;
+    add_force(link, link.rho * v, y);
+  }
+  restrict_all(y);
+}
+
+void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) const {
+  for (std::size_t b = 0; b < size(); ++b) {
+    x[b] = Twist{};
+    if (!problem_.counted(b)) continue;
+    Twist sum = f[b];
+    for (std::size_t e = begin_[b]; e < middle_[b]; ++e) take(edges_[e], x, sum);
+    x[b] = times(inverse_[b], sum);
+  }
+}
+
+// f - (D + L + U + T) x = -(U + T) x.
+void BodySystem::rest_of_forward(std::span<const Twist> x, std::span<Twist> rest) const {
+  for (std::size_t b = 0; b < size(); ++b) {
+    Twist sum;
+    for (std::size_t e = middle_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x, sum);
+    rest[b] = sum;
+  }
+  take_ties(x, rest);
+  restrict_all(rest);
+}
+
+void BodySystem::take_ties(std::span<const Twist> f, std::span<const Twist> x, std::span<Twist> rest) const {
+  for (std::size_t b = 0; b < size(); ++b) rest[b] = problem_.counted(b) ? f[b] : Twist{};
+  take_ties(x, rest);
+}
+
+void BodySystem::smooth_backward(std::span<const Twist> rest, std::span<Twist> x) const {
+  for (std::size_t b = size(); b-- > 0;) {
+    if (!problem_.counted(b)) {
+      x[b] = Twist{};
+      continue;
+    }
+    Twist sum = rest[b];
+    for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e) take(edges_[e], x, sum);
+    x[b] = times(inverse_[b], sum);
+  }
+}
+
+}  // namespace talus

@@ -1,0 +1,30 @@
+#pragma once
+
+/// How stiff a problem is, before it is solved: what rho of ADMM is chosen from.
+
+#include <span>
+
+#include "kernels/global/body_parts.hpp"
+
+namespace talus {
+
+/// kappa of rho = kappa/W_nn before any impulse is known: about the inverse of the smallest eigenvalue of W
+/// that the load excites, in effective masses of a contact, sum W_nn r^2 / |M^-1/2 H r|^2. A column of N
+/// grains: 2 N^2/3; a plate of T grain masses over L layers of c contacts: T L/c. For r, the momentum that
+/// stops every body at once is passed on, layer by layer over the contacts, to the driven walls; of what
+/// hangs on none, to the heaviest body of each cluster. Also about the number of Gauss-Seidel sweeps that the
+/// problem needs. 0 without contacts. With several parts, an exchange for each layer on the way out and one
+/// on the way back.
+double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& link);
+double estimate_stiffness(const BodyParts& parts);
+double estimate_stiffness(const BodyProblem& problem);
+
+/// 1/W_nn of a contact [kg].
+inline double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
+  const auto mobility = [&](std::int32_t body) {
+    return body < 0 ? 0 : 1 / problem.bodies[static_cast<std::size_t>(body)].mass;
+  };
+  return 1 / (mobility(c.first) + mobility(c.second));
+}
+
+}  // namespace talus

@@ -1,0 +1,9 @@
+/// Compiled for AVX2 (kernels/CMakeLists.txt): includes nothing with inline functions of external linkage.
+
+#include "kernels/sweeps/detail/error_lanes.hpp"
+
+namespace talus {
+
+constinit const LaneKernels lane_kernels_avx2[2] = {kernels_of_lanes<false, 4>, kernels_of_lanes<true, 4>};
+
+}  // namespace talus

@@ -1,0 +1,389 @@
+#pragma once
+
+/// The sweep of kernels/sweeps/sweep.hpp on W = 4 or 8 contacts at a time.
+///
+/// Contacts stand in groups of up to 16 that share no grain, so that sweeping a group at once is sweeping its
+/// contacts one after the other. In each group three phases follow one another, each without dependencies
+/// inside:
+///   gather   record_i -+ record_j while they are rows of four, then one transposition: u_i - u_j, w_i + w_j,
+///            1/m_i + 1/m_j and the sum of the spin mobilities, as lanes;
+///   compute  the law, without branches;
+///   scatter  one transposition of (dr, dr x n) back to rows, then record += mobility * row: no record is
+///            transposed for its mobility.
+/// Per contact: 2 records of 64 bytes read and written, 56 bytes of contact read and 24 written, about 108
+/// flop, 1.5 shuffles of 8 lanes. In a group that is not full the free lanes read n = r = bias = 0 and meet a
+/// grain of their own of mass 1 at rest, so that nothing happens there.
+
+#include "kernels/sweeps/detail/record_lanes.hpp"
+
+namespace talus {
+namespace {
+
+constexpr std::size_t wall_lanes = 8;  ///< copies of a wall inside a chunk
+
+/// Contacts that a kernel works on at once: W x blocks of them, from `k` on.
+template <class Number>
+struct Slice {
+  const Number *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn;
+};
+
+/// Where their impulses are written.
+template <class Number>
+struct Target {
+  Number *x, *y, *z, *n;
+};
+
+template <class Number>
+[[gnu::always_inline]] inline Slice<Number> slice(const ContactViewOf<Number>& c, std::size_t k) {
+  return {c.nx + k, c.ny + k, c.nz + k, c.bias + k, c.rx + k, c.ry + k, c.rz + k, c.rn + k};
+}
+
+template <class Number>
+[[gnu::always_inline]] inline Target<Number> target(const ImpulseViewOf<Number>& r, std::size_t k) {
+  return {r.x + k, r.y + k, r.z + k, r.n + k};
+}
+
+template <bool Friction, class V, class Only>
+[[gnu::always_inline]] inline Space<V> load_impulse(const Slice<NumberOf<V>>& c, std::size_t at, Only only,
+                                                    const Space<V>& n) {
+  if constexpr (Friction)
+    return {load<V>(c.rx, at, only), load<V>(c.ry, at, only), load<V>(c.rz, at, only)};
+  else
+    return load<V>(c.rn, at, only) * n;
+}
+
+template <bool Friction, class V>
+[[gnu::always_inline]] inline Space<V> relative_velocity(const Meeting<V>& m, const Space<V>& n) {
+  if constexpr (Friction) return less_cross(m.du, m.w, n);
+  return m.du;
+}
+
+/// A plain sweep begins where the last one ended.
+struct PlainStart {
+  static constexpr double omega = 1;
+  PlainStart from(std::size_t) const { return {}; }
+  template <class V, class Only>
+  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t, Only) const {
+    return s;
+  }
+  template <class V, class Only>
+  [[gnu::always_inline]] V begin(V s, std::size_t, Only) const {
+    return s;
+  }
+  template <class V, class Only>
+  [[gnu::always_inline]] void end(const V&, const V&, std::size_t, Only) const {}
+};
+
+/// Steps of the contacts from some place on.
+struct MomentumStart {
+  float *x, *y, *z, *n;
+  double beta, omega;
+  [[gnu::always_inline]] MomentumStart from(std::size_t k) const {
+    return {x + k, y + k, z + k, n + k, beta, omega};
+  }
+  template <class V, class Only>
+  [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at, Only only) const {
+    return add_scaled(V{} + static_cast<NumberOf<V>>(beta),
+                      Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)}, s);
+  }
+  template <class V, class Only>
+  [[gnu::always_inline]] V begin(V s, std::size_t at, Only only) const {
+    return fused(V{} + static_cast<NumberOf<V>>(beta), load<V>(n, at, only), s);
+  }
+  template <class V, class Only>
+  [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at, Only only) const {
+    store(x, at, s_new.x - s.x, only);
+    store(y, at, s_new.y - s.y, only);
+    store(z, at, s_new.z - s.z, only);
+  }
+  template <class V, class Only>
+  [[gnu::always_inline]] void end(V s, V s_new, std::size_t at, Only only) const {
+    store(n, at, s_new - s, only);
+  }
+};
+
+/// 1/W_nn and 1/W_tt: as in kernels/sweeps/detail/scalar_sweeps.hpp.
+template <class V>
+struct Inverses {
+  V nn, tt;
+};
+template <class V>
+[[gnu::always_inline]] inline Inverses<V> invert(V w_nn, V w_tt) {
+  const V inverse = NumberOf<V>{1} / (w_nn * w_tt);
+  return {inverse * w_tt, inverse * w_nn};
+}
+
+/// The impulse that solves the law, less the one that the velocities know; stores the new one. Without
+/// friction only the first component is meant, along the normal.
+template <bool Friction, class V, class Start, class Only>
+[[gnu::always_inline]] inline Space<V> solve_law(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
+                                                 std::size_t at, Only only, const Space<V>& n,
+                                                 const Space<V>& v, V w_nn, V w_tt, double mu,
+                                                 const Start& start) {
+  using Number = NumberOf<V>;
+  const V omega = V{} + static_cast<Number>(start.omega);
+  const V bias = load<V>(c.bias, at, only), v_n = fused_dot(v, n);
+  if constexpr (Friction) {
+    const Space<V> s = load_impulse<true, V>(c, at, only, n), r = start.begin(s, at, only);
+    const Inverses<V> inverse = invert(w_nn, w_tt);
+    const V r_n = fused_dot(r, n);
+    const V r_n_new = positive_part(fused(-omega, (v_n + bias) * inverse.nn, r_n));
+    const V limit = static_cast<Number>(mu) * r_n_new;
+    const Space<V> t = add_scaled(-fused(-inverse.tt, v_n, r_n), n, add_scaled(-inverse.tt, v, r));
+    V t2 = fused_dot(t, t);
+    // In floats squares vanish early: a contact that carries nothing must not keep what is left of its t.
+    if constexpr (std::same_as<Number, float>) t2 = t2 + __FLT_MIN__;
+    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + Number{1};
+    const Space<V> r_new = add_scaled(scale, t, r_n_new * n);
+    store(out.x, at, r_new.x, only);
+    store(out.y, at, r_new.y, only);
+    store(out.z, at, r_new.z, only);
+    start.end(s, r_new, at, only);
+    return r_new - r;
+  } else {
+    const V s = load<V>(c.rn, at, only), r_n = start.begin(s, at, only);
+    const V r_n_new = positive_part(fused(-omega, (v_n + bias) / w_nn, r_n));
+    store(out.n, at, r_n_new, only);
+    start.end(s, r_n_new, at, only);
+    return (r_n_new - r_n) * n;
+  }
+}
+
+template <class V, class Only>
+[[gnu::always_inline]] inline Space<V> load_normal(const Slice<NumberOf<V>>& c, std::size_t at, Only only) {
+  return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
+}
+
+/// Blocks x W contacts in three phases.
+template <bool Friction, class V, int Blocks, class Start, class Grains, class Only>
+[[gnu::always_inline]] inline void sweep_block(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
+                                               const Grains& a, const Grains& b, double mu,
+                                               const Start& start, Only only) {
+  constexpr int W = width_of<V>;
+  Meeting<V> m[Blocks];
+  Space<V> dr[Blocks];
+#pragma GCC unroll 4
+  for (int k = 0; k < Blocks; ++k) m[k] = gather<Friction, true>(a + W * k, b + W * k, V{});
+#pragma GCC unroll 4
+  for (int k = 0; k < Blocks; ++k) {
+    const auto at = static_cast<std::size_t>(W * k);
+    const Space<V> n = load_normal<V>(c, at, only);
+    V w_tt{};
+    if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
+    dr[k] = solve_law<Friction>(c, out, at, only, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt,
+                                mu, start);
+  }
+#pragma GCC unroll 4
+  for (int k = 0; k < Blocks; ++k)
+    scatter<Friction, true>(a + W * k, b + W * k, load_normal<V>(c, static_cast<std::size_t>(W * k), only),
+                            dr[k]);
+}
+
+/// Blocks of W contacts that go through the phases together: more would not stay in registers.
+constexpr int blocks_at_once = 2;
+
+constexpr std::size_t minimum(std::size_t a, std::size_t b) {
+  return a < b ? a : b;
+}
+
+/// The last contacts of a group, fewer than fill its blocks.
+template <bool Friction, class V, int Blocks, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_rest(const ContactViewOf<Number>& c, const ImpulseViewOf<Number>& r,
+                                              std::size_t k, std::size_t count, Number* bodies,
+                                              SpareGrains<V>& spare, double mu, const Start& start) {
+  constexpr std::size_t room = width_of<V> * Blocks;
+  const FewRecords<Number, room> a(first_of(c, k, bodies), count, spare),
+      b(second_of(c, k, bodies), count, spare);
+  sweep_block<Friction, V, Blocks>(slice(c, k), target(r, k), a, b, mu, start.from(k), FirstLanes{count});
+}
+
+template <bool Friction, class V, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_grains_from(const ContactViewOf<Number>& view,
+                                                     const ImpulseViewOf<Number>& impulses, Number* bodies,
+                                                     double mu, const Start& start) {
+  constexpr std::size_t W = width_of<V>, at_once = W * blocks_at_once;
+  const ContactViewOf<Number> c = view;  // local ones, so that no store can change them
+  const ImpulseViewOf<Number> r = impulses;
+  const Start all = start;
+  SpareGrains<V> spare;
+  const std::uint8_t* group = c.group;
+  for (std::size_t k = c.begin; k < c.end; ++group) {
+    const std::size_t end = k + *group;
+    prefetch_group(c, k, bodies);
+    for (; k + at_once <= end; k += at_once)
+      sweep_block<Friction, V, blocks_at_once>(slice(c, k), target(r, k), first_of(c, k, bodies),
+                                               second_of(c, k, bodies), mu, all.from(k), AllLanes{});
+    if (k + W < end)
+      sweep_rest<Friction, V, blocks_at_once>(c, r, k, end - k, bodies, spare, mu, all);
+    else if (k < end)
+      sweep_rest<Friction, V, 1>(c, r, k, end - k, bodies, spare, mu, all);
+    k = end;
+  }
+}
+
+[[gnu::always_inline]] inline MomentumStart start_of(const MomentumView& m) {
+  return {m.x, m.y, m.z, m.n, m.beta, m.omega};
+}
+
+template <bool Friction, int W>
+void sweep_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu) {
+  sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, PlainStart{});
+}
+
+template <bool Friction, int W>
+void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
+                     const MomentumView& momentum) {
+  sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, start_of(momentum));
+}
+
+template <bool Friction, class V>
+void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
+                   const MomentumView& momentum) {
+  sweep_grains_from<Friction, V>(c, r, bodies, mu, start_of(momentum));
+}
+
+/// V += M^-1 H r for W contacts.
+template <bool Friction, bool Pair, int W, class Grains, class Only>
+[[gnu::always_inline]] inline void accumulate_block(const Slice<double>& c, const Grains& a, const Grains& b,
+                                                    Only only) {
+  const auto n = load_normal<Lanes<W>>(c, 0, only);
+  scatter<Friction, Pair>(a, b, n, load_impulse<Friction, Lanes<W>>(c, 0, only, n));
+}
+
+template <bool Friction, int W>
+void accumulate_grains(const ContactView& view, double* bodies) {
+  const ContactView c = view;
+  SpareGrains<Lanes<W>> spare;
+  const std::uint8_t* group = c.group;
+  for (std::size_t k = c.begin; k < c.end; ++group) {
+    const std::size_t end = k + *group;
+    prefetch_group(c, k, bodies);
+    for (; k + W <= end; k += W)
+      accumulate_block<Friction, true, W>(slice(c, k), first_of(c, k, bodies), second_of(c, k, bodies),
+                                          AllLanes{});
+    if (k == end) continue;
+    const FewRecords<double, W> a(first_of(c, k, bodies), end - k, spare),
+        b(second_of(c, k, bodies), end - k, spare);
+    accumulate_block<Friction, true, W>(slice(c, k), a, b, FirstLanes{end - k});
+    k = end;
+  }
+}
+
+/// The copies of a wall, one for each of 8 lanes: its velocity when the sweep began and what each has gained
+/// since, apart, so that the little that a heavy wall gains is not lost in rounding; and 1/m of a lane.
+template <class V>
+struct SplitWall {
+  using Number = NumberOf<V>;
+  static constexpr int W = width_of<V>;
+  Space<V> velocity;
+  Space<V> gained[wall_lanes / W]{};
+  Number inv_mass;
+  std::size_t lanes;
+
+  SplitWall(const double* wall, double wall_inv_mass, std::size_t contacts) : lanes(minimum(contacts, 8)) {
+    const auto all = [&](int d) { return V{} + static_cast<Number>(wall[d]); };
+    velocity = {all(0), all(1), all(2)};
+    inv_mass = static_cast<Number>(wall_inv_mass * static_cast<double>(lanes));
+  }
+  void push(std::size_t part, const Space<V>& n, const Space<V>& dr) {
+    gained[part] = add_scaled(-inv_mass * fused_dot(n, dr), n, gained[part]);
+  }
+  void glue(double* wall) const {
+    if (inv_mass == 0 || lanes == 0) return;
+    Number x[wall_lanes], y[wall_lanes], z[wall_lanes];
+    for (std::size_t k = 0; k < wall_lanes / W; ++k) {
+      store(x + W * k, gained[k].x);
+      store(y + W * k, gained[k].y);
+      store(z + W * k, gained[k].z);
+    }
+    double sum[3] = {0, 0, 0};
+    for (std::size_t l = 0; l < lanes; ++l) {
+      sum[0] += x[l];
+      sum[1] += y[l];
+      sum[2] += z[l];
+    }
+    for (int d = 0; d < 3; ++d) wall[d] += 1 / static_cast<double>(lanes) * sum[d];
+  }
+};
+
+/// A block of W grains against as many copies of a wall.
+template <bool Friction, class V, class Grains, class Start, class Only>
+[[gnu::always_inline]] inline void sweep_wall_block(const Slice<NumberOf<V>>& c,
+                                                    const Target<NumberOf<V>>& out, const Grains& a,
+                                                    double mu, const Start& start, Only only,
+                                                    std::size_t lanes, SplitWall<V>& wall) {
+  Meeting<V> m = gather<Friction, false>(a, a, V{});
+  m.du = m.du - (wall.velocity + wall.gained[lanes]);
+  const Space<V> n = load_normal<V>(c, 0, only);
+  V w_tt{};
+  if constexpr (Friction) w_tt = m.w_nn + m.spin;
+  const Space<V> dr = solve_law<Friction>(c, out, 0, only, n, relative_velocity<Friction>(m, n),
+                                          m.w_nn + wall.inv_mass, w_tt, mu, start);
+  scatter<Friction, false>(a, a, n, dr);
+  wall.push(lanes, n, dr);
+}
+
+template <bool Friction, class V, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_wall_from(const ContactViewOf<Number>& view,
+                                                   const ImpulseViewOf<Number>& impulses, Number* bodies,
+                                                   double mu, double* wall, double wall_inv_mass,
+                                                   const Start& start) {
+  constexpr std::size_t W = width_of<V>;
+  const ContactViewOf<Number> c = view;
+  const ImpulseViewOf<Number> r = impulses;
+  const Start all = start;
+  SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W))
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), first_of(c, k, bodies), mu, all.from(k),
+                                  AllLanes{}, lanes, split);
+  if (k < c.end) {
+    SpareGrains<V> spare;
+    const FewRecords<Number, W> a(first_of(c, k, bodies), c.end - k, spare);
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, mu, all.from(k), FirstLanes{c.end - k}, lanes,
+                                  split);
+  }
+  split.glue(wall);
+}
+
+template <bool Friction, int W>
+void sweep_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
+                double wall_inv_mass) {
+  sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, PlainStart{});
+}
+
+template <bool Friction, int W>
+void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
+                   double wall_inv_mass, const MomentumView& momentum) {
+  sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+}
+
+template <bool Friction, class V>
+void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
+                 double* wall, double wall_inv_mass, const MomentumView& momentum) {
+  sweep_wall_from<Friction, V>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+}
+
+template <bool Friction, int W>
+void accumulate_wall(const ContactView& view, double* bodies, double* wall, double wall_inv_mass) {
+  using V = Lanes<W>;
+  const ContactView c = view;
+  SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
+  const auto add = [&](const Slice<double>& own, const auto& a, std::size_t lanes, auto only) {
+    const Space<V> n = load_normal<V>(own, 0, only);
+    accumulate_block<Friction, false, W>(own, a, a, only);
+    split.push(lanes, n, load_impulse<Friction, V>(own, 0, only, n));
+  };
+  std::size_t k = c.begin, lanes = 0;
+  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W))
+    add(slice(c, k), first_of(c, k, bodies), lanes, AllLanes{});
+  if (k < c.end) {
+    SpareGrains<Lanes<W>> spare;
+    const FewRecords<double, W> a(first_of(c, k, bodies), c.end - k, spare);
+    add(slice(c, k), a, lanes, FirstLanes{c.end - k});
+  }
+  split.glue(wall);
+}
+
+}  // namespace
+}  // namespace talus

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/detection/contacts.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
+
+namespace talus {
+
+/// How a sweep is carried on before the next one begins. With s = sweep(y), the impulses after a sweep that
+/// began from y:
+///   momentum   y+ = s + beta (s - s_before)                            (Nesterov 1983; one trail)
+///   conjugate  y+ = s + beta p, p = y - y_before of the sweep before   (NNCG, Silcowitz-Hansen et al. 2010)
+/// Velocities depend linearly on impulses, and gluing is linear too, so that the same rule keeps V and r
+/// consistent, copy by copy, without a product.
+enum class Carry { momentum, conjugate };
+
+/// What the rule remembers, in the layout of Contacts and Bodies. Empty vectors where a scene has no such
+/// quantity, or the rule has never been needed.
+struct Trail {
+  struct Impulses {
+    std::vector<double> x, y, z;  ///< with friction [N s]
+    std::vector<double> n;        ///< without [N s]
+  };
+  SweepSteps steps;              ///< momentum: s - s_before, read and made within the sweep
+  Impulses last;                 ///< conjugate: y
+  Impulses step;                 ///< conjugate: p
+  std::vector<Velocity> last_v;  ///< per slot; whole records, so that eight numbers are carried at once
+  std::vector<Velocity> step_v;
+  std::vector<std::array<double, 3>> last_wall_v;  ///< per chunk: of its wall copy [m/s]
+  std::vector<std::array<double, 3>> step_wall_v;
+};
+
+/// Room for the contacts, bodies (none where they are carried in single precision) and chunks; what was not
+/// there is void. What only the other rule remembers stays: a sweep under it may still be on its way.
+void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
+
+/// Momentum of the impulses of a range begins: no step yet.
+void begin_steps(ContactRange range, SweepSteps& steps);
+
+/// Applies the conjugate rule to the impulses of a range; beta = 0 begins a new trail.
+void carry_impulses(double beta, ContactRange range, Contacts& contacts, Trail& trail);
+
+/// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
+void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
+                      std::span<Velocity> velocity, Trail& trail);
+/// Momentum in single precision; with beta = 0 what is in `last` may be void.
+void carry_velocities(const SweepKernels& kernels, double beta, std::span<const Slot> slots,
+                      std::span<SingleVelocity> velocity, std::span<SingleVelocity> last);
+
+/// Applies the rule to the wall copy of a chunk.
+void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);
+
+/// When velocities are made afresh from the impulses, what drifted from them is gone at once, but not from
+/// what the trail remembers: the rule would take the difference for motion, and carry it on beta/(1 - beta)
+/// times as large, at every refresh. So the trail goes along: `loosen` before the velocities are reset,
+/// `fasten` when they stand.
+/// Of the slots; `last` is that of the trail, in the precision of the velocities.
+template <class Number>
+void loosen(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
+            std::vector<VelocityOf<Number>>& last);
+template <class Number>
+void fasten(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
+            std::vector<VelocityOf<Number>>& last);
+/// The same with the wall copy of a chunk.
+void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail);
+void fasten(std::size_t chunk, const WallCopy& copy, Trail& trail);
+
+/// Sum of W_nn |s - y|^2 over a range [J]: the square of what the sweep changed, in the metric of the sweep.
+/// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls.
+double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
+                      double wall_inv_mass, const Trail& trail);
+
+std::size_t memory_used(const Trail& trail);
+
+}  // namespace talus

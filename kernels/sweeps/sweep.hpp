@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/bodies.hpp"
+#include "kernels/detection/contacts.hpp"
+
+namespace talus {
+
+/// A chunk's own instance of a wall. A wall of finite mass M touched by k chunks is split into k copies of
+/// mass M/k, glued after each sweep (glue_copies): gluing inside one subdomain, so that a whole face of the
+/// sample is no chain of conflicts.
+struct WallCopy {
+  double velocity[3]{};  ///< [m/s]
+  double inv_mass{};     ///< k/M along the normal [1/kg]; 0 for a wall that is driven
+};
+
+/// Contacts [begin, end) of one chunk.
+struct ContactRange {
+  std::size_t begin;
+  std::size_t end;
+};
+
+/// What sweeps with momentum changed last, in the layout of Contacts: s - s_before [N s], s the impulses
+/// after a sweep. Rounded to float: of a step, not of an impulse, so that nothing is lost as steps become
+/// small.
+struct SweepSteps {
+  std::vector<float> x, y, z;  ///< with friction
+  std::vector<float> n;        ///< without
+};
+
+/// A sweep that begins from s + beta (s - s_before) instead of s (momentum.hpp), and over-relaxes the normal
+/// impulses by omega, in (0, 2): friction gains nothing by it. The velocities have gone on already.
+struct SweepMomentum {
+  double beta = 0, omega = 1;
+  SweepSteps& steps;  ///< read, and made anew
+};
+
+/// One pass of nonlinear Gauss-Seidel over grain-grain contacts (docs/theory.md; Jean 1999, closed form for
+/// spheres):
+///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
+///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
+/// `Friction` false: only r_n exists and only u is read and written. Per contact: reads 2 body records (128
+/// bytes) and 56 bytes of contact, writes 128 + 24; about 108 flop, 2 divisions and a square root.
+/// Momentum reads and writes 12 more.
+template <bool Friction>
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu);
+template <bool Friction>
+void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                  const SweepMomentum& momentum);
+
+/// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i. A copy of finite
+/// mass is split once more, contact k of the range against part k mod 8, and glued at the end: 8 contacts
+/// that do not wait for one another.
+template <bool Friction>
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall);
+template <bool Friction>
+void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
+                WallCopy& wall, const SweepMomentum& momentum);
+
+/// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
+/// (single_precision.hpp); `contacts` lends groups and bodies. The steps are in the units of `single`.
+template <bool Friction>
+void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                  std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum);
+template <bool Friction>
+void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
+                std::span<SingleVelocity> velocity, double mu, WallCopy& wall, const SweepMomentum& momentum);
+
+/// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
+/// r.
+template <bool Friction>
+void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity);
+template <bool Friction>
+void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                     WallCopy& wall);
+
+/// Sums of the certificate over some contacts. Add them in a fixed order only.
+struct ErrorSums {
+  double residual2 = 0;      ///< sum of e^2 [m^2/s^2]
+  double residual_max2 = 0;  ///< max of e^2 [m^2/s^2]
+  double impulse2 = 0;       ///< sum of (|r|/rho)^2 [m^2/s^2]
+  double velocity2 = 0;      ///< sum of |v + b n|^2 over contacts that carry or close [m^2/s^2]
+  double wall_impulse[3]{};  ///< sum of r at a wall, on the grains [N s]
+  std::int64_t contacts = 0;
+  std::int64_t active = 0;  ///< r_n > 0
+
+  void add(const ErrorSums& other);
+};
+
+/// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and rho
+/// = 1/W_nn [m/s] (docs/theory.md). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
+template <bool Friction>
+ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                       double mu, Multiplicities parts = {});
+template <bool Friction>
+ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities parts = {});
+
+/// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies
+/// have equal masses. Summed in order.
+void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which);
+
+/// Keeps a part of what a sweep changed: r <- before + part (r - before), and V with it. `before` holds the
+/// impulses of the range (3 each, or 1 without friction). For a contact whose bodies stand in m_1 and m_2
+/// subdomains part = 1/max(m_1, m_2): the damping that makes block Jacobi on full masses (Schwarz, (24))
+/// converge, docs/decisions/0007-couplings.md.
+template <bool Friction>
+void relax(Contacts& contacts, ContactRange range, std::span<const double> before,
+           Multiplicities multiplicity, std::span<Velocity> velocity, WallCopy* wall);
+
+/// Copies the impulses of a range into `out`, as `relax` wants them.
+template <bool Friction>
+void copy_impulses(const Contacts& contacts, ContactRange range, std::vector<double>& out);
+
+}  // namespace talus

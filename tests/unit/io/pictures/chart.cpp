@@ -1,0 +1,125 @@
+// Curves as SVG and as a gnuplot script, and the page they stand in.
+
+#include "io/pictures/chart.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <regex>
+
+#include "io/files/csv_table.hpp"
+#include "io/pictures/html_page.hpp"
+
+namespace talus::io {
+namespace {
+
+Chart two_curves() {
+  return {
+      .name = "residual",
+      .title = "Residual < 1 & falling",
+      .subtitle = "",
+      .x_label = "time  [s]",
+      .y_label = "residual  [1]",
+      .table = "residual.csv",
+      .x_column = "seconds",
+      .y_column = "error_rms",
+      .series = {{"nlgs", {{0.01, 1e-1}, {0.1, 1e-2}, {1, 1e-3}}, 0, 0, {{"method", "nlgs"}}},
+                 {"nlgs, warm", {{0.01, 1e-2}, {0.1, 1e-3}}, 0, 1, {{"method", "nlgs"}, {"start", "warm"}}}},
+      .levels = {{1e-2, "tolerance"}}};
+}
+
+/// Points of the n-th polyline.
+std::vector<std::array<double, 2>> polyline(const std::string& svg, std::size_t n) {
+  std::size_t at = 0;
+  for (std::size_t k = 0; k <= n; ++k) at = svg.find("points=\"", at) + 8;
+  const std::string list = svg.substr(at, svg.find('"', at) - at);
+  std::vector<std::array<double, 2>> points;
+  static const std::regex pair("([-0-9.]+),([-0-9.]+)");
+  for (std::sregex_iterator it(list.begin(), list.end(), pair), end; it != end; ++it)
+    points.push_back({std::stod((*it)[1]), std::stod((*it)[2])});
+  return points;
+}
+
+TEST(Chart, EqualFactorsAreEqualDistancesOnLogarithmicAxes) {
+  const auto points = polyline(draw_chart(two_curves()), 0);
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_NEAR(points[2][0] - points[1][0], points[1][0] - points[0][0], 0.02);
+  EXPECT_NEAR(points[2][1] - points[1][1], points[1][1] - points[0][1], 0.02);
+  EXPECT_GT(points[2][1], points[0][1]) << "pixels count downwards: a smaller residual is lower";
+  EXPECT_GT(points[2][0], points[0][0]);
+}
+
+TEST(Chart, CurvesShareTheirAxes) {
+  const std::string svg = draw_chart(two_curves());
+  EXPECT_NEAR(polyline(svg, 1)[1][1], polyline(svg, 0)[2][1], 0.02) << "both are 1e-3";
+  EXPECT_NEAR(polyline(svg, 1)[1][0], polyline(svg, 0)[1][0], 0.02) << "both are 0.1 s";
+}
+
+TEST(Chart, LeavesOutWhatALogarithmCannotShow) {
+  Chart chart = two_curves();
+  chart.series[0].points.push_back({10, 0});
+  chart.series[0].points.push_back({10, std::numeric_limits<double>::quiet_NaN()});
+  chart.series[0].points.push_back({-1, 1});
+  const std::string svg = draw_chart(chart);
+  EXPECT_EQ(polyline(svg, 0).size(), 3U);
+  EXPECT_EQ(svg, draw_chart(two_curves()));
+}
+
+TEST(Chart, OnePointAndNoneArePictures) {
+  Chart chart = two_curves();
+  chart.levels.clear();
+  chart.series = {{"one", {{0.3, 0.004}}, 0, 0, {}}};
+  const std::string one = draw_chart(chart);
+  EXPECT_EQ(one.find("nan"), std::string::npos);
+  EXPECT_EQ(one.find("inf"), std::string::npos);
+  EXPECT_NE(one.find("<circle"), std::string::npos);
+  chart.series.clear();
+  EXPECT_NE(draw_chart(chart).find("No data"), std::string::npos);
+  EXPECT_EQ(gnuplot_script(std::array{chart}).find("plot '"), std::string::npos);
+}
+
+TEST(Chart, AStaircaseHoldsItsValueUpToTheNextPoint) {
+  Chart chart = two_curves();
+  chart.staircase = true;
+  const auto points = polyline(draw_chart(chart), 0);
+  ASSERT_EQ(points.size(), 6U);
+  EXPECT_EQ(points[1][1], points[0][1]);
+  EXPECT_EQ(points[1][0], points[2][0]);
+  EXPECT_EQ(points[5][1], points[4][1]) << "the last value holds up to the edge";
+}
+
+TEST(Chart, TheScriptPicksTheRowsOfEachCurveFromTheTable) {
+  Chart chart = two_curves();
+  chart.title = "it's";
+  const std::string script = gnuplot_script(std::array{chart});
+  EXPECT_NE(
+      script.find("'residual.csv' using (1 && strcol('method') eq 'nlgs' && strcol('start') eq 'warm' ? "
+                  "column('seconds') : NaN):(column('error_rms'))"),
+      std::string::npos)
+      << script;
+  EXPECT_NE(script.find("set title 'it''s'"), std::string::npos);
+  EXPECT_NE(script.find("set logscale y"), std::string::npos);
+}
+
+TEST(CsvTable, QuotesWhatItMustAndKeepsEveryDigit) {
+  CsvTable table({"name", "value"});
+  table.row("a,b", 0.1 + 0.2);
+  table.row(std::string("c"), std::int64_t{7});
+  EXPECT_EQ(table.text(), "name,value\n\"a,b\",0.30000000000000004\nc,7\n");
+}
+
+TEST(HtmlPage, HoldsThePictureAndEscapesTheRest) {
+  const std::string page =
+      html_page("a < b", "one & two", {{"Part", "x > y", draw_chart(two_curves()), {{"<c>"}, {{"1&2"}}}}});
+  EXPECT_NE(page.find("<h1>a &lt; b</h1>"), std::string::npos);
+  EXPECT_NE(page.find("<p>one &amp; two</p>"), std::string::npos);
+  EXPECT_NE(page.find("<th>&lt;c&gt;</th>"), std::string::npos);
+  EXPECT_NE(page.find("<td>1&amp;2</td>"), std::string::npos);
+  EXPECT_NE(page.find("<svg"), std::string::npos);
+  EXPECT_EQ(page.find("<?xml"), std::string::npos) << "a declaration is not allowed inside a page";
+  EXPECT_EQ(page.find("src="), std::string::npos) << "nothing is fetched from elsewhere";
+}
+
+}  // namespace
+}  // namespace talus::io

@@ -1,0 +1,405 @@
+// The directory of a run, its tables, run.json, the progress line, and the recorder that ties them together.
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <nlohmann/json.hpp>
+
+#include "io/files/error.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/results/csv_writer.hpp"
+#include "io/results/progress.hpp"
+#include "io/results/recorder.hpp"
+#include "io/results/run_json.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
+
+namespace talus::io {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace talus::test;
+
+void touch(const fs::path& path) {
+  std::ofstream(path) << "mine";
+}
+
+/// For a run that ends at once.
+void prepare(const std::filesystem::path& directory, bool force) {
+  const DirectoryLock lock = prepare_output_directory(directory, force);
+}
+
+TEST(OutputDirectory, IsCreatedWithItsParents) {
+  const ScratchDirectory scratch;
+  prepare(scratch / "a/b", false);
+  EXPECT_TRUE(fs::is_directory(scratch / "a/b"));
+  prepare(scratch / "a/b", false);  // empty: nothing to lose
+}
+
+TEST(OutputDirectory, ThatHoldsAnythingIsRefusedAndLeftAlone) {
+  const ScratchDirectory scratch;
+  touch(scratch / "steps.csv");
+  const std::string message = message_of<FileError>([&] { prepare(scratch.path(), false); });
+  EXPECT_NE(message.find(scratch.path().string()), std::string::npos) << message;
+  EXPECT_NE(message.find("--force"), std::string::npos) << message;
+  EXPECT_EQ(content_of(scratch / "steps.csv"), "mine");
+}
+
+TEST(OutputDirectory, ForceRemovesOurFilesAndNeverTheUsers) {
+  const ScratchDirectory scratch;
+  fs::create_directories(scratch / "fields");
+  const std::vector<std::string> ours{"run.json",
+                                      "scene.resolved.toml",
+                                      "steps.csv",
+                                      "results.h5",
+                                      "fields/grains_000012.vtp",
+                                      "fields/forces_1000000.vtp",
+                                      "fields.pvd",
+                                      "run.json.part",
+                                      "fclib_000012.hdf5",
+                                      "fclib_000012.hdf5.4711.part",
+                                      "triaxial.svg"};
+  const std::vector<std::string> users{
+      "notes.txt",          "fields/mine.vtp",          "fields/grains_12.vtp",
+      "steps.csv.bak",      "fields/grains_final1.vtp", "fields/steps.csv",
+      "fclib_000012.hdf5.1"};
+  for (const auto& name : ours) touch(scratch / name);
+  for (const auto& name : users) touch(scratch / name);
+  fs::create_directories(scratch / "walls.csv");  // a directory of that name is not ours
+  touch(scratch / "elsewhere");
+  fs::create_symlink(scratch / "elsewhere", scratch / "triaxial.csv");
+  prepare(scratch.path(), true);
+  for (const auto& name : ours) EXPECT_FALSE(fs::exists(scratch / name)) << name;
+  for (const auto& name : users) EXPECT_TRUE(fs::exists(scratch / name)) << name;
+  EXPECT_TRUE(fs::is_directory(scratch / "walls.csv"));
+  EXPECT_TRUE(fs::is_symlink(scratch / "triaxial.csv"));
+}
+
+TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
+  const ScratchDirectory scratch, elsewhere;
+  touch(elsewhere / "grains_000000.vtp");
+  touch(scratch / "steps.csv");
+  fs::create_directory_symlink(elsewhere.path(), scratch / "fields");
+  prepare(scratch.path(), true);
+  EXPECT_FALSE(fs::exists(scratch / "steps.csv"));
+  EXPECT_TRUE(fs::is_symlink(scratch / "fields"));
+  EXPECT_EQ(content_of(elsewhere / "grains_000000.vtp"), "mine");
+}
+
+TEST(OutputDirectory, IsRefusedAsLongAsAnotherRunWritesThere) {
+  const ScratchDirectory scratch;
+  {
+    const DirectoryLock lock = prepare_output_directory(scratch / "run", false);
+    touch(scratch / "run/steps.csv");
+    for (const bool force : {false, true}) {
+      const std::string message = message_of<FileError>([&] { prepare(scratch / "run", force); });
+      EXPECT_NE(message.find("another run is writing there"), std::string::npos) << message;
+    }
+    EXPECT_EQ(content_of(scratch / "run/steps.csv"), "mine");
+  }
+  EXPECT_NO_THROW(prepare(scratch / "run", true));
+  EXPECT_TRUE(fs::is_empty(scratch / "run")) << "the lock leaves nothing behind";
+}
+
+TEST(OutputDirectory, OfScratchGoesWithTheScopeAndNothingElseDoes) {
+  const ScratchDirectory scratch;
+  fs::create_directory(scratch / "run");
+  touch(scratch / "run/thesis.txt");
+  {
+    const ScratchFolder folder(scratch / "run");
+    touch(folder.path() / "log");
+    EXPECT_EQ(folder.path().parent_path(), scratch.path());
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(scratch.path()), {}), 1);
+  EXPECT_EQ(content_of(scratch / "run/thesis.txt"), "mine");
+}
+
+TEST(OutputFile, MayNotBeWhatIsReadNorAFolder) {
+  const ScratchDirectory scratch;
+  touch(scratch / "trace.h5");
+  fs::create_symlink("trace.h5", scratch / "link.h5");
+  EXPECT_NO_THROW(check_output_files({scratch / "trace.h5"}, {scratch / "other.h5", ""}, false));
+  for (const char* out : {"trace.h5", "link.h5", ".", "nowhere/other.h5"})
+    EXPECT_THROW(check_output_files({scratch / "trace.h5"}, {scratch / out}, true), FileError) << out;
+  EXPECT_THROW(check_output_files({}, {"/dev/null"}, true), FileError);
+}
+
+TEST(OutputFile, ReplacesNothingUnlessForcedAndIsAskedForOnce) {
+  const ScratchDirectory scratch;
+  touch(scratch / "table.csv");
+  const std::string message =
+      message_of<FileError>([&] { check_output_files({}, {scratch / "table.csv"}, false); });
+  EXPECT_NE(message.find("--force"), std::string::npos) << message;
+  EXPECT_NO_THROW(check_output_files({}, {scratch / "table.csv"}, true));
+  for (const char* same : {"new.csv", "./new.csv", "../new.csv"}) {
+    const fs::path place = same == std::string("../new.csv") ? scratch / "sub" / same : scratch / same;
+    fs::create_directories(scratch / "sub");
+    EXPECT_THROW(check_output_files({}, {scratch / "new.csv", place}, true), FileError) << same;
+  }
+}
+
+TEST(OutputDirectory, ThatCannotBeMadeIsNamed) {
+  const ScratchDirectory scratch;
+  touch(scratch / "file");
+  for (const char* name : {"file", "file/below"}) {
+    const std::string message = message_of<FileError>([&] { prepare(scratch / name, true); });
+    EXPECT_NE(message.find((scratch / "file").string()), std::string::npos) << message;
+  }
+  EXPECT_EQ(content_of(scratch / "file"), "mine");
+}
+
+TEST(OutputDirectory, EveryFileOfARecorderIsKnownToForce) {
+  const ScratchDirectory scratch;
+  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
+  recorder.record_step(StepReport{}, {}, triaxial_row(1, "shear"));
+  recorder.record_frame(three_grains());
+  recorder.close();
+  std::size_t files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(scratch.path())) {
+    if (entry.is_directory()) continue;
+    EXPECT_TRUE(is_output_name(entry.path().lexically_relative(scratch.path()).generic_string()))
+        << entry.path();
+    ++files;
+  }
+  EXPECT_EQ(files, 12u);
+}
+
+TEST(WholeFile, KeepsTheOldContentWhenTheNewDoesNotFit) {
+  const ScratchDirectory scratch;
+  write_whole(scratch / "run.json", "old");
+  std::string message;
+  {
+    const FileSizeLimit limit(4096);
+    message = message_of<FileError>([&] { write_whole(scratch / "run.json", std::string(100000, 'x')); });
+  }
+  EXPECT_NE(message.find("run.json"), std::string::npos) << message;
+  EXPECT_NE(message.find("File too large"), std::string::npos) << message;
+  EXPECT_EQ(content_of(scratch / "run.json"), "old");
+  EXPECT_FALSE(fs::exists(scratch / "run.json.part"));
+}
+
+TEST(Csv, HeadersAreThosePromised) {
+  EXPECT_EQ(
+      steps_csv_header(),
+      "step,time,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,penetration_mean,"
+      "penetration_max,kinetic_translation,kinetic_rotation,solid_fraction,migrants,imbalance,wall_s,"
+      "converged\n");
+  EXPECT_EQ(walls_csv_header(), "step,time,wall,position,velocity,force_x,force_y,force_z\n");
+  EXPECT_EQ(triaxial_csv_header(),
+            "step,time,stage,strain_x,strain_y,strain_z,strain_volume,strain_shear,solid_fraction,stress_x,"
+            "stress_y,"
+            "stress_z,p,q,q_over_p,coordination\n");
+}
+
+TEST(Csv, StepsRowHoldsEveryValueInItsColumn) {
+  StepReport r{1, 2.5, 3, 4, 5, 6, 7.5, 8.5, 9.5, 10.5, 11.5, 12.5, 13.5, 14.5, 15.5, 16, 17.5, 18.5, true};
+  std::string row;
+  append_steps_row(row, r);
+  EXPECT_EQ(row, "1,2.5,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,13.5,14.5,15.5,16,17.5,18.5,1\n");
+}
+
+TEST(Csv, TriaxialAndWallRowsHoldEveryValueInItsColumn) {
+  std::string row;
+  append_triaxial_row(
+      row,
+      TriaxialReport{1, 2.5, "s", {3.5, 4.5, 5.5}, 6.5, 7.5, 8.5, {9.5, 10.5, 11.5}, 12.5, 13.5, 14.5, 15.5});
+  EXPECT_EQ(row, "1,2.5,s,3.5,4.5,5.5,6.5,7.5,8.5,9.5,10.5,11.5,12.5,13.5,14.5,15.5\n");
+  row.clear();
+  append_walls_row(row, StepReport{.step = 3, .time = 0.5},
+                   WallReport{"top", 1.5, -2.5, Vec3(3.5, 4.5, 5.5)});
+  EXPECT_EQ(row, "3,0.5,top,1.5,-2.5,3.5,4.5,5.5\n");
+}
+
+TEST(Csv, NumbersReadBackBitForBit) {
+  for (const double value :
+       {1.0 / 3, 0.1, -0.0, 5e-324, 1.7976931348623157e308, 6.02214076e23, 1e-5, 123456789.123}) {
+    std::string row;
+    append_walls_row(row, StepReport{.time = value}, WallReport{});
+    const double back = std::strtod(split(row, ',').at(1).c_str(), nullptr);
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(back), std::bit_cast<std::uint64_t>(value)) << row;
+  }
+}
+
+TEST(Csv, NamesWithCommasAndQuotesAreQuoted) {
+  std::string row;
+  append_walls_row(row, StepReport{}, WallReport{"top, \"left\""});
+  EXPECT_EQ(row, "0,0,\"top, \"\"left\"\"\",0,0,0,0,0\n");
+}
+
+TEST(Csv, AFullDiskIsAnErrorThatNamesTheFile) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "needs /dev/full";
+  const std::string message = message_of<FileError>([] { CsvFile("/dev/full", steps_csv_header()); });
+  EXPECT_NE(message.find("/dev/full"), std::string::npos) << message;
+  EXPECT_NE(message.find("No space left"), std::string::npos) << message;
+}
+
+TEST(Csv, OnDiskAreWholeLinesAtAnyMoment) {
+  const ScratchDirectory scratch;
+  CsvFile file(scratch / "steps.csv", steps_csv_header());
+  EXPECT_EQ(content_of(scratch / "steps.csv"), steps_csv_header());
+  for (int k = 0; k < 5000; ++k) {
+    append_steps_row(file.pending(), StepReport{.step = k, .time = k / 3.0});
+    if (k % 500 != 0) continue;
+    file.flush();
+    EXPECT_EQ(content_of(scratch / "steps.csv").back(), '\n');
+    EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 2u + static_cast<std::size_t>(k));
+  }
+  file.close();
+  EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 5001u);
+}
+
+TEST(RunJson, SaysWhatWasRunAndWhatCameOfIt) {
+  Provenance provenance = collect_provenance();
+  provenance.command_line = {"talus", "run", "a \"b\".toml"};
+  provenance.seed = 18446744073709551615u;
+  provenance.threads = 2;
+  Summary summary;
+  summary.status = "done";
+  summary.digest = 0xabc;
+  summary.exit_code = 3;
+  summary.worst_error_rms = 0.1;
+  const auto json = nlohmann::json::parse(run_json(provenance, summary));
+  EXPECT_EQ(json["provenance"]["command_line"][2], "a \"b\".toml");
+  EXPECT_EQ(json["provenance"]["seed"].get<std::uint64_t>(), 18446744073709551615u);
+  EXPECT_EQ(json["summary"]["digest"], "0000000000000abc");
+  EXPECT_EQ(json["summary"]["exit_code"], 3);
+  EXPECT_EQ(json["summary"]["worst_error_rms"].get<double>(), 0.1);
+  for (const char* key : {"git_hash", "compiler", "build_type", "host", "date_utc", "version"}) {
+    EXPECT_FALSE(json["provenance"][key].get<std::string>().empty()) << key;
+  }
+  EXPECT_GE(json["provenance"]["cores_online"], json["provenance"]["cores_allowed"]);
+  EXPECT_TRUE(nlohmann::json::parse(run_json(provenance, Summary{}))["summary"]["digest"].is_null());
+}
+
+TEST(RunJson, DoesNotHideThatANumberIsNone) {
+  Summary summary;
+  summary.worst_penetration = 0.25;
+  summary.worst_balance = std::numeric_limits<double>::quiet_NaN();
+  const auto json = nlohmann::json::parse(run_json(Provenance{}, summary))["summary"];
+  EXPECT_EQ(json["worst_penetration"], 0.25);
+  EXPECT_TRUE(json["worst_balance"].is_null()) << json;
+}
+
+TEST(RunJson, SurvivesAFileNameThatIsNotUtf8) {
+  Provenance provenance;
+  provenance.scene_file = "caf\xe9.toml";
+  EXPECT_NO_THROW(nlohmann::json::parse(run_json(provenance, Summary{})));
+}
+
+class ProgressOnAFile : public testing::Test {
+ protected:
+  std::string shown() {
+    std::fflush(stream_);
+    return content_of(scratch_ / "log");
+  }
+  ScratchDirectory scratch_;
+  std::FILE* stream_ = std::fopen((scratch_ / "log").c_str(), "w");
+  void TearDown() override { std::fclose(stream_); }
+};
+
+TEST_F(ProgressOnAFile, ShowsTheFirstTheLastAndOneEveryTenSeconds) {
+  Progress progress(stream_, false, 79);
+  const Progress::Clock::time_point start{};
+  for (int k = 0; k <= 250; ++k) {
+    progress.update(StepReport{.step = k}, "shear", k / 1000.0, start + std::chrono::milliseconds(100 * k));
+  }
+  progress.finish();
+  const auto lines = split(shown(), '\n');
+  ASSERT_EQ(lines.size(), 5u) << shown();  // at 0, 10, 20 and 25 s, and nothing after the last line end
+  EXPECT_NE(lines[1].find("step 100 "), std::string::npos) << lines[1];
+  EXPECT_NE(lines[3].find("step 250 "), std::string::npos) << lines[3];
+  EXPECT_EQ(occurrences(shown(), "\r"), 0u);
+  EXPECT_NE(lines[1].find("ETA 1:30"), std::string::npos) << lines[1];  // a tenth took 10 s
+}
+
+TEST_F(ProgressOnAFile, RewritesOneLineOnATerminalAndNeverLongerThanIt) {
+  Progress progress(stream_, true, 20);
+  const Progress::Clock::time_point start{};
+  for (int k = 0; k <= 100; ++k) {
+    progress.update(StepReport{.step = k}, "a stage of a long name", 0.5,
+                    start + std::chrono::milliseconds(10 * k));
+  }
+  progress.finish();
+  EXPECT_EQ(occurrences(shown(), "\r"), 6u);  // at 0, 0.2, ... 1 s
+  EXPECT_EQ(occurrences(shown(), "\n"), 1u);
+  EXPECT_EQ(split(shown(), '\r').at(1), "a stage of a long na\x1b[K");
+}
+
+TEST(ProgressLine, MarksAStepThatMissedItsTolerance) {
+  const StepReport report{
+      .step = 1234, .time = 0.0123, .contacts = 6012, .iterations = 45, .error_rms = 8.2e-4};
+  EXPECT_EQ(progress_line(report, "shear", 0.999, 3700),
+            "shear  99 %  step 1234  t 12.3 ms  6012 contacts  45 it  err 8.2e-04 MISSED  ETA 1:01:40");
+}
+
+TEST(Recorder, LeavesTheStateOfARunThatIsGoingOn) {
+  const ScratchDirectory scratch;
+  const Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
+  EXPECT_EQ(nlohmann::json::parse(content_of(scratch / "run.json"))["summary"]["status"], "running");
+  EXPECT_EQ(content_of(scratch / "steps.csv"), steps_csv_header());
+  EXPECT_FALSE(fs::exists(scratch / "triaxial.csv")) << "a scene without a triaxial stage has no such table";
+}
+
+TEST(Recorder, WritesWhatItWasGiven) {
+  const ScratchDirectory scratch;
+  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
+  for (int k = 1; k <= 3; ++k) {
+    const Frame frame = three_grains();
+    recorder.record_step(StepReport{.step = k}, frame.walls, triaxial_row(k, "shear"));
+    if (k != 2) recorder.record_frame(three_grains());
+  }
+  recorder.close();
+  EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 1u + 3u);
+  EXPECT_EQ(occurrences(content_of(scratch / "walls.csv"), "\n"), 1u + 3u * 2u);
+  EXPECT_EQ(occurrences(content_of(scratch / "triaxial.csv"), "\n"), 1u + 3u);
+  EXPECT_EQ(frame_count(scratch / "results.h5"), 2u);
+  const std::string collection = content_of(scratch / "fields.pvd");
+  for (const char* name : {"fields/grains_000001.vtp", "fields/forces_000001.vtp"}) {
+    EXPECT_EQ(occurrences(collection, name), 1u);
+    EXPECT_TRUE(fs::exists(scratch / name)) << name;
+  }
+  EXPECT_EQ(recorder.frames(), 2u);
+}
+
+TEST(Recorder, HandsOverAllLinesSoFarWhenAsked) {
+  const ScratchDirectory scratch;
+  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
+  const Frame frame = three_grains();
+  for (int k = 1; k <= 3; ++k) {
+    recorder.record_step(StepReport{.step = k}, frame.walls, triaxial_row(k, "shear"));
+    recorder.record_errors(k, std::vector<Iteration::Check>(2));
+  }
+  recorder.flush();
+  EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 1u + 3u);
+  EXPECT_EQ(occurrences(content_of(scratch / "walls.csv"), "\n"), 1u + 3u * 2u);
+  EXPECT_EQ(occurrences(content_of(scratch / "triaxial.csv"), "\n"), 1u + 3u);
+  EXPECT_EQ(occurrences(content_of(scratch / "error_history.csv"), "\n"), 1u + 3u * 2u);
+}
+
+TEST(Recorder, WritesNothingThatWasNotAskedFor) {
+  const ScratchDirectory scratch;
+  Recorder recorder(scratch.path(), {.frames = true, .fields = false, .contacts = false, .pictures = false},
+                    setup_with_two_walls(), collect_provenance());
+  recorder.record_frame(three_grains());
+  recorder.close();
+  EXPECT_TRUE(read_frame(scratch / "results.h5", 0).contact_bodies.empty());
+  for (const char* name : {"fields", "fields.pvd", "forces.svg", "triaxial.svg"}) {
+    EXPECT_FALSE(fs::exists(scratch / name)) << name;
+  }
+}
+
+TEST(ThinnedCurve, StaysSmallEvenAndEndsWithTheNewestRow) {
+  ThinnedCurve curve(100);
+  for (int k = 0; k < 12345; ++k) curve.add(triaxial_row(k, "shear"));
+  const auto rows = curve.rows();
+  ASSERT_GE(rows.size(), 100u);
+  EXPECT_LE(rows.size(), 201u);
+  EXPECT_EQ(rows.front().step, 0);
+  EXPECT_EQ(rows.back().step, 12344);
+  const std::int64_t stride = rows[1].step - rows[0].step;
+  for (std::size_t k = 1; k + 1 < rows.size(); ++k) EXPECT_EQ(rows[k].step - rows[k - 1].step, stride);
+  curve.add(triaxial_row(12345, "next"));
+  EXPECT_EQ(curve.rows().size(), 1u);
+}
+
+}  // namespace
+}  // namespace talus::io

@@ -1,0 +1,302 @@
+// results.h5, the files for ParaView, and the pictures.
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <set>
+
+#include "io/files/error.hpp"
+#include "io/pictures/detail/svg.hpp"
+#include "io/pictures/picture.hpp"
+#include "io/results/results.hpp"
+#include "io/results/vtk.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
+
+namespace talus::io {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace talus::test;
+
+/// Equal bits, not equal values: -0.0 is not 0.0.
+template <class T>
+bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+void expect_same(const Frame& a, const Frame& b) {
+  EXPECT_EQ(a.step, b.step);
+  EXPECT_EQ(a.time, b.time);
+  EXPECT_EQ(a.stage, b.stage);
+  EXPECT_TRUE(same_bits(a.id, b.id));
+  EXPECT_TRUE(same_bits(a.x, b.x));
+  EXPECT_TRUE(same_bits(a.radius, b.radius));
+  EXPECT_TRUE(same_bits(a.u, b.u));
+  EXPECT_TRUE(same_bits(a.omega, b.omega));
+  EXPECT_TRUE(same_bits(a.orientation, b.orientation));
+  EXPECT_TRUE(same_bits(a.contact_bodies, b.contact_bodies));
+  EXPECT_TRUE(same_bits(a.contact_point, b.contact_point));
+  EXPECT_TRUE(same_bits(a.contact_normal, b.contact_normal));
+  EXPECT_TRUE(same_bits(a.contact_gap, b.contact_gap));
+  EXPECT_TRUE(same_bits(a.contact_force, b.contact_force));
+  ASSERT_EQ(a.walls.size(), b.walls.size());
+  for (std::size_t k = 0; k < a.walls.size(); ++k) {
+    EXPECT_EQ(a.walls[k].name, b.walls[k].name);
+    EXPECT_EQ(a.walls[k].position, b.walls[k].position);
+    EXPECT_EQ(a.walls[k].velocity, b.walls[k].velocity);
+    EXPECT_EQ(a.walls[k].force, b.walls[k].force);
+  }
+}
+
+TEST(Results, ReadBackBitForBit) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  EXPECT_EQ(frame_count(scratch / "results.h5"), 0u);
+  writer.append(three_grains());
+
+  Frame bare = three_grains();  // as a frictionless scene leaves it before the first contact
+  bare.omega.clear();
+  bare.contact_bodies.clear();
+  bare.contact_point.clear();
+  bare.contact_normal.clear();
+  bare.contact_gap.clear();
+  bare.contact_force.clear();
+  bare.stage = "compaction isotrope, 1\u02b3\u1d49";
+  writer.append(bare);
+
+  Frame turned = three_grains();
+  turned.orientation = {{1, 0, 0, 0}, {0.5, 0.5, 0.5, 0.5}, {0, -0.0, 0, 1}};
+  writer.append(turned);
+
+  ASSERT_EQ(frame_count(scratch / "results.h5"), 3u);
+  expect_same(read_frame(scratch / "results.h5", 0), three_grains());
+  expect_same(read_frame(scratch / "results.h5", 1), bare);
+  expect_same(read_frame(scratch / "results.h5", 2), turned);
+}
+
+TEST(Results, HoldASampleWithoutBodiesAndWalls) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {});
+  writer.append(Frame{});
+  expect_same(read_frame(scratch / "results.h5", 0), Frame{});
+}
+
+TEST(Results, CanBeReadAfterEveryFrameAsAKilledRunLeavesThem) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  for (std::size_t k = 1; k <= 3; ++k) {
+    writer.append(three_grains());
+    fs::copy_file(scratch / "results.h5", scratch / "as-killed.h5", fs::copy_options::overwrite_existing);
+    EXPECT_EQ(frame_count(scratch / "as-killed.h5"), k);
+    expect_same(read_frame(scratch / "as-killed.h5", k - 1), three_grains());
+  }
+}
+
+TEST(Results, RefuseAFrameWhoseArraysDoNotFit) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  Frame frame = three_grains();
+  frame.contact_gap.pop_back();
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { writer.append(frame); }),
+            "frame: contact_gap has 1 entries, expected 2");
+  frame = three_grains();
+  frame.walls[1].name = "right";
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { writer.append(frame); }),
+            "frame: wall 1 is 'right', expected 'left'");
+  EXPECT_EQ(frame_count(scratch / "results.h5"), 0u);
+}
+
+TEST(Results, KeepTheFramesBeforeTheDiskWasFull) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  writer.append(three_grains());
+  Frame large = three_grains();
+  large.id.resize(100000);
+  large.x.resize(100000);
+  large.radius.resize(100000);
+  large.u.resize(100000);
+  large.omega.resize(100000);
+  std::string message;
+  {
+    const FileSizeLimit limit(100000);
+    message = message_of<FileError>([&] { writer.append(large); });
+  }
+  EXPECT_NE(message.find((scratch / "results.h5").string()), std::string::npos) << message;
+  EXPECT_EQ(writer.frames_written(), 1u);
+  ASSERT_EQ(frame_count(scratch / "results.h5"), 1u);
+  expect_same(read_frame(scratch / "results.h5", 0), three_grains());
+}
+
+TEST(Results, ErrorsNameTheFile) {
+  const ScratchDirectory scratch;
+  const auto names = [](const std::string& message, const fs::path& path) {
+    return message.find(path.string()) != std::string::npos;
+  };
+  EXPECT_PRED2(names, message_of<FileError>([&] { ResultsWriter(scratch / "no/results.h5", {}); }),
+               scratch / "no/results.h5");
+  EXPECT_PRED2(names, message_of<FileError>([&] { read_frame(scratch / "none.h5", 0); }),
+               scratch / "none.h5");
+  std::ofstream(scratch / "text.h5") << "not HDF5";
+  EXPECT_PRED2(names, message_of<FileError>([&] { frame_count(scratch / "text.h5"); }), scratch / "text.h5");
+  ResultsWriter writer(scratch / "results.h5", {});
+  EXPECT_PRED2(names, message_of<FileError>([&] { read_frame(scratch / "results.h5", 0); }),
+               scratch / "results.h5");
+}
+
+/// Every opened element is closed in order; enough to catch what an XML parser would refuse in files we
+/// write.
+bool well_formed(const std::string& text) {
+  std::vector<std::string> open;
+  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1)) {
+    const std::size_t end = text.find('>', at);
+    if (end == std::string::npos) return false;
+    const std::string tag = text.substr(at + 1, end - at - 1);
+    if (tag.starts_with('?') || tag.ends_with('/')) continue;
+    const std::string name = tag.substr(0, tag.find_first_of(" \n"));
+    if (name.starts_with('/')) {
+      if (open.empty() || "/" + open.back() != name) return false;
+      open.pop_back();
+    } else {
+      open.push_back(name);
+    }
+  }
+  return open.empty();
+}
+
+TEST(Vtk, GrainsKeepTheirValues) {
+  const Frame frame = three_grains();
+  const std::string text = grains_vtp(frame);
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_EQ(occurrences(text, "NumberOfPoints=\"3\" NumberOfVerts=\"3\" NumberOfLines=\"0\""), 1u);
+  EXPECT_EQ(array_of<std::int64_t>(text, "id"), frame.id);
+  EXPECT_EQ(array_of<float>(text, "radius"), (std::vector<float>{0.1f, 0.11f, static_cast<float>(0.1 / 3)}));
+  EXPECT_EQ(array_of<float>(text, "Points").at(3), 0.3f);
+  EXPECT_EQ(array_of<float>(text, "velocity").at(5), 6.0f);
+  EXPECT_EQ(array_of<float>(text, "omega").size(), 9u);
+  EXPECT_EQ(array_of<std::int64_t>(text, "offsets"), (std::vector<std::int64_t>{1, 2, 3}));
+  EXPECT_EQ(occurrences(text, "orientation"), 0u);
+}
+
+TEST(Vtk, ForcesRunBetweenCentresAndToTheWall) {
+  const std::string text = forces_vtp(three_grains());
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_EQ(occurrences(text, "NumberOfPoints=\"4\" NumberOfVerts=\"0\" NumberOfLines=\"2\""), 1u);
+  const auto points = array_of<float>(text, "Points");
+  ASSERT_EQ(points.size(), 12u);
+  EXPECT_EQ(points[0], 0.1f);   // grain 7
+  EXPECT_EQ(points[3], 0.3f);   // grain 3
+  EXPECT_EQ(points[11], 0.0f);  // on the floor
+  EXPECT_EQ(array_of<float>(text, "normal_force"), (std::vector<float>{2.5f, 2.5f, 1.25f, 1.25f}));
+  EXPECT_EQ(array_of<std::int64_t>(text, "wall"), (std::vector<std::int64_t>{-1, 0}));
+  EXPECT_EQ(array_of<std::int64_t>(text, "offsets"), (std::vector<std::int64_t>{2, 4}));
+}
+
+TEST(Vtk, GrainsTakeFieldsOfTheirOwnAndRefuseThoseThatDoNotFit) {
+  const std::vector<std::int32_t> subdomain{4, -1, 2}, two{1, 2};
+  const GrainField good{"subdomain", subdomain}, bad{"multiplicity", two};
+  const std::string text = grains_vtp(three_grains(), std::span(&good, 1));
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_EQ(array_of<std::int32_t>(text, "subdomain"), subdomain);
+  EXPECT_EQ(array_of<std::int64_t>(text, "id"), three_grains().id);
+  EXPECT_EQ(message_of<std::invalid_argument>([&] { grains_vtp(three_grains(), std::span(&bad, 1)); }),
+            "frame: field 'multiplicity' has 2 values for 3 bodies");
+}
+
+TEST(Vtk, AFrameWithoutAnythingIsStillAFile) {
+  EXPECT_TRUE(well_formed(grains_vtp(Frame{})));
+  EXPECT_TRUE(well_formed(forces_vtp(Frame{})));
+  EXPECT_TRUE(array_of<float>(grains_vtp(Frame{}), "radius").empty());
+}
+
+TEST(Vtk, AContactOfAnUnknownBodyIsNamed) {
+  Frame frame = three_grains();
+  frame.contact_bodies[0] = {7, 99};
+  EXPECT_NE(message_of<std::invalid_argument>([&] { forces_vtp(frame); }).find("body 99"), std::string::npos);
+}
+
+TEST(Vtk, CollectionGivesEveryFileItsTime) {
+  const std::string text = collection_pvd({{0, 0, "a.vtp"}, {0.1, 1, "b.vtp"}});
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_EQ(occurrences(text, "<DataSet timestep=\"0.1\" part=\"1\" file=\"b.vtp\"/>"), 1u);
+}
+
+TEST(Picture, DrawsTheGrainsAndForcesOfTheSlabOnly) {
+  Frame frame = three_grains();
+  frame.x[2].y() = 5;  // far outside of the slab about the middle of the others
+  frame.x[0].y() = -4.9;
+  const auto setup = setup_with_two_walls();
+  const std::string all = draw_forces(three_grains(), setup.walls, {});
+  EXPECT_TRUE(well_formed(all));
+  EXPECT_EQ(occurrences(all, "<circle"), 3u);
+  EXPECT_NE(all.find("3 grains, 2 contacts"), std::string::npos);
+  const std::string one = draw_forces(frame, setup.walls, {});
+  EXPECT_EQ(occurrences(one, "<circle"), 1u);
+  EXPECT_NE(one.find("1 grains, 0 contacts"), std::string::npos);
+  EXPECT_EQ(one.find("nan"), std::string::npos);
+}
+
+TEST(Picture, OfAPartitionColoursGrainsBySubdomainAndByMultiplicity) {
+  const std::vector<std::int32_t> subdomain{0, 1, 1}, multiplicity{1, 2, 9};
+  const std::string text = draw_partition(three_grains(), subdomain, multiplicity, {"a <b>", 2, 0});
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_NE(text.find("a &lt;b&gt;"), std::string::npos);
+  EXPECT_EQ(occurrences(text, "<circle"), 3u + 3u + 5u);  // either panel, and the legend
+  std::map<std::string, int> fills;
+  for (const std::string& line : split(text, '\n'))
+    if (line.starts_with("<circle")) ++fills[split(line, '"')[7]];
+  EXPECT_EQ(fills["#10151a"], 2);  // m = 9 shares the darkest grey with 5: a grain and the legend
+  std::multiset<int> counts;
+  for (const auto& [fill, count] : fills) counts.insert(count);
+  EXPECT_EQ(counts, (std::multiset<int>{1, 1, 1, 2, 2, 2, 2})) << "two subdomains: once and twice";
+  EXPECT_THROW(draw_partition(three_grains(), subdomain, {}, {}), std::invalid_argument);
+}
+
+TEST(Picture, OfNothingIsStillAPicture) {
+  EXPECT_TRUE(well_formed(draw_partition(Frame{}, {}, {}, {})));
+  EXPECT_TRUE(well_formed(draw_forces(Frame{}, {}, {})));
+  const std::string text = draw_triaxial({}, {});
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_NE(text.find("No data yet"), std::string::npos);
+}
+
+TEST(Picture, OfATriaxialTestShowsOneStageAndLeavesOutWhatIsNotFinite) {
+  std::vector<TriaxialReport> reports;
+  for (int k = 0; k <= 10; ++k) {
+    TriaxialReport report = triaxial_row(k, "shear <1>");
+    report.strain = {0, 0, -0.01 * k};
+    report.q_over_p = 0.1 * k;
+    report.strain_volume = 0.001 * k;
+    reports.push_back(report);
+  }
+  reports[4].q_over_p = std::numeric_limits<double>::quiet_NaN();
+  reports.push_back(triaxial_row(11, "unloading"));
+  reports.back().strain = {9, 9, 9};
+  const std::string text = draw_triaxial(reports, {.stage = "shear <1>", .axis = 2});
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_NE(text.find("shear &lt;1&gt;"), std::string::npos);
+  EXPECT_NE(text.find("peak q/p = 1.000 at 10 %"), std::string::npos);
+  EXPECT_EQ(text.find("nan"), std::string::npos);
+  const std::size_t begin = text.find("points=\"") + 8;
+  EXPECT_EQ(occurrences(text.substr(begin, text.find('"', begin) - begin), ","), 10u);
+}
+
+TEST(Ticks, AreRoundAndCoverTheRange) {
+  EXPECT_EQ(detail::nice_ticks(0, 10, 5), (std::vector<double>{0, 2, 4, 6, 8, 10}));
+  const auto ticks = detail::nice_ticks(-0.03, 0.91, 5);
+  EXPECT_LE(ticks.front(), -0.03);
+  EXPECT_GE(ticks.back(), 0.91);
+}
+
+TEST(Units, HavePrefixes) {
+  EXPECT_EQ(detail::with_unit(1234, "Pa"), "1.23 kPa");
+  EXPECT_EQ(detail::with_unit(0.001, "s"), "1 ms");
+  EXPECT_EQ(detail::with_unit(-2.5e-6, "m"), "-2.5 µm");
+  EXPECT_EQ(detail::with_unit(0.99996, "m"), "1 m");
+  EXPECT_EQ(detail::with_unit(0, "N"), "0 N");
+}
+
+}  // namespace
+}  // namespace talus::io

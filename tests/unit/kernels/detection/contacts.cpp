@@ -1,0 +1,234 @@
+#include "kernels/detection/narrow_phase.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "tests/unit/dense_sample.hpp"
+#include "tests/unit/kernels/detection/contact_groups.hpp"
+
+namespace talus {
+namespace {
+
+using test::Random;
+using test::Sample;
+using test::uniform;
+
+void set_random_impulses(Candidates& candidates, std::uint64_t seed) {
+  Random random(seed);
+  for (double& r : candidates.impulse) r = uniform(random, -1, 1);
+}
+
+TEST(Contacts, AreTheCandidatesNearerThanTheAlertDistance) {
+  constexpr double alert = 0.04;
+  Sample sample = test::dense_sample(7, 2, true, true, 100);
+  for (Velocity& v : sample.bodies.velocity) std::fill_n(v.u, 3, 0.0);
+  test::find_contacts(sample, alert);
+  std::multiset<std::int32_t> found, expected;
+  for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+    for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k)
+      found.insert(sample.contacts.candidate[k]);
+  const auto& [grain_pairs, wall_pairs, impulse, components] = sample.candidates;
+  for (std::size_t k = 0; k < sample.candidates.size(); ++k) {
+    double gap;
+    if (k < grain_pairs.size()) {
+      const auto i = static_cast<std::size_t>(grain_pairs[k].first),
+                 j = static_cast<std::size_t>(grain_pairs[k].second);
+      gap = (sample.bodies.x[i] - sample.bodies.x[j]).norm() - sample.bodies.radius[i] -
+            sample.bodies.radius[j];
+    } else {
+      const WallPair& pair = wall_pairs[k - grain_pairs.size()];
+      const auto i = static_cast<std::size_t>(pair.body);
+      const Wall& wall = sample.walls[static_cast<std::size_t>(pair.wall)];
+      gap = wall.normal.dot(sample.bodies.x[i] - wall.point) - sample.bodies.radius[i];
+    }
+    if (gap < alert) expected.insert(static_cast<std::int32_t>(k));
+  }
+  EXPECT_GT(expected.size(), 500u);
+  EXPECT_LT(expected.size(), sample.candidates.size());
+  EXPECT_EQ(found, expected);
+}
+
+// Also where chunks are shorter than a group, and where a large grain is in every contact.
+TEST(Contacts, StandInGroupsWithoutACommonGrain) {
+  for (int target : {1, 7, 48, 384, 1000}) {
+    const Sample sample = test::dense_sample(9, 3, true, true, target);
+    std::size_t full = 0, all = 0;
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+      for (const std::size_t size : test::checked_groups(sample, c)) {
+        full += size == 16 ? 16 : 0;
+        all += size;
+      }
+    if (target >= 384) {
+      EXPECT_GE(full, 85 * all / 100);
+    }
+  }
+}
+
+// 150 small grains on a large one share it in every pair: there is no batch of two, and more than 64 batches
+// of one.
+TEST(Contacts, OfOneLargeGrainAreAllKeptThoughNoBatchFits) {
+  Sample sample;
+  add_sphere(sample.bodies, BodyId{0}, Vec3::Zero(), 10, 1000);
+  Random random(4);
+  for (int k = 1; k <= 150; ++k) {
+    const Vec3 direction = test::uniform_vector(random, -1, 1).normalized();
+    add_sphere(sample.bodies, BodyId{k}, 10.01 * direction, 0.01, 1000);
+    sample.candidates.grain_pairs.push_back({0, static_cast<Slot>(k)});
+  }
+  sample.candidates.impulse.assign(3 * sample.candidates.size(), 0.0);
+  sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
+  test::find_contacts(sample, 0.001);
+  ASSERT_EQ(sample.chunks.size(), 1u);
+  ASSERT_EQ(sample.contacts.count[0], 150);
+  std::set<std::int32_t> kept(sample.contacts.candidate.begin(), sample.contacts.candidate.end());
+  EXPECT_EQ(kept.size(), 150u);
+}
+
+TEST(Contacts, PointFromTheSecondBodyToTheFirst) {
+  const Sample sample = test::dense_sample(5, 3, true, true, 50);
+  for (std::size_t c = 0; c < sample.chunks.size(); ++c)
+    for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k) {
+      const Contacts& contacts = sample.contacts;
+      const Vec3 n(contacts.nx[k], contacts.ny[k], contacts.nz[k]);
+      EXPECT_NEAR(n.norm(), 1, 1e-15);
+      const auto i = static_cast<std::size_t>(contacts.first[k]);
+      if (contacts.second[k] < 0) {
+        EXPECT_EQ(n, sample.walls[static_cast<std::size_t>(sample.chunks.wall[c])].normal);
+        continue;
+      }
+      const Vec3 d = sample.bodies.x[i] - sample.bodies.x[static_cast<std::size_t>(contacts.second[k])];
+      EXPECT_NEAR(n.dot(d), d.norm(), 1e-14);
+    }
+}
+
+TEST(Contacts, OfCoincidentCentresPointUp) {
+  Sample sample;
+  for (int k = 0; k < 2; ++k) add_sphere(sample.bodies, BodyId{k}, Vec3(1, 2, 3), 0.5, 1000);
+  sample.candidates.grain_pairs = {{0, 1}};
+  sample.candidates.impulse.assign(3, 0.0);
+  sample.chunks = cut_chunks(sample.candidates, 2, 10);
+  test::find_contacts(sample, 0.01);
+  ASSERT_EQ(sample.contacts.count[0], 1);
+  EXPECT_EQ(sample.contacts.nx[0], 0);
+  EXPECT_EQ(sample.contacts.ny[0], 0);
+  EXPECT_EQ(sample.contacts.nz[0], 1);
+  EXPECT_EQ(sample.contacts.bias[0], 0);
+}
+
+TEST(Contacts, WithoutFrictionHaveOneImpulseComponentAndNoRoomForMore) {
+  for (bool friction : {false, true}) {
+    Sample sample =
+        test::dense_sample(4, 1, !friction, false, 100);  // first the other kind: room is given back
+    sample.candidates = test::find_candidates(sample.bodies, sample.walls, 0.1, friction);
+    test::find_contacts(sample, 0.1);
+    const std::size_t n = sample.candidates.size();
+    for (const auto* values : {&sample.contacts.rx, &sample.contacts.ry, &sample.contacts.rz}) {
+      EXPECT_EQ(values->size(), friction ? n : 0);
+      EXPECT_EQ(values->capacity() > 0, friction);
+    }
+    EXPECT_EQ(sample.contacts.rn.size(), friction ? 0 : n);
+    EXPECT_EQ(sample.contacts.rn.capacity() > 0, !friction);
+  }
+}
+
+TEST(WarmStart, ComesBackUnchangedFromTheContacts) {
+  for (bool friction : {false, true}) {
+    Sample sample = test::dense_sample(6, 9, friction, true, 60);
+    set_random_impulses(sample.candidates, 5);
+    test::find_contacts(sample, 0.03);
+    const std::vector<double> before = sample.candidates.impulse;
+    std::set<std::int32_t> contacts;
+    for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
+      for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k)
+        contacts.insert(sample.contacts.candidate[k]);
+      store_impulses(sample.contacts, sample.chunks, c, sample.candidates);
+    }
+    EXPECT_LT(contacts.size(), sample.candidates.size());
+    const auto components = static_cast<std::size_t>(sample.candidates.components);
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      const bool contact = contacts.count(static_cast<std::int32_t>(k / components)) > 0;
+      EXPECT_EQ(sample.candidates.impulse[k], contact ? before[k] : 0.0);
+    }
+  }
+}
+
+/// Two unit spheres, or one and the wall z = 0, with a gap and a relative normal velocity v_n < 0 closing.
+struct Approach {
+  double gap;  // [m]
+  double v_n;  // [m/s]
+  double restitution;
+  double gravity = 0;  // downwards [m/s^2]
+};
+constexpr double h = 0.01, alert = 0.05;
+
+/// Bias of the contact, or NaN when there is none.
+double bias_of(const Approach& approach, bool at_wall) {
+  Sample sample;
+  add_sphere(sample.bodies, BodyId{0}, Vec3(0, 0, 1 + approach.gap), 1, 1000);
+  sample.bodies.velocity[0].u[2] = approach.v_n;
+  if (at_wall) {
+    sample.walls.resize(1);
+    sample.candidates.wall_pairs = {{0, 0}};
+  } else {
+    add_sphere(sample.bodies, BodyId{1}, Vec3(0, 0, -1), 1, 1000);
+    sample.candidates.grain_pairs = {{0, 1}};
+  }
+  sample.candidates.components = 1;
+  sample.candidates.impulse.assign(1, 0.0);
+  sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 10);
+  allocate(sample.contacts, sample.candidates, sample.chunks, false);
+  const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity,       sample.walls, h,
+                       alert,           approach.restitution, Vec3(0, 0, -approach.gravity)};
+  narrow_chunk(in, sample.candidates, sample.chunks, 0, SweepKernels(InstructionSet::portable),
+               sample.contacts);
+  return sample.contacts.count[0] > 0 ? sample.contacts.bias[0] : std::nan("");
+}
+
+TEST(GapTerm, IsGapOverStepAndZeroOnceClosed) {
+  for (bool wall : {false, true}) {
+    EXPECT_NEAR(bias_of({0.02, 0, 0}, wall), 0.02 / h, 1e-12);
+    EXPECT_NEAR(bias_of({0.02, -50, 0}, wall), 0.02 / h, 1e-12);
+    EXPECT_EQ(bias_of({-0.02, 0, 0}, wall), 0);
+    EXPECT_EQ(bias_of({-0.02, -50, 0}, wall), 0);
+  }
+}
+
+TEST(GapTerm, ExistsBeyondTheAlertDistanceOnlyWhenTheGapClosesWithinTheStep) {
+  for (bool wall : {false, true}) {
+    EXPECT_TRUE(std::isnan(bias_of({0.06, 0, 0}, wall)));
+    EXPECT_TRUE(std::isnan(bias_of({0.06, 10, 0}, wall)));
+    EXPECT_TRUE(std::isnan(bias_of({0.06, -5.9, 0}, wall)));
+    EXPECT_NEAR(bias_of({0.06, -6.1, 0}, wall), 0.06 / h, 1e-12);
+  }
+}
+
+TEST(GapTerm, AtAWallCountsWhatGravityAddsToTheApproach) {
+  EXPECT_TRUE(std::isnan(bias_of({0.06, -5.9, 0, 9}, false))) << "both grains fall alike";
+  EXPECT_NEAR(bias_of({0.06, -5.92, 0, 9}, true), 0.06 / h, 1e-12);
+}
+
+TEST(Restitution, ActsOnFastPairsOnceTheGapIsClosed) {
+  for (bool wall : {false, true}) {
+    EXPECT_TRUE(std::isnan(bias_of({0.02, -3, 0.5}, wall))) << "a fast pair flies on until it touches";
+    EXPECT_DOUBLE_EQ(bias_of({-0.02, -3, 0.5}, wall), -1.5);
+    EXPECT_DOUBLE_EQ(bias_of({-0.02, -3, 1}, wall), -3);
+    EXPECT_DOUBLE_EQ(bias_of({-0.02, 3, 0.5}, wall), 1.5) << "separating pairs follow the same law";
+    EXPECT_TRUE(std::isnan(bias_of({0.02, 3, 0.5}, wall)));
+  }
+}
+
+TEST(Restitution, LeavesSlowApproachesAtRest) {
+  const double g = 10, slow = 2 * h * g;
+  for (bool wall : {false, true}) {
+    EXPECT_EQ(bias_of({-0.001, -0.99 * slow, 0.8, g}, wall), 0);
+    EXPECT_NEAR(bias_of({0.001, -0.99 * slow, 0.8, g}, wall), 0.001 / h, 1e-12);
+    EXPECT_DOUBLE_EQ(bias_of({-0.001, -1.01 * slow, 0.8, g}, wall), -0.8 * 1.01 * slow)
+        << "e acts on the velocity at the beginning of the step, without the fall within it";
+  }
+}
+
+}  // namespace
+}  // namespace talus

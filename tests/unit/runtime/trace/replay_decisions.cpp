@@ -1,0 +1,263 @@
+/// What all ranks decide and add up together, played again.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <iterator>
+#include <vector>
+
+#include "runtime/trace/analysis.hpp"
+#include "runtime/trace/network.hpp"
+#include "runtime/trace/replay.hpp"
+#include "runtime/trace/task_times.hpp"
+#include "tests/unit/runtime/trace/replay_helpers.hpp"
+#include "tests/unit/runtime/trace/small_trace.hpp"
+
+namespace talus::trace {
+namespace {
+
+using test::bare;
+using test::makespan;
+
+// What a task or the program between two steps asks of all ranks is in a trace of one rank, where it takes no
+// time.
+TEST(ReplayDecisions, RanksMeetInEveryCallThatOneRankMade) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  // A step that began at 100 ns, behind 90 ns outside.
+  for (Record& record : records) record.begin += 100;
+  const auto call = [](std::int64_t at, std::uint32_t bytes) {
+    return Record{at, 0, bytes, -1, pack(1, kind_collective)};
+  };
+  records.insert(records.begin(), {Record{10, 90, 0, -1, pack(1, kind_outside)}, call(50, 0)});
+  const double alone = makespan(trace, bare(1, 1));
+  Machine network = bare(2, 1), none = network;
+  network.latency = 1e-6;
+  network.bandwidth = 1e9;
+  const auto calls_alone = [&] { return makespan(trace, network) - makespan(trace, none); };
+  const double before = calls_alone();
+  records.insert(records.begin() + 1, {call(20, 0), call(30, 7)});
+  EXPECT_DOUBLE_EQ(calls_alone() - before, 2 * 1000 + 7);
+  Record& task = records[4];
+  ASSERT_EQ(task.kind(), test::task);
+  task.begin -= 10;  // 10 ns of work, with a call within
+  task.duration = 10;
+  records[0].duration -= 10;
+  records.insert(records.begin() + 5, call(95, 0));
+  EXPECT_DOUBLE_EQ(calls_alone() - before, 3 * 1000 + 7);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), alone);
+  // A prediction is a trace, and has them too.
+  const double of_two = makespan(trace, network);
+  for (const Machine& machine : {bare(1, 1), network}) {
+    const Replay played = replay(Timeline(trace), machine, true);
+    EXPECT_DOUBLE_EQ(makespan(played.trace, network), of_two) << machine.ranks << " ranks";
+  }
+}
+
+// Durations are floats: the end of what took a second is known to 64 ns.
+TEST(ReplayDecisions, CountsACallAtTheVeryEndOfALongTask) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  constexpr std::int64_t second = 1'000'000'031;
+  for (Record& record : records) record.begin += second;
+  const Record outside{0, static_cast<float>(second), 0, -1, pack(1, kind_outside)},
+      call{second - 41, 31, 0, -1, pack(1, kind_collective)};
+  ASSERT_GT(call.end(), outside.end());
+  records.insert(records.begin(), {outside, call});
+  EXPECT_EQ(Timeline(trace).index(1).ranks[0].calls_outside.count, 1);
+}
+
+TEST(ReplayDecisions, ChecksAfterEverySweepAreReadASweepLater) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  const auto second =
+      std::find_if(records.begin(), records.end(), [](const Record& r) { return r.epoch == 1; });
+  records.insert(second, {second->begin, 0, 0, 0, pack(1, kind_check)});
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.late_check = true;
+    const double late = makespan(trace, machine);
+    machine.late_check = false;
+    EXPECT_DOUBLE_EQ(late, 2 * makespan(trace, machine)) << "a sweep more, and one to undo it";
+  }
+}
+
+// The last way of sums among four ranks begins when all have done the sweep behind the check; the first is
+// hidden by it.
+TEST(ReplayDecisions, SumsGoTheRestOfTheirWayWhenAllWait) {
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.late_check = true;
+    machine.latency = 40e-9;  // hidden where copies are glued
+    const double two = makespan(test::all_neighbours(2, 1), machine);
+    machine.ranks = 4;
+    EXPECT_DOUBLE_EQ(makespan(test::all_neighbours(4, 1), machine), two + 40);
+  }
+}
+
+/// Two subdomains on one rank, twice: an epoch whose sums the next one needs (1 ns, two calls), another
+/// without a decision, and one with a check.
+Trace conjugate() {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  const Record before = records.front(), behind = records.back();
+  std::vector<Record> epochs[2];
+  for (const Record& record : records)
+    if (record.epoch >= 0 && record.kind() != kind_check) epochs[record.epoch].push_back(record);
+  records = {before};
+  std::int64_t now = 0;
+  for (std::int32_t e = 0; e < 6; ++e) {
+    for (Record record : epochs[0]) {
+      record.begin += now;
+      record.epoch = e;
+      records.push_back(record);
+    }
+    now += 360;
+    if (e % 3 == 0) {
+      records.push_back({now, 1, 0, e, pack(1, kind_check)});
+      for (int call = 0; call < 2; ++call) records.push_back({now, 0, 0, -1, pack(1, kind_collective)});
+      ++now;
+    } else if (e % 3 == 2) {
+      records.push_back({now, 0, 0, e, pack(1, kind_check)});
+    }
+  }
+  records.push_back(behind);
+  records.back().begin = now;
+  return trace;
+}
+
+// Sums of a check are read where others are awaited besides: none of them stands for the other.
+TEST(ReplayDecisions, SumsThatAreReadLaterHideNoOthers) {
+  for (const Schedule schedule : {Schedule::fixed, Schedule::list}) {
+    Machine machine = bare(2, 1);
+    machine.schedule = schedule;
+    machine.latency = 200e-9;
+    const double epoch = 130 + 200;  // the inner sweep hides 50 ns of each exchange
+    EXPECT_DOUBLE_EQ(makespan(conjugate(), machine), 6 * epoch + 2 * (200 + 1) + 2 * 200);
+    machine.late_check = true;  // a sweep with sums of its own, and what undoes it, more
+    const Replay late = replay(Timeline(conjugate()), machine, true);
+    EXPECT_DOUBLE_EQ(late.makespan, 8 * epoch + 3 * (200 + 1));
+    EXPECT_DOUBLE_EQ(makespan(late.trace, machine), late.makespan) << "again";
+  }
+}
+
+TEST(ReplayDecisions, ACheckThatSettlesIsReadAtOnce) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  std::ranges::find(records, kind_check, &Record::kind)->node = check_settles;
+  Machine machine = bare(2, 1);
+  machine.late_check = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180) << "no sweep more, nothing to undo";
+}
+
+/// A task in the last check of two subdomains, which takes 10 ns more: two gathers and three exchanges. Of
+/// kind sweep all ranks and threads do it together, of kind task each rank its part.
+Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep) {
+  Trace trace = test::two_subdomains(1);
+  std::vector<Record>& records = trace.lanes[0].records;
+  const auto check = std::ranges::find(records, kind_check, &Record::kind);
+  check->duration = static_cast<float>(length + 10);
+  check->node = check_settles;
+  std::prev(records.end())->begin += length + 10;
+  records.insert(std::next(check),
+                 {check->begin + 10, static_cast<float>(length), Meetings{2, 3}.packed(), -1, pack(1, kind)});
+  return trace;
+}
+
+TEST(ReplayDecisions, WhatAllRanksDoInACheckIsShared) {
+  const Trace trace = with_a_look();
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90);
+  Machine machine = bare(2, 1);
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40);
+  machine.latency = 30e-9;  // of the check's own sums, two gathers and three exchanges
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40 + 6 * 30);
+  const Replay played = replay(Timeline(trace), machine, true);
+  EXPECT_NO_THROW(validate(played.trace));
+  EXPECT_NEAR(analyse(played.trace).exposed, 2 * 6 * 30, 1e-3);
+}
+
+// What one rank added up for both subdomains, two ranks add up for one each; a second thread of it waits.
+TEST(ReplayDecisions, WhatARankAddsUpInACheckGoesWithItsPart) {
+  const Trace trace = with_a_look(80, test::task);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 1)), 4 * 180 + 90);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(2, 1)), 2 * 180 + 10 + 40);
+  EXPECT_DOUBLE_EQ(makespan(trace, bare(1, 2)), makespan(test::two_subdomains(1), bare(1, 2)) + 90);
+  // A third thread finds no subdomain.
+  for (const int threads : {2, 3})
+    EXPECT_DOUBLE_EQ(makespan(with_a_look(), bare(1, threads)),
+                     makespan(test::two_subdomains(1), bare(1, threads)) + 50);
+  Machine machine = bare(2, 1);
+  machine.schedule = Schedule::list;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), 2 * 180 + 10 + 40);
+}
+
+TEST(ReplayDecisions, SumsOfAPredictedCheckArePlayedAgain) {
+  const Replay played = replay(Timeline(with_a_look(80, test::task)), bare(2, 1), true);
+  EXPECT_NO_THROW(validate(played.trace));
+  EXPECT_DOUBLE_EQ(makespan(played.trace, bare(2, 1)), 2 * 180 + 10 + 40);
+}
+
+// The sweep that hides the sums of a check, and its undoing, have none of their own.
+TEST(ReplayDecisions, ALateCheckAddsUpOnce) {
+  Trace trace = with_a_look(80, test::task);
+  std::ranges::find(trace.lanes[0].records, kind_check, &Record::kind)->node = 0;
+  const Trace without = test::two_subdomains(1);
+  Machine machine = bare(2, 1);
+  machine.late_check = true;
+  EXPECT_DOUBLE_EQ(makespan(trace, machine), makespan(without, machine) + 10 + 40);
+}
+
+// More contacts make chunks longer, not more of them.
+TEST(ReplayDecisions, LongerChunksAreAddedUpAsFast) {
+  Machine machine = bare(1, 1);
+  machine.contacts = 2;
+  EXPECT_DOUBLE_EQ(makespan(with_a_look(80, test::task), machine),
+                   makespan(test::two_subdomains(1), machine) + 90);
+}
+
+TEST(TaskTimes, AreThoseOfTheReplay) {
+  const Trace trace = with_a_look();
+  TaskTimes times(trace, 2, 1);
+  EXPECT_FALSE(times.begin_step(2));
+  ASSERT_TRUE(times.begin_step(1));
+  EXPECT_THROW(times.node(0, 0), TraceError) << "whose loop is not known yet";
+  times.plan(test::two_subdomains(2).plans[1]);
+  EXPECT_DOUBLE_EQ(times.task(0), 0);
+  // Of one subdomain: sweep, inner sweep, publish, centre, glue.
+  const double nodes[] = {100e-9, 50e-9, 10e-9, 0, 20e-9};
+  for (std::uint32_t n = 0; n < 5; ++n) EXPECT_NEAR(times.node(n, 0), nodes[n], 1e-15) << n;
+  EXPECT_NEAR(times.decision(1), 50e-9, 1e-15);
+  EXPECT_THROW(times.decision(0), TraceError);
+  EXPECT_THROW(times.node(0, 9), TraceError);
+  EXPECT_NO_THROW(times.check(test::three_tasks()));
+  EXPECT_THROW(times.check(std::vector<Task>{}), TraceError);
+  times.plan(trace.plans[0]);  // of both subdomains
+  EXPECT_THROW(times.node(0, 0), TraceError);
+}
+
+TEST(TaskTimes, HoldWhatTakesLongerThanTheDigitsOfARecord) {
+  const std::int64_t length = 782263171;  // known to 64 ns
+  TaskTimes times(with_a_look(length), 1, 0);
+  ASSERT_TRUE(times.begin_step(1));
+  EXPECT_NEAR(times.decision(1), 1e-9 * static_cast<double>(length), 1e-6);
+}
+
+TEST(Network, AddsUpInAMessageForEachDoublingOfRanks) {
+  Machine machine = bare(16, 1);
+  machine.ranks_per_node = 4;
+  machine.latency = 100e-9;
+  machine.overhead = 5e-9;
+  machine.bandwidth = 1e9;  // a byte a ns
+  machine.node_latency = 10e-9;
+  machine.node_bandwidth = 2e9;
+  const Network network(machine);
+  const double round_between = 110, round_inside = 20;
+  EXPECT_DOUBLE_EQ(network.time_of({3, 0}), 3 * (2 * round_between + 2 * round_inside));
+  // 8 bytes: four times over the link in each round between nodes.
+  EXPECT_DOUBLE_EQ(network.time_of({1, 8}), 2 * (round_between + 32) + 2 * (round_inside + 4));
+}
+
+}  // namespace
+}  // namespace talus::trace
