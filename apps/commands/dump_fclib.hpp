@@ -13,7 +13,7 @@ void check_dump(const Setup& setup, int ranks);
 
 /// Assembles the contact problem of the step just done, with the impulses that the step found as its
 /// solution: W = H' M^-1 H, q with the gap and restitution terms in it, mu. What it returns writes it to
-/// fclib_000012.hdf5 in `directory` for step 12, and belongs on the lane that writes files. Throws
+/// fclib_000012.hdf5 in `directory` for step 12, and belongs on the thread that writes files. Throws
 /// io::FileError there.
 std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory);
 

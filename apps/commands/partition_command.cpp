@@ -42,14 +42,14 @@ ContactPairs find_contacts(const io::Scene& scene, const Bodies& bodies, int thr
   for (double radius : bodies.radius) reach.push_back(radius + 0.5 * contacts.alert);
 
   const CellGrid cells = build_cells(bodies.x, reach);
-  const auto lanes = static_cast<std::size_t>(threads);
-  std::vector<std::vector<GrainPair>> parts(lanes);
+  const auto shares = static_cast<std::size_t>(threads);
+  std::vector<std::vector<GrainPair>> parts(shares);
   graph::Executor executor({.threads = threads});
   graph::Graph detection;
-  for (std::size_t lane = 0; lane < lanes; ++lane)
-    detection.task("find pairs", {}, [&, lane] {
-      find_pairs(cells, cells.cells.size() * lane / lanes, cells.cells.size() * (lane + 1) / lanes,
-                 parts[lane]);
+  for (std::size_t share = 0; share < shares; ++share)
+    detection.task("find pairs", {}, [&, share] {
+      find_pairs(cells, cells.cells.size() * share / shares, cells.cells.size() * (share + 1) / shares,
+                 parts[share]);
     });
   executor.run(detection);
   contacts.grains = sort_pairs(parts, bodies.size());

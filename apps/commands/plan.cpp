@@ -31,11 +31,11 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
                            : "no friction: one impulse component per contact, no tangential work");
   const bool turning = parameters.friction && scene.setup.rotation;
   line("rotation in the sweeps", turning,
-       turning               ? "tangential impulses turn the grains"
+       turning               ? "tangential impulses subdomain_colour the grains"
        : parameters.friction ? "rotation = false"
-                             : "nothing turns grains without friction");
+                             : "nothing subdomain_colours grains without friction");
   line("free angular velocities", !state.free.w.empty(),
-       state.free.w.empty() ? "no grain turns" : "24 bytes per grain");
+       state.free.w.empty() ? "no grain subdomain_colours" : "24 bytes per grain");
   line("orientations", !state.bodies.orientation.empty(),
        state.bodies.orientation.empty() ? "spheres need none; not asked for"
                                         : "asked for: 32 bytes per grain");

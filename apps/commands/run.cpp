@@ -73,10 +73,10 @@ class FrameClock {
   std::int64_t passed_ = 0;
 };
 
-/// Rows of finished steps on their way to the recorder, which runs on the executor's background lane. Rows go
-/// in batches, since a row is less work than handing it over. Frames of several ranks are written by all of
-/// them together, between two steps: messages of a background lane would need an order among those of the
-/// steps.
+/// Rows of finished steps on their way to the recorder, which runs on the executor's background thread. Rows
+/// go in batches, since a row is less work than handing it over. Frames of several ranks are written by all
+/// of them together, between two steps: messages of a background thread would need an order among those of
+/// the steps.
 class RecorderFeed {
  public:
   RecorderFeed(graph::Executor& executor, io::Recorder& recorder, const graph::Communicator& ranks,
@@ -385,7 +385,7 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     }
   };
   attempt([&] {
-    // Of one rank it writes on the background lane, from where a trace must hear of no call.
+    // Of one rank it writes on the background thread, from where a trace must hear of no call.
     recorder.emplace(directory, files, scene.setup, provenance,
                      ranks.ranks() > 1 ? ranks : graph::one_rank());
     run_steps(options, scene, std::move(sample), provenance.threads, directory, recordings, *recorder, ranks,

@@ -30,7 +30,7 @@ Sample make_sample(const io::Scene& scene) {
 
   Sample sample;
   sample.density = scene.density;
-  sample.turns = scene.setup.rotation;
+  sample.rotates = scene.setup.rotation;
   sample.radius = draw_radii(spec.radii, static_cast<std::size_t>(spec.grains()), scene.setup.seed);
   sample.x = spec.kind == io::SampleSpec::Kind::lattice ? lattice_sites(spec, sample.radius)
                                                         : deposit(sample.radius, spec.base[0], spec.base[1]);

@@ -20,7 +20,7 @@ struct StepRange {
 StepRange parse_steps(const std::string& text, const std::string& option = "--trace-steps");
 
 /// The way of a trace from the recorder to DIR/trace.h5: full buffers are written on the executor's
-/// background lane. Each rank writes a file of its own, which rank 0 puts together in the end.
+/// background thread. Each rank writes a file of its own, which rank 0 puts together in the end.
 ///
 ///     TraceFeed feed(directory, steps, false, threads, ranks);
 ///     Executor executor({.threads = threads, .trace = &feed.recorder()});

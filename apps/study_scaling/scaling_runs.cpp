@@ -118,9 +118,10 @@ RunTimes record_once(const ScalingLauncher& launcher, const ScalingSubject& subj
   const io::ScratchFolder scratch(launcher.work);
   std::vector<std::string> words =
       run_words(launcher, subject, {subdomains, 1, 1}, (scratch.path() / "out").string());
-  words.insert(words.end(),
-               {"--trace", "--trace-steps", fmt::format("{}:{}", launcher.first, launcher.last)});
-  if (own_caches) words.push_back("--trace-own-caches");
+  words.push_back("--trace");
+  words.push_back("--trace-steps");
+  words.push_back(fmt::format("{}:{}", launcher.first, launcher.last));
+  if (own_caches) words.emplace_back("--trace-own-caches");
   const RunTimes times = start(launcher, words, scratch.path());
   fs::create_directories(trace.parent_path());
   fs::rename(scratch.path() / "out" / "trace.h5", trace);

@@ -39,7 +39,7 @@ void begin_with(io::Scene& scene, const std::string& name) {
 Sample grains_of(const Frame& frame, const io::Scene& scene) {
   Sample sample;
   sample.density = scene.density;
-  sample.turns = scene.setup.rotation;
+  sample.rotates = scene.setup.rotation;
   sample.x = frame.x;
   sample.radius = frame.radius;
   for (std::size_t k = 0; k < frame.x.size(); ++k) {

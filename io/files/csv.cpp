@@ -77,12 +77,12 @@ std::size_t read_header(std::string_view line, const Place& place) {
 
 }  // namespace
 
-Sample read_bodies(const std::string& path, double density, bool turns) {
+Sample read_bodies(const std::string& path, double density, bool rotates) {
   std::ifstream in(path);
   if (!in) throw SceneError(path, 0, "", "cannot open the file of bodies");
   Sample sample;
   sample.density = density;
-  sample.turns = turns;
+  sample.rotates = rotates;
   std::unordered_map<std::int64_t, int> line_of_id;
   std::array<std::string_view, columns.size() + 1> fields;
   std::size_t count = 0;

@@ -38,15 +38,15 @@ class Gantt {
       : timeline_(timeline), trace_(timeline.trace()), window_(window) {
     begin_ = std::numeric_limits<double>::infinity();
     end_ = -begin_;
-    for (const trace::Lane& lane : trace_.lanes)
-      for (const Record& record : lane.records) {
+    for (const trace::Track& track : trace_.tracks)
+      for (const Record& record : track.records) {
         if (!window.shows(record)) continue;
         begin_ = std::min(begin_, static_cast<double>(record.begin));
         end_ = std::max(end_, record.end());
       }
     if (!(end_ > begin_))
       throw trace::TraceError("the trace holds nothing of the step or iteration that was asked for");
-    rows_ = std::min(most_rows, trace_.lanes.size());
+    rows_ = std::min(most_rows, trace_.tracks.size());
     height_ = std::clamp(800.0 / static_cast<double>(rows_), 10.0, 36.0);
   }
 
@@ -102,9 +102,9 @@ class Gantt {
   }
 
   void draw_row(Svg& svg, std::size_t row) {
-    const trace::Lane& lane = trace_.lanes[row];
+    const trace::Track& track = trace_.tracks[row];
     std::vector<Bar> team, tasks, waits;
-    for (const Record& record : lane.records) {
+    for (const Record& record : track.records) {
       if (!window_.shows(record)) continue;
       const trace::KindInfo& info = trace_.info(record.kind());
       const Bar bar{x(static_cast<double>(record.begin)), x(record.end()),
@@ -113,8 +113,8 @@ class Gantt {
       (record.kind() == trace::kind_team ? team : info.blocked ? waits : tasks).push_back(bar);
     }
     svg.text(left - 8, y(row) + 0.5 * height_ + 4,
-             trace_.ranks > 1 ? fmt::format("rank {} . {}", lane.rank, lane.thread)
-                              : fmt::format("thread {}", lane.thread),
+             trace_.ranks > 1 ? fmt::format("rank {} . {}", track.rank, track.thread)
+                              : fmt::format("thread {}", track.thread),
              {.size = 11, .colour = style::soft_ink, .anchor = "end"});
     for (const auto* bars : {&team, &tasks, &waits})
       for (const Bar& bar : merge(*bars)) {
@@ -134,7 +134,7 @@ class Gantt {
     };
     const auto each = [&](trace::Kind kind, auto&& use) {
       for (std::size_t k = 0; k < rows_; ++k)
-        for (const Record& record : trace_.lanes[k].records)
+        for (const Record& record : trace_.tracks[k].records)
           if (window_.shows(record) && record.kind() == kind) use(k, record);
     };
     std::unordered_map<const Record*, End> sent;
@@ -159,52 +159,52 @@ class Gantt {
     });
     if (!window_.step) return;
     const trace::StepIndex index = timeline_.index(*window_.step);
-    const auto turns = later_turns(index);
+    const auto subdomain_colours = later_colours(index);
     const graph::Tree tree = trace::tree_of(index);
     each(trace::kind_send, [&](std::size_t, const Record& record) {
       const auto from = sent.find(&record);
       if (from == sent.end()) return;
       const trace::Place taken =
-          taker(index, tree, turns, static_cast<std::size_t>(record.epoch), record.node);
-      if (!taken.exists() || taken.lane >= rows_) return;
+          taker(index, tree, subdomain_colours, static_cast<std::size_t>(record.epoch), record.node);
+      if (!taken.exists() || taken.track >= rows_) return;
       const auto found = static_cast<double>(timeline_.record(taken).begin);
-      if (found >= from->second.time) arrow(from->second, {taken.lane, found}, style::soft_ink);
+      if (found >= from->second.time) arrow(from->second, {taken.track, found}, style::soft_ink);
     });
   }
 
   /// Of the groups that have one other than the first.
-  static std::map<std::uint32_t, std::uint32_t> later_turns(const trace::StepIndex& index) {
-    std::map<std::uint32_t, std::uint32_t> turns;
+  static std::map<std::uint32_t, std::uint32_t> later_colours(const trace::StepIndex& index) {
+    std::map<std::uint32_t, std::uint32_t> subdomain_colours;
     for (const trace::StepIndex::Rank& rank : index.ranks)
       for (std::size_t n = 0; rank.plan && n < rank.nodes; ++n)
         if (rank.plan->role[n] == static_cast<std::uint8_t>(trace::Role::take))
-          turns[rank.plan->group[n]] = rank.plan->place[n];
-    return turns;
+          subdomain_colours[rank.plan->group[n]] = rank.plan->place[n];
+    return subdomain_colours;
   }
 
-  /// The glue, take or centre that takes a message. What goes up the tree of ranks is taken by the first
-  /// centre node of the parent of who sends it, what goes down by the last of the rank it is named after.
+  /// The glue, take or root that takes a message. What goes up the tree of ranks is taken by the first
+  /// root node of the parent of who sends it, what goes down by the last of the rank it is named after.
   static trace::Place taker(const trace::StepIndex& index, const graph::Tree& tree,
-                            const std::map<std::uint32_t, std::uint32_t>& turns, std::size_t epoch,
-                            std::uint32_t name) {
-    const auto turn_of = [&](std::uint32_t group) {
-      const auto later = turns.find(group);
-      return later == turns.end() ? 0 : later->second;
+                            const std::map<std::uint32_t, std::uint32_t>& subdomain_colours,
+                            std::size_t epoch, std::uint32_t name) {
+    const auto subdomain_colour_of = [&](std::uint32_t group) {
+      const auto later = subdomain_colours.find(group);
+      return later == subdomain_colours.end() ? 0 : later->second;
     };
     const std::uint32_t from = name >> 16, to = name & 0xffffU;
-    const bool up = to == trace::centre_group, by_centre = up || from == trace::centre_group;
+    const bool up = to == trace::root_group, by_root = up || from == trace::root_group;
     for (std::size_t r = 0; r < index.ranks.size(); ++r) {
       const trace::Plan* const plan = index.ranks[r].plan;
       if (!plan || std::ranges::find(plan->group, up ? from : to) == plan->group.end()) continue;
       if (up && tree.parent[r] < 0) continue;
       const trace::StepIndex::Rank& rank = index.ranks[up ? static_cast<std::size_t>(tree.parent[r]) : r];
       if (!rank.plan || epoch >= rank.epochs) continue;
-      const trace::Role role = by_centre                     ? trace::Role::centre
-                               : turn_of(from) < turn_of(to) ? trace::Role::take
-                                                             : trace::Role::glue;
+      const trace::Role role = by_root                                               ? trace::Role::root
+                               : subdomain_colour_of(from) < subdomain_colour_of(to) ? trace::Role::take
+                                                                                     : trace::Role::glue;
       trace::Place place;
       for (std::size_t n = 0; n < rank.nodes && !(up && place.exists()); ++n)
-        if (rank.plan->role[n] == static_cast<std::uint8_t>(role) && (by_centre || rank.plan->group[n] == to))
+        if (rank.plan->role[n] == static_cast<std::uint8_t>(role) && (by_root || rank.plan->group[n] == to))
           place = rank.at(epoch, n);
       return place;
     }
@@ -215,8 +215,8 @@ class Gantt {
     const trace::StepIndex index = timeline_.index(*window_.step);
     std::vector<std::array<double, 2>> points;
     for (const trace::PathHop& hop : trace::critical_path(timeline_, index)) {
-      if (hop.place.lane >= rows_ || !window_.shows(timeline_.record(hop.place))) continue;
-      const double under = y(hop.place.lane) + height_ - 1.5;
+      if (hop.place.track >= rows_ || !window_.shows(timeline_.record(hop.place))) continue;
+      const double under = y(hop.place.track) + height_ - 1.5;
       // Steps too small to see would only make the line thick.
       for (const double at : {x(hop.until), x(hop.from)})
         if (points.empty() || points.back()[0] - at > 0.5) points.push_back({at, under});
@@ -252,8 +252,8 @@ class Gantt {
     std::string note = "blue line: critical path";
     if (merged_ > 0)
       note += fmt::format("; {} tasks too narrow to see are drawn merged with their neighbours", merged_);
-    if (rows_ < trace_.lanes.size())
-      note += fmt::format("; {} of {} threads are shown", rows_, trace_.lanes.size());
+    if (rows_ < trace_.tracks.size())
+      note += fmt::format("; {} of {} threads are shown", rows_, trace_.tracks.size());
     if (hidden_arrows_ > 0) note += fmt::format("; {} arrows of messages are left out", hidden_arrows_);
     svg.text(left, 62, note, {.size = 11, .colour = style::soft_ink});
   }

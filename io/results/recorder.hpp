@@ -9,8 +9,8 @@
 ///     recorder.close();
 ///     write_run_json(...);                                   // says what came of it, however it ended
 ///
-/// Not locked: calls come one after the other, from one thread at a time (the service lane of the graph runs
-/// beside the steps and is such a thread). HDF5 allows no other thread in it meanwhile.
+/// Not locked: calls come one after the other, from one thread at a time (the service thread of the graph
+/// runs beside the steps and is such a thread). HDF5 allows no other thread in it meanwhile.
 
 #include <filesystem>
 #include <map>

@@ -56,32 +56,32 @@ constexpr std::uint32_t event_names = 2, name_iid = 1, name_name = 2, default_ev
 constexpr std::uint64_t slice_begin = 1, slice_end = 2;
 constexpr std::uint64_t state_cleared = 1, needs_state = 2;
 
-/// Names of the records of one lane, with a look at the plan per step only.
+/// Names of the records of one track, with a look at the plan per step only.
 class Namer {
  public:
-  Namer(const trace::Trace& trace, const trace::Lane& lane) : trace_(trace), lane_(lane) {}
+  Namer(const trace::Trace& trace, const trace::Track& track) : trace_(trace), track_(track) {}
   std::string operator()(const Record& record) {
     if (!known_ || step_ != record.step()) {
       step_ = record.step();
-      plan_ = trace::plan_of(trace_, lane_.rank, step_);
+      plan_ = trace::plan_of(trace_, track_.rank, step_);
       known_ = true;
     }
     const std::string& kind = trace_.info(record.kind()).name;
     if (record.kind() == trace::kind_send || record.kind() == trace::kind_receive) {
       const auto end = [](std::uint32_t group) {
-        return group == trace::centre_group ? std::string("centre") : fmt::format("{}", group);
+        return group == trace::root_group ? std::string("root") : fmt::format("{}", group);
       };
       return fmt::format("{} {} to {}", kind, end(record.node >> 16), end(record.node & 0xffffU));
     }
     if (record.epoch < 0 || record.kind() == trace::kind_check || record.kind() == trace::kind_collective ||
-        !plan_ || record.node >= plan_->size() || plan_->group[record.node] == trace::centre_group)
+        !plan_ || record.node >= plan_->size() || plan_->group[record.node] == trace::root_group)
       return kind;
     return fmt::format("{}, subdomain {}", kind, plan_->group[record.node]);
   }
 
  private:
   const trace::Trace& trace_;
-  const trace::Lane& lane_;
+  const trace::Track& track_;
   const trace::Plan* plan_ = nullptr;
   std::uint32_t step_ = 0;
   bool known_ = false;
@@ -89,17 +89,17 @@ class Namer {
 
 std::int64_t first_begin(const trace::Trace& trace, const TraceWindow& window) {
   std::int64_t first = std::numeric_limits<std::int64_t>::max();
-  for (const trace::Lane& lane : trace.lanes)
-    for (const Record& record : lane.records)
+  for (const trace::Track& track : trace.tracks)
+    for (const Record& record : track.records)
       if (window.shows(record)) first = std::min(first, record.begin);
   return first;
 }
 
 /// Calls `begin(record)` and `end(record)` in order of time, spans inside tasks nested.
 template <class Begin, class End>
-void in_order(const trace::Lane& lane, const TraceWindow& window, Begin begin, End end) {
+void in_order(const trace::Track& track, const TraceWindow& window, Begin begin, End end) {
   std::vector<const Record*> open;
-  for (const Record& record : lane.records) {
+  for (const Record& record : track.records) {
     if (!window.shows(record)) continue;
     while (!open.empty() && open.back()->end() <= static_cast<double>(record.begin)) {
       end(*open.back());
@@ -118,8 +118,8 @@ std::unordered_map<const Record*, std::size_t> links_of(const trace::Trace& trac
   const auto sends = trace::sends_of(trace);
   std::unordered_map<const Record*, std::size_t> links;
   std::size_t count = 0;
-  for (const trace::Lane& lane : trace.lanes)
-    for (const Record& record : lane.records)
+  for (const trace::Track& track : trace.tracks)
+    for (const Record& record : track.records)
       if (const auto sent = sends.find(&record); sent != sends.end() && window.shows(record))
         links[&record] = links[sent->second] = ++count;
   return links;
@@ -132,8 +132,8 @@ bool TraceWindow::shows(const Record& record) const {
   return !epoch || record.epoch == *epoch;
 }
 
-std::string name_of(const trace::Trace& trace, const trace::Lane& lane, const Record& record) {
-  return Namer(trace, lane)(record);
+std::string name_of(const trace::Trace& trace, const trace::Track& track, const Record& record) {
+  return Namer(trace, track)(record);
 }
 
 std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
@@ -157,15 +157,15 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
   }
   const std::int64_t start = first_begin(trace, window);
   const std::unordered_map<const Record*, std::size_t> links = links_of(trace, window);
-  for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
-    const trace::Lane& lane = trace.lanes[k];
+  for (std::size_t k = 0; k < trace.tracks.size(); ++k) {
+    const trace::Track& track = trace.tracks[k];
     const std::uint64_t uuid = std::uint64_t{2} << 32 | k, sequence = k + 1;
     Message thread, descriptor, defaults, event_defaults, packet;
-    thread.varint(field::thread_pid, static_cast<std::uint64_t>(lane.rank) + 1);
+    thread.varint(field::thread_pid, static_cast<std::uint64_t>(track.rank) + 1);
     thread.varint(field::thread_tid, static_cast<std::uint64_t>(k) + 1);
-    thread.text(field::thread_name, fmt::format("thread {}", lane.thread));
+    thread.text(field::thread_name, fmt::format("thread {}", track.thread));
     descriptor.varint(field::descriptor_uuid, uuid);
-    descriptor.varint(field::descriptor_parent, rank_uuid(lane.rank));
+    descriptor.varint(field::descriptor_parent, rank_uuid(track.rank));
     descriptor.message(field::descriptor_thread, thread);
     event_defaults.varint(field::event_track, uuid);
     defaults.message(field::default_event, event_defaults);
@@ -175,7 +175,7 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
     packet.message(field::packet_defaults, defaults);
     add(packet);
 
-    Namer name(trace, lane);
+    Namer name(trace, track);
     std::unordered_map<std::string, std::uint64_t> names;
     const auto slice = [&](const Record& record, bool begins) {
       Message event, made;
@@ -203,7 +203,7 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
       add(made);
     };
     in_order(
-        lane, window, [&](const Record& r) { slice(r, true); }, [&](const Record& r) { slice(r, false); });
+        track, window, [&](const Record& r) { slice(r, true); }, [&](const Record& r) { slice(r, false); });
   }
   return out;
 }
@@ -284,8 +284,8 @@ std::string to_paje(const trace::Trace& trace, const TraceWindow& window) {
          colours[static_cast<std::size_t>(trace.kinds[k].phase)]);
   line("4 0 all run 0 \"{}\"", trace.predicted ? "predicted" : "recorded");
   for (std::int32_t rank = 0; rank < trace.ranks; ++rank) line("4 0 r{0} rank all \"rank {0}\"", rank);
-  for (const trace::Lane& lane : trace.lanes)
-    line("4 0 r{0}t{1} thread r{0} \"thread {1}\"", lane.rank, lane.thread);
+  for (const trace::Track& track : trace.tracks)
+    line("4 0 r{0}t{1} thread r{0} \"thread {1}\"", track.rank, track.thread);
 
   // The format wants all events in order of time.
   struct Happening {
@@ -300,8 +300,8 @@ std::string to_paje(const trace::Trace& trace, const TraceWindow& window) {
           {time, fmt::format("{} {:.9f} message all m {} {}", event, time, here, found->second)});
   };
   const auto start = static_cast<double>(first_begin(trace, window));
-  for (const trace::Lane& lane : trace.lanes) {
-    const std::string here = fmt::format("r{}t{}", lane.rank, lane.thread);
+  for (const trace::Track& track : trace.tracks) {
+    const std::string here = fmt::format("r{}t{}", track.rank, track.thread);
     const auto begin = [&](const Record& r) {
       const double time = 1e-9 * (static_cast<double>(r.begin) - start);
       if (r.kind() == trace::kind_send) link('7', time, here, r);
@@ -313,7 +313,7 @@ std::string to_paje(const trace::Trace& trace, const TraceWindow& window) {
       happenings.push_back({time, fmt::format("6 {:.9f} task {}", time, here)});
       if (r.kind() == trace::kind_receive) link('8', time, here, r);
     };
-    in_order(lane, window, begin, end);
+    in_order(track, window, begin, end);
   }
   std::stable_sort(happenings.begin(), happenings.end(),
                    [](const Happening& a, const Happening& b) { return a.time < b.time; });

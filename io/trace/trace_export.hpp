@@ -27,6 +27,6 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window);
 std::string to_paje(const trace::Trace& trace, const TraceWindow& window);
 
 /// "sweep, subdomain 3" or "cells".
-std::string name_of(const trace::Trace& trace, const trace::Lane& lane, const trace::Record& record);
+std::string name_of(const trace::Trace& trace, const trace::Track& track, const trace::Record& record);
 
 }  // namespace talus::io

@@ -28,7 +28,7 @@ using detail::write_array;
 using detail::write_attribute;
 
 constexpr std::int64_t format_version = 4;         // 3: ranks of another tree, walls told with publish
-constexpr std::size_t largest_machine = 1U << 24;  ///< lanes; more is a damaged number
+constexpr std::size_t largest_machine = 1U << 24;  ///< tracks; more is a damaged number
 
 Hdf5Object record_type(const std::string& file) {
   Hdf5Object type = hold(H5Tcreate(H5T_COMPOUND, sizeof(trace::Record)), H5Tclose, file, "preparing records");
@@ -224,14 +224,14 @@ Hdf5Object open_trace(const std::string& path) {
 }
 
 /// Turns the records of a rank to the clock of rank 0: the offset changes evenly between the two comparisons.
-void turn_clock(const RankClock& clock, trace::Lane& lane) {
+void turn_clock(const RankClock& clock, trace::Track& track) {
   const ClockOffset &first = clock.offsets[0], &last = clock.offsets[1];
   const double drift = last.time > first.time ? (last.offset - first.offset) / (last.time - first.time) : 0;
-  for (trace::Record& record : lane.records)
+  for (trace::Record& record : track.records)
     record.begin += std::llround(first.offset + drift * (static_cast<double>(record.begin) - first.time));
 }
 
-/// What a trace says before its blocks, with lanes for these.
+/// What a trace says before its blocks, with tracks for these.
 trace::Trace read_head(Place root) {
   trace::Trace trace;
   const std::int64_t ranks = read_integer(root, "ranks"), threads = read_integer(root, "threads");
@@ -249,14 +249,15 @@ trace::Trace read_head(Place root) {
   }
   trace.tasks.resize(static_cast<std::size_t>(ranks));
   for (std::int32_t rank = 0; rank < trace.ranks; ++rank)
-    for (std::int32_t thread = 0; thread < trace.threads; ++thread) trace.lanes.push_back({rank, thread, {}});
+    for (std::int32_t thread = 0; thread < trace.threads; ++thread)
+      trace.tracks.push_back({rank, thread, {}});
   return trace;
 }
 
-trace::Lane& lane_of(const std::string& file, trace::Trace& trace, std::int64_t rank, std::int64_t thread) {
+trace::Track& lane_of(const std::string& file, trace::Trace& trace, std::int64_t rank, std::int64_t thread) {
   if (rank < 0 || rank >= trace.ranks || thread < 0 || thread >= trace.threads)
     damaged(file, fmt::format("records of rank {}, thread {}", rank, thread));
-  return trace.lanes[static_cast<std::size_t>(rank * trace.threads + thread)];
+  return trace.tracks[static_cast<std::size_t>(rank * trace.threads + thread)];
 }
 
 /// Each rank on its own clock.
@@ -280,13 +281,13 @@ void add_blocks(Place root, trace::Trace& trace) {
 /// there is none.
 void drop_cut_steps(const std::string& file, trace::Trace& trace) {
   std::uint32_t whole = trace::largest_step;
-  for (const trace::Lane& lane : trace.lanes) {
+  for (const trace::Track& track : trace.tracks) {
     std::uint32_t last = 0;
-    for (const trace::Record& record : lane.records) last = std::max(last, record.step());
+    for (const trace::Record& record : track.records) last = std::max(last, record.step());
     whole = std::min(whole, last > 0 ? last - 1 : 0);
   }
-  for (trace::Lane& lane : trace.lanes)
-    std::erase_if(lane.records, [&](const trace::Record& record) { return record.step() > whole; });
+  for (trace::Track& track : trace.tracks)
+    std::erase_if(track.records, [&](const trace::Record& record) { return record.step() > whole; });
   std::erase_if(trace.plans, [&](const trace::Plan& plan) { return plan.step > whole; });
   if (trace.record_count() == 0 || trace.tasks.front().empty())
     throw FileError(file,
@@ -406,8 +407,8 @@ void TraceWriter::append_file(const fs::path& other) {
 
 void write_trace(const fs::path& path, const trace::Trace& trace) {
   TraceWriter writer(path, trace.ranks, trace.threads, trace.predicted, trace.kinds, trace.machine);
-  for (const trace::Lane& lane : trace.lanes)
-    writer.append(trace::Block{lane.rank, lane.thread, lane.records, std::nullopt});
+  for (const trace::Track& track : trace.tracks)
+    writer.append(trace::Block{track.rank, track.thread, track.records, std::nullopt});
   for (const trace::Plan& plan : trace.plans) writer.append(trace::Block{plan.rank, 0, {}, plan});
   for (std::size_t rank = 0; rank < trace.tasks.size(); ++rank)
     writer.append(static_cast<std::int32_t>(rank), trace.tasks[rank]);
@@ -440,7 +441,7 @@ trace::Trace read_trace(const fs::path& path) {
   }
   if (cut) drop_cut_steps(name, trace);
   try {
-    trace::sort_lanes(trace);
+    trace::sort_tracks(trace);
     trace::validate(trace);
   } catch (const trace::TraceError& error) {
     damaged(name, error.what());

@@ -21,11 +21,11 @@ double sphere_mass(double radius, double density) {
   return four_thirds_pi * density * radius * radius * radius;
 }
 
-void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density, bool turns) {
+void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density, bool rotates) {
   const double mass = sphere_mass(radius, density);
   Velocity rest;
   rest.inv_mass = 1 / mass;
-  rest.spin_mobility = turns ? 2.5 / mass : 0;  // R^2 / (2/5 m R^2)
+  rest.spin_mobility = rotates ? 2.5 / mass : 0;  // R^2 / (2/5 m R^2)
   bodies.id.push_back(id);
   bodies.x.push_back(centre);
   bodies.radius.push_back(radius);

@@ -43,10 +43,10 @@ struct Bodies {
 /// Mass of a solid sphere [kg].
 double sphere_mass(double radius, double density);
 
-/// Appends a solid sphere at rest. radius > 0 [m], density > 0 [kg/m^3]; with `turns` false its spin mobility
-/// is 0.
+/// Appends a solid sphere at rest. radius > 0 [m], density > 0 [kg/m^3]; with `rotates` false its spin
+/// mobility is 0.
 void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density,
-                bool turns = true);
+                bool rotates = true);
 
 /// Room for `count` bodies in all, so that none of the arrays has to be moved while it is filled.
 void reserve(Bodies& bodies, std::size_t count, bool orientation = false);

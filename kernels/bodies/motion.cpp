@@ -79,8 +79,8 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> 
   return sums;
 }
 
-void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
-          std::span<const double> radius, double time_step) {
+void rotate(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
+            std::span<const double> radius, double time_step) {
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const double* w = velocity[s].w;
     const double speed = std::sqrt(square(velocity[s].w));

@@ -48,8 +48,8 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> 
                   const FreeVelocity& free, Multiplicities multiplicity = {}, Multiplicities parts = {});
 
 /// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
-void turn(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
-          std::span<const double> radius, double time_step);
+void rotate(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
+            std::span<const double> radius, double time_step);
 
 /// max(alert/2, h |u|): a pair becomes a contact when its gap is below the alert distance or closes within a
 /// step. To this a grain's reach adds its radius, half the skin, which it may have used up before the

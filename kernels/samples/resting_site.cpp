@@ -63,7 +63,7 @@ void keep_positive(const SiteCurve& curve, const Vec3& k, double k0, double k1, 
 }
 
 /// e_z . (p x d) as a function of p.
-Vec3 turn(const Vec3& d) {
+Vec3 right_angle(const Vec3& d) {
   return {d[1], -d[0], 0};
 }
 
@@ -111,7 +111,7 @@ void keep_stable(const SiteCurve& curve, const Obstacle& first, const Obstacle& 
     ranges.clear();  // three supports in a vertical plane carry nothing
     return;
   }
-  const Vec3 for_one = turn(two.d), for_two = -turn(one.d);
+  const Vec3 for_one = right_angle(two.d), for_two = -right_angle(one.d);
   Vec3 for_base = Vec3::Zero();
   if (one.round) for_base -= for_one;
   if (two.round) for_base -= for_two;

@@ -38,11 +38,11 @@ double mass(const Sample& sample, std::size_t k) {
 
 void append(const Sample& sample, Bodies& bodies) {
   for (std::size_t k = 0; k < sample.size(); ++k) {
-    add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density, sample.turns);
+    add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density, sample.rotates);
     if (sample.velocity.empty()) continue;
     const auto first = sample.velocity[k].begin();
     std::copy_n(first, 3, bodies.velocity.back().u);
-    if (sample.turns) std::copy_n(first + 3, 3, bodies.velocity.back().w);
+    if (sample.rotates) std::copy_n(first + 3, 3, bodies.velocity.back().w);
   }
 }
 

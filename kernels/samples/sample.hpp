@@ -26,7 +26,7 @@ struct Sample {
   std::vector<double> radius;                   ///< [m]
   std::vector<std::array<double, 6>> velocity;  ///< u and R omega [m/s]; empty: at rest
   double density = 0;                           ///< [kg/m^3]
-  bool turns = true;                            ///< false: spin mobility and R omega are 0
+  bool rotates = true;                          ///< false: spin mobility and R omega are 0
 
   std::size_t size() const { return x.size(); }
   BodyId id_of(std::size_t k) const { return id.empty() ? BodyId{static_cast<std::int64_t>(k)} : id[k]; }

@@ -56,20 +56,21 @@ std::size_t bytes(const Impulses& impulses) {
 
 }  // namespace
 
-void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks) {
+void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts, std::size_t bodies,
+              std::size_t chunks) {
   const auto like = [&](auto& impulses) {
     impulses.x.resize(contacts.rx.size());
     impulses.y.resize(contacts.ry.size());
     impulses.z.resize(contacts.rz.size());
     impulses.n.resize(contacts.rn.size());
   };
-  if (bodies > 0) trail.last_v.resize(bodies);  // else a sweep that is on its way may still read it
-  trail.last_wall_v.resize(chunks);
-  if (carry == Carry::momentum) return like(trail.steps);
-  like(trail.last);
-  like(trail.step);
-  trail.step_v.resize(bodies);
-  trail.step_wall_v.resize(chunks);
+  if (bodies > 0) acceleration.last_v.resize(bodies);  // else a sweep that is on its way may still read it
+  acceleration.last_wall_v.resize(chunks);
+  if (carry == Carry::momentum) return like(acceleration.steps);
+  like(acceleration.last);
+  like(acceleration.step);
+  acceleration.step_v.resize(bodies);
+  acceleration.step_wall_v.resize(chunks);
 }
 
 void begin_steps(ContactRange range, SweepSteps& steps) {
@@ -78,34 +79,35 @@ void begin_steps(ContactRange range, SweepSteps& steps) {
     if (!part->empty()) std::fill_n(part->begin() + static_cast<std::ptrdiff_t>(range.begin), count, 0.0F);
 }
 
-void carry_impulses(double beta, ContactRange range, Contacts& contacts, Trail& trail) {
+void carry_impulses(double beta, ContactRange range, Contacts& contacts, AccelerationHistory& acceleration) {
   const auto carry = [&](std::vector<double>& values, std::vector<double>& last, std::vector<double>& step) {
     for (std::size_t k = range.begin; k < range.end; ++k)
       carry_one(Carry::conjugate, beta, values[k], last[k], &step[k]);
   };
-  if (contacts.rx.empty()) return carry(contacts.rn, trail.last.n, trail.step.n);
-  carry(contacts.rx, trail.last.x, trail.step.x);
-  carry(contacts.ry, trail.last.y, trail.step.y);
-  carry(contacts.rz, trail.last.z, trail.step.z);
+  if (contacts.rx.empty()) return carry(contacts.rn, acceleration.last.n, acceleration.step.n);
+  carry(contacts.rx, acceleration.last.x, acceleration.step.x);
+  carry(contacts.ry, acceleration.last.y, acceleration.step.y);
+  carry(contacts.rz, acceleration.last.z, acceleration.step.z);
 }
 
 void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
-                      std::span<Velocity> velocity, Trail& trail) {
-  if (carry == Carry::momentum && beta != 0) return kernels.advance(slots, velocity, trail.last_v, beta);
+                      std::span<Velocity> velocity, AccelerationHistory& acceleration) {
+  if (carry == Carry::momentum && beta != 0)
+    return kernels.advance(slots, velocity, acceleration.last_v, beta);
   for (const Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);
     if (carry == Carry::conjugate) {
       auto now = std::bit_cast<Record>(velocity[s]);
-      const auto last = std::bit_cast<Record>(trail.last_v[s]);
-      auto step = beta == 0 ? Record{} : std::bit_cast<Record>(trail.step_v[s]);
+      const auto last = std::bit_cast<Record>(acceleration.last_v[s]);
+      auto step = beta == 0 ? Record{} : std::bit_cast<Record>(acceleration.step_v[s]);
       for (std::size_t k = 0; k < record_numbers && beta != 0; ++k) {
         now[k] += beta * step[k];
         step[k] = now[k] - last[k];
       }
       velocity[s] = std::bit_cast<Velocity>(now);
-      trail.step_v[s] = std::bit_cast<Velocity>(step);
+      acceleration.step_v[s] = std::bit_cast<Velocity>(step);
     }
-    trail.last_v[s] = velocity[s];
+    acceleration.last_v[s] = velocity[s];
   }
 }
 
@@ -118,9 +120,10 @@ void carry_velocities(const SweepKernels& kernels, double beta, std::span<const 
   }
 }
 
-void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail) {
-  carry_numbers(carry, beta, copy.velocity, trail.last_wall_v[chunk],
-                trail.step_wall_v.empty() ? nullptr : trail.step_wall_v[chunk].data(), 3);
+void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy,
+                AccelerationHistory& acceleration) {
+  carry_numbers(carry, beta, copy.velocity, acceleration.last_wall_v[chunk],
+                acceleration.step_wall_v.empty() ? nullptr : acceleration.step_wall_v[chunk].data(), 3);
 }
 
 template <class Number>
@@ -137,15 +140,15 @@ template void loosen(std::span<const Slot>, const std::vector<Velocity>&, std::v
 template void loosen(std::span<const Slot>, const std::vector<SingleVelocity>&, std::vector<SingleVelocity>&);
 template void fasten(std::span<const Slot>, const std::vector<Velocity>&, std::vector<Velocity>&);
 template void fasten(std::span<const Slot>, const std::vector<SingleVelocity>&, std::vector<SingleVelocity>&);
-void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail) {
-  for (std::size_t k = 0; k < 3; ++k) trail.last_wall_v[chunk][k] -= copy.velocity[k];
+void loosen(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration) {
+  for (std::size_t k = 0; k < 3; ++k) acceleration.last_wall_v[chunk][k] -= copy.velocity[k];
 }
-void fasten(std::size_t chunk, const WallCopy& copy, Trail& trail) {
-  for (std::size_t k = 0; k < 3; ++k) trail.last_wall_v[chunk][k] += copy.velocity[k];
+void fasten(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration) {
+  for (std::size_t k = 0; k < 3; ++k) acceleration.last_wall_v[chunk][k] += copy.velocity[k];
 }
 
 double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
-                      double wall_inv_mass, const Trail& trail) {
+                      double wall_inv_mass, const AccelerationHistory& acceleration) {
   const bool friction = !contacts.rx.empty();
   double sum = 0;
   for (std::size_t k = range.begin; k < range.end; ++k) {
@@ -154,11 +157,11 @@ double change_squared(ContactRange range, const Contacts& contacts, std::span<co
                         (second < 0 ? wall_inv_mass : velocity[static_cast<std::size_t>(second)].inv_mass);
     double change2 = 0;
     if (friction) {
-      const double x = contacts.rx[k] - trail.last.x[k], y = contacts.ry[k] - trail.last.y[k],
-                   z = contacts.rz[k] - trail.last.z[k];
+      const double x = contacts.rx[k] - acceleration.last.x[k], y = contacts.ry[k] - acceleration.last.y[k],
+                   z = contacts.rz[k] - acceleration.last.z[k];
       change2 = x * x + y * y + z * z;
     } else {
-      const double n = contacts.rn[k] - trail.last.n[k];
+      const double n = contacts.rn[k] - acceleration.last.n[k];
       change2 = n * n;
     }
     sum += w_nn * change2;
@@ -166,10 +169,11 @@ double change_squared(ContactRange range, const Contacts& contacts, std::span<co
   return sum;
 }
 
-std::size_t memory_used(const Trail& trail) {
-  return bytes(trail.steps) + bytes(trail.last) + bytes(trail.step) +
-         sizeof(Velocity) * (trail.last_v.capacity() + trail.step_v.capacity()) +
-         sizeof(std::array<double, 3>) * (trail.last_wall_v.capacity() + trail.step_wall_v.capacity());
+std::size_t memory_used(const AccelerationHistory& acceleration) {
+  return bytes(acceleration.steps) + bytes(acceleration.last) + bytes(acceleration.step) +
+         sizeof(Velocity) * (acceleration.last_v.capacity() + acceleration.step_v.capacity()) +
+         sizeof(std::array<double, 3>) *
+             (acceleration.last_wall_v.capacity() + acceleration.step_wall_v.capacity());
 }
 
 }  // namespace talus

@@ -12,7 +12,7 @@ namespace talus {
 
 /// How a sweep is carried on before the next one begins. With s = sweep(y), the impulses after a sweep that
 /// began from y:
-///   momentum   y+ = s + beta (s - s_before)                            (Nesterov 1983; one trail)
+///   momentum   y+ = s + beta (s - s_before)                            (Nesterov 1983; one acceleration)
 ///   conjugate  y+ = s + beta p, p = y - y_before of the sweep before   (NNCG, Silcowitz-Hansen et al. 2010)
 /// Velocities depend linearly on impulses, and gluing is linear too, so that the same rule keeps V and r
 /// consistent, copy by copy, without a product.
@@ -20,7 +20,7 @@ enum class Carry { momentum, conjugate };
 
 /// What the rule remembers, in the layout of Contacts and Bodies. Empty vectors where a scene has no such
 /// quantity, or the rule has never been needed.
-struct Trail {
+struct AccelerationHistory {
   struct Impulses {
     std::vector<double> x, y, z;  ///< with friction [N s]
     std::vector<double> n;        ///< without [N s]
@@ -36,29 +36,31 @@ struct Trail {
 
 /// Room for the contacts, bodies (none where they are carried in single precision) and chunks; what was not
 /// there is void. What only the other rule remembers stays: a sweep under it may still be on its way.
-void allocate(Trail& trail, Carry carry, const Contacts& contacts, std::size_t bodies, std::size_t chunks);
+void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts, std::size_t bodies,
+              std::size_t chunks);
 
 /// Momentum of the impulses of a range begins: no step yet.
 void begin_steps(ContactRange range, SweepSteps& steps);
 
-/// Applies the conjugate rule to the impulses of a range; beta = 0 begins a new trail.
-void carry_impulses(double beta, ContactRange range, Contacts& contacts, Trail& trail);
+/// Applies the conjugate rule to the impulses of a range; beta = 0 begins a new acceleration.
+void carry_impulses(double beta, ContactRange range, Contacts& contacts, AccelerationHistory& acceleration);
 
 /// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
 void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
-                      std::span<Velocity> velocity, Trail& trail);
+                      std::span<Velocity> velocity, AccelerationHistory& acceleration);
 /// Momentum in single precision; with beta = 0 what is in `last` may be void.
 void carry_velocities(const SweepKernels& kernels, double beta, std::span<const Slot> slots,
                       std::span<SingleVelocity> velocity, std::span<SingleVelocity> last);
 
 /// Applies the rule to the wall copy of a chunk.
-void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy, Trail& trail);
+void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy,
+                AccelerationHistory& acceleration);
 
 /// When velocities are made afresh from the impulses, what drifted from them is gone at once, but not from
-/// what the trail remembers: the rule would take the difference for motion, and carry it on beta/(1 - beta)
-/// times as large, at every refresh. So the trail goes along: `loosen` before the velocities are reset,
-/// `fasten` when they stand.
-/// Of the slots; `last` is that of the trail, in the precision of the velocities.
+/// what the acceleration remembers: the rule would take the difference for motion, and carry it on beta/(1 -
+/// beta) times as large, at every refresh. So the acceleration goes along: `loosen` before the velocities are
+/// reset, `fasten` when they stand. Of the slots; `last` is that of the acceleration, in the precision of the
+/// velocities.
 template <class Number>
 void loosen(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
             std::vector<VelocityOf<Number>>& last);
@@ -66,14 +68,14 @@ template <class Number>
 void fasten(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
             std::vector<VelocityOf<Number>>& last);
 /// The same with the wall copy of a chunk.
-void loosen(std::size_t chunk, const WallCopy& copy, Trail& trail);
-void fasten(std::size_t chunk, const WallCopy& copy, Trail& trail);
+void loosen(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration);
+void fasten(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration);
 
 /// Sum of W_nn |s - y|^2 over a range [J]: the square of what the sweep changed, in the metric of the sweep.
 /// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls.
 double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
-                      double wall_inv_mass, const Trail& trail);
+                      double wall_inv_mass, const AccelerationHistory& acceleration);
 
-std::size_t memory_used(const Trail& trail);
+std::size_t memory_used(const AccelerationHistory& acceleration);
 
 }  // namespace talus

@@ -20,7 +20,7 @@ namespace talus {
 struct SingleState {
   SingleContacts contacts;
   std::vector<SingleVelocity> velocity;  ///< per slot: m/s, mobilities times `contacts.unit`
-  std::vector<SingleVelocity> last_v;    ///< per slot: of the trail (momentum.hpp)
+  std::vector<SingleVelocity> last_v;    ///< per slot: of the acceleration (momentum.hpp)
 };
 
 /// The unit [kg] for grains whose largest 1/m is `inv_mass` [1/kg] > 0.

@@ -8,7 +8,7 @@
 namespace talus::graph {
 
 BackgroundLane::BackgroundLane(std::size_t capacity) : capacity_(capacity) {
-  if (capacity == 0) throw std::invalid_argument("a background lane needs room for at least one task");
+  if (capacity == 0) throw std::invalid_argument("a background thread needs room for at least one task");
 }
 
 BackgroundLane::~BackgroundLane() {

@@ -25,11 +25,11 @@ class BackgroundLane {
 
   /// Queues a task; blocks while `capacity` tasks are outstanding. The first call starts the thread.
   /// Throws TaskError, and queues nothing, if an earlier task has failed since the last report. Not to be
-  /// called by a task of the lane.
+  /// called by a task of its own.
   void submit(std::string name, std::function<void()> work);
 
   /// Returns when no task is outstanding. Throws TaskError if one has failed since the last report; tasks
-  /// queued behind the one that failed were not begun. Not to be called by a task of the lane.
+  /// queued behind the one that failed were not begun. Not to be called by a task of its own.
   void drain();
 
  private:
@@ -43,7 +43,7 @@ class BackgroundLane {
 
   const std::size_t capacity_;
   std::mutex mutex_;                 ///< guards all below
-  std::condition_variable changed_;  ///< a task came, a task ended, or the lane closes
+  std::condition_variable changed_;  ///< a task came, a task ended, or it closes
   std::deque<Task> queue_;           ///< outstanding; the front is running
   bool closing_ = false;
   std::string failed_;  ///< name of the task that threw failure_

@@ -212,7 +212,7 @@ void Executor::await_change(std::unique_lock<std::mutex>& lock) {
   const std::uint64_t seen = changes_.load(std::memory_order_relaxed);
   const auto changed = [&] { return changes_.load(std::memory_order_relaxed) != seen; };
   // Waking a blocked thread costs tens of microseconds, as much as a short task: poll for about as long, then
-  // free the core for the background lane and for other processes.
+  // free the core for the background thread and for other processes.
   constexpr int spins = 1000;
   constexpr int yields = 100;
   lock.unlock();

@@ -59,9 +59,10 @@ class Executor {
   /// time.
   void run(const Graph& graph);
 
-  /// Queues work for the background lane, see BackgroundLane::submit. Its thread starts with the first call.
+  /// Queues work for the background thread, see BackgroundLane::submit. Its thread starts with the first
+  /// call.
   void submit_background(std::string name, std::function<void()> work);
-  /// Waits for the background lane, see BackgroundLane::drain. Nothing to wait for if it was never used.
+  /// Waits for the background thread, see BackgroundLane::drain. Nothing to wait for if it was never used.
   void drain();
 
  private:

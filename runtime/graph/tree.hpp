@@ -30,14 +30,14 @@ inline constexpr std::uint64_t load_of_neighbour = 200;
 /// What a rank has to do in an iteration.
 struct RankLoad {
   std::uint64_t work = 0;  ///< in contacts
-  bool waits = false;      ///< on the way for others: it has subdomains of a later turn
+  bool waits = false;      ///< on the way for others: it has subdomains of a later subdomain colour
 };
 
-/// `load`: of each rank, of at least one. Each rank in turn, first those that do not wait, of them the one
-/// with the least work first, hangs on the one that can tell it soonest, where a message costs a rank 0.3 us
-/// and takes 1.5 us (LogP: Culler et al. 1993; Karp et al. 1993, their best broadcast): 96 ranks are told
-/// within 8 us, where one rank would spend 29 us on 95 messages. So those that hand on are those that have
-/// time for it.
+/// `load`: of each rank, of at least one. Each rank in subdomain colour, first those that do not wait, of
+/// them the one with the least work first, hangs on the one that can tell it soonest, where a message costs a
+/// rank 0.3 us and takes 1.5 us (LogP: Culler et al. 1993; Karp et al. 1993, their best broadcast): 96 ranks
+/// are told within 8 us, where one rank would spend 29 us on 95 messages. So those that hand on are those
+/// that have time for it.
 Tree grow_tree(std::span<const RankLoad> load);
 
 /// Colours of a rank's two parts in the loop, between those of its last tell and of glue: the way up is

@@ -80,7 +80,7 @@ void Iteration::begin_course(SolverMethod method, double most) {
   if (method == SolverMethod::nncg) conjugate_beta_ = change2_ = 0;
   if (method == SolverMethod::nlgs) return;
   if (course_.single) allocate(state_.single, state_.contacts, state_.bodies.size());
-  allocate(trail_, carry_of(method), state_.contacts, course_.single ? 0 : state_.bodies.size(),
+  allocate(acceleration_, carry_of(method), state_.contacts, course_.single ? 0 : state_.bodies.size(),
            state_.chunks.size());
   changes_.assign(method == SolverMethod::nncg ? state_.chunks.size() : 0, 0);
 }
@@ -100,7 +100,7 @@ void Iteration::go_on_in_double() {
   course_before_ = course_;
   course_.from = result_.iterations + 1;
   course_.single = false;
-  allocate(trail_, Carry::momentum, state_.contacts, state_.bodies.size(), state_.chunks.size());
+  allocate(acceleration_, Carry::momentum, state_.contacts, state_.bodies.size(), state_.chunks.size());
 }
 
 /// Brings a chunk's contacts, and the bodies that it is the first to write, to where its sweep looks for
@@ -121,7 +121,7 @@ void Iteration::change_precision(std::size_t c, ContactRange range, int epoch) {
   }
   if (first || !before) {
     if (first && course(epoch).method != SolverMethod::nlgs)
-      fasten(owned(c), state_.bodies.velocity, trail_.last_v);
+      fasten(owned(c), state_.bodies.velocity, acceleration_.last_v);
     return;
   }
   widen_impulses(single.contacts, range, state_.contacts);
@@ -129,9 +129,9 @@ void Iteration::change_precision(std::size_t c, ContactRange range, int epoch) {
   const bool goes_on = course(epoch).method == SolverMethod::momentum && number(epoch) > course(epoch).begun;
   if (!goes_on) return;
   for (const Slot slot : owned(c))
-    trail_.last_v[static_cast<std::size_t>(slot)] = velocity[static_cast<std::size_t>(slot)];
-  widen_bodies(owned(c), single.last_v, trail_.last_v);
-  widen_steps(single.contacts.unit, range, trail_.steps);
+    acceleration_.last_v[static_cast<std::size_t>(slot)] = velocity[static_cast<std::size_t>(slot)];
+  widen_bodies(owned(c), single.last_v, acceleration_.last_v);
+  widen_steps(single.contacts.unit, range, acceleration_.steps);
 }
 
 std::span<const Slot> Iteration::owned(std::size_t c) const {
@@ -140,23 +140,23 @@ std::span<const Slot> Iteration::owned(std::size_t c) const {
   return std::span(state_.chunks.owned).subspan(from, to - from);
 }
 
-/// The start of a sweep moves on along the trail: the chunk's impulses, with momentum within the sweep
+/// The start of a sweep moves on along the acceleration: the chunk's impulses, with momentum within the sweep
 /// itself, the bodies that it is the first to write, and its wall copy.
 void Iteration::carry_on(std::size_t c, ContactRange range, int epoch) {
   const Chunks& chunks = state_.chunks;
   const Carry carry = carry_of(course(epoch).method);
   const double beta = this->beta(epoch);
   if (carry == Carry::conjugate)
-    carry_impulses(beta, range, state_.contacts, trail_);
+    carry_impulses(beta, range, state_.contacts, acceleration_);
   else if (number(epoch) == course(epoch).begun)
-    begin_steps(range, trail_.steps);
+    begin_steps(range, acceleration_.steps);
   const bool at_wall = chunks.wall[c] >= 0;
-  if (epoch == sweeps_from_ && at_wall) fasten(c, state_.copies[c], trail_);
+  if (epoch == sweeps_from_ && at_wall) fasten(c, state_.copies[c], acceleration_);
   if (course(epoch).single)
     carry_velocities(kernels_, beta, owned(c), state_.single.velocity, state_.single.last_v);
   else
-    carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, trail_);
-  if (at_wall) carry_wall(carry, beta, c, state_.copies[c], trail_);
+    carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, acceleration_);
+  if (at_wall) carry_wall(carry, beta, c, state_.copies[c], acceleration_);
 }
 
 /// The last check that tells something about the present course besides the newest: at least check_every

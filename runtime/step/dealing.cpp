@@ -32,11 +32,11 @@ GrainRecord record_of(const Sample& sample, std::size_t k) {
   return record;
 }
 
-void add(const GrainRecord& record, double density, bool turns, Bodies& bodies) {
+void add(const GrainRecord& record, double density, bool rotates, Bodies& bodies) {
   add_sphere(bodies, BodyId{record.id}, {record.x[0], record.x[1], record.x[2]}, record.radius, density,
-             turns);
+             rotates);
   std::copy_n(record.velocity, 3, bodies.velocity.back().u);
-  if (turns) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
+  if (rotates) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
 }
 
 /// Rank of each grain: that of the subdomain its centre is in.
@@ -88,9 +88,9 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
   struct Common {
     std::int64_t grains;
     double density;
-    bool turns;
+    bool rotates;
   };
-  const Common own{static_cast<std::int64_t>(sample.size()), sample.density, sample.turns};
+  const Common own{static_cast<std::int64_t>(sample.size()), sample.density, sample.rotates};
   const Common all = ranks.gather_records(std::span<const Common>(&own, 1)).front();
   const std::vector<std::int32_t> rank = receivers(sample, settings, ranks);
   std::vector<std::int64_t> count(static_cast<std::size_t>(ranks.ranks()), 0);
@@ -102,7 +102,7 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
     for (std::size_t k = begin; k < std::min(begin + piece, sample.size()); ++k)
       to[static_cast<std::size_t>(rank[k])].push_back(record_of(sample, k));
     for (const auto& part : ranks.exchange_records(std::move(to)))
-      for (const GrainRecord& record : part) add(record, all.density, all.turns, bodies);
+      for (const GrainRecord& record : part) add(record, all.density, all.rotates, bodies);
   }
   return bodies;
 }

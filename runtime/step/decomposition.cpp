@@ -288,8 +288,8 @@ std::size_t memory_used(const Decomposition& decomposition) {
   std::size_t bytes =
       memory_used(decomposition.partition) +
       (decomposition.multiplicity.capacity() + decomposition.parts.capacity()) * sizeof(std::uint16_t) +
-      decomposition.taken.capacity() + decomposition.turn.capacity() + decomposition.counts.capacity() +
-      decomposition.whole.capacity() * sizeof(std::array<double, 2>);
+      decomposition.taken.capacity() + decomposition.subdomain_colour.capacity() +
+      decomposition.counts.capacity() + decomposition.whole.capacity() * sizeof(std::array<double, 2>);
   for (const SubdomainInterface& interface : decomposition.interfaces) bytes += memory_used(interface);
   return bytes;
 }

@@ -30,11 +30,12 @@ struct Decomposition {
   std::vector<std::int32_t> rank_of;    ///< of every subdomain
   std::vector<std::int32_t> here;       ///< subdomains of this rank, ascending
   std::vector<std::size_t> slot_begin;  ///< here + 1 offsets into the slots
-  std::vector<char> turn;               ///< per subdomain of all: choose_turns; empty unless they alternate
+  std::vector<char>
+      subdomain_colour;  ///< per subdomain of all: choose_subdomain_colours; empty unless they alternate
   std::vector<std::uint16_t> multiplicity;  ///< m_i per slot; empty with one subdomain
   std::vector<std::uint16_t> parts;         ///< per slot: the copy carries M/parts; empty likewise
-  std::vector<char> taken;   ///< per slot: a body that stands in a subdomain of an earlier turn, too, and no
-                             ///< hub; empty unless they alternate
+  std::vector<char> taken;   ///< per slot: a body that stands in a subdomain of an earlier subdomain colour,
+                             ///< too, and no hub; empty unless they alternate
   std::vector<char> counts;  ///< per slot: the copy of the lowest subdomain; empty likewise
   std::vector<std::array<double, 2>> whole;  ///< 1/M and R^2/I of the body [1/kg]; empty likewise
   std::vector<SubdomainInterface>
@@ -46,11 +47,11 @@ struct Decomposition {
   bool blind = false;         ///< space was cut when no candidate was known
 
   bool several() const { return partition.subdomains > 1; }
-  bool in_turns() const {
-    return std::ranges::any_of(turn, [](char t) { return t > 0; });
+  bool in_colours() const {
+    return std::ranges::any_of(subdomain_colour, [](char t) { return t > 0; });
   }
-  int turn_of(std::int32_t subdomain) const {
-    return turn.empty() ? 0 : turn[static_cast<std::size_t>(subdomain)];
+  int subdomain_colour_of(std::int32_t subdomain) const {
+    return subdomain_colour.empty() ? 0 : subdomain_colour[static_cast<std::size_t>(subdomain)];
   }
 };
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "kernels/bodies/release.hpp"
-#include "partition/turns.hpp"
+#include "partition/subdomain_colours.hpp"
 #include "runtime/step/decomposition.hpp"
 
 namespace talus {
@@ -144,8 +144,9 @@ OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& fou
   return own;
 }
 
-/// Grains are hubs from this multiplicity on, glued once a sweep through one rank. By then those of all turns
-/// must have been swept, and what waits for them cannot be hidden: where there is one, there are no turns.
+/// Grains are hubs from this multiplicity on, glued once a sweep through one rank. By then those of all
+/// subdomain colours must have been swept, and what waits for them cannot be hidden: where there is one,
+/// there are no subdomain colours.
 std::int32_t hubs_from(const DecompositionSettings& settings) {
   if (settings.exchange == ExchangeScheme::ccs) return 2;
   return settings.coupling == Coupling::alternating ? 33 : 9;
@@ -170,13 +171,13 @@ void settle_turns(Decomposition& decomposition, const graph::Communicator& ranks
   std::vector<Tie> ties;
   if (hub[0] == 0)
     for (const auto& [pair, grains] : shared) ties.push_back({pair.first, pair.second, grains});
-  decomposition.turn =
-      choose_turns(decomposition.partition.subdomains, ranks.gather_records(std::span<const Tie>(ties)));
+  decomposition.subdomain_colour = choose_subdomain_colours(decomposition.partition.subdomains,
+                                                            ranks.gather_records(std::span<const Tie>(ties)));
 }
 
-/// Contacts at glued walls of grains that stand in several subdomains go where the grain's turn comes first:
-/// a later turn then has its walls swept, and can tell, before it takes over what others did to its grains.
-/// Collective: impulses of what goes to another rank follow.
+/// Contacts at glued walls of grains that stand in several subdomains go where the grain's subdomain colour
+/// comes first: a later subdomain colour then has its walls swept, and can tell, before it takes over what
+/// others did to its grains. Collective: impulses of what goes to another rank follow.
 void move_wall_contacts(const Decomposition& decomposition, const graph::Communicator& ranks,
                         const BodySubdomains& standings, const Surroundings& around,
                         std::span<const char> glued, Candidates& found,
@@ -188,10 +189,10 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     const WallPair& pair = found.wall_pairs[k - grains];
     if (glued[at(pair.wall)] == 0) continue;
     const auto stands = standings.of(at(pair.body));
-    const std::int32_t first =
-        *std::ranges::min_element(stands, {}, [&](std::int32_t e) { return decomposition.turn_of(e); });
+    const std::int32_t first = *std::ranges::min_element(
+        stands, {}, [&](std::int32_t e) { return decomposition.subdomain_colour_of(e); });
     const std::int32_t before = subdomain[k];
-    if (decomposition.turn_of(first) == decomposition.turn_of(before)) continue;
+    if (decomposition.subdomain_colour_of(first) == decomposition.subdomain_colour_of(before)) continue;
     subdomain[k] = first;
     const std::int32_t from = decomposition.rank_of[at(before)], rank = decomposition.rank_of[at(first)];
     if (from != ranks.rank() || rank == from) continue;
@@ -214,14 +215,14 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
 }
 
 /// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
-/// without knowing of one another. Hubs are glued once a sweep, whosever turn it is.
+/// without knowing of one another. Hubs are glued once a sweep, whosever subdomain colour it is.
 std::int32_t parts_of(const Decomposition& decomposition, Coupling coupling,
                       std::span<const std::int32_t> standings, std::int32_t subdomain, std::int32_t hubs) {
   const auto m = static_cast<std::int32_t>(standings.size());
   if (coupling == Coupling::schwarz) return 1;
   if (coupling == Coupling::nscdd || m >= hubs) return m;
   return static_cast<std::int32_t>(std::ranges::count_if(standings, [&](std::int32_t other) {
-    return decomposition.turn_of(other) == decomposition.turn_of(subdomain);
+    return decomposition.subdomain_colour_of(other) == decomposition.subdomain_colour_of(subdomain);
   }));
 }
 
@@ -245,9 +246,10 @@ void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubd
       const std::int32_t parts =
           parts_of(decomposition, coupling, standings.of(b), interface.subdomain, hubs);
       decomposition.parts.push_back(static_cast<std::uint16_t>(parts));
-      if (decomposition.turn.empty()) continue;
+      if (decomposition.subdomain_colour.empty()) continue;
       const bool taken = m < hubs && std::ranges::any_of(standings.of(b), [&](std::int32_t other) {
-                           return decomposition.turn_of(other) < decomposition.turn_of(interface.subdomain);
+                           return decomposition.subdomain_colour_of(other) <
+                                  decomposition.subdomain_colour_of(interface.subdomain);
                          });
       decomposition.taken.push_back(taken ? 1 : 0);
     }
@@ -309,7 +311,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     const std::int32_t hubs = hubs_from(settings);
     if (settings.coupling == Coupling::alternating) {
       settle_turns(decomposition, ranks, standings, hubs);
-      if (decomposition.in_turns() && std::ranges::find(glued, 1) != glued.end()) {
+      if (decomposition.in_colours() && std::ranges::find(glued, 1) != glued.end()) {
         move_wall_contacts(decomposition, ranks, standings, around, glued, found, subdomain);
         standings = stand();
       }
@@ -336,10 +338,11 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     if (begin == end) continue;
     const std::size_t local = group / 2 % decomposition.here.size();
     const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
-    const ChunkSide side = group % 2 == 1                                         ? ChunkSide::inside
-                           : wall >= 0 && glued[at(wall)] != 0                    ? ChunkSide::wall
-                           : decomposition.turn_of(decomposition.here[local]) > 0 ? ChunkSide::late
-                                                                                  : ChunkSide::border;
+    const ChunkSide side = group % 2 == 1                      ? ChunkSide::inside
+                           : wall >= 0 && glued[at(wall)] != 0 ? ChunkSide::wall
+                           : decomposition.subdomain_colour_of(decomposition.here[local]) > 0
+                               ? ChunkSide::late
+                               : ChunkSide::border;
     // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
     const int target = chunk_target(all, load[at(decomposition.here[local])]);
     groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});

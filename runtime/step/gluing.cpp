@@ -59,7 +59,7 @@ void write_velocities(std::span<const Record> velocity, std::span<const Slot> sl
 }
 
 /// Turns are below the first of these; the second stands for all of them.
-constexpr int no_turn = 1000, any_turn = no_turn + 1;
+constexpr int no_turn = 1000, any_colour = no_turn + 1;
 
 /// Each copy goes on with rule(own, the neighbour's), number by number.
 template <std::size_t Width, class Record, class Rule>
@@ -92,14 +92,14 @@ void Gluing::plan(bool rotation) {
     if (state_.walls[w].inv_mass() > 0) walls_.push_back(static_cast<std::int32_t>(w));
   needed_ = all.several() || !walls_.empty();
   if (const std::int64_t subdomains = all.partition.subdomains;
-      ranks_.ranks() > 1 && subdomains * subdomains + detail::centre_tag > ranks_.largest_tag())
+      ranks_.ranks() > 1 && subdomains * subdomains + detail::root_tag > ranks_.largest_tag())
     throw std::invalid_argument(fmt::format(
         "{} subdomains on several ranks need message tags up to {}, and this MPI has {}: take fewer "
         "subdomains",
-        subdomains, subdomains * subdomains + detail::centre_tag, ranks_.largest_tag()));
+        subdomains, subdomains * subdomains + detail::root_tag, ranks_.largest_tag()));
   // Channels of the plan before must be closed on all ranks before new ones of the same tag are used.
   subdomains_.clear();
-  centre_.reset();
+  root_.reset();
   subdomains_.resize(all.here.size());
   followers_.clear();
   tellers_.clear();
@@ -109,7 +109,7 @@ void Gluing::plan(bool rotation) {
   for (std::size_t e = 0; e < subdomains_.size(); ++e) {
     plan_sides(e);
     plan_copies(e);
-    if (turn(e) > 0) followers_.push_back(static_cast<std::uint32_t>(e));
+    if (subdomain_colour(e) > 0) followers_.push_back(static_cast<std::uint32_t>(e));
     subdomains_[e].tells = all.several() && !walls_.empty() && all.interfaces[e].hubs.empty();
     if (subdomains_[e].tells) tellers_.push_back(static_cast<std::uint32_t>(e));
   }
@@ -123,14 +123,14 @@ void Gluing::plan(bool rotation) {
     }
 }
 
-int Gluing::turn(std::size_t e) const {
-  return state_.decomposition.turn_of(state_.decomposition.here[e]);
+int Gluing::subdomain_colour(std::size_t e) const {
+  return state_.decomposition.subdomain_colour_of(state_.decomposition.here[e]);
 }
 
 void Gluing::plan_sides(std::size_t e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];
-  mine.turn = turn(e);
+  mine.subdomain_colour = subdomain_colour(e);
   mine.wall_copies.resize(walls_.size());
   if (!all.several()) return;
   const SubdomainInterface& interface = all.interfaces[e];
@@ -143,7 +143,7 @@ void Gluing::plan_sides(std::size_t e) {
     Side& side = mine.sides[n];
     for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
       side.slots.push_back(slot_of(interface.exchange[at(k)]));
-    side.turn = all.turn_of(neighbour.subdomain);
+    side.subdomain_colour = all.subdomain_colour_of(neighbour.subdomain);
     const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
     const std::size_t length = side.slots.size() * width_;
     side.link.out.resize(length + 1);
@@ -174,15 +174,17 @@ std::span<const CopySource> Gluing::copies_of(std::size_t e, std::size_t s) cons
       .subspan(at(interface.copies_begin[s]), at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
 }
 
-int Gluing::turn_of(std::size_t e, const CopySource& copy) const {
-  return copy.neighbour < 0 ? subdomains_[e].turn : subdomains_[e].sides[at(copy.neighbour)].turn;
+int Gluing::subdomain_colour_of(std::size_t e, const CopySource& copy) const {
+  return copy.neighbour < 0 ? subdomains_[e].subdomain_colour
+                            : subdomains_[e].sides[at(copy.neighbour)].subdomain_colour;
 }
 
-/// The latest turn below `before` that a copy of interfaces[e].shared[s] has; -1: none.
-int Gluing::latest_turn(std::size_t e, std::size_t s, int before) const {
+/// The latest subdomain colour below `before` that a copy of interfaces[e].shared[s] has; -1: none.
+int Gluing::latest_colour(std::size_t e, std::size_t s, int before) const {
   int latest = -1;
   for (const CopySource& copy : copies_of(e, s))
-    if (const int turn = turn_of(e, copy); turn < before) latest = std::max(latest, turn);
+    if (const int subdomain_colour = subdomain_colour_of(e, copy); subdomain_colour < before)
+      latest = std::max(latest, subdomain_colour);
   return latest;
 }
 
@@ -194,15 +196,15 @@ void Gluing::plan_copies(std::size_t e) {
     const auto copies = copies_of(e, s);
     if (copies.empty()) continue;  // a hub
     const Slot slot = mine.shared[s];
-    const auto latest_before = [&](int turn) {
+    const auto latest_before = [&](int subdomain_colour) {
       std::vector<CopySource> latest;
-      const int before = latest_turn(e, s, turn);
+      const int before = latest_colour(e, s, subdomain_colour);
       std::ranges::copy_if(copies, std::back_inserter(latest),
-                           [&](const CopySource& copy) { return turn_of(e, copy) == before; });
+                           [&](const CopySource& copy) { return subdomain_colour_of(e, copy) == before; });
       return latest;
     };
     if (!all.taken.empty() && all.taken[at(slot)] != 0) {
-      const std::vector<CopySource> earlier = latest_before(mine.turn);
+      const std::vector<CopySource> earlier = latest_before(mine.subdomain_colour);
       mine.taken.push_back(slot);
       if (earlier.size() > 1)
         mine.taken_corners.push_back(static_cast<std::int32_t>(s));
@@ -210,7 +212,7 @@ void Gluing::plan_copies(std::size_t e) {
         mine.sides[at(earlier[0].neighbour)].taken.push_back({slot, earlier[0].place});
     }
     const std::vector<CopySource> last = latest_before(no_turn);
-    const bool own = turn_of(e, last[0]) == mine.turn;
+    const bool own = subdomain_colour_of(e, last[0]) == mine.subdomain_colour;
     if (last.size() > 2 || (last.size() == 2 && !own)) {
       mine.corners.push_back(static_cast<std::int32_t>(s));
     } else if (last.size() == 2) {
@@ -235,12 +237,12 @@ void Gluing::count_messages() {
     const Subdomain& subdomain = subdomains_[e];
     for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local < 0);
     if (subdomain.partial.empty()) continue;
-    add(subdomain.partial.size(), false);                                // to the centre
+    add(subdomain.partial.size(), false);                                // to the root
     add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
   }
-  if (centre_ && centre_->up) {
+  if (root_ && root_->up) {
     count[2] += 2;
-    count[3] += static_cast<std::int64_t>(8 * (centre_->up->out.size() + centre_->up->in.size() - 2));
+    count[3] += static_cast<std::int64_t>(8 * (root_->up->out.size() + root_->up->in.size() - 2));
   }
   ranks_.sum(count);
   messages_ = {count[0], count[1], count[2], count[3]};
@@ -251,7 +253,7 @@ void Gluing::begin() {
     subdomain.waited = 0;
     for (auto& copies : subdomain.wall_copies) copies.clear();
   }
-  if (centre_) centre_->waited = 0;
+  if (root_) root_->waited = 0;
   std::vector<std::int64_t> copies(state_.walls.size(), 0);
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     copies[w] = static_cast<std::int64_t>(state_.wall_states[w].copies.size());
@@ -323,10 +325,10 @@ void Gluing::tell(std::size_t e, Mode mode) {
     for (std::int32_t c : mine.wall_copies[g])
       for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[at(c)].velocity[k];
   }
-  if (!centre_->up || !centre_->links.empty()) return;
+  if (!root_->up || !root_->links.empty()) return;
   // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
-  if (centre_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
-  centre_->published.store(0, std::memory_order_relaxed);
+  if (root_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
+  root_->published.store(0, std::memory_order_relaxed);
   send_up();
 }
 
@@ -341,10 +343,12 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
     }
     const double part = 1 / static_cast<double>(state_.wall_states[at(walls_[g])].copies_everywhere);
     for (std::int32_t c : copies)
-      for (std::size_t k = 0; k < 3; ++k) state_.copies[at(c)].velocity[k] = part * centre_->sums[3 * g + k];
+      for (std::size_t k = 0; k < 3; ++k) state_.copies[at(c)].velocity[k] = part * root_->sums[3 * g + k];
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
-  const auto of_glue = [&](const Side& side) { return mode == Mode::sum || side.turn >= mine.turn; };
+  const auto of_glue = [&](const Side& side) {
+    return mode == Mode::sum || side.subdomain_colour >= mine.subdomain_colour;
+  };
   await_messages(e, of_glue);
   with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
     glue_bodies<Width, Record>(e, mode, velocity);
@@ -353,7 +357,9 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
 }
 
 void Gluing::take(std::size_t e, bool single) {
-  const auto of_take = [mine = turn(e)](const Side& side) { return side.turn < mine; };
+  const auto of_take = [mine = subdomain_colour(e)](const Side& side) {
+    return side.subdomain_colour < mine;
+  };
   await_messages(e, of_take);
   with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
     take_bodies<Width, Record>(e, velocity);
@@ -375,21 +381,21 @@ void Gluing::ask_for_messages(std::size_t e, const Which& which) {
     if (side.link.receiver && which(side)) side.link.receiver->start();
 }
 
-/// The copies of interface.shared[s] that are of the latest turn below `before`, or all with `any_turn`:
-/// their sum in order of subdomain, how many they are, and whether the own one is among them.
+/// The copies of interface.shared[s] that are of the latest subdomain colour below `before`, or all with
+/// `any_colour`: their sum in order of subdomain, how many they are, and whether the own one is among them.
 template <std::size_t Width, class Record>
 auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const {
   using Own = Numbers<Width, Record>;
   using Number = typename Own::value_type;
   const Subdomain& mine = subdomains_[e];
-  const int latest = latest_turn(e, s, before);
+  const int latest = latest_colour(e, s, before);
   struct {
     Own sum{};
     Number count = 0;
     bool own = false;
   } added;
   for (const CopySource& copy : copies_of(e, s)) {
-    if (before != any_turn && turn_of(e, copy) != latest) continue;
+    if (before != any_colour && subdomain_colour_of(e, copy) != latest) continue;
     added.count += 1;
     if (copy.neighbour < 0) {
       const Own own = numbers_of<Width>(velocity[at(mine.shared[s])]);
@@ -421,7 +427,7 @@ void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
   for (const Side& side : mine.sides)
     settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.taken), side.source, taken_over);
   for (const std::int32_t s : mine.taken_corners) {
-    auto earlier = add_copies<Width, Record>(e, at(s), mine.turn, velocity);
+    auto earlier = add_copies<Width, Record>(e, at(s), mine.subdomain_colour, velocity);
     for (auto& number : earlier.sum) number /= earlier.count;
     assign<Width>(earlier.sum, velocity[at(mine.shared[at(s)])]);
   }
@@ -462,7 +468,7 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
     if (schwarz && mode != Mode::sum) std::copy(next.begin(), next.end(), base);
   };
   const auto settle_copies = [&](std::size_t s) {
-    const auto copies = add_copies<Width, Record>(e, s, mode == Mode::sum ? any_turn : no_turn, velocity);
+    const auto copies = add_copies<Width, Record>(e, s, mode == Mode::sum ? any_colour : no_turn, velocity);
     settle(s, copies.sum, copies.count, copies.own);
   };
   if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
@@ -476,7 +482,7 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
       if (interface.copies_begin[s] < interface.copies_begin[s + 1]) settle_copies(s);
   }
   for (std::size_t h = 0; h < interface.hubs.size(); ++h) {
-    const double* const from = &centre_->sums[3 * walls_.size() + mine.hub_item[h] * Width];
+    const double* const from = &root_->sums[3 * walls_.size() + mine.hub_item[h] * Width];
     Own sum;
     for (std::size_t k = 0; k < Width; ++k) sum[k] = static_cast<Number>(from[k]);
     const std::size_t hub = at(interface.hubs[h]);
@@ -509,11 +515,10 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
     publish(e, Mode::sum);
   }
   if (tasks_of_rank() > 1) collect(Mode::sum);
-  centre(Mode::sum);
+  root(Mode::sum);
   for (std::size_t e = 0; e < subdomains_.size(); ++e) {
     glue(e, Mode::sum);
-    for (std::size_t g = 0; g < walls_.size(); ++g)
-      wall(e, g) = Eigen::Map<const Vec3>(&centre_->sums[3 * g]);
+    for (std::size_t g = 0; g < walls_.size(); ++g) wall(e, g) = Eigen::Map<const Vec3>(&root_->sums[3 * g]);
   }
   each_shared([&](Velocity& v, Twist& twist, std::size_t k) {
     std::copy_n(v.u, 3, twist.u.data());
@@ -534,14 +539,14 @@ std::vector<trace::Message> Gluing::message_plan() const {
     for (std::size_t n = 0; n < subdomain.sides.size(); ++n)
       add(all.here[e], all.interfaces[e].neighbours[n].subdomain, subdomain.sides[n].slots.size() * width_);
     if (subdomain.partial.empty()) continue;
-    add(all.here[e], trace::centre_group, subdomain.partial.size());
-    add(trace::centre_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
+    add(all.here[e], trace::root_group, subdomain.partial.size());
+    add(trace::root_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
   }
   return plan;
 }
 
 double Gluing::exposed() const {
-  double sum = centre_ ? centre_->waited : 0;
+  double sum = root_ ? root_->waited : 0;
   for (const Subdomain& subdomain : subdomains_) sum += subdomain.waited;
   return sum;
 }

@@ -31,24 +31,25 @@ struct JumpSums {
 
 /// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in tasks:
 ///
-///   tell[e]      after the chunks of subdomain e at glued walls: its part for the centre leaves; of one with
-///                bodies that go through the centre this is done by publish
+///   tell[e]      after the chunks of subdomain e at glued walls: its part for the root leaves; of one with
+///                bodies that go through the root this is done by publish
 ///   publish[e]   after the border chunks of subdomain e: its interface velocities leave
 ///   collect      on ranks between the top and the leaves of the tree of ranks: what came from below goes up
-///   centre       once a rank: what goes through one rank (CCS; always walls of finite mass and bodies with
-///                m_i >= 9, or 33 with turns, so that k copies cost O(k) messages)
+///   root       once a rank: what goes through one rank (CCS; always walls of finite mass and bodies with
+///                m_i >= 9, or 33 with subdomain colours, so that k copies cost O(k) messages)
 ///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
 ///                what all have gained (Schwarz); summed in order of subdomain
 ///
-/// Alternating, subdomains have turns (partition/turns.hpp). One whose turn is not the first begins its
-/// boundary with
+/// Alternating, subdomains have colours (partition/subdomain_colours.hpp). One whose subdomain colour is not
+/// the first begins its boundary with
 ///
-///   take[e]      copies of bodies that stand in subdomains of earlier turns, too, get the mean of the
+///   take[e]      copies of bodies that stand in subdomains of earlier subdomain colours, too, get the mean
+///   of the
 ///                latest of those
 ///
 /// Contacts at glued walls that it has wait for nobody (distribute.cpp). In the end all copies of a body get
-/// the mean of those of its last turn. Each message is sent once, as without turns: a take reads those of
-/// earlier turns, glue the others.
+/// the mean of those of its last subdomain colour. Each message is sent once, as without subdomain colours: a
+/// take reads those of earlier subdomain colours, glue the others.
 ///
 /// Between subdomains of one rank the messages are memory. A body sends its velocity, 6 numbers or 3 without
 /// rotation.
@@ -73,19 +74,21 @@ class Gluing {
   /// Subdomains here (index among those) that read what e publishes; ascending, without e. They do so in
   /// their take where reads_early() is true, else in their glue.
   std::vector<std::uint32_t> readers_here(std::size_t e) const;
-  bool reads_early(std::size_t reader, std::size_t from) const { return turn(from) < turn(reader); }
-  int turn(std::size_t e) const;
+  bool reads_early(std::size_t reader, std::size_t from) const {
+    return subdomain_colour(from) < subdomain_colour(reader);
+  }
+  int subdomain_colour(std::size_t e) const;
   /// Slots of the copies that its take writes.
   std::span<const Slot> taken(std::size_t e) const;
-  /// Subdomains here whose turn is not the first, ascending: those that have a take.
+  /// Subdomains here whose subdomain colour is not the first, ascending: those that have a take.
   std::span<const std::uint32_t> followers() const { return followers_; }
 
-  /// Subdomains here with something for the centre that need not wait for publish, ascending: they have a
+  /// Subdomains here with something for the root that need not wait for publish, ascending: they have a
   /// tell.
   std::span<const std::uint32_t> tellers() const { return tellers_; }
-  /// Tasks between publish and glue: the centre, behind collect where there is one.
+  /// Tasks between publish and glue: the root, behind collect where there is one.
   std::size_t tasks_of_rank() const;
-  enum class Task : std::uint8_t { publish, collect, centre, glue, take, tell };
+  enum class Task : std::uint8_t { publish, collect, root, glue, take, tell };
   /// What the loop's node behind the chunks is, `number` from 0: publish of all subdomains here, the rank's
   /// tasks, glue of all, take of the followers, tell of the tellers. Those of the rank have no subdomain.
   struct Node {
@@ -111,7 +114,7 @@ class Gluing {
   void publish(std::size_t e, Mode mode, bool single = false);
   void tell(std::size_t e, Mode mode);
   void collect(Mode mode);
-  void centre(Mode mode);
+  void root(Mode mode);
   void take(std::size_t e, bool single);
   void glue(std::size_t e, Mode mode, bool single = false);
 
@@ -122,7 +125,7 @@ class Gluing {
   const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
   void forget_jumps() { jumps_.assign(jumps_.size(), {}); }
   const MessageCount& messages() const { return messages_; }
-  /// What each subdomain here sends, and gets from the centre, as if alone on its rank; of an exchange.
+  /// What each subdomain here sends, and gets from the root, as if alone on its rank; of an exchange.
   std::vector<trace::Message> message_plan() const;
   /// Time that tasks of this rank waited for messages since begin() [s]; 0 with one rank.
   double exposed() const;
@@ -130,12 +133,12 @@ class Gluing {
  private:
   struct Side;
   struct Subdomain;
-  struct Centre;
+  struct Root;
   void plan_sides(std::size_t e);
   void plan_copies(std::size_t e);
   std::span<const CopySource> copies_of(std::size_t e, std::size_t s) const;
-  int turn_of(std::size_t e, const CopySource& copy) const;
-  int latest_turn(std::size_t e, std::size_t s, int before) const;
+  int subdomain_colour_of(std::size_t e, const CopySource& copy) const;
+  int latest_colour(std::size_t e, std::size_t s, int before) const;
   void count_messages();
   template <class Which>
   void await_messages(std::size_t e, const Which& which);
@@ -164,7 +167,7 @@ class Gluing {
   std::vector<Subdomain> subdomains_;  ///< per subdomain here
   std::vector<std::uint32_t> followers_, tellers_;
   graph::Tree tree_;
-  std::unique_ptr<Centre> centre_;
+  std::unique_ptr<Root> root_;
   std::vector<JumpSums> jumps_;
   MessageCount messages_;
   std::vector<Velocity> kept_;  ///< by sum_copies

@@ -43,7 +43,7 @@ Iteration::Iteration(StepState& state, const StepParameters& parameters, const S
       admm_(state, parameters, decomposition, gluing_, ranks) {}
 
 void Iteration::plan() {
-  gluing_.plan(parameters_.turns);
+  gluing_.plan(parameters_.rotates);
   ++stiffness_.renewals;
   struct Row {
     double least, most, candidates;
@@ -118,7 +118,7 @@ void Iteration::sweep(std::size_t c, ContactRange range, double mu, int epoch) {
   const bool damped = !before_.empty() && chunks.side[c] != ChunkSide::inside;
   if (damped) copy_impulses<Friction>(state_.contacts, range, before_[c]);
   if (course(epoch).method == SolverMethod::momentum) {
-    const SweepMomentum momentum{beta(epoch), omega(epoch), trail_.steps};
+    const SweepMomentum momentum{beta(epoch), omega(epoch), acceleration_.steps};
     SingleState& single = state_.single;
     if (course(epoch).single && at_wall)
       kernels_.sweep_wall<Friction>(state_.contacts, single.contacts, range, single.velocity, mu,
@@ -163,8 +163,8 @@ void Iteration::chunk(std::size_t c, int epoch) {
         if (from_single)
           loosen(owned(c), state_.single.velocity, state_.single.last_v);
         else if (!course_.single)
-          loosen(owned(c), state_.bodies.velocity, trail_.last_v);
-        if (at_wall) loosen(c, copy, trail_);
+          loosen(owned(c), state_.bodies.velocity, acceleration_.last_v);
+        if (at_wall) loosen(c, copy, acceleration_);
       }
       reset_to_free(owned(c), state_.free, velocity);
       if (at_wall) {
@@ -188,7 +188,7 @@ void Iteration::chunk(std::size_t c, int epoch) {
       if (course(epoch).method != SolverMethod::nlgs) carry_on(c, range, epoch);
       sweep<Friction>(c, range, mu, epoch);
       if (course(epoch).method == SolverMethod::nncg)
-        changes_[c] = change_squared(range, contacts, velocity, copy.inv_mass, trail_);
+        changes_[c] = change_squared(range, contacts, velocity, copy.inv_mass, acceleration_);
       break;
   }
 }
@@ -229,8 +229,8 @@ void Iteration::node(std::uint32_t node, int epoch) {
       return gluing_.publish(*subdomain, mode, single(epoch));
     case Gluing::Task::collect:
       return gluing_.collect(mode);
-    case Gluing::Task::centre:
-      return gluing_.centre(mode);
+    case Gluing::Task::root:
+      return gluing_.root(mode);
     case Gluing::Task::glue:
       return gluing_.glue(*subdomain, mode, single(epoch));
     case Gluing::Task::take:
@@ -254,8 +254,8 @@ std::optional<trace::Kind> Iteration::kind(std::uint32_t node, int epoch) const 
   if (node >= chunks) {
     if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
     // In the order of Gluing::Task.
-    constexpr TaskKind kinds[] = {TaskKind::publish, TaskKind::centre, TaskKind::centre,
-                                  TaskKind::glue,    TaskKind::take,   TaskKind::tell};
+    constexpr TaskKind kinds[] = {TaskKind::publish, TaskKind::root, TaskKind::root,
+                                  TaskKind::glue,    TaskKind::take, TaskKind::tell};
     return kind_of(kinds[static_cast<std::size_t>(gluing_.node(node - chunks).task)]);
   }
   switch (now) {
@@ -290,7 +290,8 @@ void Iteration::fetch(std::size_t subdomain) const {
   const std::size_t first = all.several() ? all.slot_begin[subdomain] : 0,
                     last = all.several() ? all.slot_begin[subdomain + 1] : state_.bodies.size();
   // What single sweeps want comes last, and is nearest then.
-  fetch(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, trail_.last_v, trail_.step_v);
+  fetch(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, acceleration_.last_v,
+        acceleration_.step_v);
   for (const bool in_single : {false, true})
     for (std::size_t c = 0; c < state_.chunks.size(); ++c) {
       if (static_cast<std::size_t>(state_.chunks.subdomain[c]) != subdomain) continue;
@@ -298,8 +299,8 @@ void Iteration::fetch(std::size_t subdomain) const {
       const std::size_t end = begin + static_cast<std::size_t>(contacts.count[c]);
       if (in_single)
         fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
-              single.rn, trail_.steps.x, trail_.steps.y, trail_.steps.z, trail_.steps.n,
-              contacts.first_record, contacts.second_record, contacts.group);
+              single.rn, acceleration_.steps.x, acceleration_.steps.y, acceleration_.steps.z,
+              acceleration_.steps.n, contacts.first_record, contacts.second_record, contacts.group);
       else
         fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
               contacts.rz, contacts.rn);

@@ -52,9 +52,9 @@ InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
 /// next epoch is `accumulate`.
 ///
 /// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
-/// centre, and glue of every subdomain follow, take of every one whose turn is not the first, and tell. The
-/// order in a subdomain is chunks at glued walls, tell, those at the border, publish, those inside, which
-/// hide the messages; in a later turn the inside comes before take, the border and publish.
+/// root, and glue of every subdomain follow, take of every one whose subdomain colour is not the first, and
+/// tell. The order in a subdomain is chunks at glued walls, tell, those at the border, publish, those inside,
+/// which hide the messages; in a later subdomain colour the inside comes before take, the border and publish.
 class Iteration {
  public:
   /// References are kept. `state.contacts` holds the narrow phase's contacts.
@@ -76,7 +76,7 @@ class Iteration {
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
-  /// Subdomain here that the node works on; none: the centre.
+  /// Subdomain here that the node works on; none: the root.
   std::optional<std::size_t> subdomain_of(std::uint32_t node) const;
   /// Brings all that the loop reads and writes of a subdomain here into the cache of the core that calls.
   void fetch(std::size_t subdomain) const;
@@ -186,7 +186,7 @@ class Iteration {
   ErrorSums total_;                          ///< of all subdomains, at the last check
   JumpSums jump_;                            ///< likewise
   std::vector<std::vector<double>> before_;  ///< Schwarz: per chunk at the interface, impulses before a sweep
-  Trail trail_;                              ///< empty with plain NLGS
+  AccelerationHistory acceleration_;         ///< empty with plain NLGS
   std::vector<double> changes_;              ///< NNCG: per chunk, what the last sweep changed [J]
   double change2_ = 0;                       ///< NNCG: of all, at the sweep before
   double conjugate_beta_ = 0;                ///< NNCG: of the next sweep
@@ -194,7 +194,7 @@ class Iteration {
   /// At the first check of the step, or the first since ADMM, or since momentum gave way [m^2/s^2].
   double first_residual2_ = 0;
   std::size_t history_from_ = 0;   ///< that check
-  std::size_t patience_from_ = 0;  ///< the check since which plain sweeps have their turn
+  std::size_t patience_from_ = 0;  ///< the check since which plain sweeps have their subdomain colour
   double sweeps_needed_ = -1;      ///< of plain NLGS, as ADMM sees the problem; < 0: not asked in this step
   /// The last answer to that, and the problem it was given for. It holds for later steps on the same
   /// candidates where the problem was far from stiff and is still much the same.

@@ -88,7 +88,7 @@ struct SolverSettings {
   InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps
 };
 
-/// Messages name them by 16 bits, of which one value is the centre (runtime/trace/trace.hpp).
+/// Messages name them by 16 bits, of which one value is the root (runtime/trace/trace.hpp).
 inline constexpr int most_subdomains = 65535;
 
 /// How subdomains act on one another.

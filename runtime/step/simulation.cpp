@@ -66,7 +66,7 @@ struct Simulation::Implementation {
     StepState state;
     state.decomposition = make_decomposition(setup.decomposition, ranks);
     state.bodies = std::move(bodies);
-    if (state.decomposition.several())  // until the first step deals them out; lanes go by subdomain
+    if (state.decomposition.several())  // until the first step deals them out; shares go by subdomain
       std::fill(state.decomposition.slot_begin.begin() + 1, state.decomposition.slot_begin.end(),
                 state.bodies.size());
     else
@@ -101,8 +101,8 @@ struct Simulation::Implementation {
     parameters.gravity = stage.gravity;
     parameters.law = stage.law;
     parameters.friction = stage.law.mu_grains > 0 || stage.law.mu_walls > 0;
-    parameters.turns = parameters.friction && setup.rotation;
-    state.free.w.resize(parameters.turns ? state.bodies.size() : 0);
+    parameters.rotates = parameters.friction && setup.rotation;
+    state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
     if (state.candidates_valid && !state.decomposition.several()) {
       // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt
       // out.

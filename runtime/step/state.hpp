@@ -22,10 +22,10 @@ struct StepParameters {
   Vec3 gravity = Vec3::Zero();
   ContactLaw law;
   bool friction =
-      false;           ///< any friction coefficient > 0: impulses have three components and grains may turn
-  bool turns = false;  ///< friction, and grains that rotate
-  double alert = 0;    ///< [m]
-  double skin = 0;     ///< [m]
+      false;             ///< any friction coefficient > 0: impulses have three components and grains may turn
+  bool rotates = false;  ///< friction, and grains that rotate
+  double alert = 0;      ///< [m]
+  double skin = 0;       ///< [m]
 };
 
 /// One wall during a step.

@@ -29,16 +29,16 @@ std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, const std::vector
 
 }  // namespace
 
-void StepGraph::predict_lane(std::uint32_t lane) {
+void StepGraph::predict_share(std::uint32_t share) {
   Bodies& bodies = state_.bodies;
-  const SlotRange range = slots(lane);
+  const SlotRange range = slots(share);
   const double h = parameters_.time_step;
   predict(range, bodies.x, bodies.velocity, h);
   free_velocities(range, bodies.velocity, h, parameters_.gravity, state_.free);
-  if (!bodies.orientation.empty()) turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
-  left_[lane].clear();
+  if (!bodies.orientation.empty()) rotate(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
+  left_[share].clear();
   if (state_.candidates_valid)
-    find_leavers(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[lane]);
+    find_skin_escapes(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[share]);
 }
 
 /// How near a grain can come to a wall for what the grain's own margin does not count: the wall's way, and
@@ -59,7 +59,7 @@ bool StepGraph::walls_left_margin() const {
 }
 
 bool StepGraph::needs_broad_phase() {
-  const bool left = std::any_of(left_.begin(), left_.end(), [](const auto& lane) { return !lane.empty(); });
+  const bool left = std::any_of(left_.begin(), left_.end(), [](const auto& share) { return !share.empty(); });
   double needed[2] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ? 1.0 : 0.0,
                       left ? 1.0 : 0.0};
   ranks_.max(needed);
@@ -70,25 +70,25 @@ bool StepGraph::needs_broad_phase() {
 /// same for any ranks, since the grains and their candidates are put together from all of them.
 bool StepGraph::candidates_hold() const {
   constexpr std::size_t few = 32;  // comparing them costs little beside a broad phase
-  std::vector<Leaver> leavers;
-  for (const auto& lane : left_) leavers.insert(leavers.end(), lane.begin(), lane.end());
-  leavers = ranks_.gather_records(std::span<const Leaver>(leavers));
-  std::sort(leavers.begin(), leavers.end());  // copies side by side, whichever rank comes first
-  leavers.erase(std::unique(leavers.begin(), leavers.end(),
-                            [](const Leaver& a, const Leaver& b) { return a.id == b.id; }),
-                leavers.end());
-  if (leavers.size() > few) return false;
-  for (const Leaver& leaver : leavers) {
-    if (!std::isfinite(leaver.need + leaver.x[0] + leaver.x[1] + leaver.x[2])) return false;  // a runaway
+  std::vector<Escape> skin_escapes;
+  for (const auto& share : left_) skin_escapes.insert(skin_escapes.end(), share.begin(), share.end());
+  skin_escapes = ranks_.gather_records(std::span<const Escape>(skin_escapes));
+  std::sort(skin_escapes.begin(), skin_escapes.end());  // copies side by side, whichever rank comes first
+  skin_escapes.erase(std::unique(skin_escapes.begin(), skin_escapes.end(),
+                                 [](const Escape& a, const Escape& b) { return a.id == b.id; }),
+                     skin_escapes.end());
+  if (skin_escapes.size() > few) return false;
+  for (const Escape& escape : skin_escapes) {
+    if (!std::isfinite(escape.need + escape.x[0] + escape.x[1] + escape.x[2])) return false;  // a runaway
     // It may have passed a grain that it is beyond by now, and that only a candidate would tell of.
-    const double speed = std::hypot(leaver.u[0], leaver.u[1], leaver.u[2]);
-    if (parameters_.time_step * speed > 0.5 * leaver.radius) return false;
+    const double speed = std::hypot(escape.u[0], escape.u[1], escape.u[2]);
+    if (parameters_.time_step * speed > 0.5 * escape.radius) return false;
   }
   std::vector<Encounter> needed, known;
-  compare_leavers(leavers, state_.bodies, state_.candidates,
-                  {state_.x_then, state_.reach_then, parameters_.time_step, parameters_.alert,
-                   parameters_.gravity, state_.walls},
-                  needed, known);
+  compare_skin_escapes(skin_escapes, state_.bodies, state_.candidates,
+                       {state_.x_then, state_.reach_then, parameters_.time_step, parameters_.alert,
+                        parameters_.gravity, state_.walls},
+                       needed, known);
   return all_known(ranks_.gather_records(std::span<const Encounter>(needed)),
                    ranks_.gather_records(std::span<const Encounter>(known)));
 }
@@ -146,11 +146,11 @@ void StepGraph::make_cells() {
   cells_ = build_cells(state_.x_then, state_.reach_then);
 }
 
-void StepGraph::find_lane_pairs(std::uint32_t lane) {
+void StepGraph::find_pairs_of_share(std::uint32_t share) {
   if (!sums_.broad_phase) return;
-  pairs_[lane].clear();
-  const SlotRange range = share(cells_.cells.size(), lane);
-  find_pairs(cells_, range.begin, range.end, pairs_[lane]);
+  pairs_[share].clear();
+  const SlotRange range = range_of_share(cells_.cells.size(), share);
+  find_pairs(cells_, range.begin, range.end, pairs_[share]);
 }
 
 void StepGraph::make_chunks() {
@@ -203,15 +203,15 @@ void StepGraph::renew_slots() {
       state_.reach_then.push_back(around_.reach[static_cast<std::size_t>(body)]);
   around_ = {};
   state_.free.u.resize(bodies.size());
-  state_.free.w.resize(parameters_.turns ? bodies.size() : 0);
+  state_.free.w.resize(parameters_.rotates ? bodies.size() : 0);
   free_velocities({0, bodies.size()}, bodies.velocity, h, parameters_.gravity, state_.free);
 }
 
-void StepGraph::narrow_lane(std::uint32_t lane) {
+void StepGraph::narrow_share(std::uint32_t share) {
   const Bodies& bodies = state_.bodies;
   if (!settings_.warm_start) {
     const auto components = static_cast<std::size_t>(state_.candidates.components);
-    const SlotRange own = share(state_.chunks.size(), lane);
+    const SlotRange own = range_of_share(state_.chunks.size(), share);
     std::fill(state_.candidates.impulse.begin() +
                   static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.begin],
               state_.candidates.impulse.begin() +
@@ -227,7 +227,7 @@ void StepGraph::narrow_lane(std::uint32_t lane) {
                        parameters_.law.restitution,
                        parameters_.gravity,
                        settings_.overlap_correction};
-  const SlotRange range = share(state_.chunks.size(), lane);
+  const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c)
     narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels(), state_.contacts);
 }

@@ -14,8 +14,8 @@ namespace talus {
 namespace {
 
 /// Where nothing is told, chunks at glued walls are of the border.
-graph::ChunkTurn::Side side_of(ChunkSide side, bool tells) {
-  using enum graph::ChunkTurn::Side;
+graph::ChunkOrder::Side side_of(ChunkSide side, bool tells) {
+  using enum graph::ChunkOrder::Side;
   switch (side) {
     case ChunkSide::wall:
       return tells ? early : border;
@@ -45,8 +45,9 @@ void StepGraph::plan_iteration() {
 }
 
 /// Chunks as they conflict; and, where copies are glued, tell[e] behind the chunks of e at glued walls,
-/// publish[e] behind those at its border, too, the centre and, where the tree has one, collect behind tells,
-/// glue[e] last; of those e whose turn is not the first take[e] before the border (iteration.hpp).
+/// publish[e] behind those at its border, too, the root and, where the tree has one, collect behind tells,
+/// glue[e] last; of those e whose subdomain colour is not the first take[e] before the border
+/// (iteration.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
   const Gluing& gluing = iteration_.gluing();
@@ -55,10 +56,11 @@ void StepGraph::plan_epochs() {
                     nodes = count +
                             (gluing.needed() ? 2 * here + of_rank + followers + gluing.tellers().size() : 0);
   const auto publish = [&](std::size_t e) { return static_cast<std::uint32_t>(count + e); };
-  const auto centre = static_cast<std::uint32_t>(count + here + of_rank - 1);
+  const auto root = static_cast<std::uint32_t>(count + here + of_rank - 1);
   const auto glue = [&](std::size_t e) { return static_cast<std::uint32_t>(count + here + of_rank + e); };
-  std::vector<char> turn;
-  for (std::size_t e = 0; e < here; ++e) turn.push_back(static_cast<char>(gluing.turn(e)));
+  std::vector<char> subdomain_colour;
+  for (std::size_t e = 0; e < here; ++e)
+    subdomain_colour.push_back(static_cast<char>(gluing.subdomain_colour(e)));
   std::vector<std::uint32_t> take(here, 0), tell(here, 0);
   std::vector<char> tells(here, 0);
   auto next = static_cast<std::uint32_t>(count + 2 * here + of_rank);
@@ -76,14 +78,14 @@ void StepGraph::plan_epochs() {
   // The tree of ranks has its part among chunks, so that the way there and the way back are both hidden. It
   // touches what walls' chunks have written and glue will read: before or behind others the bits are the
   // same.
-  std::vector<graph::ChunkTurn> turns;
+  std::vector<graph::ChunkOrder> subdomain_colours;
   for (std::size_t c = 0; c < count; ++c)
-    turns.push_back({side_of(chunks.side[c], tells[static_cast<std::size_t>(chunks.subdomain[c])] != 0),
-                     static_cast<std::uint32_t>(chunks.subdomain[c]),
-                     static_cast<std::uint32_t>(chunks.colour[c])});
+    subdomain_colours.push_back(
+        {side_of(chunks.side[c], tells[static_cast<std::size_t>(chunks.subdomain[c])] != 0),
+         static_cast<std::uint32_t>(chunks.subdomain[c]), static_cast<std::uint32_t>(chunks.colour[c])});
   const graph::LoopColours colours =
-      graph::loop_colours(turns, turn, tells, state_.decomposition.in_turns(), decomposition_.overlap,
-                          executor_.threads(), ranks_.rank(), gluing.tree());
+      graph::loop_colours(subdomain_colours, subdomain_colour, tells, state_.decomposition.in_colours(),
+                          decomposition_.overlap, executor_.threads(), ranks_.rank(), gluing.tree());
   std::copy(colours.chunk.begin(), colours.chunk.end(), colour.begin());
   for (std::size_t c = 0; c < count; ++c) {
     const auto e = static_cast<std::size_t>(chunks.subdomain[c]);
@@ -93,7 +95,7 @@ void StepGraph::plan_epochs() {
     if (at_interface) {
       neighbour.push_back(publish(e));
       neighbour.push_back(glue(e));
-      if (turn[e] > 0) neighbour.push_back(take[e]);
+      if (subdomain_colour[e] > 0) neighbour.push_back(take[e]);
       boundary[e].push_back(static_cast<std::uint32_t>(c));
       if (tells[e] != 0 && chunks.side[c] == ChunkSide::wall) {
         neighbour.push_back(tell[e]);
@@ -102,24 +104,24 @@ void StepGraph::plan_epochs() {
     }
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
   }
-  const auto to_centre = [&] {
-    for (auto task = static_cast<std::uint32_t>(count + here); task <= centre; ++task)
+  const auto to_root = [&] {
+    for (auto task = static_cast<std::uint32_t>(count + here); task <= root; ++task)
       neighbour.push_back(task);
   };
   const auto from_subdomains = [&] {
     for (std::size_t e = 0; e < here; ++e)
       if (tells[e] != 0)
         neighbour.push_back(tell[e]);
-      else if (turn[e] == 0)
+      else if (subdomain_colour[e] == 0)
         neighbour.push_back(publish(e));
   };
   if (gluing.needed()) {
     for (std::size_t e = 0; e < here; ++e) {
       colour[publish(e)] = colours.publish[e];
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
-      if (tells[e] == 0 && turn[e] == 0) to_centre();
+      if (tells[e] == 0 && subdomain_colour[e] == 0) to_root();
       neighbour.push_back(glue(e));
-      if (turn[e] > 0) neighbour.push_back(take[e]);
+      if (subdomain_colour[e] > 0) neighbour.push_back(take[e]);
       for (std::uint32_t reader : gluing.readers_here(e)) neighbour.push_back(reading(reader, e));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
@@ -128,16 +130,16 @@ void StepGraph::plan_epochs() {
       from_subdomains();
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
-    colour[centre] = colours.tree.down;
+    colour[root] = colours.tree.down;
     from_subdomains();
     for (std::size_t e = 0; e < here; ++e) neighbour.push_back(glue(e));
     offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     for (std::size_t e = 0; e < here; ++e) {
       colour[glue(e)] = colours.glue;
       neighbour.insert(neighbour.end(), boundary[e].begin(), boundary[e].end());
-      neighbour.push_back(centre);
+      neighbour.push_back(root);
       neighbour.push_back(publish(e));
-      if (turn[e] > 0) neighbour.push_back(take[e]);
+      if (subdomain_colour[e] > 0) neighbour.push_back(take[e]);
       if (tells[e] != 0) neighbour.push_back(tell[e]);
       for (std::uint32_t writer : gluing.readers_here(e))
         if (!gluing.reads_early(e, writer)) neighbour.push_back(publish(writer));
@@ -155,7 +157,7 @@ void StepGraph::plan_epochs() {
     for (const std::uint32_t e : gluing.tellers()) {
       colour[tell[e]] = colours.tell[e];
       neighbour.insert(neighbour.end(), at_walls[e].begin(), at_walls[e].end());
-      to_centre();
+      to_root();
       neighbour.push_back(glue(e));
       offset.push_back(static_cast<std::uint32_t>(neighbour.size()));
     }
@@ -182,7 +184,7 @@ void StepGraph::plan_epochs() {
     if (!gluing.needed() || (ranks_.ranks() > 1 && !ranks_.any_thread())) continue;
     const auto e = static_cast<std::size_t>(chunks.subdomain[order[k]]);
     owner[publish(e)] = owner[glue(e)] = owner_in_order[k];
-    if (turn[e] > 0) owner[take[e]] = owner_in_order[k];
+    if (subdomain_colour[e] > 0) owner[take[e]] = owner_in_order[k];
     if (tells[e] != 0) owner[tell[e]] = owner_in_order[k];
   }
   epochs_.build({colour, offset, neighbour}, owner, executor_.threads());

@@ -12,7 +12,7 @@ namespace talus {
 
 namespace {
 
-/// Enough lanes for any node to share, few enough that a task stays coarse.
+/// Enough shares for any node to share, few enough that a task stays coarse.
 std::uint32_t lanes_for(std::size_t bodies) {
   return static_cast<std::uint32_t>(std::clamp<std::size_t>(bodies / 512, 1, 64));
 }
@@ -28,47 +28,47 @@ StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const S
       decomposition_(decomposition),
       executor_(executor),
       ranks_(ranks),
-      lanes_per_subdomain_(lanes_for(
+      shares_per_subdomain_(lanes_for(
           static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
-      lanes_(lanes_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
+      shares_(shares_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
       iteration_(state, parameters, settings, decomposition, ranks),
-      left_(lanes_),
-      pairs_(lanes_),
-      motion_(lanes_) {
+      left_(shares_),
+      pairs_(shares_),
+      motion_(shares_) {
   build();
 }
 
 void StepGraph::build() {
   using graph::read;
   using graph::write;
-  const auto bodies = graph_.data("bodies", lanes_);
+  const auto bodies = graph_.data("bodies", shares_);
   const auto cells = graph_.data("cells");
-  const auto pairs = graph_.data("pairs", lanes_);
+  const auto pairs = graph_.data("pairs", shares_);
   const auto chunks = graph_.data("chunks");
-  const auto contacts = graph_.data("contacts", lanes_);
+  const auto contacts = graph_.data("contacts", shares_);
   const auto loop = graph_.data("loop");
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("predict[{}]", lane), {write(bodies[lane])},
-                [this, lane] { predict_lane(lane); });
+  for (std::uint32_t share = 0; share < shares_; ++share)
+    graph_.task(fmt::format("predict[{}]", share), {write(bodies[share])},
+                [this, share] { predict_share(share); });
   graph_.task("cells", {read(bodies), write(cells)}, [this] { make_cells(); });
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("pairs[{}]", lane), {read(cells), write(pairs[lane])},
-                [this, lane] { find_lane_pairs(lane); });
+  for (std::uint32_t share = 0; share < shares_; ++share)
+    graph_.task(fmt::format("pairs[{}]", share), {read(cells), write(pairs[share])},
+                [this, share] { find_pairs_of_share(share); });
   graph_.task("chunks", {read(cells), read(pairs), write(chunks)}, [this] { make_chunks(); });
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("narrow[{}]", lane), {read(chunks), read(bodies), write(contacts[lane])},
-                [this, lane] { narrow_lane(lane); });
+  for (std::uint32_t share = 0; share < shares_; ++share)
+    graph_.task(fmt::format("narrow[{}]", share), {read(chunks), read(bodies), write(contacts[share])},
+                [this, share] { narrow_share(share); });
   graph_.task("plan", {read(contacts), write(loop)}, [this] { plan_iteration(); });
   graph_.team("iterate", {write(loop), write(bodies), write(contacts)},
               [this](graph::Worker& worker) { iterate(worker); });
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("finish[{}]", lane), {read(loop), write(bodies[lane])},
-                [this, lane] { finish_lane(lane); });
+  for (std::uint32_t share = 0; share < shares_; ++share)
+    graph_.task(fmt::format("finish[{}]", share), {read(loop), write(bodies[share])},
+                [this, share] { finish_share(share); });
   const auto walls = graph_.data("walls");
   graph_.task("walls", {read(loop), write(walls)}, [this] { finish_walls(); });
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane)
-    graph_.task(fmt::format("measure[{}]", lane), {read(bodies), read(walls), write(contacts[lane])},
-                [this, lane] { measure_lane(lane); });
+  for (std::uint32_t share = 0; share < shares_; ++share)
+    graph_.task(fmt::format("measure[{}]", share), {read(bodies), read(walls), write(contacts[share])},
+                [this, share] { measure_share(share); });
   graph_.task("sum", {read(bodies), read(contacts)}, [this] { sum_up(); });
   if (executor_.trace()) executor_.trace()->declare(declared_tasks());
   if (executor_.times()) executor_.times()->check(declared_tasks());

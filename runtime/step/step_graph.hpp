@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "kernels/detection/leavers.hpp"
+#include "kernels/detection/skin_escape.hpp"
 #include "runtime/graph/epoch_loop.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/graph/graph.hpp"
@@ -37,11 +37,11 @@ struct StepSums {
 
 /// The task graph of a time step, built once and run every step:
 ///
-///   predict[lane] -> cells -> pairs[lane] -> chunks -> narrow[lane] -> plan -> iterate (team) ->
-///   finish[lane], walls -> measure[lane] -> sum
+///   predict[share] -> cells -> pairs[share] -> chunks -> narrow[share] -> plan -> iterate (team) ->
+///   finish[share], walls -> measure[share] -> sum
 ///
-/// A lane is a fixed share of the bodies of a subdomain, or of this rank's cells or chunks; the number of
-/// lanes of a subdomain depends on the number of all bodies and subdomains only, so that sums are the same
+/// A share is a fixed share of the bodies of a subdomain, or of this rank's cells or chunks; the number of
+/// shares of a subdomain depends on the number of all bodies and subdomains only, so that sums are the same
 /// for any number of threads and ranks. cells, pairs and chunks return at once while every grain and wall is
 /// within its margin of the last broad phase, or the few that are not meet none but their candidates;
 /// otherwise, with several subdomains, cells collects the bodies around them and chunks deals them out anew.
@@ -64,31 +64,31 @@ class StepGraph {
   const StepSums& sums() const { return sums_; }
   const Iteration& iteration() const { return iteration_; }
   const graph::Graph& graph() const { return graph_; }
-  std::uint32_t lanes() const { return lanes_; }
+  std::uint32_t shares() const { return shares_; }
 
  private:
   void build();
-  void predict_lane(std::uint32_t lane);
+  void predict_share(std::uint32_t share);
   bool partition_due() const;
   bool needs_broad_phase();
   bool candidates_hold() const;
   void make_cells();
-  void find_lane_pairs(std::uint32_t lane);
+  void find_pairs_of_share(std::uint32_t share);
   void make_chunks();
   void renew_slots();
-  void narrow_lane(std::uint32_t lane);
+  void narrow_share(std::uint32_t share);
   void plan_iteration();
   void plan_epochs();
   void iterate(graph::Worker& worker);
   std::vector<trace::Task> declared_tasks() const;
   void note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner);
   trace::Plan describe_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) const;
-  void finish_lane(std::uint32_t lane);
+  void finish_share(std::uint32_t share);
   void finish_walls();
-  void measure_lane(std::uint32_t lane);
+  void measure_share(std::uint32_t share);
   void sum_up();
-  SlotRange share(std::size_t count, std::uint32_t lane) const;
-  SlotRange slots(std::uint32_t lane) const;
+  SlotRange range_of_share(std::size_t count, std::uint32_t share) const;
+  SlotRange slots(std::uint32_t share) const;
   double margin_of(const Wall& wall) const;
   bool walls_left_margin() const;
   bool out_of_balance() const;
@@ -101,8 +101,8 @@ class StepGraph {
   const DecompositionSettings& decomposition_;
   graph::Executor& executor_;
   const graph::Communicator& ranks_;
-  std::uint32_t lanes_per_subdomain_;
-  std::uint32_t lanes_;
+  std::uint32_t shares_per_subdomain_;
+  std::uint32_t shares_;
   graph::Graph graph_;
   Iteration iteration_;
   graph::EpochGraph epochs_;
@@ -116,7 +116,7 @@ class StepGraph {
   double imbalance_then_ = 0;                 ///< the least since it was made
   CellGrid cells_;
   std::vector<double> wall_margin_;        ///< at the last broad phase [m]
-  std::vector<std::vector<Leaver>> left_;  ///< per lane: grains that have used up their margins
+  std::vector<std::vector<Escape>> left_;  ///< per share: grains that have used up their margins
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
   std::vector<ContactSums> contact_sums_;  ///< per chunk

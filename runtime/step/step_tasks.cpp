@@ -9,17 +9,17 @@
 
 namespace talus {
 
-SlotRange StepGraph::share(std::size_t count, std::uint32_t lane) const {
-  return {count * lane / lanes_, count * (lane + 1) / lanes_};
+SlotRange StepGraph::range_of_share(std::size_t count, std::uint32_t share) const {
+  return {count * share / shares_, count * (share + 1) / shares_};
 }
 
-/// Slots of a lane: a share of one subdomain.
-SlotRange StepGraph::slots(std::uint32_t lane) const {
-  const std::size_t e = lane / lanes_per_subdomain_, part = lane % lanes_per_subdomain_;
+/// Slots of a share: a share of one subdomain.
+SlotRange StepGraph::slots(std::uint32_t share) const {
+  const std::size_t e = share / shares_per_subdomain_, part = share % shares_per_subdomain_;
   const Decomposition& all = state_.decomposition;
   const std::size_t begin = all.several() ? all.slot_begin[e] : 0;
   const std::size_t count = all.several() ? all.slot_begin[e + 1] - begin : state_.bodies.size();
-  return {begin + count * part / lanes_per_subdomain_, begin + count * (part + 1) / lanes_per_subdomain_};
+  return {begin + count * part / shares_per_subdomain_, begin + count * (part + 1) / shares_per_subdomain_};
 }
 
 bool StepGraph::partition_due() const {
@@ -84,16 +84,16 @@ std::vector<double> StepGraph::costs(std::span<const double> work) const {
   return cost;
 }
 
-void StepGraph::finish_lane(std::uint32_t lane) {
+void StepGraph::finish_share(std::uint32_t share) {
   Bodies& bodies = state_.bodies;
-  const SlotRange range = slots(lane);
+  const SlotRange range = slots(share);
   const Decomposition& all = state_.decomposition;
   const bool uneven = decomposition_.coupling != Coupling::nscdd;
-  motion_[lane] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
-                         uneven ? Multiplicities(all.multiplicity) : Multiplicities(),
-                         uneven ? Multiplicities(all.parts) : Multiplicities());
+  motion_[share] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
+                          uneven ? Multiplicities(all.multiplicity) : Multiplicities(),
+                          uneven ? Multiplicities(all.parts) : Multiplicities());
   if (!bodies.orientation.empty())
-    turn(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
+    rotate(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
 }
 
 void StepGraph::finish_walls() {
@@ -118,8 +118,8 @@ void StepGraph::finish_walls() {
   contact_sums_.resize(state_.chunks.size());
 }
 
-void StepGraph::measure_lane(std::uint32_t lane) {
-  const SlotRange range = share(state_.chunks.size(), lane);
+void StepGraph::measure_share(std::uint32_t share) {
+  const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
     contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c, state_.bodies.x,
@@ -177,7 +177,8 @@ void StepGraph::sum_up() {
   const Decomposition& all = state_.decomposition;
   std::vector<MotionSums> motion(all.here.size());
   std::vector<ContactSums> contacts(all.here.size());
-  for (std::uint32_t lane = 0; lane < lanes_; ++lane) motion[lane / lanes_per_subdomain_].add(motion_[lane]);
+  for (std::uint32_t share = 0; share < shares_; ++share)
+    motion[share / shares_per_subdomain_].add(motion_[share]);
   for (std::size_t c = 0; c < contact_sums_.size(); ++c)
     contacts[static_cast<std::size_t>(state_.chunks.subdomain[c])].add(contact_sums_[c]);
   std::vector<double> rows(all.here.size() * row_width);

@@ -36,11 +36,11 @@ std::vector<trace::Task> StepGraph::declared_tasks() const {
     task.name = graph_.name(id);
     task.team = graph_.is_team(id);
     task.kind = kind_of_task(task.name, task.team);
-    // Lanes are shares of the rank's cells and chunks, which stand by subdomain, or of one subdomain's
+    // Tracks are shares of the rank's cells and chunks, which stand by subdomain, or of one subdomain's
     // bodies.
     if (const std::size_t bracket = task.name.find('['); bracket != std::string::npos) {
-      const std::uint32_t lane = static_cast<std::uint32_t>(std::stoul(task.name.substr(bracket + 1)));
-      task.group = state_.decomposition.here[lane / lanes_per_subdomain_];
+      const std::uint32_t track = static_cast<std::uint32_t>(std::stoul(task.name.substr(bracket + 1)));
+      task.group = state_.decomposition.here[track / shares_per_subdomain_];
     }
     for (graph::TaskId before : graph_.predecessors(id))
       task.predecessors.push_back(static_cast<std::uint32_t>(before));
@@ -70,11 +70,11 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
     }
     using enum trace::Role;
     // In the order of Gluing::Task.
-    constexpr trace::Role roles[] = {publish, centre, centre, glue, take, tell};
+    constexpr trace::Role roles[] = {publish, root, root, glue, take, tell};
     const auto [task, e] = iteration_.gluing().node(node - count);
     plan.role.push_back(static_cast<std::uint8_t>(roles[static_cast<std::size_t>(task)]));
-    plan.group.push_back(e ? static_cast<std::uint32_t>(here[*e]) : trace::centre_group);
-    plan.place.push_back(e ? static_cast<std::uint32_t>(iteration_.gluing().turn(*e)) : 0);
+    plan.group.push_back(e ? static_cast<std::uint32_t>(here[*e]) : trace::root_group);
+    plan.place.push_back(e ? static_cast<std::uint32_t>(iteration_.gluing().subdomain_colour(*e)) : 0);
     plan.weight.push_back(0);
   }
   plan.messages = iteration_.gluing().message_plan();

@@ -15,7 +15,7 @@ std::vector<trace::KindInfo> task_kinds() {
       {"partition", Phase::partitioning, false, true}, {"accumulate", Phase::sweeps, false, false},
       {"measure", Phase::sweeps, false, false},        {"sweep", Phase::sweeps, false, false},
       {"restore", Phase::sweeps, false, false},        {"publish", Phase::exchange, false, false},
-      {"centre", Phase::exchange, false, false},       {"glue", Phase::sweeps, false, false},
+      {"root", Phase::exchange, false, false},         {"glue", Phase::sweeps, false, false},
       {"take", Phase::sweeps, false, false},           {"tell", Phase::exchange, false, false},
       {"whole", Phase::sweeps, false, false},          {"sums", Phase::sweeps, false, true}};
   kinds.insert(kinds.end(), std::begin(own), std::end(own));

@@ -24,7 +24,7 @@ enum class TaskKind : std::uint8_t {
   sweep,
   restore,
   publish,
-  centre,
+  root,
   glue,
   take,
   tell,

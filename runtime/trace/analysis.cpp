@@ -22,11 +22,11 @@ struct RankTime {
 
 void add_lane(const Timeline& timeline, std::size_t number, RankTime& rank, Summary& sum) {
   const Trace& trace = timeline.trace();
-  const Lane& lane = trace.lanes[number];
+  const Track& track = trace.tracks[number];
   const std::vector<float>& self = timeline.self()[number];
   const Record* around = nullptr;  // the task that a wait is in
-  for (std::size_t i = 0; i < lane.records.size(); ++i) {
-    const Record& record = lane.records[i];
+  for (std::size_t i = 0; i < track.records.size(); ++i) {
+    const Record& record = track.records[i];
     const KindInfo& info = trace.info(record.kind());
     const double own = static_cast<double>(self[i]);
     if (record.kind() == kind_send) ++sum.messages;
@@ -54,10 +54,10 @@ std::string path_name(const Timeline& timeline, const StepIndex& index, Place pl
   const Record& record = timeline.record(place);
   const Trace& trace = timeline.trace();
   const std::string& kind = trace.info(record.kind()).name;
-  const auto rank = static_cast<std::size_t>(trace.lanes[place.lane].rank);
+  const auto rank = static_cast<std::size_t>(trace.tracks[place.track].rank);
   if (record.epoch < 0 || record.kind() == kind_check) return kind;
   const std::uint32_t group = index.ranks[rank].plan->group[record.node];
-  return group == centre_group ? kind : fmt::format("{} of subdomain {}", kind, group);
+  return group == root_group ? kind : fmt::format("{} of subdomain {}", kind, group);
 }
 
 void add_paths(const Timeline& timeline, Summary& sum) {
@@ -76,8 +76,8 @@ void add_paths(const Timeline& timeline, Summary& sum) {
     const std::vector<PathHop> path = critical_path(timeline, index);
     for (const PathHop& hop : path) {
       if (behind) {
-        const bool other =
-            timeline.trace().lanes[hop.place.lane].rank != timeline.trace().lanes[behind->place.lane].rank;
+        const bool other = timeline.trace().tracks[hop.place.track].rank !=
+                           timeline.trace().tracks[behind->place.track].rank;
         add(other ? "messages under way" : "between tasks", behind->from - hop.until);
       }
       add(path_name(timeline, index, hop.place), hop.until - hop.from);
@@ -140,9 +140,9 @@ Summary analyse(const Timeline& timeline) {
   for (const KindInfo& info : trace.kinds) sum.names.push_back(info.name);
   double begin = INFINITY, end = -INFINITY;
   std::vector<RankTime> ranks(static_cast<std::size_t>(trace.ranks));
-  for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
-    add_lane(timeline, k, ranks[static_cast<std::size_t>(trace.lanes[k].rank)], sum);
-    for (const Record& record : trace.lanes[k].records) {
+  for (std::size_t k = 0; k < trace.tracks.size(); ++k) {
+    add_lane(timeline, k, ranks[static_cast<std::size_t>(trace.tracks[k].rank)], sum);
+    for (const Record& record : trace.tracks[k].records) {
       begin = std::min(begin, static_cast<double>(record.begin));
       end = std::max(end, record.end());
     }
@@ -154,7 +154,7 @@ Summary analyse(const Timeline& timeline) {
     sum.exposed += rank.exposed;
     most = std::max(most, rank.work);
   }
-  sum.idle = sum.makespan * static_cast<double>(trace.lanes.size()) - sum.work - sum.exposed;
+  sum.idle = sum.makespan * static_cast<double>(trace.tracks.size()) - sum.work - sum.exposed;
   sum.imbalance = sum.work > 0 ? most * trace.ranks / sum.work - 1 : 0;
   sum.efficiency = efficiencies(ranks, trace.threads, sum.makespan);
   add_paths(timeline, sum);

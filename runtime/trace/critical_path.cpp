@@ -38,7 +38,7 @@ class Walker {
 
   const Record& record(Place place) const { return timeline_.record(place); }
   std::size_t rank_of(Place place) const {
-    return static_cast<std::size_t>(timeline_.trace().lanes[place.lane].rank);
+    return static_cast<std::size_t>(timeline_.trace().tracks[place.track].rank);
   }
   void keep_later(Place& best, Place other, double limit) const {
     if (!other.exists() || record(other).end() > limit) return;
@@ -54,20 +54,20 @@ class Walker {
 
   /// The task before on the same thread.
   Place previous(Place place) const {
-    const Lane& lane = timeline_.trace().lanes[place.lane];
+    const Track& track = timeline_.trace().tracks[place.track];
     for (std::uint32_t i = place.record; i-- > 0;) {
-      const Record& other = lane.records[i];
+      const Record& other = track.records[i];
       const Kind kind = other.kind();
       if (other.step() != index_.step) return {};
       if (kind == kind_team || is_communication(kind)) continue;
       if (other.end() > static_cast<double>(record(place).begin)) continue;
-      if (other.epoch < 0 && kind != kind_outside && !is_task(place.lane, i)) continue;
-      return {place.lane, i};
+      if (other.epoch < 0 && kind != kind_outside && !is_task(place.track, i)) continue;
+      return {place.track, i};
     }
     return {};
   }
-  bool is_task(std::uint32_t lane, std::uint32_t i) const {
-    const Lane& of = timeline_.trace().lanes[lane];
+  bool is_task(std::uint32_t track, std::uint32_t i) const {
+    const Track& of = timeline_.trace().tracks[track];
     const auto& tasks = timeline_.trace().tasks[static_cast<std::size_t>(of.rank)];
     const Record& r = of.records[i];
     return r.node < tasks.size() && tasks[r.node].kind == r.kind();
@@ -76,15 +76,15 @@ class Walker {
   /// What a task went on with, or none: the last message that it waited for; of calls of all ranks the
   /// longest, since in the first the others are awaited, and what comes behind has them together.
   Place deciding_wait(Place place) const {
-    const Lane& lane = timeline_.trace().lanes[place.lane];
+    const Track& track = timeline_.trace().tracks[place.track];
     Place best;
-    for (std::uint32_t i = place.record + 1; i < lane.records.size(); ++i) {
-      const Record& inside = lane.records[i];
+    for (std::uint32_t i = place.record + 1; i < track.records.size(); ++i) {
+      const Record& inside = track.records[i];
       if (static_cast<double>(inside.begin) >= record(place).end()) break;
       if (static_cast<double>(inside.duration) <= no_wait) continue;
       if (inside.kind() == kind_receive ||
           (inside.kind() == kind_collective && (!best.exists() || inside.duration > record(best).duration)))
-        best = {place.lane, i};
+        best = {place.track, i};
     }
     return best;
   }
@@ -103,7 +103,7 @@ class Walker {
     if (const Place wait = deciding_wait(at); wait.exists()) {
       const bool message = record(wait).kind() == kind_receive;
       const Place cause = message ? sender_of(wait) : last_to_come(at);
-      if (cause.exists() && !(cause.lane == at.lane && cause.record == at.record)) {
+      if (cause.exists() && !(cause.track == at.track && cause.record == at.record)) {
         return {cause, message ? record(cause).end() : came(cause), record(wait).end()};
       }
     }
@@ -168,18 +168,17 @@ class Walker {
              std::find(rank.plan->group.begin(), rank.plan->group.end(), group) != rank.plan->group.end();
     };
     const StepIndex::Rank* speaks = nullptr;
-    for (std::size_t r = 0; r < index_.ranks.size() && from == centre_group; ++r)
+    for (std::size_t r = 0; r < index_.ranks.size() && from == root_group; ++r)
       if (tree_.parent[r] >= 0 && has(index_.ranks[r], to))
         speaks = &index_.ranks[static_cast<std::size_t>(tree_.parent[r])];
     for (const StepIndex::Rank& rank : index_.ranks) {
       if (!rank.plan || epoch >= rank.epochs) continue;
-      if (from == centre_group ? &rank != speaks : !has(rank, from)) continue;
+      if (from == root_group ? &rank != speaks : !has(rank, from)) continue;
       for (std::size_t n = 0; n < rank.nodes; ++n) {
         const Role role = static_cast<Role>(rank.plan->role[n]);
-        const bool sends = from == centre_group || (to == centre_group && role == Role::centre)
-                               ? role == Role::centre
-                           : to == centre_group ? tells(*rank.plan, n)
-                                                : role == Role::publish && rank.plan->group[n] == from;
+        const bool sends = from == root_group || (to == root_group && role == Role::root) ? role == Role::root
+                           : to == root_group ? tells(*rank.plan, n)
+                                              : role == Role::publish && rank.plan->group[n] == from;
         if (sends) keep_later(best, rank.at(epoch, n), received.end());
       }
     }

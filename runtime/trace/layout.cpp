@@ -47,14 +47,14 @@ class Builder {
     std::vector<std::uint32_t> chunks;  ///< recorded nodes
     std::uint32_t publish = none, glue = none, take = none, tell = none;
     std::uint32_t new_publish = none, new_glue = none, new_take = none, new_tell = none;
-    bool publish_tells() const { return turn == 0 && tell == none; }
+    bool publish_tells() const { return subdomain_colour == 0 && tell == none; }
     std::uint32_t teller() const { return publish_tells() ? new_publish : new_tell; }
-    std::uint32_t turn = 0;
+    std::uint32_t subdomain_colour = 0;
   };
 
   /// The node that takes a message.
   static std::uint32_t receiver(const Group& from, const Group& to) {
-    return from.turn < to.turn ? to.new_take : to.new_glue;
+    return from.subdomain_colour < to.subdomain_colour ? to.new_take : to.new_glue;
   }
 
   std::size_t place_of(std::uint32_t group) const {
@@ -67,7 +67,7 @@ class Builder {
   void grow_tree() {
     std::vector<graph::RankLoad> load(static_cast<std::size_t>(machine_.ranks));
     for (const Plan* plan : plans_) {
-      for (const Message& message : plan->messages) has_centre_ = has_centre_ || message.to == centre_group;
+      for (const Message& message : plan->messages) has_centre_ = has_centre_ || message.to == root_group;
       add_load(
           *plan, [&](std::uint32_t group) { return rank_of_[place_of(group)]; }, load);
     }
@@ -85,7 +85,7 @@ class Builder {
       const Plan& plan = *plans_[s];
       for (std::uint32_t n = 0; n < plan.size(); ++n) {
         const Role role = static_cast<Role>(plan.role[n]);
-        if (role == Role::centre) continue;
+        if (role == Role::root) continue;
         Group& group = group_[place_of(plan.group[n])];
         if (group.source >= 0 && group.source != static_cast<std::int32_t>(s))
           throw TraceError(fmt::format("subdomain {} is on two ranks at once", plan.group[n]));
@@ -95,8 +95,8 @@ class Builder {
         if (role == Role::glue) group.glue = n;
         if (role == Role::take) {
           group.take = n;
-          group.turn = plan.place[n];
-          in_turns_ = in_turns_ || group.turn > 0;
+          group.subdomain_colour = plan.place[n];
+          in_colours_ = in_colours_ || group.subdomain_colour > 0;
         }
         if (role == Role::tell) group.tell = n;
       }
@@ -104,15 +104,15 @@ class Builder {
     for (const Group& group : group_)
       for (std::uint32_t n : group.chunks)
         if (const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
-            group.glue != none && group.turn == 0 && plan.colour[group.glue] < plan.colour[n])
+            group.glue != none && group.subdomain_colour == 0 && plan.colour[group.glue] < plan.colour[n])
           overlap_ = false;
   }
 
-  graph::ChunkTurn::Side side_of(const Group& group, const SimNode& node) const {
+  graph::ChunkOrder::Side side_of(const Group& group, const SimNode& node) const {
     const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
-    using enum graph::ChunkTurn::Side;
+    using enum graph::ChunkOrder::Side;
     if (group.tell != none && node.colour < plan.colour[group.tell]) return early;
-    if (group.turn > 0) return plan.colour[group.take] < node.colour ? late : inside;
+    if (group.subdomain_colour > 0) return plan.colour[group.take] < node.colour ? late : inside;
     return group.publish == none || plan.colour[group.publish] < node.colour ? inside : border;
   }
 
@@ -126,25 +126,27 @@ class Builder {
   /// As the program would have them with these subdomains on one rank; `first`: the rank's first chunk, all
   /// of which get theirs.
   graph::LoopColours colours_of(std::uint32_t first, std::span<const std::size_t> mine) {
-    std::vector<graph::ChunkTurn> turns;
-    std::vector<char> turn_of, tells;
+    std::vector<graph::ChunkOrder> subdomain_colours;
+    std::vector<char> subdomain_colour_of, tells;
     for (std::size_t g : mine) {
-      turn_of.push_back(static_cast<char>(group_[g].turn));
+      subdomain_colour_of.push_back(static_cast<char>(group_[g].subdomain_colour));
       tells.push_back(group_[g].tell != none ? 1 : 0);
     }
     for (std::size_t n = first, at = 0; n < out_.nodes.size(); ++n) {
       const SimNode& node = out_.nodes[n];
       while (groups_[mine[at]] != node.group) ++at;
-      turns.push_back({side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
+      subdomain_colours.push_back(
+          {side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
     }
     graph::LoopColours colours =
-        graph::loop_colours(turns, turn_of, tells, in_turns_, overlap_, machine_.threads,
-                            static_cast<int>(out_.rank_begin.size()) - 1, out_.tree);
-    for (std::size_t k = 0; k < turns.size(); ++k) out_.nodes[first + k].colour = colours.chunk[k];
+        graph::loop_colours(subdomain_colours, subdomain_colour_of, tells, in_colours_, overlap_,
+                            machine_.threads, static_cast<int>(out_.rank_begin.size()) - 1, out_.tree);
+    for (std::size_t k = 0; k < subdomain_colours.size(); ++k)
+      out_.nodes[first + k].colour = colours.chunk[k];
     return colours;
   }
 
-  /// Nodes of a rank in the program's order: chunks, publishes, the centre, glues, takes, tells; and their
+  /// Nodes of a rank in the program's order: chunks, publishes, the root, glues, takes, tells; and their
   /// owners.
   void add_rank(std::uint32_t rank) {
     const auto first = static_cast<std::uint32_t>(out_.nodes.size());
@@ -197,16 +199,16 @@ class Builder {
       glued = true;
     }
     out_.tellers.push_back(tellers);
-    centre_.push_back(none);
+    root_.push_back(none);
     collect_.push_back(none);
     if (!glued) return;
     const auto add = [&](std::uint32_t colour) {
-      out_.nodes.push_back(centre_node(rank, colour));
+      out_.nodes.push_back(root_node(rank, colour));
       out_.nodes.back().worker = worker(0);
       return static_cast<std::uint32_t>(out_.nodes.size() - 1);
     };
     if (has_centre_ && out_.tree.relays(static_cast<int>(rank))) collect_.back() = add(colours.tree.up);
-    centre_.back() = add(colours.tree.down);
+    root_.back() = add(colours.tree.down);
     for (std::size_t g : mine) {
       if (group_[g].glue == none) continue;
       group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);
@@ -215,7 +217,7 @@ class Builder {
     }
     for (std::size_t at = 0; at < mine.size(); ++at) {
       Group& group = group_[mine[at]];
-      if (group.turn == 0) continue;
+      if (group.subdomain_colour == 0) continue;
       group.new_take = add_node(rank, group.source, group.take);
       out_.nodes.back().worker = owner_of(mine[at]);
       out_.nodes.back().colour = colours.take[at];
@@ -230,15 +232,15 @@ class Builder {
     }
   }
 
-  /// The top is the centre; the others hand on what goes up and down, and work no more than that.
-  SimNode centre_node(std::uint32_t rank, std::uint32_t colour) const {
+  /// The top is the root; the others hand on what goes up and down, and work no more than that.
+  SimNode root_node(std::uint32_t rank, std::uint32_t colour) const {
     const bool top = static_cast<int>(rank) == out_.tree.top();
     const std::size_t recorded = top || plans_.size() == 1 ? recorded_top_ : recorded_top_ == 0 ? 1 : 0;
-    SimNode node{-1, 0, Role::centre, centre_group, rank, 0, colour};
+    SimNode node{-1, 0, Role::root, root_group, rank, 0, colour};
     node.waits_only = !top && recorded == recorded_top_;
     const Plan& plan = *plans_[recorded];
     for (std::uint32_t n = 0; n < plan.size(); ++n)
-      if (static_cast<Role>(plan.role[n]) == Role::centre) {
+      if (static_cast<Role>(plan.role[n]) == Role::root) {
         node.source_rank = static_cast<std::int32_t>(recorded);
         node.source_node = n;
       }
@@ -250,7 +252,7 @@ class Builder {
     for (std::size_t s = 0; s < plans_.size(); ++s) place[s].resize(plans_[s]->size(), none);
     for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
       const SimNode& node = out_.nodes[n];
-      if (node.role != Role::centre) place[static_cast<std::size_t>(node.source_rank)][node.source_node] = n;
+      if (node.role != Role::root) place[static_cast<std::size_t>(node.source_rank)][node.source_node] = n;
     }
     std::vector<std::vector<std::uint32_t>> extra(out_.nodes.size());
     const auto join = [&](std::uint32_t a, std::uint32_t b) {
@@ -260,21 +262,21 @@ class Builder {
     for (const Group& group : group_) {
       if (group.new_publish == none) continue;
       join(group.new_publish, group.new_glue);
-      if (group.turn > 0) {
+      if (group.subdomain_colour > 0) {
         join(group.new_publish, group.new_take);
         join(group.new_glue, group.new_take);
       }
       if (group.new_tell != none) join(group.new_glue, group.new_tell);
-      const std::uint32_t centre = centre_[out_.nodes[group.new_publish].rank];
-      join(group.new_glue, centre);
+      const std::uint32_t root = root_[out_.nodes[group.new_publish].rank];
+      join(group.new_glue, root);
       if (group.teller() == none) continue;
-      join(group.teller(), centre);
+      join(group.teller(), root);
       const std::uint32_t collect = collect_[out_.nodes[group.new_publish].rank];
       if (collect != none) join(group.teller(), collect);
     }
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {
-        if (m.from == centre_group || m.to == centre_group) continue;
+        if (m.from == root_group || m.to == root_group) continue;
         const Group &from = group_[place_of(m.from)], &to = group_[place_of(m.to)];
         if (from.new_publish == none || to.new_glue == none)
           throw TraceError("a message between subdomains without gluing");
@@ -284,7 +286,7 @@ class Builder {
     out_.offset.push_back(0);
     for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
       const SimNode& node = out_.nodes[n];
-      if (node.role != Role::centre) {
+      if (node.role != Role::root) {
         const auto source = static_cast<std::size_t>(node.source_rank);
         for (std::uint32_t other : plans_[source]->neighbours(node.source_node)) {
           const std::uint32_t there = place[source][other];
@@ -317,9 +319,9 @@ class Builder {
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {
         const std::uint32_t bytes = scaled_bytes(m.bytes, faces_);
-        if (m.to == centre_group) {
+        if (m.to == root_group) {
           up[rank_of_[place_of(m.from)]] += bytes;
-        } else if (m.from == centre_group) {
+        } else if (m.from == root_group) {
           down[rank_of_[place_of(m.to)]] += bytes;
         } else {
           const Group &sender = group_[place_of(m.from)], &taker = group_[place_of(m.to)];
@@ -334,30 +336,30 @@ class Builder {
           ++out_.incoming[to];
         }
       }
-    out_.to_centre.resize(ranks);
+    out_.to_root.resize(ranks);
     // A message of the tree holds those of the whole branch.
     for (std::size_t k = ranks; k-- > 1;) {
       const auto r = static_cast<std::size_t>(out_.tree.order[k]),
                  parent = static_cast<std::size_t>(out_.tree.parent[r]);
       up[parent] += up[r];
       down[parent] += down[r];
-      if (up[r] == 0 || centre_[r] == none || centre_[parent] == none) continue;
+      if (up[r] == 0 || root_[r] == none || root_[parent] == none) continue;
       const auto first =
           static_cast<std::uint32_t>(std::find(rank_of_.begin(), rank_of_.end(), r) - rank_of_.begin());
       const auto named = [](std::uint64_t bytes) {
         return static_cast<std::uint32_t>(std::min<std::uint64_t>(bytes, none));
       };
-      const SimMessage message{collect_[r] == none ? centre_[r] : collect_[r],
-                               collect_[parent] == none ? centre_[parent] : collect_[parent], named(up[r]),
-                               message_name(groups_[first], centre_group)};
+      const SimMessage message{collect_[r] == none ? root_[r] : collect_[r],
+                               collect_[parent] == none ? root_[parent] : collect_[parent], named(up[r]),
+                               message_name(groups_[first], root_group)};
       if (collect_[r] == none)
-        out_.to_centre[r] = message;
+        out_.to_root[r] = message;
       else
         sends[collect_[r]].push_back(message);
       ++out_.incoming[message.to];
-      sends[centre_[parent]].push_back(
-          {centre_[parent], centre_[r], named(down[r]), message_name(centre_group, groups_[first])});
-      ++out_.incoming[centre_[r]];
+      sends[root_[parent]].push_back(
+          {root_[parent], root_[r], named(down[r]), message_name(root_group, groups_[first])});
+      ++out_.incoming[root_[r]];
     }
     for (const auto& of_node : sends) {
       out_.send_begin.push_back(static_cast<std::uint32_t>(out_.sends.size()));
@@ -401,7 +403,7 @@ class Builder {
     }
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {
-        const std::uint16_t group = m.from == centre_group ? m.to : m.from;
+        const std::uint16_t group = m.from == root_group ? m.to : m.from;
         out_.plans[rank_of_[place_of(group)]].messages.push_back(
             {m.from, m.to, scaled_bytes(m.bytes, faces_)});
       }
@@ -413,11 +415,11 @@ class Builder {
   const Machine& machine_;
   const double faces_;
   std::vector<Group> group_;            ///< like groups_
-  bool in_turns_ = false;               ///< some group has a later turn than the first
+  bool in_colours_ = false;             ///< some group has a later subdomain colour than the first
   bool overlap_ = true;                 ///< glue comes behind the chunks inside
   bool has_centre_ = false;             ///< something goes through it
-  std::size_t recorded_top_ = 0;        ///< the rank that was the centre
-  std::vector<std::uint32_t> centre_;   ///< per rank
+  std::size_t recorded_top_ = 0;        ///< the rank that was the root
+  std::vector<std::uint32_t> root_;     ///< per rank
   std::vector<std::uint32_t> collect_;  ///< per rank; none unless it is between the top and the leaves
   LoopLayout out_;
 };
@@ -428,7 +430,7 @@ std::vector<std::uint32_t> groups_of(const Trace& trace) {
   std::set<std::uint32_t> groups;
   for (const Plan& plan : trace.plans)
     for (std::uint32_t group : plan.group)
-      if (group != centre_group) groups.insert(group);
+      if (group != root_group) groups.insert(group);
   for (const auto& tasks : trace.tasks)
     for (const Task& task : tasks)
       if (task.group >= 0) groups.insert(static_cast<std::uint32_t>(task.group));
@@ -472,7 +474,7 @@ std::vector<std::vector<SimTask>> lay_out_tasks(const Trace& trace, const std::v
       if (rank_of[g] == r) mine.insert(static_cast<std::int32_t>(groups[g]));
     std::vector<SimTask>& tasks = all[r];
     std::map<std::pair<std::size_t, std::uint32_t>, std::uint32_t> place;  // recorded (rank, task) -> task
-    // All recorded ranks have the same kinds in the same order, each with its own subdomains' lanes.
+    // All recorded ranks have the same kinds in the same order, each with its own subdomains' tracks.
     std::vector<std::size_t> next(trace.tasks.size(), 0);
     while (next[0] < trace.tasks[0].size()) {
       const Kind kind = trace.tasks[0][next[0]].kind;

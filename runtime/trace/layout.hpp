@@ -19,11 +19,11 @@ struct SimNode {
   std::uint32_t rank = 0;
   std::uint32_t worker = 0;  ///< rank x threads + thread
   std::uint32_t colour = 0;
-  bool tells = false;       ///< the part of its group for the centre leaves with it
+  bool tells = false;       ///< the part of its group for the root leaves with it
   bool waits_only = false;  ///< takes messages, and does none of the recorded work
 };
 
-/// A message of each exchange, from the node `from` to the glue, take or centre `to`.
+/// A message of each exchange, from the node `from` to the glue, take or root `to`.
 struct SimMessage {
   std::uint32_t from = 0, to = 0;
   std::uint32_t bytes = 0;
@@ -39,7 +39,7 @@ struct LoopLayout {
   std::vector<std::uint32_t> walk_begin, walk;   ///< per worker: its nodes by (colour, index)
   std::vector<std::uint32_t> send_begin;         ///< n + 1, into sends
   std::vector<SimMessage> sends;                 ///< of publishes and centres
-  std::vector<SimMessage> to_centre;             ///< per rank: sent by the last of a leaf that tells
+  std::vector<SimMessage> to_root;               ///< per rank: sent by the last of a leaf that tells
   std::vector<std::uint32_t> tellers;            ///< per rank: nodes that tell
   std::vector<std::uint32_t> handed;    ///< n: bytes that a node newly shares with other threads of its rank
   std::vector<std::uint32_t> incoming;  ///< n: messages that a node takes per exchange

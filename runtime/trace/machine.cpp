@@ -53,7 +53,7 @@ RankMap recorded_map(const Trace& trace) {
   for (const Plan& plan : trace.plans)
     for (const std::uint32_t group : plan.group) {
       const auto at = std::lower_bound(groups.begin(), groups.end(), group);
-      if (group != centre_group &&
+      if (group != root_group &&
           cyclic[static_cast<std::size_t>(at - groups.begin())] != static_cast<std::uint32_t>(plan.rank))
         return RankMap::block;
     }

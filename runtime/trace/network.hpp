@@ -10,9 +10,10 @@
 namespace talus::trace {
 
 /// When messages arrive. A message leaves through the link of its node when those before it have left, is
-/// under way for the latency, and takes the link of the other node in turn: alone on the network it needs
-/// latency + bytes/bandwidth. Inside a node nothing is shared, and nowhere where the machine is unbounded:
-/// whoever shares a link in another order may be the sooner for it, and a bound must hold for every order.
+/// under way for the latency, and takes the link of the other node in subdomain colour: alone on the network
+/// it needs latency + bytes/bandwidth. Inside a node nothing is shared, and nowhere where the machine is
+/// unbounded: whoever shares a link in another order may be the sooner for it, and a bound must hold for
+/// every order.
 class Network {
  public:
   explicit Network(const Machine& machine);

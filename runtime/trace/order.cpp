@@ -19,11 +19,11 @@ Order::Order(const Trace& trace, int rank) : ranks_(trace.ranks), threads_(trace
   };
   std::map<std::uint32_t, std::vector<Begun>> steps;
   for (int thread = 0; thread < trace.threads; ++thread) {
-    const Lane& lane = trace.lane(rank, thread);
+    const Track& track = trace.track(rank, thread);
     std::uint32_t step = 0;
     const Plan* plan = nullptr;
     std::optional<Begun> last;
-    for (const Record& record : lane.records) {
+    for (const Record& record : track.records) {
       if (record.kind() == kind_check) steps_[record.step()].gates.insert(record.epoch);
       if (record.epoch < 0 || record.kind() == kind_check || is_communication(record.kind())) continue;
       if (!plan || record.step() != step) {

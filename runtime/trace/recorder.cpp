@@ -9,11 +9,11 @@ namespace talus::trace {
 Recorder::Recorder(RecorderOptions options) : options_(std::move(options)) {
   if (options_.threads < 1 || !options_.sink || options_.block == 0)
     throw std::invalid_argument("a recorder needs threads, a sink and room for records");
-  lanes_.resize(static_cast<std::size_t>(options_.threads));
-  for (std::size_t t = 0; t < lanes_.size(); ++t) {
-    lanes_[t].owner_ = this;
-    lanes_[t].thread_ = static_cast<std::int32_t>(t);
-    lanes_[t].records_.reserve(options_.block + Lane::records_ahead);
+  tracks_.resize(static_cast<std::size_t>(options_.threads));
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    tracks_[t].owner_ = this;
+    tracks_[t].thread_ = static_cast<std::int32_t>(t);
+    tracks_[t].records_.reserve(options_.block + Track::records_ahead);
   }
 }
 
@@ -24,7 +24,7 @@ void Recorder::begin_step(std::uint32_t step) {
   last_ = step_;
   if (!std::exchange(declared_, true) && !tasks_.empty()) pass({options_.rank, 0, {}, std::nullopt, tasks_});
   if (pending_) plan(std::move(*std::exchange(pending_, std::nullopt)));
-  if (left_ >= 0) lane(0).add(left_, now(), 0, -1, kind_outside);
+  if (left_ >= 0) track(0).add(left_, now(), 0, -1, kind_outside);
 }
 
 void Recorder::end_step() {
@@ -43,20 +43,20 @@ void Recorder::plan(Plan plan) {
 }
 
 void Recorder::finish() {
-  for (Lane& lane : lanes_) {
+  for (Track& track : tracks_) {
     // Behind the last step, where results are written, say: between it and no other.
-    while (!lane.records_.empty() && lane.records_.back().step() > last_) lane.records_.pop_back();
-    hand_over(lane);
+    while (!track.records_.empty() && track.records_.back().step() > last_) track.records_.pop_back();
+    hand_over(track);
   }
   report_failure();
 }
 
-void Recorder::hand_over(Lane& lane) {
-  if (lane.records_.empty()) return;
+void Recorder::hand_over(Track& track) {
+  if (track.records_.empty()) return;
   std::vector<Record> full;
-  full.reserve(options_.block + Lane::records_ahead);
-  std::swap(full, lane.records_);
-  pass({options_.rank, lane.thread_, std::move(full), std::nullopt});
+  full.reserve(options_.block + Track::records_ahead);
+  std::swap(full, track.records_);
+  pass({options_.rank, track.thread_, std::move(full), std::nullopt});
 }
 
 /// A full disk must not end the program in the destructor of a span.

@@ -7,7 +7,7 @@
 ///     ...
 ///     const std::int64_t begin = recorder.now();
 ///     work();
-///     recorder.lane(thread).add(begin, recorder.now(), node, epoch, kind);
+///     recorder.track(thread).add(begin, recorder.now(), node, epoch, kind);
 ///     ...
 ///     recorder.finish();                            // hands over what is left
 ///
@@ -53,7 +53,7 @@ struct RecorderOptions {
 class Recorder {
  public:
   /// One thread's buffer.
-  class Lane {
+  class Track {
    public:
     void add(std::int64_t begin, std::int64_t end, std::uint32_t node, std::int32_t epoch, Kind kind) {
       records_.push_back({begin, static_cast<float>(end - begin), node, epoch, owner_->step_and_kind(kind)});
@@ -75,7 +75,7 @@ class Recorder {
     std::int32_t thread_ = 0;
     std::int32_t epoch_ = -1;
     std::vector<Record> records_;
-    std::byte apart_[64] = {};  ///< lanes must not share a cache line: each is written all the time
+    std::byte apart_[64] = {};  ///< tracks must not share a cache line: each is written all the time
   };
 
   /// Throws std::invalid_argument without threads, sink or room in a buffer.
@@ -103,24 +103,24 @@ class Recorder {
   bool active() const { return active_; }
   /// [ns] since the recorder was made.
   std::int64_t now() const { return ticks_.now(); }
-  Lane& lane(int thread) { return lanes_[static_cast<std::size_t>(thread)]; }
+  Track& track(int thread) { return tracks_[static_cast<std::size_t>(thread)]; }
   /// Of the calling thread of the team.
-  Lane& lane() { return lane(omp_get_thread_num()); }
+  Track& track() { return track(omp_get_thread_num()); }
   /// A task of the step has run on `thread`.
   void task(int thread, std::uint32_t id, std::int64_t begin) {
-    lane(thread).add(begin, now(), id, -1, id < tasks_.size() ? tasks_[id].kind : kind_team);
+    track(thread).add(begin, now(), id, -1, id < tasks_.size() ? tasks_[id].kind : kind_team);
   }
 
  private:
   std::uint32_t step_and_kind(Kind kind) const { return pack(step_, kind); }
-  void hand_over(Lane& lane);
+  void hand_over(Track& track);
   void pass(Block&& block);
   void report_failure();
 
   const RecorderOptions options_;
   const Ticks ticks_;
   std::vector<Task> tasks_;
-  std::vector<Lane> lanes_;
+  std::vector<Track> tracks_;
   std::optional<Plan> pending_;  ///< made while nothing was recorded
   std::uint32_t step_ = 0;
   std::uint32_t last_ = 0;  ///< step that was recorded
@@ -152,9 +152,9 @@ class Span {
   /// Ends it here.
   void end() {
     if (recorder_ && where_ == in_check)
-      recorder_->lane().add(begin_, recorder_->now(), node_, -1, kind_);
+      recorder_->track().add(begin_, recorder_->now(), node_, -1, kind_);
     else if (recorder_)
-      recorder_->lane().add_span(begin_, recorder_->now(), node_, kind_);
+      recorder_->track().add_span(begin_, recorder_->now(), node_, kind_);
     recorder_ = nullptr;
   }
 

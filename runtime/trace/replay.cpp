@@ -19,9 +19,9 @@ double dispatch_time(const Trace& trace) {
   constexpr double longest = 1000;
   double sum = 0;
   std::size_t count = 0;
-  for (const Lane& lane : trace.lanes) {
+  for (const Track& track : trace.tracks) {
     const Record* last = nullptr;
-    for (const Record& record : lane.records) {
+    for (const Record& record : track.records) {
       if (record.epoch < 0 || is_communication(record.kind())) continue;
       if (last && last->epoch == record.epoch && last->step() == record.step()) {
         const double gap = static_cast<double>(record.begin) - last->end();
@@ -64,7 +64,7 @@ class Player {
     out_.trace.kinds = trace_.kinds;
     if (!keep) return;
     for (std::int32_t r = 0; r < machine.ranks; ++r)
-      for (std::int32_t t = 0; t < machine.threads; ++t) out_.trace.lanes.push_back({r, t, {}});
+      for (std::int32_t t = 0; t < machine.threads; ++t) out_.trace.tracks.push_back({r, t, {}});
   }
 
   Replay play() {
@@ -84,12 +84,12 @@ class Player {
     out_.work = stage_.log.work();
     out_.tasks = stage_.log.tasks();
     out_.dispatch = stage_.dispatch;
-    if (!out_.trace.lanes.empty()) {
+    if (!out_.trace.tracks.empty()) {
       for (const auto& rank : tasks_) {
         std::vector<Task>& tasks = out_.trace.tasks.emplace_back();
         for (const SimTask& task : rank) tasks.push_back(task.task);
       }
-      sort_lanes(out_.trace);
+      sort_tracks(out_.trace);
     }
     return std::move(out_);
   }
@@ -111,7 +111,7 @@ class Player {
       for (std::size_t n = 0; n < plans[s]->size(); ++n) {
         const auto at =
             std::lower_bound(groups_.begin(), groups_.end(), plans[s]->group[n]) - groups_.begin();
-        if (at == static_cast<std::ptrdiff_t>(groups_.size())) continue;  // the centre
+        if (at == static_cast<std::ptrdiff_t>(groups_.size())) continue;  // the root
         weight_[static_cast<std::size_t>(at)] += plans[s]->weight[n];
         source_[static_cast<std::size_t>(at)] = s;
       }
@@ -121,7 +121,7 @@ class Player {
       tasks_ = lay_out_tasks(trace_, groups_, rank_of_, machine_.ranks);
     }
     layout_ = lay_out(plans_, groups_, rank_of_, machine_);
-    if (out_.trace.lanes.empty()) return;
+    if (out_.trace.tracks.empty()) return;
     for (Plan plan : layout_.plans) {
       plan.step = index.step;
       out_.trace.plans.push_back(std::move(plan));
@@ -346,8 +346,8 @@ class Player {
     for (std::uint32_t n = 0; n < layout_.nodes.size(); ++n) {
       const SimNode& node = layout_.nodes[n];
       const double count = layout_.incoming[n] + layout_.send_begin[n + 1] - layout_.send_begin[n];
-      if (node.role != Role::centre) messages[node.rank] += count;
-      tree = tree || (node.role == Role::centre && count > 0);
+      if (node.role != Role::root) messages[node.rank] += count;
+      tree = tree || (node.role == Role::root && count > 0);
     }
     const double overhead = stage_.network.overhead(), latency = stage_.network.latency(),
                  most = *std::ranges::max_element(messages);

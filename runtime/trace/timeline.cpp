@@ -29,10 +29,10 @@ void resize_checks(StepIndex::Rank& rank, std::size_t epochs) {
 }  // namespace
 
 std::vector<std::vector<float>> self_times(const Trace& trace) {
-  std::vector<std::vector<float>> all(trace.lanes.size());
+  std::vector<std::vector<float>> all(trace.tracks.size());
   std::vector<std::size_t> open;
-  for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
-    const std::vector<Record>& records = trace.lanes[k].records;
+  for (std::size_t k = 0; k < trace.tracks.size(); ++k) {
+    const std::vector<Record>& records = trace.tracks[k].records;
     std::vector<float>& self = all[k];
     self.resize(records.size());
     open.clear();
@@ -55,7 +55,7 @@ std::vector<std::uint32_t> steps_of(const Trace& trace) {
   std::vector<char> task(trace.kinds.size(), 0);
   for (std::size_t k = 0; k < task.size(); ++k) task[k] = names_task(trace, static_cast<Kind>(k)) ? 1 : 0;
   for (int thread = 0; thread < trace.threads; ++thread)
-    for (const Record& record : trace.lane(0, thread).records)
+    for (const Record& record : trace.track(0, thread).records)
       if (task[static_cast<std::size_t>(record.kind())] && (steps.empty() || steps.back() != record.step()))
         steps.push_back(record.step());
   std::sort(steps.begin(), steps.end());
@@ -72,8 +72,8 @@ std::unordered_map<const Record*, const Record*> sends_of(const Trace& trace) {
     return std::tuple(name(record), waits ? record->end() : static_cast<double>(record->begin), waits);
   };
   std::vector<const Record*> messages;
-  for (const Lane& lane : trace.lanes)
-    for (const Record& record : lane.records)
+  for (const Track& track : trace.tracks)
+    for (const Record& record : track.records)
       if (record.kind() == kind_send || record.kind() == kind_receive) messages.push_back(&record);
   std::ranges::sort(messages, {}, in_time);
   std::unordered_map<const Record*, const Record*> sends;
@@ -94,18 +94,18 @@ Timeline::Timeline(const Trace& trace) : trace_(trace), self_(self_times(trace))
   if (steps_.empty()) throw TraceError("the trace holds no step of a run");
 }
 
-void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) const {
+void Timeline::add(const Track& track, std::uint32_t number, StepIndex& index) const {
   const auto by_step = [](const Record& record, std::uint32_t step) { return record.step() < step; };
-  const auto first = std::lower_bound(lane.records.begin(), lane.records.end(), index.step, by_step);
-  StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(lane.rank)];
-  const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(lane.rank)];
+  const auto first = std::lower_bound(track.records.begin(), track.records.end(), index.step, by_step);
+  StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(track.rank)];
+  const std::vector<Task>& tasks = trace_.tasks[static_cast<std::size_t>(track.rank)];
   Place last_task, last_check;
   // By its beginning: ends of long ones are rounded.
   const auto within = [&](const Record& span, Place place) {
     return place.exists() && static_cast<double>(span.begin) < record(place).end();
   };
-  for (auto it = first; it != lane.records.end() && it->step() == index.step; ++it) {
-    const Place place{number, static_cast<std::uint32_t>(it - lane.records.begin())};
+  for (auto it = first; it != track.records.end() && it->step() == index.step; ++it) {
+    const Place place{number, static_cast<std::uint32_t>(it - track.records.begin())};
     const Kind kind = it->kind();
     if (kind == kind_team || kind == kind_send || kind == kind_receive) continue;
     if (kind == kind_outside) {
@@ -127,7 +127,7 @@ void Timeline::add(const Lane& lane, std::uint32_t number, StepIndex& index) con
     } else if (it->epoch >= 0) {
       if (it->node >= rank.nodes)
         throw TraceError(fmt::format("step {}: node {} of a plan of {} on rank {}", index.step, it->node,
-                                     rank.nodes, lane.rank));
+                                     rank.nodes, track.rank));
       const auto epoch = static_cast<std::size_t>(it->epoch);
       if (rank.epochs <= epoch) {
         rank.epochs = epoch + 1;
@@ -160,7 +160,7 @@ StepIndex Timeline::index(std::uint32_t step) const {
     rank.calls.resize(rank.task.size());
     rank.part.resize(rank.task.size());
   }
-  for (std::uint32_t k = 0; k < trace_.lanes.size(); ++k) add(trace_.lanes[k], k, index);
+  for (std::uint32_t k = 0; k < trace_.tracks.size(); ++k) add(trace_.tracks[k], k, index);
   for (int r = 0; r < trace_.ranks; ++r) {
     StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(r)];
     resize_checks(rank, rank.epochs);

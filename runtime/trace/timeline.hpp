@@ -12,8 +12,8 @@
 
 namespace talus::trace {
 
-/// Per lane and record: its duration without that of the spans within it [ns]. Records must be sorted as Lane
-/// says. Cost: every record once.
+/// Per track and record: its duration without that of the spans within it [ns]. Records must be sorted as
+/// Track says. Cost: every record once.
 std::vector<std::vector<float>> self_times(const Trace& trace);
 
 /// Steps that hold tasks, ascending.
@@ -25,10 +25,10 @@ std::vector<std::uint32_t> steps_of(const Trace& trace);
 /// out. Cost: a sort of all messages.
 std::unordered_map<const Record*, const Record*> sends_of(const Trace& trace);
 
-/// Where a record stands: trace.lanes[lane].records[record].
+/// Where a record stands: trace.tracks[track].records[record].
 struct Place {
-  std::uint32_t lane = 0xffffffffU, record = 0;
-  bool exists() const { return lane != 0xffffffffU; }
+  std::uint32_t track = 0xffffffffU, record = 0;
+  bool exists() const { return track != 0xffffffffU; }
 };
 
 /// Calls of all ranks.
@@ -81,15 +81,15 @@ class Timeline {
   const std::vector<std::uint32_t>& steps() const { return steps_; }
   /// Throws TraceError when the step was recorded in part only.
   StepIndex index(std::uint32_t step) const;
-  const Record& record(Place place) const { return trace_.lanes[place.lane].records[place.record]; }
+  const Record& record(Place place) const { return trace_.tracks[place.track].records[place.record]; }
   /// [ns]; 0 where nothing was recorded.
   double self(Place place) const {
-    return place.exists() ? static_cast<double>(self_[place.lane][place.record]) : 0.0;
+    return place.exists() ? static_cast<double>(self_[place.track][place.record]) : 0.0;
   }
   const std::vector<std::vector<float>>& self() const { return self_; }
 
  private:
-  void add(const Lane& lane, std::uint32_t number, StepIndex& index) const;
+  void add(const Track& track, std::uint32_t number, StepIndex& index) const;
   const Trace& trace_;
   std::vector<std::vector<float>> self_;
   std::vector<std::uint32_t> steps_;

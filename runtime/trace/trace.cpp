@@ -36,10 +36,11 @@ void check(const Plan& plan, int ranks) {
   std::map<std::uint32_t, std::array<std::size_t, role_count>> count;
   for (std::size_t node = 0; node < n; ++node) {
     const Role role = static_cast<Role>(plan.role[node]);
-    if (role == Role::compute || role == Role::centre) continue;
+    if (role == Role::compute || role == Role::root) continue;
     ++count[plan.group[node]][plan.role[node]];
     if (plan.place[node] > most_turn)
-      refuse(fmt::format("{}: subdomain {} has turn {}", where, plan.group[node], plan.place[node]));
+      refuse(
+          fmt::format("{}: subdomain {} has subdomain_colour {}", where, plan.group[node], plan.place[node]));
   }
   for (const auto& [group, of] : count) {
     const auto has = [&of = of](Role role) { return of[static_cast<std::size_t>(role)]; };
@@ -88,7 +89,7 @@ std::vector<KindInfo> runtime_kinds() {
 
 std::size_t Trace::record_count() const {
   std::size_t sum = 0;
-  for (const Lane& lane : lanes) sum += lane.records.size();
+  for (const Track& track : tracks) sum += track.records.size();
   return sum;
 }
 
@@ -96,8 +97,8 @@ void validate(const Trace& trace) {
   if (trace.ranks < 1 || trace.threads < 1)
     refuse(fmt::format("{} ranks with {} threads", trace.ranks, trace.threads));
   const auto ranks = static_cast<std::size_t>(trace.ranks), threads = static_cast<std::size_t>(trace.threads);
-  if (trace.lanes.size() != ranks * threads || trace.tasks.size() != ranks)
-    refuse(fmt::format("{} lanes and tasks of {} ranks for {} ranks with {} threads", trace.lanes.size(),
+  if (trace.tracks.size() != ranks * threads || trace.tasks.size() != ranks)
+    refuse(fmt::format("{} tracks and tasks of {} ranks for {} ranks with {} threads", trace.tracks.size(),
                        trace.tasks.size(), ranks, threads));
   const std::vector<KindInfo> own = runtime_kinds();
   if (trace.kinds.size() < own.size() || trace.kinds.size() > 256 ||
@@ -107,29 +108,29 @@ void validate(const Trace& trace) {
   for (const Plan& plan : trace.plans) check(plan, trace.ranks);
   // Every epoch leaves records, so a larger number is a damaged one, and nobody should make room for it.
   const auto most_epochs = static_cast<std::int64_t>(trace.record_count());
-  for (std::size_t k = 0; k < trace.lanes.size(); ++k) {
-    const Lane& lane = trace.lanes[k];
-    if (lane.rank != static_cast<std::int32_t>(k / threads) ||
-        lane.thread != static_cast<std::int32_t>(k % threads))
-      refuse(fmt::format("lane {} is of rank {}, thread {}", k, lane.rank, lane.thread));
-    for (const Record& record : lane.records)
+  for (std::size_t k = 0; k < trace.tracks.size(); ++k) {
+    const Track& track = trace.tracks[k];
+    if (track.rank != static_cast<std::int32_t>(k / threads) ||
+        track.thread != static_cast<std::int32_t>(k % threads))
+      refuse(fmt::format("track {} is of rank {}, thread {}", k, track.rank, track.thread));
+    for (const Record& record : track.records)
       if (static_cast<std::size_t>(record.kind()) >= trace.kinds.size() || record.epoch < -1 ||
           (record.kind() == kind_check && record.epoch < 0) || record.epoch >= most_epochs ||
           !std::isfinite(record.duration) || record.duration < 0)
         refuse(fmt::format("a record of rank {}, thread {} in step {}: kind {}, epoch {}, duration {}",
-                           lane.rank, lane.thread, record.step(), static_cast<int>(record.kind()),
+                           track.rank, track.thread, record.step(), static_cast<int>(record.kind()),
                            record.epoch, record.duration));
   }
 }
 
-void sort_lanes(Trace& trace) {
+void sort_tracks(Trace& trace) {
   // A task is written when it ends, hence after the spans within it.
   const auto before = [](const Record& a, const Record& b) {
     return a.begin != b.begin ? a.begin < b.begin : a.duration > b.duration;
   };
-  for (Lane& lane : trace.lanes)
-    if (!std::is_sorted(lane.records.begin(), lane.records.end(), before))
-      std::stable_sort(lane.records.begin(), lane.records.end(), before);
+  for (Track& track : trace.tracks)
+    if (!std::is_sorted(track.records.begin(), track.records.end(), before))
+      std::stable_sort(track.records.begin(), track.records.end(), before);
 }
 
 const Plan* plan_of(const Trace& trace, int rank, std::uint32_t step) {
@@ -141,7 +142,7 @@ const Plan* plan_of(const Trace& trace, int rank, std::uint32_t step) {
 
 std::size_t memory_used(const Trace& trace) {
   std::size_t sum = 0;
-  for (const Lane& lane : trace.lanes) sum += lane.records.capacity() * sizeof(Record);
+  for (const Track& track : trace.tracks) sum += track.records.capacity() * sizeof(Record);
   for (const Plan& plan : trace.plans)
     sum += (6 * plan.size() + plan.neighbour.size()) * sizeof(std::uint32_t) + plan.role.size() +
            plan.messages.size() * sizeof(Message);

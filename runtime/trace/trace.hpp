@@ -2,7 +2,7 @@
 
 /// What a trace holds. Everything that follows from the plan of the loop (colours, conflicts, owners,
 /// messages) is stored once per plan; a task that ran leaves one record of 24 bytes that points into it.
-/// Example: record {begin 1200, duration 7300, node 17, epoch 4, step 3, kind "sweep"} on lane (rank 0,
+/// Example: record {begin 1200, duration 7300, node 17, epoch 4, step 3, kind "sweep"} on track (rank 0,
 /// thread 1): at 1.2 us this thread began to work on node 17 of the plan of step 3, in epoch 4, and had
 /// finished 7.3 us later. It could begin because the nodes that conflict with node 17 and have lower colours
 /// had ended epoch 4, those with higher colours epoch 3.
@@ -73,7 +73,7 @@ struct Meetings {
   }
 };
 
-/// One task, or one span within a task (then it lies within the task's time, on the same lane).
+/// One task, or one span within a task (then it lies within the task's time, on the same track).
 struct Record {
   std::int64_t begin = 0;   ///< [ns] on the clock of the rank, from the beginning of the trace
   float duration = 0;       ///< [ns]; exact to the ns below 16 ms
@@ -96,18 +96,19 @@ inline std::uint32_t pack(std::uint32_t step, Kind kind) {
 enum class Role : std::uint8_t {
   compute,  ///< nothing
   publish,  ///< sends what its group shows to others
-  centre,   ///< of a rank: what goes through one rank; before it, on ranks between, what goes up to it
+  root,     ///< of a rank: what goes through one rank; before it, on ranks between, what goes up to it
   glue,     ///< takes what others have published
-  take,  ///< of a group whose turn is not 0, before its border: takes what those of earlier turns published
-  tell,  ///< its group's part for the centre leaves, which without one its publish sends
+  take,     ///< of a group whose subdomain colour is not 0, before its border: takes what those of earlier
+            ///< subdomain colours published
+  tell,     ///< its group's part for the root leaves, which without one its publish sends
 };
 
-/// Names the centre as the end of a message.
-inline constexpr std::uint16_t centre_group = 0xffffU;
+/// Names the root as the end of a message.
+inline constexpr std::uint16_t root_group = 0xffffU;
 
 /// Sent in each epoch that exchanges, from the publish of one group to the glue of another (`from` to `to`),
-/// or to its take if the turn of the first is the earlier; or to and from the centre. Groups on one rank need
-/// no message.
+/// or to its take if the subdomain colour of the first is the earlier; or to and from the root. Groups on one
+/// rank need no message.
 struct Message {
   std::uint16_t from = 0, to = 0;
   std::uint32_t bytes = 0;
@@ -121,15 +122,15 @@ struct Plan {
   std::int32_t rank = 0;
   std::uint32_t step = 0;
   std::vector<std::uint32_t> colour;     ///< n
-  std::vector<std::uint32_t> group;      ///< n: subdomain among all; of the centre 0xffff
+  std::vector<std::uint32_t> group;      ///< n: subdomain among all; of the root 0xffff
   std::vector<std::uint8_t> role;        ///< n: of Role
   std::vector<std::uint32_t> weight;     ///< n: expected work, in contacts; 0 for what no work is planned for
   std::vector<std::uint32_t> place;      ///< n: order in space within the rank, for owners; of publish, take,
-                                         ///< tell and glue the turn of their group
+                                         ///< tell and glue the subdomain colour of their group
   std::vector<std::uint32_t> owner;      ///< n: thread
   std::vector<std::uint32_t> offset;     ///< n + 1, into neighbour
   std::vector<std::uint32_t> neighbour;  ///< conflicting nodes
-  std::vector<Message> messages;         ///< that leave a group of this rank, and those from the centre
+  std::vector<Message> messages;         ///< that leave a group of this rank, and those from the root
 
   std::size_t size() const { return colour.size(); }
   std::span<const std::uint32_t> neighbours(std::size_t node) const {
@@ -142,13 +143,13 @@ struct Plan {
 template <class RankOf>
 void add_load(const Plan& plan, const RankOf& rank_of, std::span<graph::RankLoad> load) {
   for (std::size_t n = 0; n < plan.size(); ++n) {
-    if (plan.group[n] == centre_group) continue;
+    if (plan.group[n] == root_group) continue;
     graph::RankLoad& rank = load[rank_of(plan.group[n])];
     rank.work += plan.weight[n];
     rank.waits = rank.waits || static_cast<Role>(plan.role[n]) == Role::take;
   }
   for (const Message& message : plan.messages)
-    if (message.from != centre_group && message.to != centre_group)
+    if (message.from != root_group && message.to != root_group)
       load[rank_of(message.from)].work += graph::load_of_neighbour;
 }
 
@@ -162,7 +163,7 @@ struct Task {
 };
 
 /// What one thread of one rank did, in order of begin; a span within a task comes after it.
-struct Lane {
+struct Track {
   std::int32_t rank = 0, thread = 0;
   std::vector<Record> records;
 };
@@ -174,11 +175,11 @@ struct Trace {
   std::vector<KindInfo> kinds;
   std::vector<std::vector<Task>> tasks;  ///< per rank
   std::vector<Plan> plans;               ///< of every rank, ascending steps within a rank
-  std::vector<Lane> lanes;               ///< ranks x threads, rank by rank
+  std::vector<Track> tracks;             ///< ranks x threads, rank by rank
 
-  const Lane& lane(int rank, int thread) const {
-    return lanes[static_cast<std::size_t>(rank) * static_cast<std::size_t>(threads) +
-                 static_cast<std::size_t>(thread)];
+  const Track& track(int rank, int thread) const {
+    return tracks[static_cast<std::size_t>(rank) * static_cast<std::size_t>(threads) +
+                  static_cast<std::size_t>(thread)];
   }
   const KindInfo& info(Kind kind) const { return kinds[static_cast<std::size_t>(kind)]; }
   std::size_t record_count() const;
@@ -193,8 +194,8 @@ class TraceError : public std::runtime_error {
 /// Throws TraceError when sizes do not match, or an index points at nothing. Cost: every number once.
 void validate(const Trace& trace);
 
-/// Sorts the records of all lanes as Lane wants them. Cost: nothing for what is sorted.
-void sort_lanes(Trace& trace);
+/// Sorts the records of all tracks as Track wants them. Cost: nothing for what is sorted.
+void sort_tracks(Trace& trace);
 
 /// The plan that `rank` ran in `step`; null before its first.
 const Plan* plan_of(const Trace& trace, int rank, std::uint32_t step);

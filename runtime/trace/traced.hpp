@@ -53,8 +53,8 @@ template <NamedProgram Program>
 class Traced : public View<Program> {
  public:
   Traced(Program& program, Recorder& recorder, int thread)
-      : View<Program>(program), recorder_(recorder), lane_(recorder.lane(thread)) {}
-  ~Traced() { lane_.at_epoch(-1); }
+      : View<Program>(program), recorder_(recorder), track_(recorder.track(thread)) {}
+  ~Traced() { track_.at_epoch(-1); }
   Traced(const Traced&) = delete;
   Traced& operator=(const Traced&) = delete;
 
@@ -65,19 +65,19 @@ class Traced : public View<Program> {
     const std::int64_t begin = last_end_ >= 0 ? last_end_ : recorder_.now();
     program_.node(node, epoch);
     last_end_ = recorder_.now();
-    lane_.add(begin, last_end_, node, epoch, *kind);
+    track_.add(begin, last_end_, node, epoch, *kind);
   }
   void about_to_wait() { last_end_ = -1; }
   bool gate(int epoch) {
     last_end_ = -1;  // threads meet at decisions
-    lane_.at_epoch(epoch);
+    track_.at_epoch(epoch);
     return program_.gate(epoch);
   }
   bool decide(int epoch) {
     const std::int64_t begin = recorder_.now();
     const std::uint32_t how = this->settles(epoch) ? check_settles : 0;
     const bool goes_on = program_.decide(epoch);
-    lane_.add(begin, recorder_.now(), how, epoch, kind_check);
+    track_.add(begin, recorder_.now(), how, epoch, kind_check);
     return goes_on;
   }
 
@@ -92,7 +92,7 @@ class Traced : public View<Program> {
 
   using View<Program>::program_;
   Recorder& recorder_;
-  Recorder::Lane& lane_;
+  Recorder::Track& track_;
   std::optional<std::size_t> at_hand_;  ///< subdomain whose data were fetched last
   std::int64_t last_end_ = -1;  ///< [ns] of a node with nothing between it and what comes next; else -1
 };

@@ -36,7 +36,7 @@ double record_time() {
     std::int64_t begin = recorder.now();
     for (std::uint32_t i = 0; i < count; ++i) {
       const std::int64_t end = recorder.now();
-      recorder.lane(0).add(begin, end, i, 0, trace::kind_check);
+      recorder.track(0).add(begin, end, i, 0, trace::kind_check);
       begin = end;
     }
     times.push_back((wall_now() - start) / count);

@@ -74,6 +74,11 @@ TEST(House, NoFileIncludesUpward) {
       const std::string file = fs::relative(entry.path(), root).generic_string();
       std::ifstream lines(entry.path());
       std::string line;
+      if (extension == ".hpp") {
+        std::getline(lines, line);
+        EXPECT_EQ(line, "#pragma once") << file << ": may be included twice";
+        lines.seekg(0);
+      }
       for (int number = 1; std::getline(lines, line); ++number) {
         const auto header = included(line);
         if (!header) continue;

@@ -140,7 +140,7 @@ TEST_F(TraceCommand, OfOneRankHoldsTheCallsThatSeveralMake) {
     if (at.second == "cells") detecting.insert(calls.first);
     if (at.second == "chunks") cutting.insert(calls.first);
   }
-  EXPECT_GE(detecting.size(), 3u);  // steps that keep their candidates, look at leavers, cut space
+  EXPECT_GE(detecting.size(), 3u);  // steps that keep their candidates, look at skin_escapes, cut space
   EXPECT_GE(cutting.size(), 1u);
 }
 
@@ -189,14 +189,14 @@ TEST_F(TraceCommand, RefusesWhatIsNoTrace) {
 TEST_F(TraceCommand, RecordsSubdomainsAsOnCoresOfTheirOwn) {
   const auto follows_at_once = [&](const std::string& file) {
     const trace::Trace trace = io::read_trace(folder_ / file);
-    const std::vector<trace::Record>& records = trace.lanes.front().records;
+    const std::vector<trace::Record>& records = trace.tracks.front().records;
     int pairs = 0;
     for (std::size_t k = 1; k < records.size(); ++k) {
       const trace::Record &before = records[k - 1], &now = records[k];
       const trace::Plan* const plan = trace::plan_of(trace, 0, now.step());
       const auto of_loop = [&](const trace::Record& r) {
         return r.epoch >= 0 && plan && r.node < plan->size() && trace.info(r.kind()).name != "check" &&
-               plan->group[r.node] != trace::centre_group;
+               plan->group[r.node] != trace::root_group;
       };
       if (before.step() == now.step() && before.epoch == now.epoch && of_loop(before) && of_loop(now) &&
           plan->group[before.node] != plan->group[now.node] && before.end() == static_cast<double>(now.begin))

@@ -54,10 +54,10 @@ struct Pair {
   std::int32_t place;
 };
 
-inline constexpr int centre_tag = graph::Communicator::first_tag;
+inline constexpr int root_tag = graph::Communicator::first_tag;
 /// The largest is subdomains^2 + centre_tag.
 inline int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
-  return centre_tag + 1 + from * subdomains + to;
+  return root_tag + 1 + from * subdomains + to;
 }
 
 }  // namespace talus::detail
@@ -66,13 +66,15 @@ namespace talus {
 
 /// Towards one neighbour.
 struct Gluing::Side {
-  std::vector<Slot> slots;            ///< of the bodies in the message, in its order
-  std::vector<detail::Pair> pairs;    ///< those in it of which these two copies alone are of the last turn
-  std::vector<detail::Pair> given;    ///< where only the neighbour's copy is
-  std::vector<detail::Pair> taken;    ///< where only the neighbour's copy is of the turn before this one's
-  detail::Link link;                  ///< `in` and the channels: of neighbours on other ranks only
+  std::vector<Slot> slots;  ///< of the bodies in the message, in its order
+  std::vector<detail::Pair>
+      pairs;  ///< those in it of which these two copies alone are of the last subdomain colour
+  std::vector<detail::Pair> given;  ///< where only the neighbour's copy is
+  std::vector<detail::Pair>
+      taken;          ///< where only the neighbour's copy is of the subdomain colour before this one's
+  detail::Link link;  ///< `in` and the channels: of neighbours on other ranks only
   const std::byte* source = nullptr;  ///< the neighbour's message to this subdomain
-  int turn = 0;                       ///< of the neighbour
+  int subdomain_colour = 0;           ///< of the neighbour
   std::int32_t local = -1;            ///< the neighbour's place here, -1 on another rank
 };
 
@@ -80,22 +82,22 @@ struct Gluing::Subdomain {
   std::vector<Side> sides;
   std::vector<Slot> shared;  ///< slots of `interface.shared`
   std::vector<Slot> taken;   ///< those of `shared` that are
-  int turn = 0;
+  int subdomain_colour = 0;
   bool tells = false;  ///< before it publishes
   std::vector<std::int32_t>
-      corners;  ///< indices into `shared`, without hubs: of the last turn are more copies
-  std::vector<std::int32_t> taken_corners;  ///< likewise of the turn before this one's
+      corners;  ///< indices into `shared`, without hubs: of the last subdomain colour are more copies
+  std::vector<std::int32_t> taken_corners;  ///< likewise of the subdomain colour before this one's
   std::vector<double> base;                 ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
-  std::vector<double> partial;                         ///< to the centre: 3 per wall, then width per hub
-  std::vector<std::size_t> hub_item;                   ///< per hub: its place in the centre's results
+  std::vector<double> partial;                         ///< to the root: 3 per wall, then width per hub
+  std::vector<std::size_t> hub_item;                   ///< per hub: its place in the root's results
   double waited = 0;
 };
 
 /// The one rank through which some velocities go is the top of a tree of ranks (runtime/graph/tree.hpp). A
 /// message up holds the parts of a rank's own subdomains, then its children's messages: nothing is added up
 /// on the way, so that the sums on the top are the same on any ranks.
-struct Gluing::Centre {
+struct Gluing::Root {
   struct Contribution {
     const double* partial = nullptr;
     std::vector<std::size_t> item;  ///< per hub of the subdomain

@@ -26,7 +26,7 @@ void LoopEvents::send_up(std::uint32_t node, std::uint32_t worker, std::uint32_t
   const std::uint32_t rank = layout_.nodes[node].rank;
   if (!layout_.nodes[node].tells || ++ranks_[rank].told < layout_.tellers[rank]) return;
   ranks_[rank].told = 0;
-  if (layout_.to_centre[rank].bytes > 0)
+  if (layout_.to_root[rank].bytes > 0)
     message_left(static_cast<std::uint32_t>(layout_.sends.size() + rank), worker, epoch, now);
 }
 

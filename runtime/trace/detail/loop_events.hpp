@@ -75,7 +75,7 @@ class LoopEvents {
   /// True when the node sends in an epoch that exchanges.
   bool sends(std::uint32_t node) const {
     return layout_.send_begin[node + 1] > layout_.send_begin[node] ||
-           (layout_.nodes[node].tells && layout_.to_centre[layout_.nodes[node].rank].bytes > 0);
+           (layout_.nodes[node].tells && layout_.to_root[layout_.nodes[node].rank].bytes > 0);
   }
   /// Its messages leave one after the other from when it has done its work, `worked`.
   void send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked);
@@ -101,10 +101,10 @@ class LoopEvents {
   std::size_t inbox(std::uint32_t node, std::size_t epoch) const {
     return 2 * node + epochs_[epoch].exchanges_before % 2;
   }
-  /// Those of `sends`, then those to the centre.
+  /// Those of `sends`, then those to the root.
   const SimMessage& message(std::size_t number) const {
     return number < layout_.sends.size() ? layout_.sends[number]
-                                         : layout_.to_centre[number - layout_.sends.size()];
+                                         : layout_.to_root[number - layout_.sends.size()];
   }
   void message_left(std::uint32_t number, std::uint32_t worker, std::uint32_t epoch, double now);
   void decide(std::uint32_t r, std::uint32_t e, double now);

@@ -12,7 +12,7 @@ void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t nod
   if (!trace_) return;
   // Ends in whole nanoseconds too: one that lay behind the next beginning would take it for a part of itself.
   const std::int64_t from = std::llround(begin);
-  trace_->lanes[worker].records.push_back(
+  trace_->tracks[worker].records.push_back(
       {from, static_cast<float>(std::llround(end) - from), node, epoch, pack(step_, kind)});
 }
 
@@ -115,7 +115,7 @@ std::vector<std::map<Kind, float>> typical_tasks(const Timeline& timeline, const
 ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::uint32_t node) {
   const SimNode& of = layout.nodes[node];
   double sent = layout.send_begin[node + 1] - layout.send_begin[node];
-  if (of.tells && layout.to_centre[of.rank].bytes > 0) sent += 1.0 / layout.tellers[of.rank];
+  if (of.tells && layout.to_root[of.rank].bytes > 0) sent += 1.0 / layout.tellers[of.rank];
   const double overhead = stage.network.overhead();
   return {layout.incoming[node] * overhead, 0.5e9 * stage.machine.line / 64 * layout.handed[node],
           sent * overhead};

@@ -57,13 +57,13 @@ TEST(Export, PajeOpensAndClosesEachTask) {
 TEST(Export, PajeLinksTheMessagesThatWereWaitedFor) {
   Trace trace = test::two_subdomains(2);
   const std::uint32_t there = message_name(0, 1), back = message_name(1, 0);
-  trace.lanes[0].records.push_back({110, 0, there, 0, pack(1, kind_send)});
-  trace.lanes[1].records.push_back({110, 0, back, 0, pack(1, kind_send)});
-  trace.lanes[1].records.push_back({160, 10, there, 0, pack(1, kind_receive)});
+  trace.tracks[0].records.push_back({110, 0, there, 0, pack(1, kind_send)});
+  trace.tracks[1].records.push_back({110, 0, back, 0, pack(1, kind_send)});
+  trace.tracks[1].records.push_back({160, 10, there, 0, pack(1, kind_receive)});
   // Once more, as copies are added up within a check.
-  trace.lanes[0].records.push_back({171, 0, there, 0, pack(1, kind_send)});
-  trace.lanes[1].records.push_back({172, 5, there, 0, pack(1, kind_receive)});
-  sort_lanes(trace);
+  trace.tracks[0].records.push_back({171, 0, there, 0, pack(1, kind_send)});
+  trace.tracks[1].records.push_back({172, 5, there, 0, pack(1, kind_receive)});
+  sort_tracks(trace);
   std::istringstream text(io::to_paje(trace, {}));
   std::vector<std::string> begun, ended;
   for (std::string line; std::getline(text, line);) {

@@ -7,8 +7,8 @@
 #include <limits>
 
 #include "kernels/bodies/motion.hpp"
-#include "kernels/detection/leavers.hpp"
 #include "kernels/detection/narrow_phase.hpp"
+#include "kernels/detection/skin_escape.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace talus {
@@ -172,7 +172,7 @@ TEST(BroadPhase, NoPairMeansMoreThanCellsCanCount) {
 }
 
 // By blocks of bodies, wherever these lie: the same contacts as one by one.
-TEST(Leavers, MeetWhomTheyTouch) {
+TEST(SkinEscape, MeetWhomTheyTouch) {
   for (const int n : {1, 2, 63, 64, 65, 1000}) {
     Random random(static_cast<std::uint64_t>(n));
     Bodies bodies;
@@ -188,12 +188,12 @@ TEST(Leavers, MeetWhomTheyTouch) {
     }
     const std::vector<Vec3> x_then = bodies.x;
     const Margins margins{x_then, reach, 0.02, 0.03};
-    std::vector<Leaver> leavers;
-    find_leavers({0, bodies.size()}, bodies, margins, leavers);
-    std::sort(leavers.begin(), leavers.end());
-    ASSERT_EQ(leavers.size(), static_cast<std::size_t>((n + 6) / 7));
+    std::vector<Escape> skin_escapes;
+    find_skin_escapes({0, bodies.size()}, bodies, margins, skin_escapes);
+    std::sort(skin_escapes.begin(), skin_escapes.end());
+    ASSERT_EQ(skin_escapes.size(), static_cast<std::size_t>((n + 6) / 7));
     std::vector<Encounter> needed, known, expected;
-    compare_leavers(leavers, bodies, {}, margins, needed, known);
+    compare_skin_escapes(skin_escapes, bodies, {}, margins, needed, known);
     for (std::size_t i = 0; i < bodies.size(); ++i)
       for (std::size_t j = 0; j < bodies.size(); ++j) {
         if (i == j || i % 7 != 0) continue;
@@ -238,13 +238,13 @@ TEST(Candidates, HoldEveryContactUntilAGrainThatLeftItsMarginMeetsOneMore) {
       const Margins margins{x_then, reach_then, h, alert, Vec3::Zero(), walls};
       bool holds = step > 0;
       if (holds) {
-        std::vector<Leaver> leavers;
+        std::vector<Escape> skin_escapes;
         std::vector<Encounter> needed, known;
-        find_leavers({0, n}, bodies, margins, leavers);
-        std::sort(leavers.begin(), leavers.end());
-        compare_leavers(leavers, bodies, candidates, margins, needed, known);
+        find_skin_escapes({0, n}, bodies, margins, skin_escapes);
+        std::sort(skin_escapes.begin(), skin_escapes.end());
+        compare_skin_escapes(skin_escapes, bodies, candidates, margins, needed, known);
         holds = all_known(needed, known);
-        held += holds && !leavers.empty();
+        held += holds && !skin_escapes.empty();
       }
       if (!holds) {
         ++searches;

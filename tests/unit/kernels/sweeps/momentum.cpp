@@ -28,21 +28,21 @@ void expect_plain_sweeps_of_what_went_on() {
   const test::Sample sample = test::dense_sample(5, 3, Friction, false, 60);
   Contacts with = sample.contacts, plain = with;
   std::vector<Velocity> velocity = sample.bodies.velocity, same = velocity;
-  Trail trail;
-  allocate(trail, Carry::momentum, with, velocity.size(), sample.chunks.size());
-  begin_steps({0, with.rx.size() + with.rn.size()}, trail.steps);
+  AccelerationHistory acceleration;
+  allocate(acceleration, Carry::momentum, with, velocity.size(), sample.chunks.size());
+  begin_steps({0, with.rx.size() + with.rn.size()}, acceleration.steps);
   for (const double beta : {0.0, 0.0, 0.5, 0.9}) {
     const auto go_on = [&](std::vector<double>& r, const std::vector<float>& step) {
       for (std::size_t k = 0; k < r.size(); ++k) r[k] = sum(r[k], beta, step[k]);
     };
-    go_on(plain.rx, trail.steps.x);
-    go_on(plain.ry, trail.steps.y);
-    go_on(plain.rz, trail.steps.z);
-    go_on(plain.rn, trail.steps.n);
+    go_on(plain.rx, acceleration.steps.x);
+    go_on(plain.ry, acceleration.steps.y);
+    go_on(plain.rz, acceleration.steps.z);
+    go_on(plain.rn, acceleration.steps.n);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
       if (sample.chunks.wall[c] >= 0) continue;
       kernels.sweep_grains<Friction>(with, sample.range(c), velocity, 0.3,
-                                     SweepMomentum{beta, 1, trail.steps});
+                                     SweepMomentum{beta, 1, acceleration.steps});
       kernels.sweep_grains<Friction>(plain, sample.range(c), same, 0.3);
     }
     EXPECT_EQ(with.rx, plain.rx) << beta;
@@ -59,29 +59,29 @@ TEST(Momentum, SweepsWhatGoesOnBeyondTheLastSweepByBeta) {
 TEST(Momentum, ConjugateDirectionIsTheWayOfTheSweepBefore) {
   Contacts contacts;
   contacts.rn = {1.0};
-  Trail trail;
-  allocate(trail, Carry::conjugate, contacts, 0, 0);
-  carry_impulses(0, {0, 1}, contacts, trail);  // y0 = 1
-  contacts.rn = {3.0};                         // s
-  carry_impulses(0.5, {0, 1}, contacts, trail);
+  AccelerationHistory acceleration;
+  allocate(acceleration, Carry::conjugate, contacts, 0, 0);
+  carry_impulses(0, {0, 1}, contacts, acceleration);  // y0 = 1
+  contacts.rn = {3.0};                                // s
+  carry_impulses(0.5, {0, 1}, contacts, acceleration);
   EXPECT_EQ(contacts.rn[0], 3.0);  // no direction before the first sweep: y1 = 3, p = 2
   contacts.rn = {4.0};
-  carry_impulses(0.5, {0, 1}, contacts, trail);
+  carry_impulses(0.5, {0, 1}, contacts, acceleration);
   EXPECT_EQ(contacts.rn[0], 5.0);  // 4 + 0.5 * 2
 }
 
 TEST(Momentum, StaleTrailsAreNeverRead) {
   Contacts contacts;
   contacts.rn = {1.0};
-  Trail trail;
-  allocate(trail, Carry::conjugate, contacts, 0, 0);
-  trail.last.n = trail.step.n = {std::numeric_limits<double>::quiet_NaN()};
-  carry_impulses(0, {0, 1}, contacts, trail);
+  AccelerationHistory acceleration;
+  allocate(acceleration, Carry::conjugate, contacts, 0, 0);
+  acceleration.last.n = acceleration.step.n = {std::numeric_limits<double>::quiet_NaN()};
+  carry_impulses(0, {0, 1}, contacts, acceleration);
   EXPECT_EQ(contacts.rn[0], 1.0);
-  allocate(trail, Carry::momentum, contacts, 0, 0);
-  trail.steps.n = {std::numeric_limits<float>::quiet_NaN()};
-  begin_steps({0, 1}, trail.steps);
-  EXPECT_EQ(trail.steps.n[0], 0);
+  allocate(acceleration, Carry::momentum, contacts, 0, 0);
+  acceleration.steps.n = {std::numeric_limits<float>::quiet_NaN()};
+  begin_steps({0, 1}, acceleration.steps);
+  EXPECT_EQ(acceleration.steps.n[0], 0);
 }
 
 // Velocities made afresh lose what rounding had added to them. Momentum must not take that loss for motion:
@@ -90,20 +90,20 @@ TEST(Momentum, TakesARefreshForNoMotion) {
   Contacts contacts;
   std::vector<Velocity> velocity(1);
   const std::vector<Slot> slots = {0};
-  Trail trail;
-  allocate(trail, Carry::momentum, contacts, 1, 1);
+  AccelerationHistory acceleration;
+  allocate(acceleration, Carry::momentum, contacts, 1, 1);
   WallCopy wall;
   velocity[0].u[0] = wall.velocity[0] = 1 + 1e-3;  // drifted from 1
   velocity[0].inv_mass = 0.3;
-  carry_velocities(kernels, Carry::momentum, 0, slots, velocity, trail);
-  carry_wall(Carry::momentum, 0, 0, wall, trail);
-  loosen(slots, velocity, trail.last_v);
-  loosen(0, wall, trail);
+  carry_velocities(kernels, Carry::momentum, 0, slots, velocity, acceleration);
+  carry_wall(Carry::momentum, 0, 0, wall, acceleration);
+  loosen(slots, velocity, acceleration.last_v);
+  loosen(0, wall, acceleration);
   velocity[0].u[0] = wall.velocity[0] = 1;  // made afresh
-  fasten(slots, velocity, trail.last_v);
-  fasten(0, wall, trail);
-  carry_velocities(kernels, Carry::momentum, 0.9, slots, velocity, trail);
-  carry_wall(Carry::momentum, 0.9, 0, wall, trail);
+  fasten(slots, velocity, acceleration.last_v);
+  fasten(0, wall, acceleration);
+  carry_velocities(kernels, Carry::momentum, 0.9, slots, velocity, acceleration);
+  carry_wall(Carry::momentum, 0.9, 0, wall, acceleration);
   EXPECT_NEAR(velocity[0].u[0], 1, 1e-15);
   EXPECT_NEAR(wall.velocity[0], 1, 1e-15);
   EXPECT_EQ(velocity[0].inv_mass, 0.3);

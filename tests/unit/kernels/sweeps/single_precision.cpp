@@ -122,17 +122,18 @@ double difference_to_double(double mu, int sweeps) {
   Contacts contacts = sample.contacts;
   std::vector<Velocity> velocity = sample.bodies.velocity;
   std::vector<WallCopy> walls(sample.chunks.size(), {{0.1, -0.2, 0.05}, 1e-4});
-  Trail trail;
-  allocate(trail, Carry::momentum, contacts, velocity.size(), walls.size());
+  AccelerationHistory acceleration;
+  allocate(acceleration, Carry::momentum, contacts, velocity.size(), walls.size());
   for (int s = 0; s < sweeps; ++s) {
     const double beta = s == 0 ? 0 : 0.8;
-    carry_velocities(kernels, Carry::momentum, beta, slots, velocity, trail);
+    carry_velocities(kernels, Carry::momentum, beta, slots, velocity, acceleration);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
       if (sample.chunks.wall[c] < 0)
-        kernels.sweep_grains<Friction>(contacts, sample.range(c), velocity, mu, {beta, 1.2, trail.steps});
+        kernels.sweep_grains<Friction>(contacts, sample.range(c), velocity, mu,
+                                       {beta, 1.2, acceleration.steps});
       else
         kernels.sweep_wall<Friction>(contacts, sample.range(c), velocity, mu, walls[c],
-                                     {beta, 1.2, trail.steps});
+                                     {beta, 1.2, acceleration.steps});
   }
   const std::vector<double>&r = Friction ? contacts.rx : contacts.rn,
         &r_single = Friction ? single.contacts.rx : single.contacts.rn;

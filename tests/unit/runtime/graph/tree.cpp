@@ -97,23 +97,25 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
   }
 }
 
-using enum ChunkTurn::Side;
+using enum ChunkOrder::Side;
 
 struct Machine {
   int threads = 1, rank = 0, ranks = 2;
   bool overlap = true;
 };
-/// Of subdomains with these turns; in_turns, also elsewhere.
-LoopColours colours_of(std::span<const ChunkTurn> turns, const std::vector<char>& turn_of,
-                       const std::vector<char>& tells, bool in_turns, Machine machine = {}) {
-  return loop_colours(turns, turn_of, tells, in_turns, machine.overlap, machine.threads, machine.rank,
-                      grow_tree(equal_loads(machine.ranks)));
+/// Of subdomains with these subdomain colours; in_turns, also elsewhere.
+LoopColours colours_of(std::span<const ChunkOrder> subdomain_colours,
+                       const std::vector<char>& subdomain_colour_of, const std::vector<char>& tells,
+                       bool in_colours, Machine machine = {}) {
+  return loop_colours(subdomain_colours, subdomain_colour_of, tells, in_colours, machine.overlap,
+                      machine.threads, machine.rank, grow_tree(equal_loads(machine.ranks)));
 }
 
 TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
-  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {border, 0, 1}, {inside, 0, 2}, {inside, 0, 2},
-                                        {border, 1, 0}, {inside, 1, 2}, {inside, 1, 3}};
-  const LoopColours colours = colours_of(turns, {0, 0, 0}, {0, 0, 0}, false);
+  const std::vector<ChunkOrder> subdomain_colours = {{border, 0, 0}, {border, 0, 1}, {inside, 0, 2},
+                                                     {inside, 0, 2}, {border, 1, 0}, {inside, 1, 2},
+                                                     {inside, 1, 3}};
+  const LoopColours colours = colours_of(subdomain_colours, {0, 0, 0}, {0, 0, 0}, false);
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 6, 8, 12, 14}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 10, 16}));  // the third has no chunk
   EXPECT_EQ(colours.tell, colours.publish) << "which does that";
@@ -121,15 +123,16 @@ TEST(LoopColours, TakeOneSubdomainAfterAnotherAndGlueAllInTheEnd) {
 }
 
 TEST(LoopColours, WithoutOverlapGlueBeforeAllInsides) {
-  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {inside, 0, 2}, {border, 1, 0}, {inside, 1, 2}};
-  const LoopColours colours = colours_of(turns, {0, 0}, {0, 0}, false, {.overlap = false});
+  const std::vector<ChunkOrder> subdomain_colours = {
+      {border, 0, 0}, {inside, 0, 2}, {border, 1, 0}, {inside, 1, 2}};
+  const LoopColours colours = colours_of(subdomain_colours, {0, 0}, {0, 0}, false, {.overlap = false});
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 10, 4, 12}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
   EXPECT_EQ(colours.glue, 8U);
 }
 
-const std::vector<ChunkTurn> at_walls = {{early, 0, 0}, {border, 0, 1}, {inside, 0, 3},
-                                         {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
+const std::vector<ChunkOrder> at_walls = {{early, 0, 0}, {border, 0, 1}, {inside, 0, 3},
+                                          {early, 1, 0}, {inside, 1, 1}, {late, 1, 4}};
 
 TEST(LoopColours, TellFirstAndInLaterTurnsPutTakeAndBorderBehindTheInside) {
   const LoopColours two = colours_of(at_walls, {0, 1}, {1, 1}, true);
@@ -155,25 +158,27 @@ TEST(LoopColours, OfARankAloneTellWithTheirSubdomain) {
 }
 
 TEST(LoopColours, OfTheFirstTurnPutNoInsideBeforeAPublishThatOthersWaitFor) {
-  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {inside, 0, 3}, {border, 1, 0}, {inside, 1, 2}};
-  const LoopColours colours = colours_of(turns, {0, 0}, {0, 0}, true, {.rank = 1});
+  const std::vector<ChunkOrder> subdomain_colours = {
+      {border, 0, 0}, {inside, 0, 3}, {border, 1, 0}, {inside, 1, 2}};
+  const LoopColours colours = colours_of(subdomain_colours, {0, 0}, {0, 0}, true, {.rank = 1});
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 8, 4, 10}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{2, 6}));
 }
 
 TEST(LoopColours, OfARelayLetNobodyWaitForEver) {
-  // Rank 1 of 40 alike has children, and subdomains of three turns.
+  // Rank 1 of 40 alike has children, and subdomains of three subdomain colours.
   ASSERT_TRUE(grow_tree(equal_loads(40)).relays(1));
-  const std::vector<char> turn_of = {1, 2, 0};
-  std::vector<ChunkTurn> turns;
+  const std::vector<char> subdomain_colour_of = {1, 2, 0};
+  std::vector<ChunkOrder> subdomain_colours;
   for (std::uint32_t e = 0; e < 3; ++e) {
-    turns.push_back({early, e, 0});
-    turns.push_back({turn_of[e] == 0 ? border : inside, e, 1});
-    turns.push_back({turn_of[e] == 0 ? inside : late, e, 2});
+    subdomain_colours.push_back({early, e, 0});
+    subdomain_colours.push_back({subdomain_colour_of[e] == 0 ? border : inside, e, 1});
+    subdomain_colours.push_back({subdomain_colour_of[e] == 0 ? inside : late, e, 2});
   }
   for (const bool overlap : {true, false})
     for (const int threads : {1, 3}) {
-      const LoopColours colours = colours_of(turns, turn_of, {1, 1, 1}, true, {threads, 1, 40, overlap});
+      const LoopColours colours =
+          colours_of(subdomain_colours, subdomain_colour_of, {1, 1, 1}, true, {threads, 1, 40, overlap});
       for (const std::size_t e : {0U, 1U, 2U}) EXPECT_LT(colours.tell[e], colours.tree.up);
       for (const std::size_t later : {0U, 1U}) {
         EXPECT_LT(colours.tree.up, colours.take[later]);
@@ -188,21 +193,21 @@ TEST(LoopColours, OfARelayLetNobodyWaitForEver) {
 }
 
 TEST(LoopColours, OfSeveralThreadsCountAlikeInAllSubdomains) {
-  const std::vector<ChunkTurn> turns = {{border, 0, 0}, {border, 0, 1}, {inside, 0, 7},
-                                        {border, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
-  const LoopColours colours = colours_of(turns, {0, 0}, {0, 0}, false, {.threads = 2});
+  const std::vector<ChunkOrder> subdomain_colours = {{border, 0, 0}, {border, 0, 1}, {inside, 0, 7},
+                                                     {border, 1, 4}, {inside, 1, 9}, {inside, 1, 12}};
+  const LoopColours colours = colours_of(subdomain_colours, {0, 0}, {0, 0}, false, {.threads = 2});
   EXPECT_EQ(colours.chunk, (std::vector<std::uint32_t>{0, 2, 6, 0, 6, 8}));
   EXPECT_EQ(colours.publish, (std::vector<std::uint32_t>{4, 4}));
   EXPECT_EQ(colours.glue, 10U);
 }
 
 TEST(LoopColours, OfASubdomainAloneFollowFromThoseThatItHadAmongOthers) {
-  const std::vector<ChunkTurn> all = {{border, 0, 0}, {inside, 0, 3}, {border, 1, 0}, {border, 1, 2},
-                                      {inside, 1, 3}, {inside, 1, 5}, {inside, 2, 3}};
+  const std::vector<ChunkOrder> all = {{border, 0, 0}, {inside, 0, 3}, {border, 1, 0}, {border, 1, 2},
+                                       {inside, 1, 3}, {inside, 1, 5}, {inside, 2, 3}};
   for (int threads_then : {1, 4})
     for (int threads : {1, 4}) {
       const LoopColours among = colours_of(all, {0, 0, 0}, {0, 0, 0}, false, {.threads = threads_then});
-      std::vector<ChunkTurn> alone, again;
+      std::vector<ChunkOrder> alone, again;
       for (std::size_t k = 0; k < all.size(); ++k)
         if (all[k].subdomain == 1) {
           alone.push_back({all[k].side, 0, all[k].colour});

@@ -178,14 +178,14 @@ Formula formula(const StepState& state, std::size_t numbers, std::int64_t glued_
     for (std::size_t s = all.slot_begin[e]; s < all.slot_begin[e + 1]; ++s)
       standings[state.bodies.id[s]].push_back(e);
   std::set<std::pair<std::size_t, std::size_t>> pairs;
-  std::set<std::size_t> to_the_centre;
-  std::int64_t told = 0, gathered = 0;  // bodies, over all messages between two subdomains; to the centre
+  std::set<std::size_t> to_the_root;
+  std::int64_t told = 0, gathered = 0;  // bodies, over all messages between two subdomains; to the root
   for (const auto& [id, in] : standings) {
     const std::size_t m = in.size();
     if (m < 2) continue;
     if (m >= hubs_from) {
       gathered += static_cast<std::int64_t>(m);
-      to_the_centre.insert(in.begin(), in.end());
+      to_the_root.insert(in.begin(), in.end());
       continue;
     }
     told += static_cast<std::int64_t>(m * (m - 1));
@@ -197,7 +197,7 @@ Formula formula(const StepState& state, std::size_t numbers, std::int64_t glued_
   const auto body = static_cast<std::int64_t>(8 * numbers);
   Formula sent;
   sent.messages = static_cast<std::int64_t>(pairs.size()) +
-                  2 * (glued_walls > 0 ? subdomains : static_cast<std::int64_t>(to_the_centre.size()));
+                  2 * (glued_walls > 0 ? subdomains : static_cast<std::int64_t>(to_the_root.size()));
   sent.bytes = body * told + 2 * (body * gathered + 3 * 8 * glued_walls * subdomains);
   return sent;
 }

@@ -39,7 +39,7 @@ TEST(Dealing, OnOneRankKeepsEveryGrain) {
 TEST(Dealing, GrainsThatDoNotTurnLoseTheirSpin) {
   Sample sample = some_grains(1);
   sample.velocity.assign(1, {1, 2, 3, 4, 5, 6});
-  sample.turns = false;
+  sample.rotates = false;
   Bodies bodies;
   append(sample, bodies);
   EXPECT_EQ(bodies.velocity[0].u[2], 3);

@@ -268,7 +268,7 @@ TEST(Decomposition, SendsWhatTheFormulaSays) {
   setup.decomposition.exchange = ExchangeScheme::ccs;
   Simulation simulation(setup, bodies, executor);
   simulation.step();
-  EXPECT_EQ(simulation.messages().messages, 8) << "to the centre and back, per subdomain";
+  EXPECT_EQ(simulation.messages().messages, 8) << "to the root and back, per subdomain";
   EXPECT_EQ(simulation.messages().bytes, 2 * 6 * 6 * 8) << "the same velocities, each once up and once down";
 }
 

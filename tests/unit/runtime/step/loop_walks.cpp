@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "partition/turns.hpp"
+#include "partition/subdomain_colours.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace talus::graph {
@@ -22,7 +22,7 @@ using test::uniform;
 /// n_x x n_y x n_z boxes with made-up numbers of chunks, each on one rank.
 struct Machine {
   std::vector<std::vector<std::size_t>> neighbours;
-  std::vector<char> turn;
+  std::vector<char> subdomain_colour;
   std::vector<std::size_t> rank_of;
   std::vector<int> border, inside;  ///< chunks per subdomain
   std::size_t ranks = 0;
@@ -32,9 +32,9 @@ struct Machine {
 
 /// What waits or is waited for. Chunks do neither.
 struct Node {
-  enum Role { publish, collect, centre, glue, take, tell } role;
+  enum Role { publish, collect, root, glue, take, tell } role;
   std::uint32_t colour;
-  std::size_t subdomain;  ///< of collect and centre none
+  std::size_t subdomain;  ///< of collect and root none
 };
 
 /// What a thread goes through, in order.
@@ -47,15 +47,15 @@ class Play {
  public:
   explicit Play(const Machine& machine) : machine_(machine), tells_left_(machine.ranks, 0) {
     std::vector<RankLoad> load(machine.ranks);
-    for (std::size_t e = 0; e < machine.turn.size(); ++e) {
+    for (std::size_t e = 0; e < machine.subdomain_colour.size(); ++e) {
       RankLoad& rank = load[machine.rank_of[e]];
       rank.work += static_cast<std::uint64_t>(10 + machine.border[e] + machine.inside[e]);
-      rank.waits = rank.waits || machine.turn[e] > 0;
+      rank.waits = rank.waits || machine.subdomain_colour[e] > 0;
       ++tells_left_[machine.rank_of[e]];
     }
     tree_ = grow_tree(load);
     for (std::size_t r = 0; r < machine.ranks; ++r) add_walks(r);
-    published_.assign(machine.turn.size(), 0);
+    published_.assign(machine.subdomain_colour.size(), 0);
     up_.assign(machine.ranks, 0);
     down_.assign(machine.ranks, 0);
   }
@@ -83,27 +83,28 @@ class Play {
  private:
   void add_walks(std::size_t rank) {
     std::vector<std::size_t> mine;
-    for (std::size_t e = 0; e < machine_.turn.size(); ++e)
+    for (std::size_t e = 0; e < machine_.subdomain_colour.size(); ++e)
       if (machine_.rank_of[e] == rank) mine.push_back(e);
-    std::vector<ChunkTurn> chunks;
-    std::vector<char> turn_of;
-    using enum ChunkTurn::Side;
+    std::vector<ChunkOrder> chunks;
+    std::vector<char> subdomain_colour_of;
+    using enum ChunkOrder::Side;
     for (std::uint32_t k = 0; k < mine.size(); ++k) {
-      const char turn = machine_.turn[mine[k]];
-      turn_of.push_back(turn);
+      const char subdomain_colour = machine_.subdomain_colour[mine[k]];
+      subdomain_colour_of.push_back(subdomain_colour);
       std::uint32_t colour = 0;
-      const auto add = [&](ChunkTurn::Side side, int count) {
+      const auto add = [&](ChunkOrder::Side side, int count) {
         for (int i = 0; i < count; ++i) chunks.push_back({side, k, colour++});
       };
       add(early, 2);
-      if (turn == 0) add(border, machine_.border[mine[k]]);
+      if (subdomain_colour == 0) add(border, machine_.border[mine[k]]);
       add(inside, machine_.inside[mine[k]]);
-      if (turn > 0) add(late, machine_.border[mine[k]]);
+      if (subdomain_colour > 0) add(late, machine_.border[mine[k]]);
     }
-    const bool in_turns = std::ranges::any_of(machine_.turn, [](char turn) { return turn > 0; });
+    const bool in_colours = std::ranges::any_of(machine_.subdomain_colour,
+                                                [](char subdomain_colour) { return subdomain_colour > 0; });
     const LoopColours colours =
-        loop_colours(chunks, turn_of, std::vector<char>(mine.size(), 1), in_turns, machine_.overlap,
-                     machine_.threads, static_cast<int>(rank), tree_);
+        loop_colours(chunks, subdomain_colour_of, std::vector<char>(mine.size(), 1), in_colours,
+                     machine_.overlap, machine_.threads, static_cast<int>(rank), tree_);
     const auto threads = static_cast<std::size_t>(machine_.threads);
     std::vector<Walk> walks(threads, Walk{rank, {}});
     for (std::size_t k = 0; k < mine.size(); ++k) {
@@ -111,10 +112,10 @@ class Play {
       own.push_back({Node::publish, colours.publish[k], mine[k]});
       own.push_back({Node::glue, colours.glue, mine[k]});
       own.push_back({Node::tell, colours.tell[k], mine[k]});
-      if (turn_of[k] > 0) own.push_back({Node::take, colours.take[k], mine[k]});
+      if (subdomain_colour_of[k] > 0) own.push_back({Node::take, colours.take[k], mine[k]});
     }
     if (tree_.relays(static_cast<int>(rank))) walks[0].nodes.push_back({Node::collect, colours.tree.up, 0});
-    walks[0].nodes.push_back({Node::centre, colours.tree.down, 0});
+    walks[0].nodes.push_back({Node::root, colours.tree.down, 0});
     for (Walk& walk : walks) {
       std::ranges::stable_sort(walk.nodes, {}, [](const Node& n) { return std::pair(n.colour, n.role); });
       walks_.push_back(std::move(walk));
@@ -129,10 +130,12 @@ class Play {
     const bool top = static_cast<int>(walk.rank) == tree_.top();
     switch (node.role) {
       case Node::take:
-        return all_of([&](std::size_t e) { return machine_.turn[e] < machine_.turn[node.subdomain]; });
+        return all_of([&](std::size_t e) {
+          return machine_.subdomain_colour[e] < machine_.subdomain_colour[node.subdomain];
+        });
       case Node::glue:
         return down_[walk.rank] != 0 && all_of([](std::size_t) { return true; });
-      case Node::centre:
+      case Node::root:
         if (!top)
           return tells_left_[walk.rank] == 0 && down_[static_cast<std::size_t>(tree_.parent[walk.rank])] != 0;
         [[fallthrough]];
@@ -150,7 +153,7 @@ class Play {
   void run(std::size_t rank, const Node& node) {
     if (node.role == Node::publish) published_[node.subdomain] = 1;
     if (node.role == Node::collect) up_[rank] = 1;
-    if (node.role == Node::centre) down_[rank] = 1;
+    if (node.role == Node::root) down_[rank] = 1;
     if (node.role == Node::tell && --tells_left_[rank] == 0 && tree_.leaf(static_cast<int>(rank)))
       up_[rank] = 1;
   }
@@ -163,8 +166,8 @@ class Play {
   std::vector<int> tells_left_;
 };
 
-/// With turns as the partition chooses them, or none.
-Machine made_up(Random& random, bool in_turns) {
+/// With subdomain colours as the partition chooses them, or none.
+Machine made_up(Random& random, bool in_colours) {
   const auto any = [&](int from, int to) {
     return std::min(to, from + static_cast<int>(uniform(random, 0, to - from + 1)));
   };
@@ -192,8 +195,8 @@ Machine made_up(Random& random, bool in_turns) {
                       : apart == 2 ? 10
                                    : 1});
     }
-  machine.turn =
-      in_turns ? choose_turns(static_cast<std::int32_t>(count), ties) : std::vector<char>(count, 0);
+  machine.subdomain_colour = in_colours ? choose_subdomain_colours(static_cast<std::int32_t>(count), ties)
+                                        : std::vector<char>(count, 0);
   machine.ranks = std::max<std::size_t>(1, count / static_cast<std::size_t>(any(1, 8)));
   const bool cyclic = any(0, 1) == 1;
   for (std::size_t e = 0; e < count; ++e) {
@@ -213,9 +216,9 @@ TEST(LoopWalks, OfAnyRanksThreadsAndTurnsComeToTheirEnds) {
     const Machine machine = made_up(random, trial % 4 != 0);
     Play play(machine);
     with_relays += play.has_relays() ? 1 : 0;
-    ASSERT_TRUE(play.ends()) << "trial " << trial << ": " << machine.turn.size() << " subdomains, "
-                             << machine.ranks << " ranks, " << machine.threads << " threads, overlap "
-                             << machine.overlap;
+    ASSERT_TRUE(play.ends()) << "trial " << trial << ": " << machine.subdomain_colour.size()
+                             << " subdomains, " << machine.ranks << " ranks, " << machine.threads
+                             << " threads, overlap " << machine.overlap;
   }
   EXPECT_GT(with_relays, 100);
 }

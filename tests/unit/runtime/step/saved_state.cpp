@@ -10,7 +10,8 @@
 namespace talus {
 namespace {
 
-/// Grains that overlap in a box whose lid is pushed, with friction; the second stage turns gravity on.
+/// Grains that overlap in a box whose lid is pushed, with friction; the second stage subdomain colours
+/// gravity on.
 talus::Setup pressed_box() {
   talus::Setup setup;
   setup.walls = test::box_of_walls(-1, 6);

@@ -35,13 +35,13 @@ class Orders : public testing::Test {
     Trace trace = test::one_loop(colour_, {}, std::vector<float>(8, 1));
     trace.threads = 2;
     trace.plans[0].owner = owner_;
-    trace.lanes = {{0, 0, {}}, {0, 1, {}}};
+    trace.tracks = {{0, 0, {}}, {0, 1, {}}};
     for (int epoch = 0; epoch < 2; ++epoch) {
       for (std::uint32_t n = 0; n < 8; ++n)
-        trace.lanes[n / 4].records.push_back(
+        trace.tracks[n / 4].records.push_back(
             {20 * epoch + 2 * (n % 4) + n / 4, 1, n, epoch, pack(1, test::sweep)});
       if (epoch == 1 || two_gates)
-        trace.lanes[0].records.push_back({20 * epoch + 10, 1, 0, epoch, pack(1, kind_check)});
+        trace.tracks[0].records.push_back({20 * epoch + 10, 1, 0, epoch, pack(1, kind_check)});
     }
     return trace;
   }
@@ -102,14 +102,14 @@ TEST_F(Orders, ThatCannotBeFollowedEndTheRun) {
   expect_failure(trace(), 3, -1);       // the recorded loop had ended
   expect_failure(trace(false), 2, -1);  // it had gone on without a decision
   Trace idle = trace();
-  std::erase_if(idle.lanes[1].records, [](const Record& record) { return record.node == 5; });
+  std::erase_if(idle.tracks[1].records, [](const Record& record) { return record.node == 5; });
   expect_failure(idle, 1, -1);  // a node that did nothing does something
 }
 
 TEST_F(Orders, OfFreeThreadsAreRefused) {
   Trace free = test::one_loop({0, 1}, {}, {1, 1});
-  std::swap(free.lanes[0].records[1].begin, free.lanes[0].records[2].begin);
-  sort_lanes(free);
+  std::swap(free.tracks[0].records[1].begin, free.tracks[0].records[2].begin);
+  sort_tracks(free);
   EXPECT_THROW(Order(free, 0), TraceError);
 }
 

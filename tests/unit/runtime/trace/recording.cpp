@@ -44,7 +44,7 @@ TEST(Recording, LosesNothingWhenBuffersAreFull) {
                        records.insert(records.end(), block.records.begin(), block.records.end());
                      }});
   recorder.begin_step(3);
-  for (std::uint32_t i = 0; i < 100; ++i) recorder.lane(0).add(i, i + 1, i, 2, test::sweep);
+  for (std::uint32_t i = 0; i < 100; ++i) recorder.track(0).add(i, i + 1, i, 2, test::sweep);
   recorder.end_step();
   recorder.finish();
   ASSERT_EQ(records.size(), 100u);

@@ -100,12 +100,12 @@ TEST(Replay, OfTwoRecordedRanksOnOneAddsThemUp) {
 // Rank 0 waits longer for rank 1, but goes on with what comes from rank 2.
 TEST(CriticalPath, GoesToTheSenderOfTheLastMessage) {
   Trace trace = test::all_neighbours(3, 3);
-  for (Lane& lane : trace.lanes)
-    for (Record& record : lane.records) {
+  for (Track& track : trace.tracks)
+    for (Record& record : track.records) {
       record.begin *= 100;
       record.duration *= 100;
     }
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   const auto glue = std::ranges::find(records, test::glue, &Record::kind);
   const std::int64_t begin = glue->begin;
   for (auto later = std::next(glue); later != records.end(); ++later) later->begin += 3500;
@@ -114,11 +114,11 @@ TEST(CriticalPath, GoesToTheSenderOfTheLastMessage) {
                                    {begin + 3000, 500, message_name(2, 0), 0, pack(1, kind_receive)}});
   const Timeline timeline(trace);
   const std::vector<PathHop> path = critical_path(timeline, timeline.index(1));
-  const auto lane_of = [](const PathHop& hop) { return hop.place.lane; };
+  const auto lane_of = [](const PathHop& hop) { return hop.place.track; };
   const auto crossing = std::ranges::find_if(
-      path, [](std::uint32_t lane) { return lane != 0; }, lane_of);
+      path, [](std::uint32_t track) { return track != 0; }, lane_of);
   ASSERT_NE(crossing, path.end());
-  EXPECT_EQ(crossing->place.lane, 2u);
+  EXPECT_EQ(crossing->place.track, 2u);
   EXPECT_EQ(timeline.record(crossing->place).kind(), test::publish);
 }
 
@@ -133,11 +133,12 @@ TEST(CriticalPath, GoesFromTakerToSenderUpAndDownTheTreeOfRanks) {
   for (std::size_t k = 1; k < path.size(); ++k) {
     const Record &later = timeline.record(path[k - 1].place), &before = timeline.record(path[k].place);
     if (later.kind() == kind_check || before.epoch < 0) continue;  // sums; tasks of no length
-    const bool crosses = played.lanes[path[k].place.lane].rank != played.lanes[path[k - 1].place.lane].rank;
+    const bool crosses =
+        played.tracks[path[k].place.track].rank != played.tracks[path[k - 1].place.track].rank;
     crossings += crosses;
     EXPECT_NEAR(path[k - 1].from - path[k].until, crosses ? 1e4 : 0, 1) << "hop " << k;
   }
-  // In each of two epochs to the centre and back, over ranks between.
+  // In each of two epochs to the root and back, over ranks between.
   EXPECT_GE(crossings, 8);
 }
 
@@ -171,7 +172,7 @@ TEST(Replay, OfAReplayIsTheSame) {
 TEST(Replay, TypicalTimesLeaveInterruptionsOut) {
   // A node of 10 ns in five epochs, once interrupted for 1000 ns.
   Trace trace = test::one_loop({0}, {}, {10}, 5);
-  for (Record& record : trace.lanes[0].records) {
+  for (Record& record : trace.tracks[0].records) {
     if (record.begin >= 40) record.begin += 990;
     if (record.epoch == 3 && record.kind() == test::sweep) record.duration = 1000;
   }
@@ -191,7 +192,7 @@ TEST(Replay, TypicalTimesLeaveInterruptedTasksOfSubdomainsOut) {
     before.push_back({100 * i, i == 2 ? 90.0F : 8.0F, i, -1, pack(1, test::task)});
   }
   trace.tasks[0].push_back({"loop", kind_team, -1, true, {0, 1, 2, 3, 4}});
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   std::erase_if(records, [](const Record& record) { return record.epoch < 0; });
   for (Record& record : records) record.begin += 1000;
   records.insert(records.begin(), before.begin(), before.end());
@@ -205,7 +206,7 @@ TEST(Replay, AQuantileStandsForAllTimesOfANode) {
   // Ten epochs of 10 ns, seven of them on a busy machine.
   Trace trace = test::one_loop({0}, {}, {10}, 10);
   std::int64_t late = 0;
-  for (Record& record : trace.lanes[0].records) {
+  for (Record& record : trace.tracks[0].records) {
     record.begin += late;
     if (record.kind() != test::sweep || record.epoch < 3) continue;
     record.duration = 25;
@@ -241,7 +242,7 @@ TEST(Replay, NoiseIsTheSameForTheSameSeed) {
 /// What a thread needs from one node to the next, 10 ns, is seen between records.
 Trace with_gaps(Trace trace) {
   std::int64_t gaps = 0;
-  for (Record& record : trace.lanes[0].records) record.begin += 10 * gaps++;
+  for (Record& record : trace.tracks[0].records) record.begin += 10 * gaps++;
   return trace;
 }
 
@@ -294,7 +295,7 @@ TEST(Replay, KindsOfTasksMayHaveSpeedsOfTheirOwn) {
   machine.speed = 2;
   EXPECT_DOUBLE_EQ(makespan(trace, machine), alone / 2);
   double publishes = 0;
-  for (const Record& record : trace.lanes[0].records)
+  for (const Record& record : trace.tracks[0].records)
     if (trace.info(record.kind()).name == "publish") publishes += static_cast<double>(record.duration);
   ASSERT_GT(publishes, 0);
   machine.speed_of["publish"] = 4;

@@ -23,7 +23,7 @@ using test::makespan;
 // time.
 TEST(ReplayDecisions, RanksMeetInEveryCallThatOneRankMade) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   // A step that began at 100 ns, behind 90 ns outside.
   for (Record& record : records) record.begin += 100;
   const auto call = [](std::int64_t at, std::uint32_t bytes) {
@@ -57,7 +57,7 @@ TEST(ReplayDecisions, RanksMeetInEveryCallThatOneRankMade) {
 // Durations are floats: the end of what took a second is known to 64 ns.
 TEST(ReplayDecisions, CountsACallAtTheVeryEndOfALongTask) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   constexpr std::int64_t second = 1'000'000'031;
   for (Record& record : records) record.begin += second;
   const Record outside{0, static_cast<float>(second), 0, -1, pack(1, kind_outside)},
@@ -69,7 +69,7 @@ TEST(ReplayDecisions, CountsACallAtTheVeryEndOfALongTask) {
 
 TEST(ReplayDecisions, ChecksAfterEverySweepAreReadASweepLater) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   const auto second =
       std::find_if(records.begin(), records.end(), [](const Record& r) { return r.epoch == 1; });
   records.insert(second, {second->begin, 0, 0, 0, pack(1, kind_check)});
@@ -101,7 +101,7 @@ TEST(ReplayDecisions, SumsGoTheRestOfTheirWayWhenAllWait) {
 /// without a decision, and one with a check.
 Trace conjugate() {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   const Record before = records.front(), behind = records.back();
   std::vector<Record> epochs[2];
   for (const Record& record : records)
@@ -145,7 +145,7 @@ TEST(ReplayDecisions, SumsThatAreReadLaterHideNoOthers) {
 
 TEST(ReplayDecisions, ACheckThatSettlesIsReadAtOnce) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   std::ranges::find(records, kind_check, &Record::kind)->node = check_settles;
   Machine machine = bare(2, 1);
   machine.late_check = true;
@@ -156,7 +156,7 @@ TEST(ReplayDecisions, ACheckThatSettlesIsReadAtOnce) {
 /// kind sweep all ranks and threads do it together, of kind task each rank its part.
 Trace with_a_look(std::int64_t length = 80, Kind kind = test::sweep) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   const auto check = std::ranges::find(records, kind_check, &Record::kind);
   check->duration = static_cast<float>(length + 10);
   check->node = check_settles;
@@ -202,7 +202,7 @@ TEST(ReplayDecisions, SumsOfAPredictedCheckArePlayedAgain) {
 // The sweep that hides the sums of a check, and its undoing, have none of their own.
 TEST(ReplayDecisions, ALateCheckAddsUpOnce) {
   Trace trace = with_a_look(80, test::task);
-  std::ranges::find(trace.lanes[0].records, kind_check, &Record::kind)->node = 0;
+  std::ranges::find(trace.tracks[0].records, kind_check, &Record::kind)->node = 0;
   const Trace without = test::two_subdomains(1);
   Machine machine = bare(2, 1);
   machine.late_check = true;
@@ -225,7 +225,7 @@ TEST(TaskTimes, AreThoseOfTheReplay) {
   EXPECT_THROW(times.node(0, 0), TraceError) << "whose loop is not known yet";
   times.plan(test::two_subdomains(2).plans[1]);
   EXPECT_DOUBLE_EQ(times.task(0), 0);
-  // Of one subdomain: sweep, inner sweep, publish, centre, glue.
+  // Of one subdomain: sweep, inner sweep, publish, root, glue.
   const double nodes[] = {100e-9, 50e-9, 10e-9, 0, 20e-9};
   for (std::uint32_t n = 0; n < 5; ++n) EXPECT_NEAR(times.node(n, 0), nodes[n], 1e-15) << n;
   EXPECT_NEAR(times.decision(1), 50e-9, 1e-15);

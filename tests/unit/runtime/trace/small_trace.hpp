@@ -11,14 +11,14 @@
 
 namespace talus::trace::test {
 
-inline constexpr Kind task{6}, sweep{7}, publish{8}, centre{9}, glue{10};
+inline constexpr Kind task{6}, sweep{7}, publish{8}, root{9}, glue{10};
 
 inline std::vector<KindInfo> kinds() {
   std::vector<KindInfo> all = runtime_kinds();
   all.push_back({"task", Phase::update, false, true});
   all.push_back({"sweep", Phase::sweeps, false, false});
   all.push_back({"publish", Phase::exchange, false, false});
-  all.push_back({"centre", Phase::exchange, false, false});
+  all.push_back({"root", Phase::exchange, false, false});
   all.push_back({"glue", Phase::sweeps, false, false});
   return all;
 }
@@ -66,12 +66,12 @@ inline std::vector<Task> three_tasks() {
 
 /// One step on one thread: tasks of 0 ns around a loop, every node once an epoch in the order of their
 /// colours, with these durations, and a decision of 0 ns at the end.
-inline Lane run_once(const Plan& plan, const std::vector<float>& duration, const std::vector<Kind>& kind,
-                     int epochs) {
-  Lane lane{plan.rank, 0, {}};
+inline Track run_once(const Plan& plan, const std::vector<float>& duration, const std::vector<Kind>& kind,
+                      int epochs) {
+  Track track{plan.rank, 0, {}};
   std::int64_t now = 0;
   const auto add = [&](float length, std::uint32_t node, std::int32_t epoch, Kind of) {
-    lane.records.push_back({now, length, node, epoch, pack(1, of)});
+    track.records.push_back({now, length, node, epoch, pack(1, of)});
     now += static_cast<std::int64_t>(length);
   };
   std::vector<std::uint32_t> order;
@@ -83,12 +83,12 @@ inline Lane run_once(const Plan& plan, const std::vector<float>& duration, const
     for (std::uint32_t n : order) add(duration[n], n, epoch, kind[n]);
   add(0, 0, epochs - 1, kind_check);
   add(0, 2, -1, task);
-  return lane;
+  return track;
 }
 
 /// Subdomains that all share copies: in each epoch a sweep of 100 ns, publish of 10 ns, an inner sweep of 50
 /// ns, glue of 20 ns, on one rank or one on each; two epochs, messages of 1000 bytes. With a wall that all of
-/// them touch, 100 bytes each go to the centre and back besides.
+/// them touch, 100 bytes each go to the root and back besides.
 inline Trace all_neighbours(int subdomains, int ranks, bool wall = false) {
   Trace trace;
   trace.ranks = ranks;
@@ -112,15 +112,15 @@ inline Trace all_neighbours(int subdomains, int ranks, bool wall = false) {
     }
     for (int e = first; e < end; ++e)
       publishes.push_back(add(Role::publish, static_cast<std::uint32_t>(e), 2, 10, publish));
-    const std::uint32_t hub = add(Role::centre, centre_group, 7, 0, centre);
+    const std::uint32_t hub = add(Role::root, root_group, 7, 0, root);
     for (int e = first; e < end; ++e) {
       glues.push_back(add(Role::glue, static_cast<std::uint32_t>(e), 8, 20, glue));
       for (int other = 0; other < subdomains; ++other)
         if (other != e)
           messages.push_back({static_cast<std::uint16_t>(e), static_cast<std::uint16_t>(other), 1000});
       if (!wall) continue;
-      messages.push_back({static_cast<std::uint16_t>(e), centre_group, 100});
-      messages.push_back({centre_group, static_cast<std::uint16_t>(e), 100});
+      messages.push_back({static_cast<std::uint16_t>(e), root_group, 100});
+      messages.push_back({root_group, static_cast<std::uint16_t>(e), 100});
     }
     for (std::size_t k = 0; k < publishes.size(); ++k) {
       builder.join(publishes[k], outer[k]);
@@ -131,7 +131,7 @@ inline Trace all_neighbours(int subdomains, int ranks, bool wall = false) {
     }
     trace.plans.push_back(builder.plan(rank, messages));
     trace.tasks.push_back(three_tasks());
-    trace.lanes.push_back(run_once(trace.plans.back(), duration, kind, 2));
+    trace.tracks.push_back(run_once(trace.plans.back(), duration, kind, 2));
   }
   return trace;
 }
@@ -151,7 +151,7 @@ inline Trace one_loop(const std::vector<std::uint32_t>& colour,
   trace.kinds = kinds();
   trace.plans.push_back(builder.plan(0));
   trace.tasks.push_back(three_tasks());
-  trace.lanes.push_back(
+  trace.tracks.push_back(
       run_once(trace.plans.back(), duration, std::vector<Kind>(colour.size(), sweep), epochs));
   return trace;
 }

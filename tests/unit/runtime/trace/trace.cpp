@@ -43,7 +43,7 @@ void expect_equal(const Record& a, const Record& b) {
 
 TEST_F(TraceFile, ReadsBackWhatWasWritten) {
   Trace trace = test::two_subdomains(2);
-  sort_lanes(trace);
+  sort_tracks(trace);
   io::write_trace(path_, trace);
   const Trace back = io::read_trace(path_);
   EXPECT_EQ(back.ranks, trace.ranks);
@@ -54,17 +54,17 @@ TEST_F(TraceFile, ReadsBackWhatWasWritten) {
   EXPECT_EQ(back.plans[1].messages[0].bytes, trace.plans[1].messages[0].bytes);
   ASSERT_EQ(back.tasks[1].size(), trace.tasks[1].size());
   EXPECT_EQ(back.tasks[1][2].predecessors, trace.tasks[1][2].predecessors);
-  ASSERT_EQ(back.lanes.size(), trace.lanes.size());
-  for (std::size_t k = 0; k < back.lanes.size(); ++k) {
-    ASSERT_EQ(back.lanes[k].records.size(), trace.lanes[k].records.size());
-    for (std::size_t i = 0; i < back.lanes[k].records.size(); ++i)
-      expect_equal(back.lanes[k].records[i], trace.lanes[k].records[i]);
+  ASSERT_EQ(back.tracks.size(), trace.tracks.size());
+  for (std::size_t k = 0; k < back.tracks.size(); ++k) {
+    ASSERT_EQ(back.tracks[k].records.size(), trace.tracks[k].records.size());
+    for (std::size_t i = 0; i < back.tracks[k].records.size(); ++i)
+      expect_equal(back.tracks[k].records[i], trace.tracks[k].records[i]);
   }
 }
 
 TEST_F(TraceFile, TakesNoMoreThan32BytesATask) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   const Record one = records.back();
   for (int k = 0; k < 200000; ++k) {
     records.push_back(one);
@@ -77,8 +77,8 @@ TEST_F(TraceFile, TakesNoMoreThan32BytesATask) {
 TEST_F(TraceFile, OffsetsOfClocksAreTakenOut) {
   const Trace trace = test::two_subdomains(2);
   io::TraceWriter writer(path_, 2, 1, false, trace.kinds);
-  for (const Lane& lane : trace.lanes)
-    writer.append(Block{lane.rank, lane.thread, lane.records, std::nullopt});
+  for (const Track& track : trace.tracks)
+    writer.append(Block{track.rank, track.thread, track.records, std::nullopt});
   for (const Plan& plan : trace.plans) writer.append(Block{plan.rank, 0, {}, plan});
   for (std::int32_t rank = 0; rank < 2; ++rank)
     writer.append(rank, trace.tasks[static_cast<std::size_t>(rank)]);
@@ -86,9 +86,9 @@ TEST_F(TraceFile, OffsetsOfClocksAreTakenOut) {
   // Rank 1 is 500 ns behind in the beginning, 700 ns at time 2000.
   writer.append(io::RankClock{1, {io::ClockOffset{0, 500}, io::ClockOffset{2000, 700}}});
   const Trace back = io::read_trace(path_);
-  EXPECT_EQ(back.lanes[0].records[0].begin, trace.lanes[0].records[0].begin);
-  const std::int64_t before = trace.lanes[1].records[0].begin;
-  EXPECT_EQ(back.lanes[1].records[0].begin, before + 500 + before / 10);
+  EXPECT_EQ(back.tracks[0].records[0].begin, trace.tracks[0].records[0].begin);
+  const std::int64_t before = trace.tracks[1].records[0].begin;
+  EXPECT_EQ(back.tracks[1].records[0].begin, before + 500 + before / 10);
 }
 
 TEST_F(TraceFile, PartsOfRanksMakeOneTrace) {
@@ -96,7 +96,7 @@ TEST_F(TraceFile, PartsOfRanksMakeOneTrace) {
   const Trace trace = test::two_subdomains(2);
   const auto write = [&](const fs::path& path, std::int32_t rank) {
     io::TraceWriter writer(path, 2, 1, false, trace.kinds);
-    writer.append(Block{rank, 0, trace.lane(rank, 0).records, trace.plans[static_cast<std::size_t>(rank)]});
+    writer.append(Block{rank, 0, trace.track(rank, 0).records, trace.plans[static_cast<std::size_t>(rank)]});
     writer.append(rank, trace.tasks[static_cast<std::size_t>(rank)]);
     writer.append(io::RankClock{rank, {}});
     return writer;
@@ -132,7 +132,7 @@ TEST_F(TraceFile, NoticesIndicesThatPointNowhere) {
 
 TEST_F(TraceFile, NoticesACheckOutsideOfTheLoop) {
   Trace trace = test::two_subdomains(1);
-  std::ranges::find(trace.lanes[0].records, kind_check, &Record::kind)->epoch = -1;
+  std::ranges::find(trace.tracks[0].records, kind_check, &Record::kind)->epoch = -1;
   io::write_trace(path_, trace);
   EXPECT_NE(complaint().find("epoch -1"), std::string::npos) << complaint();
 }
@@ -151,13 +151,13 @@ TEST_F(TraceFile, NoticesATurnThatNoSubdomainHas) {
   const auto publish = std::ranges::find(plan.role, static_cast<std::uint8_t>(Role::publish));
   plan.place[static_cast<std::size_t>(publish - plan.role.begin())] = 128;
   io::write_trace(path_, trace);
-  EXPECT_NE(complaint().find("turn 128"), std::string::npos) << complaint();
+  EXPECT_NE(complaint().find("subdomain_colour 128"), std::string::npos) << complaint();
 }
 
 /// Two threads; what is recorded comes in parts of steps 1, 2 and so on, as of a run that was killed.
 class CutTraceFile : public TraceFile {
  protected:
-  /// Steps that the lane of each thread has come to.
+  /// Steps that the track of each thread has come to.
   void write(std::uint32_t first, std::uint32_t second) const {
     const Trace trace = test::two_subdomains(1);
     io::TraceWriter writer(path_, 1, 2, false, trace.kinds);
@@ -166,7 +166,7 @@ class CutTraceFile : public TraceFile {
     for (const auto& [thread, steps] : {std::pair(0, first), std::pair(1, second)}) {
       std::vector<Record> records;
       for (std::uint32_t step = 1; step <= steps; ++step)
-        for (Record record : trace.lanes[0].records) {
+        for (Record record : trace.tracks[0].records) {
           if (thread == 1) record = {record.begin, 1, 1, -1, pack(1, kind_team)};
           record.begin += 10000 * step;
           record.step_and_kind = pack(step, record.kind());
@@ -192,7 +192,7 @@ TEST_F(TraceFile, OfAKilledRunOfSeveralRanksIsRefused) {
     io::TraceWriter writer(io::trace_file_of(folder_.path(), rank), 2, 1, false, trace.kinds);
     writer.append(Block{rank, 0, {}, std::nullopt, trace.tasks[static_cast<std::size_t>(rank)]});
     writer.append(Block{rank, 0, {}, trace.plans[static_cast<std::size_t>(rank)]});
-    writer.append(Block{rank, 0, trace.lanes[static_cast<std::size_t>(rank)].records, std::nullopt});
+    writer.append(Block{rank, 0, trace.tracks[static_cast<std::size_t>(rank)].records, std::nullopt});
   }
   EXPECT_NE(complaint().find("was killed"), std::string::npos) << complaint();
 }
@@ -223,7 +223,7 @@ TEST_F(TraceFile, OfAPredictionKnowsItsMachine) {
 
 TEST(Timelines, RefuseAStepThatWasRecordedInPart) {
   Trace trace = test::two_subdomains(1);
-  std::vector<Record>& records = trace.lanes[0].records;
+  std::vector<Record>& records = trace.tracks[0].records;
   records.erase(std::find_if(records.begin(), records.end(),
                              [](const Record& r) { return r.epoch == 1 && r.node == 0; }));
   const Timeline timeline(trace);
@@ -232,10 +232,10 @@ TEST(Timelines, RefuseAStepThatWasRecordedInPart) {
 
 TEST(Timelines, TimeWithinATaskIsNotCountedTwice) {
   Trace trace = test::two_subdomains(1);
-  trace.lanes[0].records = {{0, 100, 0, 0, pack(1, test::sweep)},
-                            {10, 30, 0, 0, pack(1, kind_receive)},
-                            {50, 20, 0, 0, pack(1, kind_receive)},
-                            {100, 5, 1, 0, pack(1, test::sweep)}};
+  trace.tracks[0].records = {{0, 100, 0, 0, pack(1, test::sweep)},
+                             {10, 30, 0, 0, pack(1, kind_receive)},
+                             {50, 20, 0, 0, pack(1, kind_receive)},
+                             {100, 5, 1, 0, pack(1, test::sweep)}};
   EXPECT_EQ(self_times(trace)[0], (std::vector<float>{50, 30, 20, 5}));
 }
 
@@ -243,7 +243,7 @@ TEST(Analysis, KnowsHowLongThreadsWereIdle) {
   Trace trace = test::two_subdomains(2);
   EXPECT_NEAR(analyse(trace).idle, 0, 1e-9);
   // Rank 0 does nothing for 70 ns between its two epochs, rank 1 nothing for as long at the end.
-  for (Record& record : trace.lanes[0].records)
+  for (Record& record : trace.tracks[0].records)
     if (record.begin >= 180) record.begin += 70;
   const Summary sum = analyse(trace);
   EXPECT_NEAR(sum.makespan, 2 * 180 + 70, 1e-9);

@@ -1,4 +1,4 @@
-/// The centre of the gluing, and the tree of ranks that leads to it and back.
+/// The root of the gluing, and the tree of ranks that leads to it and back.
 
 #include <algorithm>
 #include <ranges>
@@ -10,8 +10,8 @@ namespace talus {
 
 using detail::at;
 using detail::await;
-using detail::centre_tag;
 using detail::Link;
+using detail::root_tag;
 using detail::start;
 
 void Gluing::plan_tree(std::uint64_t contacts) {
@@ -21,7 +21,7 @@ void Gluing::plan_tree(std::uint64_t contacts) {
     load.work += graph::load_of_neighbour * subdomain.sides.size();
   tree_ = graph::grow_tree(ranks_.gather_records(std::span<const graph::RankLoad>(&load, 1)));
   if (!needed_) return;
-  /// A body that goes through the centre, as a subdomain names it.
+  /// A body that goes through the root, as a subdomain names it.
   struct HubRecord {
     std::int64_t subdomain;
     std::int64_t id;
@@ -55,9 +55,9 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   };
   const std::vector<std::int64_t> items = items_below(me);
   const std::size_t at_walls = 3 * walls_.size();
-  centre_ = std::make_unique<Centre>();
-  Centre& centre = *centre_;
-  centre.sums.resize(at_walls + items.size() * width_);
+  root_ = std::make_unique<Root>();
+  Root& root = *root_;
+  root.sums.resize(at_walls + items.size() * width_);
   std::vector<std::size_t> length(at(all.partition.subdomains), at_walls);
   for (const HubRecord& record : everywhere) length[static_cast<std::size_t>(record.subdomain)] += width_;
   for (std::size_t e = 0; e < all.here.size(); ++e) {
@@ -74,42 +74,42 @@ void Gluing::plan_tree(std::uint64_t contacts) {
       for (const int rank : tree_.branch(top)) sum += length_of_rank[at(rank)];
       return sum;
     };
-    // A message is named after the first subdomain of the child; its parent speaks for the centre.
+    // A message is named after the first subdomain of the child; its parent speaks for the root.
     const auto open = [&](int child, std::size_t out, std::size_t in) {
       const int other = child == me ? tree_.parent[at(me)] : child;
       auto link = std::make_unique<Link>();
       link->out.resize(out + 1);
       link->in.resize(in + 1);
-      link->sender = ranks_.open_send(other, centre_tag, link->out);
-      link->receiver = ranks_.open_receive(other, centre_tag, link->in);
+      link->sender = ranks_.open_send(other, root_tag, link->out);
+      link->receiver = ranks_.open_receive(other, root_tag, link->in);
       const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), child) -
                                                     all.rank_of.begin());
-      link->out_name = trace::message_name(first, trace::centre_group);
-      link->in_name = trace::message_name(trace::centre_group, first);
+      link->out_name = trace::message_name(first, trace::root_group);
+      link->in_name = trace::message_name(trace::root_group, first);
       if (me != child) std::swap(link->out_name, link->in_name);
       link->receiver->start();
       return link;
     };
     for (const int child : children) {
-      std::vector<std::size_t>& wanted = centre.items_of_child.emplace_back();
+      std::vector<std::size_t>& wanted = root.items_of_child.emplace_back();
       for (std::int64_t id : items_below(child)) wanted.push_back(place(items, id));
-      centre.links.push_back(open(child, at_walls + wanted.size() * width_, length_of_branch(child)));
+      root.links.push_back(open(child, at_walls + wanted.size() * width_, length_of_branch(child)));
     }
-    if (me != tree_.top()) centre.up = open(me, length_of_branch(me), centre.sums.size());
+    if (me != tree_.top()) root.up = open(me, length_of_branch(me), root.sums.size());
   }
   count_messages();
   if (me != tree_.top()) return;
   // Where the parts of each rank come: the message of its branch, and where in it.
   std::vector<const double*> parts(static_cast<std::size_t>(ranks), nullptr);
-  for (std::size_t child = 0; child < centre.links.size(); ++child) {
-    const double* from = centre.links[child]->in.data();
+  for (std::size_t child = 0; child < root.links.size(); ++child) {
+    const double* from = root.links[child]->in.data();
     for (const int rank : tree_.branch(children[child])) {
       parts[at(rank)] = from;
       from += length_of_rank[at(rank)];
     }
   }
   for (std::size_t e = 0; e < length.size(); ++e) {
-    Centre::Contribution contribution;
+    Root::Contribution contribution;
     const std::int32_t rank = all.rank_of[e];
     if (rank == me) {
       const auto local = std::lower_bound(all.here.begin(), all.here.end(), static_cast<std::int32_t>(e));
@@ -121,19 +121,19 @@ void Gluing::plan_tree(std::uint64_t contacts) {
     for (const HubRecord& record : everywhere)
       if (record.subdomain == static_cast<std::int64_t>(e))
         contribution.item.push_back(place(items, record.id));
-    centre.contributions.push_back(std::move(contribution));
+    root.contributions.push_back(std::move(contribution));
   }
 }
 
 std::size_t Gluing::tasks_of_rank() const {
-  return centre_ && centre_->up && !centre_->links.empty() ? 2 : 1;
+  return root_ && root_->up && !root_->links.empty() ? 2 : 1;
 }
 
 Gluing::Node Gluing::node(std::size_t number) const {
   const std::size_t here = subdomains_.size(), of_rank = tasks_of_rank();
   if (number < here) return {Task::publish, number};
   if (number < here + of_rank - 1) return {Task::collect, std::nullopt};
-  if (number < here + of_rank) return {Task::centre, std::nullopt};
+  if (number < here + of_rank) return {Task::root, std::nullopt};
   if (number < 2 * here + of_rank) return {Task::glue, number - here - of_rank};
   const std::size_t rest = number - 2 * here - of_rank;
   if (rest < followers_.size()) return {Task::take, followers_[rest]};
@@ -142,65 +142,65 @@ Gluing::Node Gluing::node(std::size_t number) const {
 
 /// The parts of this rank's subdomains, then the messages of its children as they came.
 void Gluing::send_up() {
-  Link& link = *centre_->up;
-  await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
+  Link& link = *root_->up;
+  await(*link.sender, root_->waited, ranks_.trace(), link.out_name);
   auto out = link.out.begin();
   for (const Subdomain& subdomain : subdomains_)
     out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  for (const auto& child : centre_->links) out = std::copy(child->in.begin(), child->in.end() - 1, out);
+  for (const auto& child : root_->links) out = std::copy(child->in.begin(), child->in.end() - 1, out);
   start(*link.sender, ranks_.trace(), link.out_name);
 }
 
 /// The last to be told comes first: it has least below it.
 void Gluing::await_children() {
-  for (const auto& link : centre_->links | std::views::reverse)
-    await(*link->receiver, centre_->waited, ranks_.trace(), link->in_name);
+  for (const auto& link : root_->links | std::views::reverse)
+    await(*link->receiver, root_->waited, ranks_.trace(), link->in_name);
 }
 
 void Gluing::collect(Mode mode) {
   if (mode == Mode::local) return;
   await_children();
   send_up();
-  for (const auto& link : centre_->links) link->receiver->start();
+  for (const auto& link : root_->links) link->receiver->start();
 }
 
-void Gluing::centre(Mode mode) {
-  Centre& centre = *centre_;
+void Gluing::root(Mode mode) {
+  Root& root = *root_;
   // A rank whose subdomains have nothing to sum takes what its parent sends all the same, and passes it on.
-  if (mode == Mode::local || (centre.sums.empty() && !centre.up && centre.links.empty())) return;
-  if (centre.up) {
-    Link& link = *centre.up;
-    await(*link.receiver, centre.waited, ranks_.trace(), link.in_name);
-    std::copy_n(link.in.begin(), centre.sums.size(), centre.sums.begin());
+  if (mode == Mode::local || (root.sums.empty() && !root.up && root.links.empty())) return;
+  if (root.up) {
+    Link& link = *root.up;
+    await(*link.receiver, root.waited, ranks_.trace(), link.in_name);
+    std::copy_n(link.in.begin(), root.sums.size(), root.sums.begin());
     link.receiver->start();
     answer();
     return;
   }
   await_children();
-  std::fill(centre.sums.begin(), centre.sums.end(), 0.0);
+  std::fill(root.sums.begin(), root.sums.end(), 0.0);
   const std::size_t at_walls = 3 * walls_.size();
-  for (const Centre::Contribution& contribution : centre.contributions) {
-    for (std::size_t k = 0; k < at_walls; ++k) centre.sums[k] += contribution.partial[k];
+  for (const Root::Contribution& contribution : root.contributions) {
+    for (std::size_t k = 0; k < at_walls; ++k) root.sums[k] += contribution.partial[k];
     for (std::size_t h = 0; h < contribution.item.size(); ++h)
       for (std::size_t k = 0; k < width_; ++k)
-        centre.sums[at_walls + contribution.item[h] * width_ + k] +=
+        root.sums[at_walls + contribution.item[h] * width_ + k] +=
             contribution.partial[at_walls + h * width_ + k];
   }
-  for (const auto& link : centre.links) link->receiver->start();
+  for (const auto& link : root.links) link->receiver->start();
   answer();
 }
 
 /// To each child what its branch asks for.
 void Gluing::answer() {
-  const Centre& centre = *centre_;
+  const Root& root = *root_;
   const std::size_t at_walls = 3 * walls_.size();
-  for (std::size_t child = 0; child < centre.links.size(); ++child) {
-    Link& link = *centre.links[child];
-    await(*link.sender, centre_->waited, ranks_.trace(), link.out_name);
-    auto out = std::copy_n(centre.sums.begin(), at_walls, link.out.begin());
-    for (std::size_t item : centre.items_of_child[child])
-      out = std::copy_n(centre.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_,
-                        out);
+  for (std::size_t child = 0; child < root.links.size(); ++child) {
+    Link& link = *root.links[child];
+    await(*link.sender, root_->waited, ranks_.trace(), link.out_name);
+    auto out = std::copy_n(root.sums.begin(), at_walls, link.out.begin());
+    for (std::size_t item : root.items_of_child[child])
+      out =
+          std::copy_n(root.sums.begin() + static_cast<std::ptrdiff_t>(at_walls + item * width_), width_, out);
     start(*link.sender, ranks_.trace(), link.out_name);
   }
 }

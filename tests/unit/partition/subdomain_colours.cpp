@@ -1,4 +1,4 @@
-#include "partition/turns.hpp"
+#include "partition/subdomain_colours.hpp"
 
 #include <gtest/gtest.h>
 
@@ -25,9 +25,9 @@ std::vector<Tie> grid(int n, int face) {
 
 TEST(Turns, OfBoxesAreThoseOfAChessboard) {
   const int n = 4;
-  const std::vector<char> turn = choose_turns(n * n * n, grid(n, 20));
+  const std::vector<char> subdomain_colour = choose_subdomain_colours(n * n * n, grid(n, 20));
   for (int a = 0; a < n * n * n; ++a)
-    EXPECT_EQ(turn[static_cast<std::size_t>(a)], (a % n + a / n % n + a / (n * n)) % 2) << a;
+    EXPECT_EQ(subdomain_colour[static_cast<std::size_t>(a)], (a % n + a / n % n + a / (n * n)) % 2) << a;
 }
 
 TEST(Turns, AreThreeWhereTwoLeaveTooManyTiesWithinOne) {
@@ -35,25 +35,25 @@ TEST(Turns, AreThreeWhereTwoLeaveTooManyTiesWithinOne) {
   for (std::int32_t a = 0; a < 3; ++a)
     for (std::int32_t b = 0; b < 3; ++b)
       if (a != b) triangle.push_back({a, b, 5});
-  const std::vector<char> turn = choose_turns(3, triangle);
-  EXPECT_EQ(std::set<char>(turn.begin(), turn.end()).size(), 3U);
+  const std::vector<char> subdomain_colour = choose_subdomain_colours(3, triangle);
+  EXPECT_EQ(std::set<char>(subdomain_colour.begin(), subdomain_colour.end()).size(), 3U);
 }
 
 TEST(Turns, DoNotDependOnTheOrderInWhichTiesAreTold) {
   std::vector<Tie> ties = grid(3, 7);
-  const std::vector<char> turn = choose_turns(27, ties);
+  const std::vector<char> subdomain_colour = choose_subdomain_colours(27, ties);
   std::reverse(ties.begin(), ties.end());
-  EXPECT_EQ(choose_turns(27, ties), turn);
+  EXPECT_EQ(choose_subdomain_colours(27, ties), subdomain_colour);
 }
 
 TEST(Turns, OfSubdomainsThatShareNothingAreTheFirst) {
-  EXPECT_EQ(choose_turns(3, {}), std::vector<char>(3, 0));
-  EXPECT_EQ(choose_turns(1, {}), std::vector<char>(1, 0));
+  EXPECT_EQ(choose_subdomain_colours(3, {}), std::vector<char>(3, 0));
+  EXPECT_EQ(choose_subdomain_colours(1, {}), std::vector<char>(1, 0));
 }
 
 TEST(Turns, RefuseATieOfASubdomainThatThereIsNot) {
   const std::vector<Tie> ties = {{0, 2, 1}};
-  EXPECT_THROW(choose_turns(2, ties), std::out_of_range);
+  EXPECT_THROW(choose_subdomain_colours(2, ties), std::out_of_range);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "partition/turns.hpp"
+#include "partition/subdomain_colours.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -34,12 +34,12 @@ struct Ties {
 
 constexpr char none = -1;
 
-/// Grains that subdomain e shares with those of each turn.
-std::vector<std::int64_t> shared_with(const Ties& ties, const std::vector<char>& turn, std::size_t e,
-                                      int turns) {
-  std::vector<std::int64_t> shared(static_cast<std::size_t>(turns), 0);
+/// Grains that subdomain e shares with those of each subdomain colour.
+std::vector<std::int64_t> shared_with(const Ties& ties, const std::vector<char>& subdomain_colour,
+                                      std::size_t e, int subdomain_colours) {
+  std::vector<std::int64_t> shared(static_cast<std::size_t>(subdomain_colours), 0);
   for (const Tie& tie : ties.of(e))
-    if (const char other = turn[static_cast<std::size_t>(tie.other)]; other != none)
+    if (const char other = subdomain_colour[static_cast<std::size_t>(tie.other)]; other != none)
       shared[static_cast<std::size_t>(other)] += tie.grains;
   return shared;
 }
@@ -48,38 +48,39 @@ char least(const std::vector<std::int64_t>& shared) {
   return static_cast<char>(std::ranges::min_element(shared) - shared.begin());
 }
 
-std::vector<char> grow(const Ties& ties, int turns) {
-  std::vector<char> turn(ties.subdomains(), none);
-  // The most strongly tied to those that have a turn; of equals the first. What is out of date is passed
-  // over.
-  std::vector<std::int64_t> strength(turn.size(), 0);
+std::vector<char> grow(const Ties& ties, int subdomain_colours) {
+  std::vector<char> subdomain_colour(ties.subdomains(), none);
+  // The most strongly tied to those that have a subdomain colour; of equals the first. What is out of date is
+  // passed over.
+  std::vector<std::int64_t> strength(subdomain_colour.size(), 0);
   std::priority_queue<std::pair<std::int64_t, std::int64_t>> next;
-  for (std::size_t e = 0; e < turn.size(); ++e) next.emplace(0, -static_cast<std::int64_t>(e));
+  for (std::size_t e = 0; e < subdomain_colour.size(); ++e) next.emplace(0, -static_cast<std::int64_t>(e));
   while (!next.empty()) {
     const auto [strong, minus] = next.top();
     next.pop();
     const auto e = static_cast<std::size_t>(-minus);
-    if (turn[e] != none || strong != strength[e]) continue;
-    turn[e] = least(shared_with(ties, turn, e, turns));
+    if (subdomain_colour[e] != none || strong != strength[e]) continue;
+    subdomain_colour[e] = least(shared_with(ties, subdomain_colour, e, subdomain_colours));
     for (const Tie& tie : ties.of(e)) {
       const auto other = static_cast<std::size_t>(tie.other);
-      if (turn[other] != none) continue;
+      if (subdomain_colour[other] != none) continue;
       strength[other] += tie.grains;
       next.emplace(strength[other], -static_cast<std::int64_t>(other));
     }
   }
-  return turn;
+  return subdomain_colour;
 }
 
-/// Each move takes ties out of a turn, so they end.
-void improve(const Ties& ties, int turns, std::vector<char>& turn) {
+/// Each move takes ties out of a subdomain colour, so they end.
+void improve(const Ties& ties, int subdomain_colours, std::vector<char>& subdomain_colour) {
   for (bool moved = true; moved;) {
     moved = false;
-    for (std::size_t e = 0; e < turn.size(); ++e) {
-      const std::vector<std::int64_t> shared = shared_with(ties, turn, e, turns);
+    for (std::size_t e = 0; e < subdomain_colour.size(); ++e) {
+      const std::vector<std::int64_t> shared = shared_with(ties, subdomain_colour, e, subdomain_colours);
       const char best = least(shared);
-      if (shared[static_cast<std::size_t>(best)] == shared[static_cast<std::size_t>(turn[e])]) continue;
-      turn[e] = best;
+      if (shared[static_cast<std::size_t>(best)] == shared[static_cast<std::size_t>(subdomain_colour[e])])
+        continue;
+      subdomain_colour[e] = best;
       moved = true;
     }
   }
@@ -87,19 +88,20 @@ void improve(const Ties& ties, int turns, std::vector<char>& turn) {
 
 }  // namespace
 
-std::vector<char> choose_turns(std::int32_t subdomains, std::span<const Tie> list) {
+std::vector<char> choose_subdomain_colours(std::int32_t subdomains, std::span<const Tie> list) {
   constexpr int most = 4;
   const Ties ties(static_cast<std::size_t>(subdomains), list);
-  for (int turns = 2;; ++turns) {
-    std::vector<char> turn = grow(ties, turns);
-    improve(ties, turns, turn);
+  for (int subdomain_colours = 2;; ++subdomain_colours) {
+    std::vector<char> subdomain_colour = grow(ties, subdomain_colours);
+    improve(ties, subdomain_colours, subdomain_colour);
     std::int64_t all = 0, within = 0;
     for (const Tie& tie : list) {
       all += tie.grains;
-      if (turn[static_cast<std::size_t>(tie.subdomain)] == turn[static_cast<std::size_t>(tie.other)])
+      if (subdomain_colour[static_cast<std::size_t>(tie.subdomain)] ==
+          subdomain_colour[static_cast<std::size_t>(tie.other)])
         within += tie.grains;
     }
-    if (4 * within <= all || turns == most) return turn;
+    if (4 * within <= all || subdomain_colours == most) return subdomain_colour;
   }
 }
 

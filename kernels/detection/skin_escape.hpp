@@ -19,13 +19,13 @@
 
 namespace talus {
 
-struct Leaver {
+struct Escape {
   std::int64_t id;
   double radius;  ///< [m]
   double need;    ///< [m] radius + contact_margin: within it, and another's, lies whatever it can touch
   double x[3];    ///< at the middle of the step [m]
   double u[3];    ///< at its beginning [m/s]
-  auto operator<=>(const Leaver&) const = default;
+  auto operator<=>(const Escape&) const = default;
 };
 
 /// Two grains by their ids, the smaller first; or wall w, as -1 - w, and a grain.
@@ -45,15 +45,16 @@ struct Margins {
 };
 
 /// Appends the grains of the range that are no longer within their reach of then.
-void find_leavers(SlotRange range, const Bodies& bodies, const Margins& margins,
-                  std::vector<Leaver>& leavers);
+void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& margins,
+                       std::vector<Escape>& skin_escapes);
 
-/// Appends to `needed` the contacts of a leaver with a grain here or a wall, and to `known` the candidates
-/// here of the leavers. Over all ranks, which are to have the same leavers, the candidates hold if
-/// all_known(needed, known). `leavers` are in order of id, each once; cheap where slots that follow one
+/// Appends to `needed` the contacts of a escape with a grain here or a wall, and to `known` the candidates
+/// here of the skin_escapes. Over all ranks, which are to have the same skin_escapes, the candidates hold if
+/// all_known(needed, known). `skin_escapes` are in order of id, each once; cheap where slots that follow one
 /// another are near in space.
-void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, const Candidates& candidates,
-                     const Margins& margins, std::vector<Encounter>& needed, std::vector<Encounter>& known);
+void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bodies,
+                          const Candidates& candidates, const Margins& margins,
+                          std::vector<Encounter>& needed, std::vector<Encounter>& known);
 
 bool all_known(std::vector<Encounter> needed, std::vector<Encounter> known);
 

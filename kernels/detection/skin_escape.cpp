@@ -1,4 +1,4 @@
-#include "kernels/detection/leavers.hpp"
+#include "kernels/detection/skin_escape.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,56 +17,58 @@ double need_of(const Bodies& bodies, std::size_t s, const Margins& margins) {
 
 constexpr double rounding = 1e-12;
 
-/// Body s with the leavers, which need `widest` at most.
-void compare(std::span<const Leaver* const> leavers, const Bodies& bodies, std::size_t s,
+/// Body s with the skin_escapes, which need `widest` at most.
+void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, std::size_t s,
              const Margins& margins, double widest, char& left, std::vector<Encounter>& needed) {
   using Map = Eigen::Map<const Vec3>;
   const Vec3& x = bodies.x[s];
   const double most = std::max(margins.reach_then[s], widest);
-  for (const Leaver* leaver : leavers) {
-    const double dx = x[0] - leaver->x[0], dy = x[1] - leaver->x[1], dz = x[2] - leaver->x[2];
-    const double d2 = dx * dx + dy * dy + dz * dz, near = leaver->need + most;
+  for (const Escape* escape : skin_escapes) {
+    const double dx = x[0] - escape->x[0], dy = x[1] - escape->x[1], dz = x[2] - escape->x[2];
+    const double d2 = dx * dx + dy * dy + dz * dz, near = escape->need + most;
     if (d2 >= near * near) continue;
     const auto id = static_cast<std::int64_t>(bodies.id[s]);
-    if (id == leaver->id) {
+    if (id == escape->id) {
       left = 1;
       continue;
     }
-    const double distance = std::sqrt(d2), gap = distance - leaver->radius - bodies.radius[s];
-    const Vec3 v = Map(bodies.velocity[s].u) - Map(leaver->u);
+    const double distance = std::sqrt(d2), gap = distance - escape->radius - bodies.radius[s];
+    const Vec3 v = Map(bodies.velocity[s].u) - Map(escape->u);
     const double v_n = distance > 0 ? Vec3(dx, dy, dz).dot(v) / distance : 0;
     // Rounded otherwise than in the narrow phase: a little more than it asks for.
     if (may_touch(gap - rounding * distance, v_n, margins.time_step, margins.alert))
-      needed.push_back({std::min(id, leaver->id), std::max(id, leaver->id)});
+      needed.push_back({std::min(id, escape->id), std::max(id, escape->id)});
   }
 }
 
 }  // namespace
 
-void find_leavers(SlotRange range, const Bodies& bodies, const Margins& margins,
-                  std::vector<Leaver>& leavers) {
+void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& margins,
+                       std::vector<Escape>& skin_escapes) {
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Vec3& x = bodies.x[s];
     const double need = need_of(bodies, s, margins);
     if (need + (x - margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
     const double* u = bodies.velocity[s].u;
-    leavers.push_back({static_cast<std::int64_t>(bodies.id[s]),
-                       bodies.radius[s],
-                       need,
-                       {x[0], x[1], x[2]},
-                       {u[0], u[1], u[2]}});
+    skin_escapes.push_back({static_cast<std::int64_t>(bodies.id[s]),
+                            bodies.radius[s],
+                            need,
+                            {x[0], x[1], x[2]},
+                            {u[0], u[1], u[2]}});
   }
 }
 
-void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, const Candidates& candidates,
-                     const Margins& margins, std::vector<Encounter>& needed, std::vector<Encounter>& known) {
+void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bodies,
+                          const Candidates& candidates, const Margins& margins,
+                          std::vector<Encounter>& needed, std::vector<Encounter>& known) {
   using Map = Eigen::Map<const Vec3>;
   const double h = margins.time_step;
   double widest = 0;
-  for (const Leaver& leaver : leavers) widest = std::max(widest, leaver.need);
+  for (const Escape& escape : skin_escapes) widest = std::max(widest, escape.need);
   std::vector<char> left(bodies.size(), 0);
-  std::vector<const Leaver*> near;
-  constexpr std::size_t block = 64;  // in Morton order, side by side: most leavers are far from all of them
+  std::vector<const Escape*> near;
+  constexpr std::size_t block =
+      64;  // in Morton order, side by side: most skin_escapes are far from all of them
   for (std::size_t begin = 0; begin < bodies.size(); begin += block) {
     const std::size_t end = std::min(begin + block, bodies.size());
     const auto x = std::span(bodies.x).subspan(begin, end - begin);
@@ -79,20 +81,20 @@ void compare_leavers(std::span<const Leaver> leavers, const Bodies& bodies, cons
     const auto reach = margins.reach_then.subspan(begin, end - begin);
     const double most = std::max(widest, *std::max_element(reach.begin(), reach.end()));
     near.clear();
-    for (const Leaver& leaver : leavers) {
-      const Map at(leaver.x);
-      const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = leaver.need + most;
-      if (!(d2 * (1 - rounding) >= reached * reached)) near.push_back(&leaver);
+    for (const Escape& escape : skin_escapes) {
+      const Map at(escape.x);
+      const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = escape.need + most;
+      if (!(d2 * (1 - rounding) >= reached * reached)) near.push_back(&escape);
     }
     for (std::size_t s = begin; s < end; ++s) compare(near, bodies, s, margins, widest, left[s], needed);
   }
-  for (const Leaver& leaver : leavers)
+  for (const Escape& escape : skin_escapes)
     for (std::size_t w = 0; w < margins.walls.size(); ++w) {
       const Wall& wall = margins.walls[w];
-      const double distance = wall.normal.dot(Map(leaver.x) - wall.point);
-      const double v_n = wall.normal.dot(Map(leaver.u) - wall.velocity - wall.gain + h * margins.gravity);
-      if (may_touch(distance - leaver.radius - rounding * std::abs(distance), v_n, h, margins.alert))
-        needed.push_back({-1 - static_cast<std::int64_t>(w), leaver.id});
+      const double distance = wall.normal.dot(Map(escape.x) - wall.point);
+      const double v_n = wall.normal.dot(Map(escape.u) - wall.velocity - wall.gain + h * margins.gravity);
+      if (may_touch(distance - escape.radius - rounding * std::abs(distance), v_n, h, margins.alert))
+        needed.push_back({-1 - static_cast<std::int64_t>(w), escape.id});
     }
   const auto id = [&](Slot s) { return static_cast<std::int64_t>(bodies.id[static_cast<std::size_t>(s)]); };
   for (const GrainPair& pair : candidates.grain_pairs)
