@@ -155,6 +155,38 @@ class ProximalNewton {
   ProximalSweep sweep_;
 };
 
+/// Goes along the step found from x, as far as the residual falls below nine tenths of `reference`, and
+/// smooths; where it falls nowhere on the way, smooths x itself longer. x stays where even that leaves twice
+/// the reference. Returns the residual; `failed_contacts`: those that the smoothing could not solve.
+double go_on(ProximalNewton& newton, int smoothing, double reference, Vector& x,
+             std::int64_t& failed_contacts) {
+  Vector trial(x.size());
+  const auto residual_behind = [&](int sweeps) {
+    failed_contacts = newton.smooth(trial, sweeps);
+    return newton.residual(trial, false);
+  };
+  double part = 1;
+  for (int k = 0; k < 4; ++k, part *= 0.25) {
+    trial = x + part * newton.step();
+    if (const double now = residual_behind(smoothing); now < 0.9 * reference) {
+      x = trial;
+      return now;
+    }
+  }
+  trial = x;
+  const double now = residual_behind(20 * smoothing);
+  if (now < 2 * reference) x = trial;
+  return now;
+}
+
+/// The next proximal parameter: larger behind an outer step that was lost or slow, smaller behind a quick
+/// one.
+double next_proximal(double alpha, int inner, bool lost) {
+  if (lost) return std::min(10 * alpha, 10.0);
+  if (inner <= 4) return std::max(0.1 * alpha, 1e-12);
+  return inner > 10 ? std::min(3 * alpha, 1.0) : alpha;
+}
+
 }  // namespace
 
 DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& goal,
@@ -168,7 +200,7 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
   }
   if (report.failed_contacts > 0) return answer.hand_back();
   const UnitDiagonal scaled = unit_diagonal(problem);
-  Vector x(first_row(problem.contacts())), trial(x.size()), centre(x.size());
+  Vector x(first_row(problem.contacts())), centre(x.size());
   for (std::size_t k = 0; k < r.size(); ++k) x[static_cast<Eigen::Index>(k)] = r[k] * scaled.root[k / 3];
   std::vector<double> candidate(r.size());
   const auto offer = [&](const Vector& of) {
@@ -205,36 +237,17 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
         break;
       }
       const double reference = *std::max_element(past.begin(), past.end());
-      double now = std::numeric_limits<double>::infinity();
-      bool accepted = false;
-      double part = 1;
-      for (int k = 0; k < 4 && !accepted; ++k, part *= 0.25) {
-        trial = x + part * newton.step();
-        report.failed_contacts = newton.smooth(trial, settings.smoothing);
-        now = newton.residual(trial, false);
-        accepted = now < 0.9 * reference;
-      }
-      if (!accepted) {
-        trial = x;
-        report.failed_contacts = newton.smooth(trial, 20 * settings.smoothing);
-        now = newton.residual(trial, false);
-        failed = !(now < 2 * reference);
-      }
-      if (!failed) x = trial;
+      const double now = go_on(newton, settings.smoothing, reference, x, report.failed_contacts);
+      failed = !(now < 2 * reference);
       past[static_cast<std::size_t>(++inner) % past.size()] = now;
       offer(x);
       report.stopped = goal.stop && goal.stop();
       solved = now <= 0.1 * std::min(1.0, alpha) * first;
       if (!solved && !failed) newton.residual(x, true);
     }
-    if (failed || (!solved && inner >= most_inner)) {
-      alpha = std::min(10 * alpha, 10.0);
-      x = centre;
-    } else if (inner <= 4) {
-      alpha = std::max(0.1 * alpha, 1e-12);
-    } else if (inner > 10) {
-      alpha = std::min(3 * alpha, 1.0);
-    }
+    const bool lost = failed || (!solved && inner >= most_inner);
+    if (lost) x = centre;
+    alpha = next_proximal(alpha, inner, lost);
   }
   return answer.hand_back();
 }

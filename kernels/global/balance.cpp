@@ -138,15 +138,17 @@ Fit fit_of(const BodyParts& parts, const PartField& motion, std::span<const Wish
   return {sums[0], sums[1]};
 }
 
-}  // namespace
+/// What the error of the velocities of all parts is held against.
+struct Scales {
+  double contacts = 0;  ///< of all parts
+  double mass = 0;      ///< of all bodies [kg]
+  double momentum = 0;  ///< [kg m/s]; 0 where nothing moves
 
-VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough) {
-  const BodyParts parts(problems, link);
-  const double kappa = firmness * estimate_stiffness(parts);
-  const PartField V = velocities_of(parts, impulses_of(parts));
-  std::vector<Wishes> wishes(parts.size());
-  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p]); });
+  /// By Cauchy and Schwarz: the most momentum in so much energy.
+  double most(double energy) const { return std::sqrt(mass * energy); }
+};
 
+Scales scales_of(const BodyParts& parts, const std::vector<Wishes>& wishes, const PartField& V) {
   enum { contacts, mass, pressed, incoming, drive, fastest, width };
   const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
     row[contacts] = static_cast<double>(wishes[p].change.size());
@@ -163,18 +165,31 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   std::array<double, width> all{};
   for (std::size_t k = 0; k < rows.size(); ++k)
     all[k % width] = k % width >= drive ? std::max(all[k % width], rows[k]) : all[k % width] + rows[k];
-  if (all[contacts] == 0) return {};
+  Scales scales{all[contacts], all[mass]};
   PartField free = parts.field();
   parts.each([&](std::size_t p) {
     for (std::size_t b = 0; b < free[p].size(); ++b) free[p][b] = parts[p].bodies[b].free;
   });
-  // By Cauchy and Schwarz: the most momentum in so much energy.
-  const auto most = [&](double energy) { return std::sqrt(all[mass] * energy); };
   // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
-  const double sound = most(all[incoming]) + all[mass] * all[fastest];
-  const double scale = std::max({std::min(distance(parts, V, free), sound),
-                                 all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed],
-                                 rounding * most(all[incoming])});
+  const double sound = scales.most(all[incoming]) + all[mass] * all[fastest];
+  scales.momentum = std::max({std::min(distance(parts, V, free), sound),
+                              all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed],
+                              rounding * scales.most(all[incoming])});
+  return scales;
+}
+
+}  // namespace
+
+VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough) {
+  const BodyParts parts(problems, link);
+  const double kappa = firmness * estimate_stiffness(parts);
+  const PartField V = velocities_of(parts, impulses_of(parts));
+  std::vector<Wishes> wishes(parts.size());
+  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p]); });
+
+  const Scales scales = scales_of(parts, wishes, V);
+  if (scales.contacts == 0) return {};
+  const double scale = scales.momentum;
   VelocityError error;
   if (scale == 0) {  // nothing moves: overlaps may still ask for it
     if (fit_of(parts, parts.field(), wishes, kappa).missed > 0)
@@ -207,13 +222,13 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     if (fit_of(parts, stop, wishes, kappa).cost < fit_of(parts, motion, wishes, kappa).cost) motion = stop;
     BodySolver solver(parts, rho);
     PartField then = motion;
-    left = caution * most(solver.begin(force, motion));
+    left = caution * scales.most(solver.begin(force, motion));
     found = momentum(parts, motion);
     // The bound gives light bodies the mass of all: beside a heavy one what is left shows in how far the last
     // half of the iterations went, and the quarter before it.
     double before = std::numeric_limits<double>::infinity();
     for (int k = 1; k <= max_linear && !small(left); ++k) {
-      const double bound = caution * most(solver.iterate(motion));
+      const double bound = caution * scales.most(solver.iterate(motion));
       ++error.linear_iterations;
       if (!std::has_single_bit(static_cast<unsigned>(k)) && !small(bound)) continue;
       found = momentum(parts, motion);
@@ -226,7 +241,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
       row[0] = close_open(problems[p], motion[p], wishes[p]);
     })[0];
-    if (small(most(kappa * pushed2)) || (round > 0 && small(distance(parts, motion, began)))) break;
+    if (small(scales.most(kappa * pushed2)) || (round > 0 && small(distance(parts, motion, began)))) break;
   }
   error.relative = (found + missed + left) / scale;
   return error;

@@ -189,56 +189,77 @@ struct CoarseLevel::Block {
   Matrix6 values = Matrix6::Zero();
 };
 
+/// The blocks of one part, found by the pair of groups that they couple.
+class CoarseLevel::BlockMap {
+ public:
+  /// All blocks that the contacts and bodies of part p of `level` add to, each 0 yet.
+  BlockMap(const CoarseLevel& level, std::size_t p) : level_(level), p_(p) {
+    const BodyProblem& problem = level.parts_[p];
+    for (const ContactEquation& c : problem.contacts) {
+      const std::int64_t one = group_of(c.first), other = c.second < 0 ? one : group_of(c.second);
+      keys_.insert(keys_.end(),
+                   {key(one, one), key(other, other), key(std::max(one, other), std::min(one, other))});
+    }
+    for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+      if (const std::int64_t g = group_of(static_cast<std::int32_t>(b)); problem.counted(b) && g >= 0)
+        keys_.push_back(key(g, g));
+    std::sort(keys_.begin(), keys_.end());
+    keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+    for (std::int64_t k : keys_) blocks_.push_back({k / groups(), k % groups()});
+  }
+
+  std::int64_t group_of(std::int32_t body) const {
+    const BodyProblem& problem = level_.parts_[p_];
+    return at(body) < problem.grains
+               ? std::int64_t{level_.members_[p_][at(body)].group}
+               : level_.aggregates_ + static_cast<std::int64_t>(at(body) - problem.grains);
+  }
+  Matrix6& operator()(std::int64_t high, std::int64_t low) {
+    const auto place = std::lower_bound(keys_.begin(), keys_.end(), key(high, low)) - keys_.begin();
+    return blocks_[static_cast<std::size_t>(place)].values;
+  }
+  std::vector<Block> take() { return std::move(blocks_); }
+
+ private:
+  std::int64_t groups() const { return level_.aggregates_ + level_.walls_; }
+  std::int64_t key(std::int64_t high, std::int64_t low) const { return high * groups() + low; }
+
+  const CoarseLevel& level_;
+  std::size_t p_;
+  std::vector<std::int64_t> keys_;  ///< ascending
+  std::vector<Block> blocks_;       ///< per key
+};
+
+/// Relative velocity at a contact of normal n as a function of the motion of the group of body `index`, which
+/// stands first (sign 1) or second (-1) in it.
+CoarseLevel::ContactMotion CoarseLevel::contact_motion(std::size_t p, std::int32_t index, double sign,
+                                                       const Vec3& n) const {
+  const BodyUnknown& body = parts_[p].bodies[at(index)];
+  ContactMotion motion = ContactMotion::Zero();
+  if (body.wall) {
+    motion.col(0) = sign * body.axis;
+    return motion;
+  }
+  const Member& member = members_[p][at(index)];
+  motion.leftCols<3>() = sign * Eigen::Matrix3d::Identity();
+  motion.rightCols<3>() = sign * rotation(member.arm);
+  if (body.spin_mass > 0) motion.rightCols<3>() -= body.radius * rotation(n);  // n x (R Omega)
+  motion.rightCols<3>() /= member.length;
+  return motion;
+}
+
 /// What a part adds to P^T A P, by ascending (high, low).
 std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<const double> rho) const {
   const BodyProblem& problem = parts_[p];
-  const std::int64_t groups = aggregates_ + walls_;
-  const auto group_of = [&](std::int32_t body) {
-    return at(body) < problem.grains ? std::int64_t{members_[p][at(body)].group}
-                                     : aggregates_ + static_cast<std::int64_t>(at(body) - problem.grains);
-  };
-  std::vector<std::int64_t> keys;
-  for (const ContactEquation& c : problem.contacts) {
-    const std::int64_t one = group_of(c.first), other = c.second < 0 ? one : group_of(c.second);
-    keys.insert(keys.end(), {one * groups + one, other * groups + other,
-                             std::max(one, other) * groups + std::min(one, other)});
-  }
-  for (std::size_t b = 0; b < problem.bodies.size(); ++b)
-    if (const std::int64_t g = group_of(static_cast<std::int32_t>(b)); problem.counted(b) && g >= 0)
-      keys.push_back(g * groups + g);
-  std::sort(keys.begin(), keys.end());
-  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  std::vector<Block> blocks;
-  for (std::int64_t key : keys) blocks.push_back({key / groups, key % groups});
-  const auto block = [&](std::int64_t high, std::int64_t low) -> Matrix6& {
-    const auto place = std::lower_bound(keys.begin(), keys.end(), high * groups + low) - keys.begin();
-    return blocks[static_cast<std::size_t>(place)].values;
-  };
-
-  /// Relative velocity at a contact as a function of the motion of a body's group.
-  using Part = Eigen::Matrix<double, 3, 6>;
-  const auto part_of = [&](std::int32_t index, double sign, const Vec3& n) {
-    const BodyUnknown& body = problem.bodies[at(index)];
-    Part part = Part::Zero();
-    if (body.wall) {
-      part.col(0) = sign * body.axis;
-      return part;
-    }
-    const Member& member = members_[p][at(index)];
-    part.leftCols<3>() = sign * Eigen::Matrix3d::Identity();
-    part.rightCols<3>() = sign * rotation(member.arm);
-    if (body.spin_mass > 0) part.rightCols<3>() -= body.radius * rotation(n);  // n x (R Omega)
-    part.rightCols<3>() /= member.length;
-    return part;
-  };
+  BlockMap block(*this, p);
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
     const Eigen::Matrix3d weight = c.mu > 0 ? Eigen::Matrix3d(rho[k] * Eigen::Matrix3d::Identity())
                                             : Eigen::Matrix3d(rho[k] * c.normal * c.normal.transpose());
-    const std::int64_t one = group_of(c.first), other = c.second < 0 ? one : group_of(c.second);
-    Part a = part_of(c.first, 1, c.normal);
+    const std::int64_t one = block.group_of(c.first), other = c.second < 0 ? one : block.group_of(c.second);
+    ContactMotion a = contact_motion(p, c.first, 1, c.normal);
     if (c.second >= 0) {
-      const Part b = part_of(c.second, -1, c.normal);
+      const ContactMotion b = contact_motion(p, c.second, -1, c.normal);
       if (one == other) {
         a += b;
       } else {
@@ -254,7 +275,7 @@ std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<
 
   for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
     const BodyUnknown& body = problem.bodies[b];
-    const std::int64_t g = group_of(static_cast<std::int32_t>(b));
+    const std::int64_t g = block.group_of(static_cast<std::int32_t>(b));
     if (!problem.counted(b) || g < 0) continue;
     if (body.wall) {
       block(g, g)(0, 0) += body.mass;
@@ -262,14 +283,14 @@ std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<
     }
     const Member& member = members_[p][b];
     const double relative = body.radius / member.length;
-    Part part;
-    part << Eigen::Matrix3d::Identity(), rotation(member.arm) / member.length;
-    Matrix6 mass = body.mass * part.transpose() * part;
+    ContactMotion motion;
+    motion << Eigen::Matrix3d::Identity(), rotation(member.arm) / member.length;
+    Matrix6 mass = body.mass * motion.transpose() * motion;
     // A little inertia also where nothing turns: grains in a row would leave a rotation without any.
     mass.diagonal().tail<3>().array() += std::max(body.spin_mass * relative * relative, 1e-6 * body.mass);
     block(g, g) += mass;
   }
-  return blocks;
+  return block.take();
 }
 
 /// Blocks of all parts, added in order of subdomain.

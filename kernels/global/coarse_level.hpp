@@ -55,8 +55,11 @@ class CoarseLevel {
     double length = 0;        ///< [m]: rotations are counted in length x angle
   };
   struct Block;
+  class BlockMap;
+  using ContactMotion = Eigen::Matrix<double, 3, 6>;
   void join(std::span<const std::vector<char>> touched, int target);
   void list_groups();
+  ContactMotion contact_motion(std::size_t part, std::int32_t index, double sign, const Vec3& n) const;
   std::vector<Block> blocks_of(std::size_t part, std::span<const double> rho) const;
   void factorise(std::span<const std::vector<double>> rho);
   Eigen::Index first(std::int64_t group) const {

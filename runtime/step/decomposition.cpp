@@ -201,21 +201,40 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
   return decomposition;
 }
 
+namespace {
+
+/// Collective. Makes the partition anew, near the one before.
+void cut_space(Decomposition& decomposition, const DecompositionSettings& settings,
+               const graph::Communicator& ranks, const Bodies& bodies, const Candidates& candidates) {
+  std::int64_t all[1] = {static_cast<std::int64_t>(candidates.size())};
+  ranks.sum(all);
+  decomposition.blind = all[0] == 0;
+  const Partition before = decomposition.partition;
+  const bool first = before.tree.cuts.empty() && before.table.subdomain.empty();
+  PartitionOptions options = partition_options(settings, before.subdomains);
+  options.previous = first ? nullptr : &before;
+  decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0]), options,
+                                           reduction_over(ranks));
+}
+
+/// Fills `by_id`, and `of_slot` of the bodies that others sent here.
+void index_by_id(Surroundings& around, std::span<const BodyId> id_of_slot) {
+  const std::size_t count = around.bodies.size();
+  around.by_id.reserve(count);
+  for (std::size_t k = 0; k < count; ++k)
+    around.by_id.emplace_back(static_cast<std::int64_t>(around.bodies.id[k]), static_cast<Slot>(k));
+  std::sort(around.by_id.begin(), around.by_id.end());
+  for (std::size_t s = 0; s < id_of_slot.size(); ++s)
+    if (around.of_slot[s] < 0) around.of_slot[s] = around.find(static_cast<std::int64_t>(id_of_slot[s]));
+}
+
+}  // namespace
+
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
                                   const graph::Communicator& ranks, Bodies& bodies,
                                   std::span<const double> reach, const Candidates& candidates,
                                   bool partition_anew) {
-  if (partition_anew) {
-    std::int64_t all[1] = {static_cast<std::int64_t>(candidates.size())};
-    ranks.sum(all);
-    decomposition.blind = all[0] == 0;
-    const Partition before = decomposition.partition;
-    const bool first = before.tree.cuts.empty() && before.table.subdomain.empty();
-    PartitionOptions options = partition_options(settings, before.subdomains);
-    options.previous = first ? nullptr : &before;
-    decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0]),
-                                             options, reduction_over(ranks));
-  }
+  if (partition_anew) cut_space(decomposition, settings, ranks, bodies, candidates);
   Gathered gathered = exchange_surroundings(decomposition, ranks, bodies, reach);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
   /// `source`: into the own slots, then into what came.
@@ -275,12 +294,7 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
     if (order[k].source < own) around.of_slot[at(gathered.own[order[k].source])] = static_cast<Slot>(k);
   release(order);
   gathered = {};
-  around.by_id.reserve(count);
-  for (std::size_t k = 0; k < count; ++k)
-    around.by_id.emplace_back(static_cast<std::int64_t>(around.bodies.id[k]), static_cast<Slot>(k));
-  std::sort(around.by_id.begin(), around.by_id.end());
-  for (std::size_t s = 0; s < bodies.size(); ++s)
-    if (around.of_slot[s] < 0) around.of_slot[s] = around.find(static_cast<std::int64_t>(bodies.id[s]));
+  index_by_id(around, bodies.id);
   return around;
 }
 

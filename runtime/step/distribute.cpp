@@ -283,6 +283,53 @@ Bodies make_copies(Decomposition& decomposition, Bodies& around) {
   return copies;
 }
 
+/// What the groups of candidates depend on beside the candidates.
+struct GroupRules {
+  std::span<const std::int64_t> load;  ///< candidates per subdomain of all
+  std::int64_t all;                    ///< their sum
+  std::span<const char> glued;         ///< per wall: of finite mass
+};
+
+/// The groups of this rank, and in `cut` their candidates between the slots of the copies, with impulses.
+/// `bodies`: how many there are around.
+std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const Candidates& found,
+                                       const OwnCandidates& own, const GroupRules& given, std::size_t bodies,
+                                       Candidates& cut) {
+  // Of the bodies of the subdomain at hand.
+  std::vector<Slot> slot(bodies);
+  const auto components = static_cast<std::size_t>(found.components);
+  cut.impulse.reserve(components * own.candidate.size());
+  cut.grain_pairs.reserve(own.begin[2 * decomposition.here.size()]);
+  std::vector<CandidateGroup> groups;
+  for (std::size_t group = 0; group + 1 < own.begin.size(); ++group) {
+    const auto begin = static_cast<std::int32_t>(own.begin[group]);
+    const auto end = static_cast<std::int32_t>(own.begin[group + 1]);
+    if (begin == end) continue;
+    const std::size_t local = group / 2 % decomposition.here.size();
+    const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
+    const ChunkSide side = group % 2 == 1                            ? ChunkSide::inside
+                           : wall >= 0 && given.glued[at(wall)] != 0 ? ChunkSide::wall
+                           : decomposition.subdomain_colour_of(decomposition.here[local]) > 0
+                               ? ChunkSide::late
+                               : ChunkSide::border;
+    // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
+    const int target = chunk_target(given.all, given.load[at(decomposition.here[local])]);
+    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
+    auto next = static_cast<Slot>(decomposition.slot_begin[local]);
+    for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
+    for (std::int32_t place = begin; place < end; ++place) {
+      const std::size_t k = at(own.candidate[at(place)]);
+      if (wall < 0)
+        cut.grain_pairs.push_back(
+            {slot[at(found.grain_pairs[k].first)], slot[at(found.grain_pairs[k].second)]});
+      else
+        cut.wall_pairs.push_back({wall, slot[at(found.wall_pairs[k - found.grain_pairs.size()].body)]});
+      for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
+    }
+  }
+  return groups;
+}
+
 }  // namespace
 
 std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
@@ -290,7 +337,6 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
                                        Candidates found, std::span<const char> glued, Bodies& bodies,
                                        Candidates& candidates) {
   const Partition& partition = decomposition.partition;
-  const std::size_t grains = found.grain_pairs.size();
   match_impulses(collect_impulses(decomposition, ranks, around, bodies, std::move(candidates)), found);
   candidates = {};
   release(bodies.x);
@@ -324,40 +370,10 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   ranks.sum(load);
   const std::int64_t all = std::accumulate(load.begin(), load.end(), std::int64_t{0});
 
-  // Of the bodies of the subdomain at hand.
-  std::vector<Slot> slot(around.bodies.size());
   Candidates cut;
   cut.components = found.components;
-  const auto components = static_cast<std::size_t>(found.components);
-  cut.impulse.reserve(components * own.candidate.size());
-  cut.grain_pairs.reserve(own.begin[2 * decomposition.here.size()]);
-  std::vector<CandidateGroup> groups;
-  for (std::size_t group = 0; group + 1 < own.begin.size(); ++group) {
-    const auto begin = static_cast<std::int32_t>(own.begin[group]);
-    const auto end = static_cast<std::int32_t>(own.begin[group + 1]);
-    if (begin == end) continue;
-    const std::size_t local = group / 2 % decomposition.here.size();
-    const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
-    const ChunkSide side = group % 2 == 1                      ? ChunkSide::inside
-                           : wall >= 0 && glued[at(wall)] != 0 ? ChunkSide::wall
-                           : decomposition.subdomain_colour_of(decomposition.here[local]) > 0
-                               ? ChunkSide::late
-                               : ChunkSide::border;
-    // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
-    const int target = chunk_target(all, load[at(decomposition.here[local])]);
-    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
-    auto next = static_cast<Slot>(decomposition.slot_begin[local]);
-    for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
-    for (std::int32_t place = begin; place < end; ++place) {
-      const std::size_t k = at(own.candidate[at(place)]);
-      if (wall < 0)
-        cut.grain_pairs.push_back(
-            {slot[at(found.grain_pairs[k].first)], slot[at(found.grain_pairs[k].second)]});
-      else
-        cut.wall_pairs.push_back({wall, slot[at(found.wall_pairs[k - grains].body)]});
-      for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
-    }
-  }
+  const std::vector<CandidateGroup> groups =
+      cut_groups(decomposition, found, own, {load, all, glued}, around.bodies.size(), cut);
   own = {};
   found = {};
 
