@@ -137,6 +137,14 @@ void print_table(const io::Scene& scene, std::size_t grains, const ContactPairs&
     if (cut.kind == PartitionKind::automatic) fmt::print("\nauto is {}\n", name_of(cut.partition.kind));
 }
 
+/// Whether `name` is one that write_files gives to a file.
+bool is_partition_name(const std::string& name) {
+  return std::ranges::any_of(partition_kinds, [&](PartitionKind kind) {
+    const std::string stem = "partition_" + std::string(name_of(kind));
+    return name == stem + ".vtp" || name == stem + ".svg";
+  });
+}
+
 void write_files(const std::string& directory, const io::Scene& scene, const Bodies& bodies,
                  std::span<const Cut> cuts) {
   const Frame frame = frame_of(bodies);
@@ -167,7 +175,7 @@ int partition_command(const PartitionCommandOptions& options) {
     append(sample, bodies);
     if (directory.empty()) directory = "out/partition-" + scene.name;
     check_boxes(scene.setup.decomposition, options.subdomains, kinds);
-    lock.emplace(io::prepare_output_directory(directory, options.force, io::is_partition_name));
+    lock.emplace(io::prepare_output_directory(directory, options.force, is_partition_name));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     return exit_bad_input;

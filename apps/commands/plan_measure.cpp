@@ -9,8 +9,8 @@
 #include <functional>
 #include <limits>
 
+#include "apps/shared/median.hpp"
 #include "apps/shared/sample_builder.hpp"
-#include "apps/shared/study_variants.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
 

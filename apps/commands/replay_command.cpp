@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "apps/shared/exit_codes.hpp"
+#include "io/files/detail/with_unit.hpp"
 #include "io/files/output_directory.hpp"
-#include "io/pictures/detail/svg.hpp"
 #include "io/trace/smpi_platform.hpp"
 #include "io/trace/trace_file.hpp"
 #include "runtime/trace/analysis.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "io/files/csv.hpp"
+#include "io/scene/bodies_file.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/samples/sample.hpp"
 

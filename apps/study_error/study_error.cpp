@@ -13,11 +13,11 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
-#include "apps/shared/study_variants.hpp"
 #include "apps/study_error/study_problem.hpp"
 #include "apps/study_error/study_profile.hpp"
 #include "apps/study_error/study_report.hpp"
 #include "apps/study_error/study_runs.hpp"
+#include "apps/study_error/study_variants.hpp"
 #include "io/fclib/fclib.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/results/run_json.hpp"
@@ -119,7 +119,7 @@ int study_scene(const StudyErrorOptions& options) {
   ProblemStudy problem;
   RunStudy runs;
   const auto keep = [&] {  // a study that is stopped leaves what it has
-    StudyReport report;
+    ReportPage report;
     report.title = title;
     report.introduction = introduction;
     if (!problem.references.empty()) report_problem(problem, plan, report);
@@ -165,7 +165,7 @@ int study_folder(const StudyErrorOptions& options) {
                              options.max_seconds, cheap_solve);
   std::vector<ProfileRow> rows;
   const auto keep = [&] {
-    StudyReport report;
+    ReportPage report;
     report.title = "FCLIB problems: who solves how many, and how fast";
     report.introduction = introduction;
     report_profile(rows, report);

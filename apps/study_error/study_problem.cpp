@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "apps/shared/median.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/shared/study_variants.hpp"
+#include "apps/study_error/study_variants.hpp"
 
 namespace talus {
 

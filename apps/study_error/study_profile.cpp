@@ -6,7 +6,8 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "apps/shared/study_variants.hpp"
+#include "apps/shared/median.hpp"
+#include "apps/study_error/study_variants.hpp"
 #include "io/fclib/fclib.hpp"
 #include "io/files/error.hpp"
 #include "kernels/delassus/delassus_solve.hpp"

@@ -9,7 +9,6 @@
 #include <string_view>
 
 #include "io/files/csv_table.hpp"
-#include "io/files/output_directory.hpp"
 
 namespace talus {
 
@@ -115,12 +114,7 @@ io::HtmlTable times_to_tolerance(const std::vector<io::ChartSeries>& in_seconds,
 
 }  // namespace
 
-void add_chart(StudyReport& report, io::Chart chart, const std::string& sentence, io::HtmlTable table) {
-  report.sections.push_back({chart.title, sentence, io::draw_chart(chart), std::move(table)});
-  report.charts.push_back(std::move(chart));
-}
-
-void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyReport& report) {
+void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage& report) {
   io::CsvTable residual(
       {"method", "subdomains", "threads", "seed", "start", "sweeps", "seconds", "error_rms"});
   for (const ResidualRow& r : study.residual)
@@ -228,7 +222,7 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, StudyRepor
             "ones, a small residual promises too much.");
 }
 
-void report_runs(const RunStudy& study, const StudyPlan& plan, StudyReport& report) {
+void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& report) {
   io::CsvTable runs({"method", "subdomains", "threads", "seed", "time_step", "tolerance", "steps", "sweeps",
                      "missed_steps", "seconds", "stress_error", "position_error"});
   for (const RunRow& r : study.rows)
@@ -305,7 +299,7 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, StudyReport& repo
       table);
 }
 
-void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
+void report_profile(const std::vector<ProfileRow>& rows, ReportPage& report) {
   io::CsvTable solves({"problem", "contacts", "method", "tolerance", "seconds", "iterations", "error",
                        "scaled_error", "solved"});
   for (const auto& [tolerance, r] : rows)
@@ -372,24 +366,6 @@ void report_profile(const std::vector<ProfileRow>& rows, StudyReport& report) {
       "how "
       "many problems it solves at all.",
       std::move(table));
-}
-
-void write_report(const std::filesystem::path& directory, const StudyReport& report) {
-  for (const auto& [name, text] : report.tables) io::write_whole(directory / name, text);
-  for (const io::Chart& chart : report.charts)
-    io::write_whole(directory / (chart.name + ".svg"), io::draw_chart(chart));
-  io::write_whole(directory / "plot.gp", io::gnuplot_script(report.charts));
-  io::write_whole(directory / "report.html",
-                  io::html_page(report.title, report.introduction, report.sections));
-}
-
-bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
-                    std::span<const std::string_view> charts) {
-  const auto is_chart = [&](std::string_view chart) {
-    return name == std::string(chart) + ".svg" || name == std::string(chart) + ".gnuplot.svg";
-  };
-  return name == "plot.gp" || name == "report.html" || std::ranges::find(tables, name) != tables.end() ||
-         std::ranges::any_of(charts, is_chart);
 }
 
 bool is_study_error_name(const std::string& name) {

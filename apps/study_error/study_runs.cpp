@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "apps/shared/median.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
 

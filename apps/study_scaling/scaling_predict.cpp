@@ -6,7 +6,6 @@
 #include <map>
 #include <stdexcept>
 
-#include "apps/shared/study_variants.hpp"
 #include "io/trace/trace_file.hpp"
 #include "runtime/trace/analysis.hpp"
 

@@ -180,7 +180,7 @@ void add_other_curves(const std::vector<OtherSpeedup>& beside, bool efficiency, 
   }
 }
 
-void add_strong(const ScalingReport& report, StudyReport& page) {
+void add_strong(const ScalingReport& report, ReportPage& page) {
   const std::vector<ScalingRow>& rows = report.rows;
   io::Chart speedup = chart_of("speedup", "Strong scaling: speedup", "cores", "speedup  [1]",
                                "strong_scaling.csv", "cores", "speedup");
@@ -227,8 +227,8 @@ std::vector<OtherSpeedup> ideal(const std::vector<ScalingRow>& rows) {
   return {{"ideal", 1, 1}, {"ideal", most, most}};
 }
 
-StudyReport page_of(ScalingReport report) {
-  StudyReport page;
+ReportPage page_of(ScalingReport report) {
+  ReportPage page;
   const std::vector<OtherSpeedup> best = ideal(report.rows);
   report.beside.insert(report.beside.end(), best.begin(), best.end());
   page.title = fmt::format("{}: scaling", report.name);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/study_error/study_report.hpp"
+#include "apps/shared/report_page.hpp"
 #include "apps/study_scaling/scaling_predict.hpp"
 
 namespace talus {

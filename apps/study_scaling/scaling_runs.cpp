@@ -9,7 +9,7 @@
 
 #include "apps/shared/child_process.hpp"
 #include "apps/shared/exit_codes.hpp"
-#include "apps/shared/study_variants.hpp"
+#include "apps/shared/median.hpp"
 #include "io/files/csv_table.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"

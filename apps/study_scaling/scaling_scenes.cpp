@@ -7,9 +7,9 @@
 #include <stdexcept>
 
 #include "apps/shared/sample_builder.hpp"
-#include "io/files/csv.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/results/results.hpp"
+#include "io/scene/bodies_file.hpp"
 
 namespace talus {
 

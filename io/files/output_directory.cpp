@@ -16,7 +16,6 @@
 
 #include "io/files/detail/descriptor.hpp"
 #include "io/files/error.hpp"
-#include "partition/partitioner.hpp"
 
 namespace talus::io {
 namespace {
@@ -68,13 +67,6 @@ bool is_output_name(const std::string& name) {
   return std::ranges::find(fixed_names, name) != fixed_names.end() ||
          is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
          is_numbered(name, "trace_rank_", ".h5") || is_numbered(name, "fclib_", ".hdf5");
-}
-
-bool is_partition_name(const std::string& name) {
-  return std::ranges::any_of(partition_kinds, [&](PartitionKind kind) {
-    const std::string stem = "partition_" + std::string(name_of(kind));
-    return name == stem + ".vtp" || name == stem + ".svg";
-  });
 }
 
 DirectoryLock::DirectoryLock(const fs::path& directory)

@@ -18,9 +18,6 @@ using IsOutputName = bool (*)(const std::string& name);
 /// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md).
 bool is_output_name(const std::string& name);
 
-/// The same for the files of `talus partition`: partition_NAME.vtp and partition_NAME.svg.
-bool is_partition_name(const std::string& name);
-
 /// A directory as long as a run writes there. The system takes the lock away when the process ends, however
 /// it ends, and nothing is left in the directory.
 class DirectoryLock {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/slab.hpp"
 #include "io/pictures/detail/svg.hpp"
 #include "io/pictures/picture.hpp"

@@ -9,6 +9,7 @@
 #include <map>
 #include <unordered_map>
 
+#include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/svg.hpp"
 #include "runtime/trace/analysis.hpp"
 

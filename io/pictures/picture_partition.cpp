@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/slab.hpp"
 #include "io/pictures/detail/svg.hpp"
 #include "io/pictures/picture.hpp"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/pictures/detail/svg.hpp"
+#include "io/files/detail/with_unit.hpp"
 
 namespace talus::io {
 namespace {

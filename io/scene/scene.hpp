@@ -22,7 +22,7 @@ struct SampleSpec {
     deposition,  ///< layer by layer, each grain in the lowest place with three supports, on z = 0 between the
                  ///< sides of `base`
     lattice,     ///< simple cubic, not touching unless spacing is 1
-    bodies,      ///< read from `file` (io/files/csv.hpp)
+    bodies,      ///< read from `file` (io/scene/bodies_file.hpp)
   };
   Kind kind = Kind::deposition;
   std::int64_t count = 0;  ///< grains; 0 for a lattice given by `cells`

@@ -8,8 +8,9 @@
 #include <map>
 #include <set>
 
-#include "io/files/error.hpp"
+#include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/svg.hpp"
+#include "io/files/error.hpp"
 #include "io/pictures/picture.hpp"
 #include "io/results/results.hpp"
 #include "io/results/vtk.hpp"

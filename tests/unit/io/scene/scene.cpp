@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "io/files/csv.hpp"
+#include "io/scene/bodies_file.hpp"
 #include "io/scene/detail/spelling.hpp"
 
 namespace talus::io {

@@ -1,4 +1,4 @@
-#include "apps/shared/study_variants.hpp"
+#include "apps/study_error/study_variants.hpp"
 
 #include <fmt/format.h>
 
@@ -49,13 +49,6 @@ std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> 
   add("thread", &StudyVariant::threads);
   add("seed", &StudyVariant::seed);
   return label;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::ranges::sort(values);
-  const std::size_t half = values.size() / 2;
-  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
 }  // namespace talus

@@ -1,4 +1,4 @@
-#include "io/files/csv.hpp"
+#include "io/scene/bodies_file.hpp"
 
 #include <gtest/gtest.h>
 

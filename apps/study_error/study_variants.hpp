@@ -50,9 +50,6 @@ double most_steps(std::span<const Stage> stages);
 /// "nlgs, 12 subdomains, 2 threads, seed 1"; of the last three only those in which `all` differ.
 std::string label_of(const StudyVariant& variant, std::span<const StudyVariant> all);
 
-/// The middle one, or the mean of both; NaN of none.
-double median(std::vector<double> values);
-
 /// Solves faster than this are timed three times [s].
 inline constexpr double cheap_solve = 2;
 
