@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "kernels/detection/domain.hpp"
 #include "partition/detail/bisection.hpp"
 #include "partition/detail/cell_graph.hpp"
 
@@ -72,8 +73,8 @@ PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainP
   for (const GrainPair& pair : grain_pairs) {
     const Vec3 &first = x[static_cast<std::size_t>(pair.first)],
                &second = x[static_cast<std::size_t>(pair.second)];
-    points.x.push_back(0.5 * (first + second));
-    points.half.push_back(0.5 * (first - second));
+    points.x.push_back(Domain{}.midpoint(first, second));
+    points.half.push_back(0.5 * Domain{}.separation(first, second));
   }
   for (const WallPair& pair : wall_pairs) {
     points.x.push_back(x[static_cast<std::size_t>(pair.body)]);

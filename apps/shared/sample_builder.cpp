@@ -8,6 +8,7 @@
 
 #include "io/scene/bodies_file.hpp"
 #include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/domain.hpp"
 #include "kernels/samples/sample.hpp"
 
 namespace talus {
@@ -90,15 +91,15 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
     find_pairs(grid, 0, grid.cells.size(), pairs);
     for (const GrainPair& pair : pairs) {
       const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
-      overlaps.add(sample.radius[a] + sample.radius[b] - (sample.x[a] - sample.x[b]).norm(),
+      overlaps.add(sample.radius[a] + sample.radius[b] - Domain{}.separation(sample.x[a], sample.x[b]).norm(),
                    std::min(sample.radius[a], sample.radius[b]),
                    [&] { return fmt::format("grains {} and {}", id(a), id(b)); });
     }
   }
   for (const Wall& wall : scene.setup.walls)
     for (std::size_t k = 0; k < sample.size(); ++k)
-      overlaps.add(sample.radius[k] - wall.normal.dot(sample.x[k] - wall.point), sample.radius[k],
-                   [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
+      overlaps.add(sample.radius[k] - wall.normal.dot(Domain{}.separation(sample.x[k], wall.point)),
+                   sample.radius[k], [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
   if (overlaps.count == 0) return "";
   return fmt::format(
       "{} overlap{} of more than 10 % of the smaller radius, the deepest of {:.0f} % between {}; {}",

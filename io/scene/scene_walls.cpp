@@ -5,6 +5,7 @@
 #include "io/scene/detail/scene_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
 #include "io/scene/scene.hpp"
+#include "kernels/detection/domain.hpp"
 
 namespace talus::io {
 
@@ -65,7 +66,7 @@ void place_walls(Scene& scene, const Sample& grains) {
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);
   for (const Wall& wall : walls)
     for (std::size_t k = 0; k < grains.size(); ++k)
-      if (const double depth = wall.normal.dot(wall.point - grains.x[k]); depth > 0)
+      if (const double depth = wall.normal.dot(Domain{}.separation(wall.point, grains.x[k])); depth > 0)
         refuse(fmt::format("the centre of grain {} lies {} m behind wall '{}'",
                            static_cast<std::int64_t>(grains.id_of(k)), depth, wall.name));
   try {

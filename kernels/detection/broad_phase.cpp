@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "kernels/detection/domain.hpp"
+
 namespace talus {
 
 namespace {
@@ -86,10 +88,11 @@ class PairList {
     GrainPair* next = pairs_.data() + size_;
     for (std::size_t b = begin; b < end; ++b) {
       const CellGrid::Member& other = grid.members[b];
-      const double dx = one.x[0] - other.x[0], dy = one.x[1] - other.x[1], dz = one.x[2] - other.x[2];
+      const Vec3 d =
+          Domain::separation(Vec3(one.x[0], one.x[1], one.x[2]), Vec3(other.x[0], other.x[1], other.x[2]));
       const double distance = one.reach + other.reach;
       *next = {std::min(slot, grid.slots[b]), std::max(slot, grid.slots[b])};
-      next += dx * dx + dy * dy + dz * dz < distance * distance ? 1 : 0;
+      next += d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < distance * distance ? 1 : 0;
     }
     size_ = static_cast<std::size_t>(next - pairs_.data());
   }

@@ -75,7 +75,7 @@ void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::s
 }
 
 void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
-                      std::span<const Wall> walls) {
+                      std::span<const Wall> walls, const Domain& domain) {
   if (components == candidates.components) return;
   const std::size_t grains = candidates.grain_pairs.size();
   std::vector<double> converted(candidates.size() * static_cast<std::size_t>(components));
@@ -83,7 +83,8 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
     Vec3 normal;
     if (k < grains) {
       const GrainPair& pair = candidates.grain_pairs[k];
-      const Vec3 d = x[static_cast<std::size_t>(pair.first)] - x[static_cast<std::size_t>(pair.second)];
+      const Vec3 d = domain.separation(x[static_cast<std::size_t>(pair.first)],
+                                       x[static_cast<std::size_t>(pair.second)]);
       normal = unit_normal(d, d.norm());
     } else {
       normal = walls[static_cast<std::size_t>(candidates.wall_pairs[k - grains].wall)].normal;

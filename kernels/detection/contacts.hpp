@@ -7,6 +7,7 @@
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/bodies/walls.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "kernels/detection/domain.hpp"
 
 namespace talus {
 
@@ -62,7 +63,7 @@ void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::s
 /// vectors along today's normals, and vectors their normal parts, so that forces outlive the change. x [m] of
 /// all grains.
 void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
-                      std::span<const Wall> walls);
+                      std::span<const Wall> walls, const Domain& domain = {});
 
 std::size_t memory_used(const Contacts& contacts);
 

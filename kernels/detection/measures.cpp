@@ -22,7 +22,7 @@ void ContactSums::add(const ContactSums& other) {
 
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              std::span<const Vec3> x, std::span<const double> radius,
-                             std::span<const Wall> walls) {
+                             std::span<const Wall> walls, const Domain& domain) {
   ContactSums sums;
   sums.passed = contacts.passed[chunk];
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
@@ -42,7 +42,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
     const Wall& wall = walls[static_cast<std::size_t>(chunks.wall[chunk])];
     for (std::size_t k = begin; k < end; ++k) {
       const auto i = static_cast<std::size_t>(contacts.first[k]);
-      const double distance = wall.normal.dot(x[i] - wall.point);
+      const double distance = wall.normal.dot(domain.separation(x[i], wall.point));
       add(k, distance * wall.normal, distance - radius[i]);
     }
   } else {
@@ -54,7 +54,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
       }
       const auto i = static_cast<std::size_t>(contacts.first[k]),
                  j = static_cast<std::size_t>(contacts.second[k]);
-      const Vec3 branch = x[i] - x[j];
+      const Vec3 branch = domain.separation(x[i], x[j]);
       add(k, branch, branch.norm() - radius[i] - radius[j]);
     }
   }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/detection/contacts.hpp"
+#include "kernels/detection/domain.hpp"
 
 namespace talus {
 
@@ -25,7 +26,7 @@ struct ContactSums {
 /// plane to the centre.
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              std::span<const Vec3> x, std::span<const double> radius,
-                             std::span<const Wall> walls);
+                             std::span<const Wall> walls, const Domain& domain = {});
 
 /// Its normal, and its impulse on the first body [N s], whatever the storage.
 inline Vec3 contact_normal(const Contacts& contacts, std::size_t k) {

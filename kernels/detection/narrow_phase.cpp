@@ -36,7 +36,7 @@ struct Pairing {
 Pairing meet(const PairView& pairs, std::size_t k) {
   const std::size_t i = index(pairs.first[k]), j = index(pairs.second[k]);
   using Map = Eigen::Map<const Vec3>;
-  return {Map(pairs.x + 3 * i) - Map(pairs.x + 3 * j),
+  return {pairs.domain.separation(Vec3(Map(pairs.x + 3 * i)), Vec3(Map(pairs.x + 3 * j))),
           Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
 }
 
@@ -90,7 +90,8 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
   Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
-  const PairView pairs{in.x.data()->data(), in.radius.data(), in.velocity.data()->u, first, second, count};
+  const PairView pairs{
+      in.x.data()->data(), in.radius.data(), in.velocity.data()->u, first, second, count, in.domain};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
   const bool far =
@@ -111,7 +112,7 @@ void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& c
   for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
     const Slot body = candidates.wall_pairs[k - grains].body;
     const std::size_t i = index(body);
-    const double gap = wall.normal.dot(in.x[i] - wall.point) - in.radius[i];
+    const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
     if (!constrain(rule, gap, v_n, v_n + fall, contacts.bias[at])) continue;

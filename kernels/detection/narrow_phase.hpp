@@ -3,6 +3,7 @@
 #include <span>
 
 #include "kernels/detection/contacts.hpp"
+#include "kernels/detection/domain.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 
 namespace talus {
@@ -19,6 +20,7 @@ struct NarrowPhase {
   double restitution;                  ///< e in [0, 1]
   Vec3 gravity;                        ///< [m/s^2]
   double overlap_correction = 0;       ///< in [0, 1]
+  [[no_unique_address]] Domain domain = {};
 };
 
 /// Whether a pair may be a contact of this step: nearer than the alert distance, or to be closed within the

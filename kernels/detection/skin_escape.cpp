@@ -24,8 +24,8 @@ void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, 
   const Vec3& x = bodies.x[s];
   const double most = std::max(margins.reach_then[s], widest);
   for (const Escape* escape : skin_escapes) {
-    const double dx = x[0] - escape->x[0], dy = x[1] - escape->x[1], dz = x[2] - escape->x[2];
-    const double d2 = dx * dx + dy * dy + dz * dz, near = escape->need + most;
+    const Vec3 d = margins.domain.separation(x, Vec3(Map(escape->x)));
+    const double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], near = escape->need + most;
     if (d2 >= near * near) continue;
     const auto id = static_cast<std::int64_t>(bodies.id[s]);
     if (id == escape->id) {
@@ -34,7 +34,7 @@ void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, 
     }
     const double distance = std::sqrt(d2), gap = distance - escape->radius - bodies.radius[s];
     const Vec3 v = Map(bodies.velocity[s].u) - Map(escape->u);
-    const double v_n = distance > 0 ? Vec3(dx, dy, dz).dot(v) / distance : 0;
+    const double v_n = distance > 0 ? d.dot(v) / distance : 0;
     // Rounded otherwise than in the narrow phase: a little more than it asks for.
     if (may_touch(gap - rounding * distance, v_n, margins.time_step, margins.alert))
       needed.push_back({std::min(id, escape->id), std::max(id, escape->id)});
@@ -48,7 +48,7 @@ void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& mar
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Vec3& x = bodies.x[s];
     const double need = need_of(bodies, s, margins);
-    if (need + (x - margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
+    if (need + margins.domain.separation(x, margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
     const double* u = bodies.velocity[s].u;
     skin_escapes.push_back({static_cast<std::int64_t>(bodies.id[s]),
                             bodies.radius[s],
@@ -91,7 +91,7 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
   for (const Escape& escape : skin_escapes)
     for (std::size_t w = 0; w < margins.walls.size(); ++w) {
       const Wall& wall = margins.walls[w];
-      const double distance = wall.normal.dot(Map(escape.x) - wall.point);
+      const double distance = wall.normal.dot(margins.domain.separation(Vec3(Map(escape.x)), wall.point));
       const double v_n = wall.normal.dot(Map(escape.u) - wall.velocity - wall.gain + h * margins.gravity);
       if (may_touch(distance - escape.radius - rounding * std::abs(distance), v_n, h, margins.alert))
         needed.push_back({-1 - static_cast<std::int64_t>(w), escape.id});

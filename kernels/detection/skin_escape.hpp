@@ -16,6 +16,7 @@
 #include "kernels/bodies/motion.hpp"
 #include "kernels/bodies/walls.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "kernels/detection/domain.hpp"
 
 namespace talus {
 
@@ -42,6 +43,7 @@ struct Margins {
   double alert;                        ///< [m]
   Vec3 gravity = Vec3::Zero();         ///< [m/s^2]
   std::span<const Wall> walls = {};    ///< at the middle of the step
+  [[no_unique_address]] Domain domain = {};
 };
 
 /// Appends the grains of the range that are no longer within their reach of then.

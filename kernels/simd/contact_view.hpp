@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "kernels/detection/separation.hpp"
+
 namespace talus {
 
 inline constexpr std::size_t group_size = 16;  ///< contacts of a full group
@@ -41,6 +43,7 @@ struct PairView {
   const double* velocity;              ///< 8 per body: its record
   const std::int32_t *first, *second;  ///< per pair: slots of its bodies
   std::size_t count;                   ///< of pairs
+  [[no_unique_address]] WalledSpace domain = {};
 };
 
 /// When a pair is a contact, and its bias: `NarrowPhase`.

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "kernels/bodies/release.hpp"
+#include "kernels/detection/domain.hpp"
 #include "partition/subdomain_colours.hpp"
 #include "runtime/step/decomposition.hpp"
 
@@ -30,7 +31,7 @@ Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3>
   const std::size_t grains = candidates.grain_pairs.size();
   if (k >= grains) return x[at(candidates.wall_pairs[k - grains].body)];
   const GrainPair& pair = candidates.grain_pairs[k];
-  return 0.5 * (x[at(pair.first)] + x[at(pair.second)]);
+  return Domain{}.midpoint(x[at(pair.first)], x[at(pair.second)]);
 }
 
 /// The impulses of the last steps, in slots of the surroundings. Those whose point has come to a subdomain of

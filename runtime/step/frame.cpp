@@ -5,6 +5,7 @@
 
 #include "kernels/bodies/permute.hpp"
 #include "kernels/bodies/release.hpp"
+#include "kernels/detection/domain.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
@@ -71,8 +72,9 @@ ContactRow contact_row(const StepState& state, const Active& active, double time
   const auto wall =
       static_cast<std::size_t>(std::max(state.chunks.wall[static_cast<std::size_t>(active.chunk)], 0));
   const double gap =
-      second >= 0 ? (bodies.x[i] - bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
-                  : state.walls[wall].normal.dot(bodies.x[i] - state.walls[wall].point) - bodies.radius[i];
+      second >= 0 ? Domain{}.separation(bodies.x[i], bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
+                  : state.walls[wall].normal.dot(Domain{}.separation(bodies.x[i], state.walls[wall].point)) -
+                        bodies.radius[i];
   ContactRow row;
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
   row.bodies[1] =

@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "kernels/bodies/larger.hpp"
+#include "kernels/detection/domain.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/dealing.hpp"
 
@@ -120,7 +121,7 @@ struct Simulation::Implementation {
       state.candidates_valid = false;
     }
     stage_steps = 0;
-    lengths_at_start = box_lengths(state.walls);
+    lengths_at_start = Domain{}.lengths(state.walls);
   }
 
   /// The stage began with a box; when it is none any more, walls have run through one another.
@@ -239,7 +240,7 @@ struct Simulation::Implementation {
     report.passed = sums.contacts.passed;
     report.kinetic_translation = sums.motion.energy.translation;
     report.kinetic_rotation = sums.motion.energy.rotation;
-    const double box = box_volume(state.walls);
+    const double box = Domain{}.volume(state.walls);
     report.solid_fraction = box > 0 ? size.volume / box : 0;
     report.wall_s = elapsed;
     report.converged = result.converged && defect <= setup.solver.balance_tolerance && report.passed == 0;
@@ -264,9 +265,7 @@ struct Simulation::Implementation {
   }
 
   double strain(int axis) const {
-    const Vec3 lengths = box_lengths(state.walls);
-    return lengths_at_start[axis] > 0 && lengths[axis] > 0 ? std::log(lengths[axis] / lengths_at_start[axis])
-                                                           : 0;
+    return Domain{}.strain(Domain{}.lengths(state.walls)[axis], lengths_at_start[axis]);
   }
 
   struct Done {
@@ -448,7 +447,7 @@ std::vector<WallReport> Simulation::walls() const {
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {
-  const double box = box_volume(impl_->state.walls);
+  const double box = Domain{}.volume(impl_->state.walls);
   if (!(box > 0)) return std::nullopt;
   TriaxialReport out;
   out.step = impl_->report.step;

@@ -22,7 +22,7 @@ std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, const std::vector
   std::vector<WallPair> pairs;
   for (std::size_t w = 0; w < walls.size(); ++w)
     for (std::size_t s = 0; s < x.size(); ++s)
-      if (walls[w].normal.dot(x[s] - walls[w].point) < reach[s] + margin[w])
+      if (walls[w].normal.dot(Domain{}.separation(x[s], walls[w].point)) < reach[s] + margin[w])
         pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
   return pairs;
 }

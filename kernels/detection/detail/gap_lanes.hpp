@@ -22,7 +22,8 @@ struct Pairing {
 /// x_i - x_j in the first three lanes; no number behind the three of a centre is read.
 template <std::same_as<Quad> V>
 [[gnu::always_inline]] inline V apart(const PairView& pairs, std::size_t i, std::size_t j) {
-  return load<V>(pairs.x + 3 * i, 0, FirstLanes{3}) - load<V>(pairs.x + 3 * j, 0, FirstLanes{3});
+  return pairs.domain.separation(load<V>(pairs.x + 3 * i, 0, FirstLanes{3}),
+                                 load<V>(pairs.x + 3 * j, 0, FirstLanes{3}));
 }
 [[gnu::always_inline]] inline Quad relative(const PairView& pairs, std::size_t i, std::size_t j) {
   return load<Quad>(pairs.velocity + 8 * i) - load<Quad>(pairs.velocity + 8 * j);
