@@ -26,6 +26,12 @@ struct Entry {
   Maker make = {};
 };
 
+/// A way that only its name tells from the others, for a Registry<std::string_view, Maker>.
+template <class Maker>
+constexpr Entry<std::string_view, Maker> named(std::string_view name, std::string_view sentence, Maker make) {
+  return {name, name, sentence, make};
+}
+
 /// A view of entries that outlive it, in the order in which they are listed to users.
 template <class Kind, class Maker = std::monostate>
 class Registry {

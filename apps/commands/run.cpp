@@ -21,8 +21,9 @@
 #include "apps/shared/trace_feed.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/output/recorder.hpp"
+#include "io/output/sinks.hpp"
 #include "io/results/progress.hpp"
-#include "io/results/recorder.hpp"
 #include "io/results/run_json.hpp"
 #include "io/scene/scene.hpp"
 #include "kernels/bodies/larger.hpp"
@@ -112,27 +113,18 @@ class RecorderFeed {
     since_ = {};
     if (rows_.empty()) return;
     executor_.submit_background("output of steps", [this, rows = std::move(rows_)] {
-      for (const Row& row : rows) {
-        recorder_.record_step(row.step, row.walls, row.triaxial);
-        recorder_.record_errors(row.step.step, row.errors);
-      }
+      for (const io::StepRecord& row : rows) recorder_.record_step(row);
       recorder_.flush();
     });
     rows_.clear();
   }
 
  private:
-  struct Row {
-    StepReport step;
-    std::vector<WallReport> walls;
-    std::optional<TriaxialReport> triaxial;
-    std::vector<Iteration::Check> errors;
-  };
   graph::Executor& executor_;
   io::Recorder& recorder_;
   const graph::Communicator& ranks_;
   StepList error_steps_;
-  std::vector<Row> rows_;
+  std::vector<io::StepRecord> rows_;
   Stopwatch since_;
 };
 
@@ -369,13 +361,14 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
                      const std::string& directory, const io::Provenance& provenance,
                      const Recordings& recordings, const graph::Communicator& ranks) {
   const Stopwatch watch;
-  const io::RecorderOptions files{.frames = true,
-                                  .fields = scene.output.fields,
-                                  .contacts = scene.output.contacts,
-                                  .pictures = scene.output.pictures};
   io::Summary summary;
   summary.bodies = sample.size();
-  std::optional<io::Recorder> recorder;
+  // Of one rank it writes on the background thread, from where a trace must hear of no call.
+  io::OutputContext context =
+      io::output_context(directory, scene.setup, ranks.ranks() > 1 ? ranks : graph::one_rank());
+  context.contacts = scene.output.contacts;
+  context.provenance = provenance;
+  io::Recorder recorder(std::move(context), scene.output.sinks);
   // The first fault is what to mend.
   const auto attempt = [&](const auto& work) {
     try {
@@ -385,18 +378,14 @@ io::Summary simulate(const RunOptions& options, const io::Scene& scene, Sample s
     }
   };
   attempt([&] {
-    // Of one rank it writes on the background thread, from where a trace must hear of no call.
-    recorder.emplace(directory, files, scene.setup, provenance,
-                     ranks.ranks() > 1 ? ranks : graph::one_rank());
-    run_steps(options, scene, std::move(sample), provenance.threads, directory, recordings, *recorder, ranks,
+    recorder.open();
+    run_steps(options, scene, std::move(sample), provenance.threads, directory, recordings, recorder, ranks,
               summary);
-    recorder->close();
+    recorder.close();
   });
   summary.wall_s = watch.seconds();
-  if (recorder) summary.frames = recorder->frames();
-  attempt([&] {
-    if (ranks.rank() == 0) io::write_run_json(directory + "/run.json", provenance, summary);
-  });
+  summary.frames = recorder.frames();
+  attempt([&] { recorder.end(summary); });
   return summary;
 }
 
@@ -494,7 +483,7 @@ int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, 
   std::optional<io::DirectoryLock> lock;
   if (ranks.rank() == 0) {
     try {
-      lock.emplace(io::prepare_output_directory(directory, options.force));
+      lock.emplace(io::prepare_output_directory(directory, options.force, io::is_output_name));
     } catch (const io::FileError& error) {
       refused = error.what();
     }

@@ -73,9 +73,8 @@ ScalingSample finished(io::Scene scene, Sample grains, const std::string& stage)
                                 .every = {},
                                 .every_steps = {},
                                 .stage_frames = false,
-                                .fields = false,
                                 .contacts = false,
-                                .pictures = false};
+                                .sinks = {}};
   return {std::move(scene), std::move(grains)};
 }
 

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstdlib>
@@ -23,20 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view unfinished = ".part";
-
-constexpr std::array<std::string_view, 13> fixed_names{
-    "error_history.csv", "run.json",          "scene.resolved.toml", "steps.csv",
-    "walls.csv",         "triaxial.csv",      "results.h5",          "fields.pvd",
-    "fields/grains.pvd", "fields/forces.pvd", "triaxial.svg",        "forces.svg",
-    "trace.h5"};
-
-/// prefix, six digits or more, suffix
-bool is_numbered(std::string_view name, std::string_view prefix, std::string_view suffix) {
-  if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
-  if (name.size() < prefix.size() + suffix.size() + 6) return false;
-  const auto digits = name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
-  return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
-}
 
 /// The name that a file has when it is whole: without ".part", or ".PID.part".
 std::string whole_name(std::string name) {
@@ -63,10 +48,11 @@ std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_
 
 }  // namespace
 
-bool is_output_name(const std::string& name) {
-  return std::ranges::find(fixed_names, name) != fixed_names.end() ||
-         is_numbered(name, "fields/grains_", ".vtp") || is_numbered(name, "fields/forces_", ".vtp") ||
-         is_numbered(name, "trace_rank_", ".h5") || is_numbered(name, "fclib_", ".hdf5");
+bool is_numbered_name(std::string_view name, std::string_view prefix, std::string_view suffix) {
+  if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
+  if (name.size() < prefix.size() + suffix.size() + 6) return false;
+  const auto digits = name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
+  return std::ranges::all_of(digits, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
 DirectoryLock::DirectoryLock(const fs::path& directory)

@@ -15,8 +15,8 @@ namespace talus::io {
 /// Tells from the name of a whole file, relative to a directory, whether a command of Talus wrote it.
 using IsOutputName = bool (*)(const std::string& name);
 
-/// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md).
-bool is_output_name(const std::string& name);
+/// True for `prefix`, six digits or more, `suffix`.
+bool is_numbered_name(std::string_view name, std::string_view prefix, std::string_view suffix);
 
 /// A directory as long as a run writes there. The system takes the lock away when the process ends, however
 /// it ends, and nothing is left in the directory.
@@ -39,7 +39,7 @@ class DirectoryLock {
 /// the directory when it is refused, when another run is writing there, or when it is not a directory, or
 /// cannot be created or written to.
 [[nodiscard]] DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
-                                                     IsOutputName is_ours = is_output_name);
+                                                     IsOutputName is_ours);
 
 /// A fresh folder `prefix`-XXXXXX, removed at the end of the scope with all that is in it by then.
 class ScratchFolder {

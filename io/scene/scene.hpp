@@ -6,9 +6,11 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "io/output/sinks.hpp"
 #include "io/scene/scene_error.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/size_distribution.hpp"
@@ -44,9 +46,9 @@ struct OutputSpec {
   std::optional<double> every;              ///< [s] between frames
   std::optional<std::int64_t> every_steps;  ///< steps between frames
   bool stage_frames = true;  ///< a frame at the ends of each stage, and where the run is stopped
-  bool fields = true;        ///< .vtp files for ParaView
   bool contacts = true;      ///< contacts with forces in the frames
-  bool pictures = true;      ///< curves and force network as pictures
+  /// Names of the output sinks to write (io/output/sinks.hpp), besides those that always are.
+  std::set<std::string> sinks = default_sinks();
 };
 
 /// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said

@@ -1,5 +1,6 @@
 #include "io/scene/detail/scene_keys.hpp"
 
+#include <cctype>
 #include <cmath>
 
 namespace talus::io::detail {
@@ -414,25 +415,48 @@ Section<DecompositionSettings> decomposition_keys() {
       }};
 }
 
+/// The registry's words as the reference says them.
+template <class Item>
+std::string sentence_of(const Item& item) {
+  std::string sentence(item.sentence);
+  sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence.front())));
+  return sentence + ".";
+}
+
+/// A key for every output sink that is not always written.
+std::vector<Key<OutputSpec>> sink_keys() {
+  std::vector<Key<OutputSpec>> keys;
+  for (const auto& sink : sink_registry()) {
+    if (sink.make->use == SinkUse::always) continue;
+    const std::string name(sink.name);
+    keys.push_back(bound<bool, OutputSpec>(
+        name.c_str(), "", any, sentence_of(sink).c_str(),
+        [name](OutputSpec& output, bool wanted) {
+          if (wanted)
+            output.sinks.insert(name);
+          else
+            output.sinks.erase(name);
+        },
+        [name](const OutputSpec& output) -> Value { return output.sinks.contains(name); }));
+  }
+  return keys;
+}
+
 Section<OutputSpec> output_keys() {
-  return {
-      "[output]",
-      "What is written, and when. Frames come at the first of `every` and `every_steps`.",
-      {
-          key<OutputSpec>("directory", "", any, "Where results go, unless the command line says otherwise.",
-                          &OutputSpec::directory)
-              .or_else("out/NAME"),
-          key<OutputSpec>("every", "s", positive, "Time between frames.", &OutputSpec::every),
-          key<OutputSpec>("every_steps", "", at_least_one, "Steps between frames.", &OutputSpec::every_steps),
-          key<OutputSpec>(
-              "stage_frames", "", any,
-              "A frame at the beginning and at the end of each stage, and where the run is stopped.",
-              &OutputSpec::stage_frames),
-          key<OutputSpec>("fields", "", any, "Write frames as .vtp files for ParaView.", &OutputSpec::fields),
-          key<OutputSpec>("contacts", "", any, "Write the contacts and their forces with each frame.",
-                          &OutputSpec::contacts),
-          key<OutputSpec>("pictures", "", any, "Draw curves and the force network.", &OutputSpec::pictures),
-      }};
+  std::vector<Key<OutputSpec>> keys = {
+      key<OutputSpec>("directory", "", any, "Where results go, unless the command line says otherwise.",
+                      &OutputSpec::directory)
+          .or_else("out/NAME"),
+      key<OutputSpec>("every", "s", positive, "Time between frames.", &OutputSpec::every),
+      key<OutputSpec>("every_steps", "", at_least_one, "Steps between frames.", &OutputSpec::every_steps),
+      key<OutputSpec>("stage_frames", "", any,
+                      "A frame at the beginning and at the end of each stage, and where the run is stopped.",
+                      &OutputSpec::stage_frames),
+      key<OutputSpec>("contacts", "", any, "Write the contacts and their forces with each frame.",
+                      &OutputSpec::contacts)};
+  for (auto& sink_key : sink_keys()) keys.push_back(std::move(sink_key));
+  return {"[output]", "What is written, and when. Frames come at the first of `every` and `every_steps`.",
+          std::move(keys)};
 }
 
 }  // namespace

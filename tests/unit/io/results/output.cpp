@@ -1,4 +1,4 @@
-// The directory of a run, its tables, run.json, the progress line, and the recorder that ties them together.
+// The directory of a run, its tables, run.json and the progress line.
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/output/sinks.hpp"
 #include "io/results/csv_writer.hpp"
 #include "io/results/progress.hpp"
-#include "io/results/recorder.hpp"
 #include "io/results/run_json.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
@@ -25,7 +25,7 @@ void touch(const fs::path& path) {
 
 /// For a run that ends at once.
 void prepare(const std::filesystem::path& directory, bool force) {
-  const DirectoryLock lock = prepare_output_directory(directory, force);
+  const DirectoryLock lock = prepare_output_directory(directory, force, is_output_name);
 }
 
 TEST(OutputDirectory, IsCreatedWithItsParents) {
@@ -88,7 +88,7 @@ TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
 TEST(OutputDirectory, IsRefusedAsLongAsAnotherRunWritesThere) {
   const ScratchDirectory scratch;
   {
-    const DirectoryLock lock = prepare_output_directory(scratch / "run", false);
+    const DirectoryLock lock = prepare_output_directory(scratch / "run", false, is_output_name);
     touch(scratch / "run/steps.csv");
     for (const bool force : {false, true}) {
       const std::string message = message_of<FileError>([&] { prepare(scratch / "run", force); });
@@ -145,22 +145,6 @@ TEST(OutputDirectory, ThatCannotBeMadeIsNamed) {
     EXPECT_NE(message.find((scratch / "file").string()), std::string::npos) << message;
   }
   EXPECT_EQ(content_of(scratch / "file"), "mine");
-}
-
-TEST(OutputDirectory, EveryFileOfARecorderIsKnownToForce) {
-  const ScratchDirectory scratch;
-  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
-  recorder.record_step(StepReport{}, {}, triaxial_row(1, "shear"));
-  recorder.record_frame(three_grains());
-  recorder.close();
-  std::size_t files = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(scratch.path())) {
-    if (entry.is_directory()) continue;
-    EXPECT_TRUE(is_output_name(entry.path().lexically_relative(scratch.path()).generic_string()))
-        << entry.path();
-    ++files;
-  }
-  EXPECT_EQ(files, 12u);
 }
 
 TEST(WholeFile, KeepsTheOldContentWhenTheNewDoesNotFit) {
@@ -329,76 +313,6 @@ TEST(ProgressLine, MarksAStepThatMissedItsTolerance) {
       .step = 1234, .time = 0.0123, .contacts = 6012, .iterations = 45, .error_rms = 8.2e-4};
   EXPECT_EQ(progress_line(report, "shear", 0.999, 3700),
             "shear  99 %  step 1234  t 12.3 ms  6012 contacts  45 it  err 8.2e-04 MISSED  ETA 1:01:40");
-}
-
-TEST(Recorder, LeavesTheStateOfARunThatIsGoingOn) {
-  const ScratchDirectory scratch;
-  const Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
-  EXPECT_EQ(nlohmann::json::parse(content_of(scratch / "run.json"))["summary"]["status"], "running");
-  EXPECT_EQ(content_of(scratch / "steps.csv"), steps_csv_header());
-  EXPECT_FALSE(fs::exists(scratch / "triaxial.csv")) << "a scene without a triaxial stage has no such table";
-}
-
-TEST(Recorder, WritesWhatItWasGiven) {
-  const ScratchDirectory scratch;
-  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
-  for (int k = 1; k <= 3; ++k) {
-    const Frame frame = three_grains();
-    recorder.record_step(StepReport{.step = k}, frame.walls, triaxial_row(k, "shear"));
-    if (k != 2) recorder.record_frame(three_grains());
-  }
-  recorder.close();
-  EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 1u + 3u);
-  EXPECT_EQ(occurrences(content_of(scratch / "walls.csv"), "\n"), 1u + 3u * 2u);
-  EXPECT_EQ(occurrences(content_of(scratch / "triaxial.csv"), "\n"), 1u + 3u);
-  EXPECT_EQ(frame_count(scratch / "results.h5"), 2u);
-  const std::string collection = content_of(scratch / "fields.pvd");
-  for (const char* name : {"fields/grains_000001.vtp", "fields/forces_000001.vtp"}) {
-    EXPECT_EQ(occurrences(collection, name), 1u);
-    EXPECT_TRUE(fs::exists(scratch / name)) << name;
-  }
-  EXPECT_EQ(recorder.frames(), 2u);
-}
-
-TEST(Recorder, HandsOverAllLinesSoFarWhenAsked) {
-  const ScratchDirectory scratch;
-  Recorder recorder(scratch.path(), {}, setup_with_two_walls(), collect_provenance());
-  const Frame frame = three_grains();
-  for (int k = 1; k <= 3; ++k) {
-    recorder.record_step(StepReport{.step = k}, frame.walls, triaxial_row(k, "shear"));
-    recorder.record_errors(k, std::vector<Iteration::Check>(2));
-  }
-  recorder.flush();
-  EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 1u + 3u);
-  EXPECT_EQ(occurrences(content_of(scratch / "walls.csv"), "\n"), 1u + 3u * 2u);
-  EXPECT_EQ(occurrences(content_of(scratch / "triaxial.csv"), "\n"), 1u + 3u);
-  EXPECT_EQ(occurrences(content_of(scratch / "error_history.csv"), "\n"), 1u + 3u * 2u);
-}
-
-TEST(Recorder, WritesNothingThatWasNotAskedFor) {
-  const ScratchDirectory scratch;
-  Recorder recorder(scratch.path(), {.frames = true, .fields = false, .contacts = false, .pictures = false},
-                    setup_with_two_walls(), collect_provenance());
-  recorder.record_frame(three_grains());
-  recorder.close();
-  EXPECT_TRUE(read_frame(scratch / "results.h5", 0).contact_bodies.empty());
-  for (const char* name : {"fields", "fields.pvd", "forces.svg", "triaxial.svg"}) {
-    EXPECT_FALSE(fs::exists(scratch / name)) << name;
-  }
-}
-
-TEST(ThinnedCurve, StaysSmallEvenAndEndsWithTheNewestRow) {
-  ThinnedCurve curve(100);
-  for (int k = 0; k < 12345; ++k) curve.add(triaxial_row(k, "shear"));
-  const auto rows = curve.rows();
-  ASSERT_GE(rows.size(), 100u);
-  EXPECT_LE(rows.size(), 201u);
-  EXPECT_EQ(rows.front().step, 0);
-  EXPECT_EQ(rows.back().step, 12344);
-  const std::int64_t stride = rows[1].step - rows[0].step;
-  for (std::size_t k = 1; k + 1 < rows.size(); ++k) EXPECT_EQ(rows[k].step - rows[k - 1].step, stride);
-  curve.add(triaxial_row(12345, "next"));
-  EXPECT_EQ(curve.rows().size(), 1u);
 }
 
 }  // namespace

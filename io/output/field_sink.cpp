@@ -1,0 +1,80 @@
+/// fields/ for ParaView: grains and forces of every frame, and the collections that give them their times.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <system_error>
+
+#include "io/files/error.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/output/sinks.hpp"
+#include "io/results/vtk.hpp"
+
+namespace talus::io {
+namespace {
+
+constexpr std::array<std::string_view, 3> collections{"fields/grains.pvd", "fields/forces.pvd", "fields.pvd"};
+
+class FieldSink : public OutputSink {
+ public:
+  explicit FieldSink(const OutputContext& context)
+      : directory_(context.directory), contacts_(context.contacts), ranks_(context.ranks) {}
+
+  void open() override {
+    if (ranks_.rank() != 0) return;
+    std::error_code error;
+    std::filesystem::create_directories(directory_ / "fields", error);
+    if (error) throw FileError((directory_ / "fields").string(), "cannot be created: " + error.message());
+  }
+
+  void frame(const Frame& part) override {
+    const std::string grains = fmt::format("grains_{:06}.vtp", frames_);
+    write(grains, [&](const WriteText& out) { write_grains_vtp(part, ranks_, out); });
+    grain_files_.push_back({part.time, 0, grains});
+    collect(collections[0], grain_files_);
+    if (contacts_) {
+      const std::string forces = fmt::format("forces_{:06}.vtp", frames_);
+      write(forces, [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
+      force_files_.push_back({part.time, 0, forces});
+      collect(collections[1], force_files_);
+    }
+    std::vector<FieldFile> all;
+    for (const FieldFile& file : grain_files_) all.push_back({file.time, 0, "fields/" + file.path});
+    for (const FieldFile& file : force_files_) all.push_back({file.time, 1, "fields/" + file.path});
+    collect(collections[2], all);
+    ++frames_;
+  }
+
+ private:
+  /// Made of the parts of all ranks; rank 0 writes.
+  void write(const std::string& name, const std::function<void(const WriteText&)>& make) const {
+    if (ranks_.rank() == 0)
+      write_whole(directory_ / "fields" / name, make);
+    else
+      make([](std::string_view) {});
+  }
+  void collect(std::string_view name, const std::vector<FieldFile>& files) const {
+    if (ranks_.rank() == 0) write_whole(directory_ / name, collection_pvd(files));
+  }
+
+  std::filesystem::path directory_;
+  bool contacts_;
+  const graph::Communicator& ranks_;
+  std::vector<FieldFile> grain_files_, force_files_;  ///< paths relative to fields/
+  std::size_t frames_ = 0;
+};
+
+}  // namespace
+
+const SinkKind field_sink{SinkUse::by_default,
+                          [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+                            return std::make_unique<FieldSink>(context);
+                          },
+                          [](const std::string& name) {
+                            return std::ranges::find(collections, name) != collections.end() ||
+                                   is_numbered_name(name, "fields/grains_", ".vtp") ||
+                                   is_numbered_name(name, "fields/forces_", ".vtp");
+                          }};
+
+}  // namespace talus::io

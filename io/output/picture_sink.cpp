@@ -1,0 +1,61 @@
+/// forces.svg of the newest frame, and triaxial.svg of the newest stage that has such reports.
+
+#include "io/files/output_directory.hpp"
+#include "io/output/sinks.hpp"
+#include "io/output/thinned_curve.hpp"
+#include "io/pictures/picture.hpp"
+
+namespace talus::io {
+namespace {
+
+class PictureSink : public OutputSink {
+ public:
+  explicit PictureSink(const OutputContext& context) : context_(context) {}
+
+  void step(const StepRecord& record) override {
+    if (record.triaxial) curve_.add(*record.triaxial);
+  }
+  void frame(const Frame& part) override {
+    if (context_.contacts) draw_force_picture(part);
+    draw_triaxial_picture();
+  }
+  void close() override { draw_triaxial_picture(); }
+
+ private:
+  void draw_force_picture(const Frame& part) const {
+    const ForcePicture options;
+    const auto write = [&](const Frame& all) {
+      write_whole(context_.directory / "forces.svg", draw_forces(all, context_.walls, options));
+    };
+    if (context_.ranks.ranks() == 1) {
+      write(part);
+      return;
+    }
+    const Frame all = gather_for_picture(part, context_.ranks, options);
+    if (context_.ranks.rank() == 0) write(all);
+  }
+
+  void draw_triaxial_picture() const {
+    if (curve_.empty()) return;
+    const std::vector<TriaxialReport> rows = curve_.rows();
+    TriaxialPicture picture;
+    picture.stage = rows.back().stage;
+    if (const auto found = context_.axis_of_stage.find(picture.stage); found != context_.axis_of_stage.end())
+      picture.axis = found->second;
+    write_whole(context_.directory / "triaxial.svg", draw_triaxial(rows, picture));
+  }
+
+  OutputContext context_;
+  ThinnedCurve curve_;
+};
+
+}  // namespace
+
+const SinkKind picture_sink{
+    SinkUse::by_default,
+    [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+      return std::make_unique<PictureSink>(context);
+    },
+    [](const std::string& name) { return name == "forces.svg" || name == "triaxial.svg"; }};
+
+}  // namespace talus::io

@@ -1,0 +1,69 @@
+#include "io/output/recorder.hpp"
+
+#include <utility>
+
+#include "io/output/sinks.hpp"
+#include "io/results/results.hpp"
+
+namespace talus::io {
+namespace {
+
+void drop_contacts(Frame& frame) {
+  frame.contact_bodies.clear();
+  frame.contact_point.clear();
+  frame.contact_normal.clear();
+  frame.contact_gap.clear();
+  frame.contact_force.clear();
+}
+
+}  // namespace
+
+OutputContext output_context(const std::filesystem::path& directory, const Setup& setup,
+                             const graph::Communicator& ranks) {
+  OutputContext context{.directory = directory, .walls = setup.walls, .ranks = ranks};
+  for (const Stage& stage : setup.stages) context.axis_of_stage.emplace(stage.name, stage.end.strain_axis);
+  return context;
+}
+
+Recorder::Recorder(OutputContext context, const std::set<std::string>& names) : context_(std::move(context)) {
+  for (const auto& sink : sink_registry())
+    if (sink.make->use == SinkUse::always || names.contains(std::string(sink.name)))
+      sinks_.push_back(sink.make->make(context_));
+}
+
+void Recorder::open() {
+  for (const auto& sink : sinks_) sink->open();
+}
+
+void Recorder::record_step(const StepRecord& record) {
+  if (context_.ranks.rank() != 0) return;
+  for (const auto& sink : sinks_) sink->step(record);
+}
+
+void Recorder::flush() {
+  if (context_.ranks.rank() != 0) return;
+  for (const auto& sink : sinks_) sink->flush();
+}
+
+void Recorder::record_frame(Frame&& frame) {
+  const Frame state = [&] {
+    Frame taken = std::move(frame);
+    if (!context_.contacts) drop_contacts(taken);
+    return taken;
+  }();
+  validate(state);
+  for (const auto& sink : sinks_) sink->frame(state);
+  ++frames_;
+}
+
+void Recorder::close() {
+  if (context_.ranks.rank() != 0) return;
+  for (const auto& sink : sinks_) sink->close();
+}
+
+void Recorder::end(const Summary& summary) {
+  if (context_.ranks.rank() != 0) return;
+  for (const auto& sink : sinks_) sink->end(summary);
+}
+
+}  // namespace talus::io

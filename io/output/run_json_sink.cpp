@@ -1,0 +1,34 @@
+/// run.json: says "running" from the beginning, and what came of the run at its end.
+
+#include "io/output/sinks.hpp"
+
+namespace talus::io {
+namespace {
+
+class RunJsonSink : public OutputSink {
+ public:
+  explicit RunJsonSink(const OutputContext& context)
+      : path_(context.directory / "run.json"),
+        provenance_(context.provenance),
+        writes_(context.ranks.rank() == 0) {}
+
+  void open() override {
+    if (writes_) write_run_json(path_, provenance_, Summary{});
+  }
+  void end(const Summary& summary) override { write_run_json(path_, provenance_, summary); }
+
+ private:
+  std::filesystem::path path_;
+  Provenance provenance_;
+  bool writes_;
+};
+
+}  // namespace
+
+const SinkKind run_json_sink{SinkUse::always,
+                             [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+                               return std::make_unique<RunJsonSink>(context);
+                             },
+                             [](const std::string& name) { return name == "run.json"; }};
+
+}  // namespace talus::io

@@ -1,0 +1,39 @@
+#include "io/output/sinks.hpp"
+
+#include <algorithm>
+
+#include "io/files/output_directory.hpp"
+
+namespace talus::io {
+namespace {
+
+/// In the order in which they are driven.
+constexpr SinkRegistry::Item sinks[] = {
+    named("tables", "steps.csv, walls.csv, triaxial.csv and error_history.csv", &table_sink),
+    named("run", "run.json: where the numbers come from, and what came of the run", &run_json_sink),
+    named("frames", "results.h5: the state at every output time, in full precision", &frame_sink),
+    named("fields", "write frames as .vtp files for ParaView", &field_sink),
+    named("pictures", "draw curves and the force network", &picture_sink),
+};
+
+}  // namespace
+
+const SinkRegistry& sink_registry() {
+  static constexpr SinkRegistry registry("output sink", sinks);
+  return registry;
+}
+
+std::set<std::string> default_sinks() {
+  std::set<std::string> names;
+  for (const auto& sink : sink_registry())
+    if (sink.make->use == SinkUse::by_default) names.emplace(sink.name);
+  return names;
+}
+
+bool is_output_name(const std::string& name) {
+  return name == "scene.resolved.toml" || name == "trace.h5" ||
+         is_numbered_name(name, "trace_rank_", ".h5") || is_numbered_name(name, "fclib_", ".hdf5") ||
+         std::ranges::any_of(sink_registry(), [&](const auto& sink) { return sink.make->writes(name); });
+}
+
+}  // namespace talus::io
