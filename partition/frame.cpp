@@ -39,7 +39,7 @@ IntegerFrame make_frame(const Vec3& low, const Vec3& high) {
 
 IntegerFrame make_frame(std::span<const Vec3> points, const Reduction& reduction) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
-  // -min and max of each axis, and a flag: a maximum would lose a NaN on its way.
+  // -min and max of each axis, and a flag: a maximum over ranks would lose a NaN.
   std::array<double, 7> bounds;
   bounds.fill(-infinity);
   bounds[6] = 0;

@@ -45,8 +45,8 @@ void list_exchanges(SubdomainInterface& here, const BodySubdomains& standings,
     here.copies_begin.push_back(here.copies_begin.back() + (m < hub_multiplicity ? m : 0));
   }
   here.copies.resize(at(here.copies_begin.back()));
-  // Ties come by ascending subdomain, so the copies of each grain are filled in that order; the own copy when
-  // its turn has come.
+  // Ties come by ascending subdomain, so the copies of each grain are filled in that order, its own copy at
+  // the place of its subdomain.
   std::vector<std::int32_t> filled(here.copies_begin.begin(), here.copies_begin.end() - 1);
   std::vector<char> own(here.shared.size(), 0);
   const auto put_own = [&](std::size_t s) {
@@ -93,7 +93,7 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
                                 std::span<const WallPair> wall_pairs, std::span<const std::int32_t> subdomain,
                                 std::span<const std::int32_t> home) {
-  // Most grains stand in one subdomain: what says the same as the first standing found is not listed.
+  // Most grains stand in one subdomain: repetitions of its first standing are not listed.
   std::vector<Standing> standings;
   standings.reserve(grains);
   std::vector<std::int32_t> first(grains, -1);

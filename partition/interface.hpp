@@ -13,7 +13,8 @@
 
 namespace talus {
 
-/// That a body (a grain's slot, or the index of a wall) stands in a subdomain.
+/// States that a body (a grain's slot, or the index of a wall) stands in a subdomain: one of its candidates
+/// lies there.
 struct Standing {
   std::int32_t body;
   std::int32_t subdomain;
@@ -43,9 +44,9 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 /// Grains of these candidates, which are in `subdomain` (grain pairs first, then wall pairs). The answer is
 /// complete for a grain when all its candidates are given, whichever subdomain they are in; a subdomain is a
 /// function of the point alone, so a rank can give those of other ranks' subdomains too. (Contacts at glued
-/// walls go by the turns of the subdomains that their grain is known to stand in: never to one where it does
-/// not.) With `home` (one per grain, or empty) a grain without candidates stands in its home, the subdomain
-/// of its centre: every grain then stands somewhere, and somebody moves it.
+/// walls are given to one of the subdomains in which their grain is known to stand, by the colours of these;
+/// so they add no subdomain.) With `home` (one per grain, or empty) a grain without candidates stands in its
+/// home, the subdomain of its centre: every grain then stands in some subdomain, which integrates its motion.
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
                                 std::span<const WallPair> wall_pairs, std::span<const std::int32_t> subdomain,
                                 std::span<const std::int32_t> home = {});

@@ -43,8 +43,8 @@ LoadTable measure_load(std::int32_t subdomains, std::span<const SubdomainInterfa
   for (std::int32_t subdomain : contacts) ++table.contacts[static_cast<std::size_t>(subdomain)];
   for (const SubdomainInterface& interface : interfaces) {
     const auto e = static_cast<std::size_t>(interface.subdomain);
-    // Neighbours are counted from the standings, not from the exchange lists: a hub's subdomains are tied
-    // too.
+    // Neighbours are counted from the standings, not from the exchange lists, which leave out the subdomains
+    // of a hub.
     std::set<std::int32_t> others;
     for (std::int32_t k : interface.shared) {
       const auto in = grains.of(static_cast<std::size_t>(interface.bodies[static_cast<std::size_t>(k)]));

@@ -32,7 +32,7 @@ inline constexpr std::array<PartitionKind, 5> partition_kinds{PartitionKind::aut
                                                               PartitionKind::fitted, PartitionKind::rcb,
                                                               PartitionKind::metis};
 
-/// Whether it makes boxes per axis, whose numbers may be given.
+/// Whether the partitioner cuts a grid of boxes, whose numbers per axis may be given.
 constexpr bool cuts_boxes(PartitionKind kind) {
   return kind != PartitionKind::rcb && kind != PartitionKind::metis;
 }
@@ -97,19 +97,19 @@ struct PartitionOptions {
   /// Boxes per axis for `boxes` and `fitted`; their product is `subdomains`. Zeros: of all factorisations,
   /// the one with the least area of cuts in the box of the sample.
   std::array<std::int32_t, 3> boxes{};
-  double auto_imbalance = 0.02;  ///< heaviest box over the mean box, less 1, that `automatic` bears
+  double auto_imbalance = 0.02;  ///< imbalance (heaviest box over the mean, less 1) up to which boxes stay
   /// The partition in force, or nullptr. `rcb` then keeps its axes while the spreads allow it, and `metis`
   /// gives a new region the number of the old one it overlaps most, so that fewer bodies migrate.
   const Partition* previous = nullptr;
 };
 
 /// Collective over the ranks of `reduction`. The result is the same for any order of the points and any way
-/// of dealing them to ranks. No rank sees the points of another: sums over histograms or cells travel.
-/// Subdomains may come out empty: with fewer points than subdomains they must.
-/// Cost for P points and N subdomains on a rank: boxes P; rcb, fitted about 4 P log2 N and as many histograms
-/// of 512 N integers; metis P and one sum over 14 x cells (below 2^18), then METIS on the cells.
-/// Throws std::invalid_argument if subdomains < 1, the boxes' product is not `subdomains`, a weight is
-/// negative, their sum reaches 2^31, or a point is not finite.
+/// of dealing them to ranks. No rank sees the points of another: ranks add up histograms or cells. Subdomains
+/// may come out empty: with fewer points than subdomains they must. Cost for P points and N subdomains on a
+/// rank: boxes P; rcb, fitted about 4 P log2 N and as many histograms of 512 N integers; metis P and one sum
+/// over 14 x cells (below 2^18), then METIS on the cells. Throws std::invalid_argument if subdomains < 1, the
+/// boxes' product is not `subdomains`, a weight is negative, their sum reaches 2^31, or a point is not
+/// finite.
 Partition make_partition(const PartitionPoints& points, const PartitionOptions& options,
                          const Reduction& reduction = {});
 

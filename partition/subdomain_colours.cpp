@@ -50,8 +50,8 @@ char least(const std::vector<std::int64_t>& shared) {
 
 std::vector<char> grow(const Ties& ties, int subdomain_colours) {
   std::vector<char> subdomain_colour(ties.subdomains(), none);
-  // The most strongly tied to those that have a subdomain colour; of equals the first. What is out of date is
-  // passed over.
+  // The subdomain most strongly tied to coloured ones comes next; of equals the first. Entries whose strength
+  // has changed since are skipped.
   std::vector<std::int64_t> strength(subdomain_colour.size(), 0);
   std::priority_queue<std::pair<std::int64_t, std::int64_t>> next;
   for (std::size_t e = 0; e < subdomain_colour.size(); ++e) next.emplace(0, -static_cast<std::int64_t>(e));
@@ -71,7 +71,7 @@ std::vector<char> grow(const Ties& ties, int subdomain_colours) {
   return subdomain_colour;
 }
 
-/// Each move takes ties out of a subdomain colour, so they end.
+/// Each move reduces the grains shared within a colour, so the moves end.
 void improve(const Ties& ties, int subdomain_colours, std::vector<char>& subdomain_colour) {
   for (bool moved = true; moved;) {
     moved = false;

@@ -1,7 +1,7 @@
 #pragma once
 
-/// When it is whose subdomain colour, where subdomains that share grains act one after the other
-/// (Coupling::alternating).
+/// Colours of subdomains for alternating coupling (Coupling::alternating): subdomains that share grains act
+/// one colour after the other.
 
 #include <cstdint>
 #include <span>
@@ -16,12 +16,12 @@ struct Tie {
   std::int32_t grains;
 };
 
-/// Turns of the subdomains, 0 to 3, such that as many ties as can easily be had, counted in grains, run
-/// between subdomains of different subdomain colours: a colouring that leaves few conflicts, by growth from
-/// subdomain 0 along the strongest ties and moves of single subdomains as long as one helps. No more
-/// subdomain colours than leave a quarter of the ties within one: two for boxes, which come out like the
-/// fields of a chessboard, three for parts of METIS. A function of the ties alone, whatever their order.
-/// Throws std::out_of_range when a tie names no subdomain.
+/// The colour of each subdomain, 0 to 3. A heuristic makes the shared grains between subdomains of one colour
+/// few: it grows the colouring from subdomain 0 along the strongest ties, then recolours single subdomains as
+/// long as that helps. It takes the smallest number of colours that leaves at most a quarter of the shared
+/// grains between subdomains of one colour: two for boxes, which come out like a chessboard, three for
+/// subdomains cut by METIS. The result depends on the ties alone, not on their order. Throws
+/// std::out_of_range when a tie names no subdomain.
 std::vector<char> choose_subdomain_colours(std::int32_t subdomains, std::span<const Tie> ties);
 
 }  // namespace talus

@@ -48,7 +48,7 @@ double sphere_mass(double radius, double density);
 void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density,
                 bool rotates = true);
 
-/// Room for `count` bodies in all, so that none of the arrays has to be moved while it is filled.
+/// Reserves room for `count` bodies in all, so that filling the arrays does not move them.
 void reserve(Bodies& bodies, std::size_t count, bool orientation = false);
 
 /// Volume of the spheres [m^3], summed in slot order.

@@ -13,8 +13,8 @@ struct SlotRange {
   std::size_t end;
 };
 
-/// Free velocity: what a grain would have at the end of the step without contacts, V- + h g. Only what a
-/// scene needs: `w` is empty without friction or rotation, where the sweeps do not touch it.
+/// Free velocity of the grains: their velocity at the end of the step if there were no contacts, V- + h g.
+/// `w` is empty without friction or rotation, since the sweeps do not touch it then.
 struct FreeVelocity {
   std::vector<std::array<double, 3>> u;  ///< [m/s]
   std::vector<std::array<double, 3>> w;  ///< [m/s]
@@ -42,8 +42,9 @@ struct MotionSums {
   void add(const MotionSums& other);
 };
 
-/// Second half: x += h/2 u, with the sums. `multiplicity` and `parts` tell what a copy adds to them where the
-/// masses of a body's copies, M/parts each, are not those of one body together: M/m_i. Both empty elsewhere.
+/// Second half: x += h/2 u, with the sums. A copy adds M/m_i to the sums over bodies. Where the mass of a
+/// copy is M/parts with parts other than m_i, `multiplicity` and `parts` tell both numbers; elsewhere both
+/// are empty.
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
                   const FreeVelocity& free, Multiplicities multiplicity = {}, Multiplicities parts = {});
 

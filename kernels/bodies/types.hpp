@@ -17,9 +17,10 @@ enum class BodyId : std::int64_t {};
 /// to compile.
 using Slot = std::int32_t;
 
-/// Where it matters that bodies have copies: one entry per slot, or empty when all are 1. Either the
-/// multiplicities m_i, or the parts into which a mass is divided for the copies: they carry M/m_i (Visseq et
-/// al. 2013, (7)), or M over those of them that act at a time; the error is that of the whole body.
+/// One number per slot for bodies with copies; empty when all are 1. It is either the multiplicity m_i, or
+/// the number of parts into which the mass is divided: a copy carries M/m_i (Visseq et al. 2013, (7)), or,
+/// with alternating coupling, M over the number of copies that act at the same time. Errors are those of the
+/// whole body.
 using Multiplicities = std::span<const std::uint16_t>;
 
 }  // namespace talus

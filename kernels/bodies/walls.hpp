@@ -27,8 +27,8 @@ struct WallLoad {
   bool pushed() const { return drive == WallDrive::pressure || drive == WallDrive::force; }
 };
 
-/// A plane wall: the half space normal . (x - point) < 0 is solid.
-/// A pressed wall has one degree of freedom, its displacement along `normal`; walls never turn.
+/// A plane wall: the half space normal . (x - point) < 0 is solid. A pressed wall has one degree of freedom,
+/// its displacement along `normal`; walls never rotate.
 struct Wall {
   std::string name;
   Vec3 point = Vec3::Zero();     ///< a point of the plane [m]

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Global balance: do the impulses carry what they must? The natural map looks at one contact at a time; on
+/// Global balance: do the impulses carry what they must? The natural map measures one contact at a time; on
 /// long chains and under heavy bodies each contact can be nearly satisfied while hardly anything of the load
 /// is carried (docs/decisions/0012-stiff.md).
 

@@ -30,7 +30,7 @@ inline double dot(const Twist& a, const Twist& b) {
   return a.u.dot(b.u) + a.w.dot(b.w);
 }
 
-/// One body. A wall turns never and moves along `axis` only; its part of a Twist is (velocity x axis, 0).
+/// One body. A wall never rotates and moves along `axis` only; its part of a Twist is (velocity x axis, 0).
 struct BodyUnknown {
   double mass = 0;           ///< [kg] > 0
   double spin_mass = 0;      ///< I/R^2 [kg]; 0: does not turn

@@ -33,7 +33,8 @@ class BodySystem {
   BodySystem(const BodyProblem& problem, std::span<const double> rho);
 
   std::vector<Matrix6>& diagonal() { return diagonal_; }
-  /// Once `diagonal` holds what the contacts of all parts give; it is void then.
+  /// Factorises the diagonal blocks, once `diagonal` holds the contributions of all parts. `diagonal` is
+  /// released.
   void close();
   /// Per unknown: some part has contacts of it.
   const std::vector<char>& touched() const { return touched_; }
@@ -46,7 +47,7 @@ class BodySystem {
 
   /// First half of the symmetric smoother, from 0: x = (D + L)^-1 f.
   void smooth_forward(std::span<const Twist> f, std::span<Twist> x) const;
-  /// What it left, f - A x, of the summed x.
+  /// The residual f - A x of the summed x.
   void rest_of_forward(std::span<const Twist> x, std::span<Twist> rest) const;
   /// f less what ties add to A x, for the second half.
   void take_ties(std::span<const Twist> f, std::span<const Twist> x, std::span<Twist> rest) const;

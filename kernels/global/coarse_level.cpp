@@ -78,7 +78,7 @@ Aggregates grow_aggregates(const BodyProblem& problem, std::span<const char> tou
         members.push_back(other);
       }
     }
-    // A scrap between full aggregates joins the one it touches first.
+    // A small group left over between full aggregates joins the first one it touches.
     if (static_cast<int>(members.size()) * 4 < target) {
       std::int32_t host = -1;
       for (std::size_t m = 0; m < members.size() && host < 0; ++m)
@@ -286,7 +286,8 @@ std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<
     ContactMotion motion;
     motion << Eigen::Matrix3d::Identity(), rotation(member.arm) / member.length;
     Matrix6 mass = body.mass * motion.transpose() * motion;
-    // A little inertia also where nothing turns: grains in a row would leave a rotation without any.
+    // A little inertia is added also to bodies that do not rotate: the rotation of a row of grains about its
+    // axis would have none.
     mass.diagonal().tail<3>().array() += std::max(body.spin_mass * relative * relative, 1e-6 * body.mass);
     block(g, g) += mass;
   }

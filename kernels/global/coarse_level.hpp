@@ -25,16 +25,15 @@ struct Aggregates {
 /// Depends on the order of bodies and contacts alone.
 Aggregates grow_aggregates(const BodyProblem& problem, std::span<const char> touched, int target);
 
-/// A sensible `target` for so many bodies in all parts: 16 in small problems, so that chains get links; up to
-/// 256 in large ones, where the coarse factorisation would cost more than it saves; and more beyond half a
-/// million, so that what every process holds of the coarse level stays bounded.
+/// A sensible `target` for so many bodies in all parts: 16 in small problems, so that a chain becomes several
+/// aggregates; up to 256 in large ones, where the coarse factorisation would cost more than it saves; and
+/// more beyond half a million, so that what every process holds of the coarse level stays bounded.
 int aggregate_target(std::size_t bodies);
 
-/// P^T A P and its factor, P the six rigid motions of each aggregate and the one of each wall: with them,
-/// what takes sweeps over thousands of contacts to travel through a sample goes in one step. Where bodies do
-/// not turn, their aggregates still do. Every process gathers and factorises all of it, some thousand
-/// numbers: about 300 bytes for each pair of aggregates that touch, and as much again for the factor times
-/// its fill.
+/// P^T A P and its factor, P the six rigid motions of each aggregate and the one of each wall: a correction
+/// that sweeps would carry through thousands of contacts takes one coarse solve. Aggregates rotate even where
+/// single bodies do not. Every process gathers and factorises all of it, some thousand numbers: about 300
+/// bytes for each pair of aggregates that touch, and as much again for the factor times its fill.
 class CoarseLevel {
  public:
   /// Keeps a reference to `parts`. `touched` and `rho` [kg] per part.

@@ -84,7 +84,8 @@ bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
          })[0] > 0;
 }
 
-/// Without a driven wall: what the others come to rest on, the heaviest body that touches one.
+/// Without a driven wall the walk begins at the heaviest body that touches another, on which the others come
+/// to rest.
 void mark_heaviest(Graph& graph, PartField& mark) {
   std::vector<std::size_t> heaviest(graph.parts.size());
   const auto find = [&](std::size_t p, std::span<double> row) {
@@ -125,8 +126,8 @@ void each_unreached(const Layers& here, const Visit& visit) {
   }
 }
 
-/// The heaviest body of every cluster of every part that no walk has come to. What stands in several parts
-/// gets one in each.
+/// The heaviest body of every cluster of every part that no walk has come to. A cluster that lies in several
+/// parts gets one body in each.
 void mark_rest(Graph& graph, PartField& mark) {
   graph.each([&](std::size_t p) {
     each_unreached(graph.parts[p], [&](std::size_t, std::int32_t heaviest) {

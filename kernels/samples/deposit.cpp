@@ -19,8 +19,8 @@ namespace {
 // classes, and each class keeps its sites in a heap, keyed by the height of the site for the smallest radius
 // of the class: as height grows with radius, that bounds from below what a grain of the class can get there.
 // To place a grain, sites leave the heap until the bound exceeds the best height found: exact for the grain's
-// own radius, and only the sites within a class width of the lowest are looked at. Nothing is told to sites
-// that a new grain blocks; they find out when they are looked at.
+// own radius, and only the sites within a class width of the lowest are examined. A new grain does not update
+// the sites that it blocks: each site is checked against its neighbours when it is examined.
 
 // Supports that are not grains; the lower number counts as the older.
 enum Plane : std::int32_t { floor_plane = -1, x_high = -2, x_low = -3, y_high = -4, y_low = -5 };
@@ -251,7 +251,7 @@ class Deposition {
       const double gap = to_plane[static_cast<std::size_t>(-1 - plane)] - radius;
       if (gap < 2 * largest_) near_.push_back({gap, plane, {}});
     }
-    // The nearest blocks most often: with it first, most triples die at once.
+    // The nearest obstacle blocks most often: tested first, it rejects most triples at once.
     std::sort(near_.begin(), near_.end(), [](const Near& a, const Near& b) {
       return std::tie(a.gap, a.index) < std::tie(b.gap, b.index);
     });

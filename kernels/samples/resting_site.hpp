@@ -64,7 +64,7 @@ bool site_curve(double base_radius, const Obstacle& first, const Obstacle& secon
 void keep_real(const SiteCurve& curve, RadiusRanges& ranges);
 
 /// Keeps the radii for which the site clears `obstacle`; overlaps of less than `slack` [m^2] = gap x distance
-/// are let pass.
+/// are accepted.
 void keep_clear(const SiteCurve& curve, const Obstacle& obstacle, double slack, RadiusRanges& ranges);
 
 /// Keeps the radii for which the weight falls between the base grain, `first` and `second`: e_z is a

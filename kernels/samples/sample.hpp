@@ -17,8 +17,8 @@
 
 namespace talus {
 
-/// Grains before the first step, in as few numbers as say all: 32 bytes a grain at rest, where Bodies take
-/// 104. A sample is made on one rank; it becomes Bodies piece by piece, where they belong
+/// Grains before the first step, stored compactly: 32 bytes a grain at rest instead of the 104 of Bodies. One
+/// rank makes the sample and sends it in pieces to the ranks that turn them into Bodies
 /// (runtime/step/dealing.hpp).
 struct Sample {
   std::vector<BodyId> id;                       ///< empty: grain k has id k

@@ -9,10 +9,10 @@ namespace talus::detail {
 namespace {
 
 /// A median is found by radix selection. A round settles a few of the 63 bits of a key: one histogram per
-/// open node and one sum over the ranks, all histograms together of at most 512 numbers or 8 per node. What a
-/// round takes is the way to all ranks as long as sums are short, so few nodes settle 9 bits at a time;
-/// behind 32 ranks that share a link, sums as long for each of many nodes would take twenty times as long as
-/// the way.
+/// open node and one sum over the ranks, all histograms together of at most 512 numbers or 8 per node. A
+/// round with a short sum takes the latency of an all-reduction, so few nodes settle 9 bits at a time. With
+/// many nodes such histograms would make the sum long: where 32 ranks share a link, it would take twenty
+/// times the latency.
 constexpr int key_bits = 3 * IntegerFrame::bits;
 constexpr int most_bits = 9, least_bits = 3;
 int bits_of_a_round(std::size_t histograms) {
@@ -130,7 +130,7 @@ class Bisection {
     node.prefix = node.prefix << bits | bin;
     const std::int64_t short_of = wanted - node.below * node.parts;
     const std::int64_t too_many = (node.below + counts[bin]) * node.parts - wanted;
-    // No cut need be nearer than by half of the heaviest point; shift 0 means one key.
+    // A cut may miss the wanted weight by half of the heaviest point; shift 0 means that one key is left.
     if (2 * std::min(short_of, too_many) > points_.heaviest * node.parts && shift > 0) return;
     node.open = false;
     node.prefix += too_many < short_of ? 1 : 0;

@@ -99,7 +99,7 @@ Compressed compress(const CellGraph& graph, const CellTable& table) {
     result.vertex_weight.push_back(static_cast<idx_t>(graph.weight[c]));
   }
   // Grains without candidates yet (the first partition of a run) share nothing: cells are then tied by their
-  // faces, all alike. Without ties METIS deals cells out like cards.
+  // faces, all with the same weight. Without ties METIS scatters the cells of a subdomain over the box.
   const bool tied =
       std::any_of(graph.shared.begin(), graph.shared.end(), [](std::int64_t s) { return s > 0; });
   const auto shared_by = [&](std::size_t cell, std::size_t d) {
