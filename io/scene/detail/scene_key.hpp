@@ -134,6 +134,14 @@ struct Held<std::optional<T>> {
   static Value out(const std::optional<T>& member) { return member ? Held<T>::out(*member) : Value{}; }
   static void in(std::optional<T>& member, const Value& value) { Held<T>::in(member.emplace(), value); }
 };
+/// A value of the kind that members of type T are written as: the alternative, and the length of a list.
+template <class T>
+Value example_of() {
+  if constexpr (std::is_same_v<T, Vec3>)
+    return std::vector<double>(3);  // Vec3{} is not initialised
+  else
+    return Held<T>::out({});
+}
 template <class T>
 struct Bare {
   using type = T;
@@ -148,7 +156,7 @@ template <class Part, class Access>
 Key<Part> key(const char* name, const char* unit, Range range, const char* meaning, Access access) {
   using Member = std::remove_cvref_t<std::invoke_result_t<Access, Part&>>;
   Key<Part> result{{name, unit, range, meaning}};
-  result.kind = Held<typename Bare<Member>::type>::out({});
+  result.kind = example_of<typename Bare<Member>::type>();
   result.set = [access](Part& part, const Value& value) {
     Held<Member>::in(std::invoke(access, part), value);
   };
@@ -161,7 +169,7 @@ Key<Part> key(const char* name, const char* unit, Range range, const char* meani
 template <class T, class Part, class Set, class Get>
 Key<Part> bound(const char* name, const char* unit, Range range, const char* meaning, Set set, Get get) {
   Key<Part> result{{name, unit, range, meaning}};
-  result.kind = Held<T>::out({});
+  result.kind = example_of<T>();
   result.set = [set](Part& part, const Value& value) {
     T held{};
     Held<T>::in(held, value);
