@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
-#include <unordered_map>
 #include <utility>
+
+#include "io/trace/detail/trace_events.hpp"
 
 namespace talus::io {
 namespace {
@@ -87,44 +86,6 @@ class Namer {
   bool known_ = false;
 };
 
-std::int64_t first_begin(const trace::Trace& trace, const TraceWindow& window) {
-  std::int64_t first = std::numeric_limits<std::int64_t>::max();
-  for (const trace::Track& track : trace.tracks)
-    for (const Record& record : track.records)
-      if (window.shows(record)) first = std::min(first, record.begin);
-  return first;
-}
-
-/// Calls `begin(record)` and `end(record)` in order of time, spans inside tasks nested.
-template <class Begin, class End>
-void in_order(const trace::Track& track, const TraceWindow& window, Begin begin, End end) {
-  std::vector<const Record*> open;
-  for (const Record& record : track.records) {
-    if (!window.shows(record)) continue;
-    while (!open.empty() && open.back()->end() <= static_cast<double>(record.begin)) {
-      end(*open.back());
-      open.pop_back();
-    }
-    begin(record);
-    open.push_back(&record);
-  }
-  for (; !open.empty(); open.pop_back()) end(*open.back());
-}
-
-/// Numbers the messages that somebody waited for, by their records at both ends. Others have no end that is
-/// known, which the formats want.
-std::unordered_map<const Record*, std::size_t> links_of(const trace::Trace& trace,
-                                                        const TraceWindow& window) {
-  const auto sends = trace::sends_of(trace);
-  std::unordered_map<const Record*, std::size_t> links;
-  std::size_t count = 0;
-  for (const trace::Track& track : trace.tracks)
-    for (const Record& record : track.records)
-      if (const auto sent = sends.find(&record); sent != sends.end() && window.shows(record))
-        links[&record] = links[sent->second] = ++count;
-  return links;
-}
-
 }  // namespace
 
 bool TraceWindow::shows(const Record& record) const {
@@ -155,8 +116,8 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
     packet.message(field::track_descriptor, descriptor);
     add(packet);
   }
-  const std::int64_t start = first_begin(trace, window);
-  const std::unordered_map<const Record*, std::size_t> links = links_of(trace, window);
+  const std::int64_t start = detail::first_begin(trace, window);
+  const std::unordered_map<const Record*, std::size_t> links = detail::links_of(trace, window);
   for (std::size_t k = 0; k < trace.tracks.size(); ++k) {
     const trace::Track& track = trace.tracks[k];
     const std::uint64_t uuid = std::uint64_t{2} << 32 | k, sequence = k + 1;
@@ -202,122 +163,9 @@ std::string to_perfetto(const trace::Trace& trace, const TraceWindow& window) {
       made.message(field::track_event, event);
       add(made);
     };
-    in_order(
+    detail::in_order(
         track, window, [&](const Record& r) { slice(r, true); }, [&](const Record& r) { slice(r, false); });
   }
-  return out;
-}
-
-std::string to_paje(const trace::Trace& trace, const TraceWindow& window) {
-  // Event numbers are ours; what they mean stands in the head of the file.
-  std::string out = R"(%EventDef PajeDefineContainerType 0
-%  Alias string
-%  Type string
-%  Name string
-%EndEventDef
-%EventDef PajeDefineStateType 1
-%  Alias string
-%  Type string
-%  Name string
-%EndEventDef
-%EventDef PajeDefineLinkType 2
-%  Alias string
-%  Type string
-%  StartContainerType string
-%  EndContainerType string
-%  Name string
-%EndEventDef
-%EventDef PajeDefineEntityValue 3
-%  Alias string
-%  Type string
-%  Name string
-%  Color color
-%EndEventDef
-%EventDef PajeCreateContainer 4
-%  Time date
-%  Alias string
-%  Type string
-%  Container string
-%  Name string
-%EndEventDef
-%EventDef PajePushState 5
-%  Time date
-%  Type string
-%  Container string
-%  Value string
-%EndEventDef
-%EventDef PajePopState 6
-%  Time date
-%  Type string
-%  Container string
-%EndEventDef
-%EventDef PajeStartLink 7
-%  Time date
-%  Type string
-%  Container string
-%  Value string
-%  StartContainer string
-%  Key string
-%EndEventDef
-%EventDef PajeEndLink 8
-%  Time date
-%  Type string
-%  Container string
-%  Value string
-%  EndContainer string
-%  Key string
-%EndEventDef
-0 run 0 run
-0 rank run rank
-0 thread rank thread
-1 task thread task
-2 message run thread thread message
-)";
-  const auto line = [&out]<class... T>(fmt::format_string<T...> format, T&&... values) {
-    fmt::format_to(std::back_inserter(out), format, std::forward<T>(values)...);
-    out += '\n';
-  };
-  static constexpr const char* colours[] = {"0.6 0.4 0.8", "0.3 0.6 0.9", "0.2 0.7 0.3", "0.9 0.5 0.1",
-                                            "0.5 0.5 0.2", "0.9 0.9 0.9", "0.7 0.7 0.7"};
-  for (std::size_t k = 0; k < trace.kinds.size(); ++k)
-    line("3 k{} task \"{}\" \"{}\"", k, trace.kinds[k].name,
-         colours[static_cast<std::size_t>(trace.kinds[k].phase)]);
-  line("4 0 all run 0 \"{}\"", trace.predicted ? "predicted" : "recorded");
-  for (std::int32_t rank = 0; rank < trace.ranks; ++rank) line("4 0 r{0} rank all \"rank {0}\"", rank);
-  for (const trace::Track& track : trace.tracks)
-    line("4 0 r{0}t{1} thread r{0} \"thread {1}\"", track.rank, track.thread);
-
-  // The format wants all events in order of time.
-  struct Happening {
-    double time;
-    std::string text;
-  };
-  std::vector<Happening> happenings;
-  const std::unordered_map<const Record*, std::size_t> links = links_of(trace, window);
-  const auto link = [&](char event, double time, const std::string& here, const Record& r) {
-    if (const auto found = links.find(&r); found != links.end())
-      happenings.push_back(
-          {time, fmt::format("{} {:.9f} message all m {} {}", event, time, here, found->second)});
-  };
-  const auto start = static_cast<double>(first_begin(trace, window));
-  for (const trace::Track& track : trace.tracks) {
-    const std::string here = fmt::format("r{}t{}", track.rank, track.thread);
-    const auto begin = [&](const Record& r) {
-      const double time = 1e-9 * (static_cast<double>(r.begin) - start);
-      if (r.kind() == trace::kind_send) link('7', time, here, r);
-      happenings.push_back(
-          {time, fmt::format("5 {:.9f} task {} k{}", time, here, static_cast<int>(r.kind()))});
-    };
-    const auto end = [&](const Record& r) {
-      const double time = 1e-9 * (r.end() - start);
-      happenings.push_back({time, fmt::format("6 {:.9f} task {}", time, here)});
-      if (r.kind() == trace::kind_receive) link('8', time, here, r);
-    };
-    in_order(track, window, begin, end);
-  }
-  std::stable_sort(happenings.begin(), happenings.end(),
-                   [](const Happening& a, const Happening& b) { return a.time < b.time; });
-  for (const Happening& happening : happenings) line("{}", happening.text);
   return out;
 }
 

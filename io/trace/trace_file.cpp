@@ -7,10 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/files/detail/hdf5_read.hpp"
-#include "io/files/detail/hdf5_write.hpp"
 #include "io/files/error.hpp"
 #include "io/results/version.hpp"
+#include "io/trace/detail/trace_parts.hpp"
 
 namespace talus::io {
 
@@ -18,193 +17,29 @@ namespace fs = std::filesystem;
 
 namespace {
 
+using detail::damaged_trace;
 using detail::demand;
 using detail::Hdf5Object;
 using detail::hold;
+using detail::open_group;
 using detail::Place;
-using detail::read_array;
+using detail::read_clock;
 using detail::read_integer;
+using detail::read_kinds;
+using detail::read_machine;
+using detail::read_plan;
+using detail::read_records;
+using detail::read_tasks;
+using detail::record_type;
 using detail::write_array;
 using detail::write_attribute;
+using detail::write_kinds;
+using detail::write_machine;
+using detail::write_plan;
+using detail::write_tasks;
 
 constexpr std::int64_t format_version = 4;         // 3: ranks of another tree, walls told with publish
 constexpr std::size_t largest_machine = 1U << 24;  ///< tracks; more is a damaged number
-
-Hdf5Object record_type(const std::string& file) {
-  Hdf5Object type = hold(H5Tcreate(H5T_COMPOUND, sizeof(trace::Record)), H5Tclose, file, "preparing records");
-  const auto insert = [&](const char* name, std::size_t offset, hid_t member) {
-    demand(H5Tinsert(type.id(), name, offset, member), file, "preparing records");
-  };
-  insert("begin", offsetof(trace::Record, begin), H5T_STD_I64LE);
-  insert("duration", offsetof(trace::Record, duration), H5T_IEEE_F32LE);
-  insert("node", offsetof(trace::Record, node), H5T_STD_U32LE);
-  insert("epoch", offsetof(trace::Record, epoch), H5T_STD_I32LE);
-  insert("step_and_kind", offsetof(trace::Record, step_and_kind), H5T_STD_U32LE);
-  return type;
-}
-
-/// A list of lists as offsets and one list.
-struct Lists {
-  std::vector<std::uint32_t> offset{0}, entry;
-  void add(const std::vector<std::uint32_t>& list) {
-    entry.insert(entry.end(), list.begin(), list.end());
-    offset.push_back(static_cast<std::uint32_t>(entry.size()));
-  }
-};
-
-template <class Part, class Get>
-auto column(const std::vector<Part>& parts, Get get) {
-  std::vector<decltype(get(parts.front()))> values;
-  values.reserve(parts.size());
-  for (const Part& part : parts) values.push_back(get(part));
-  return values;
-}
-
-void write_kinds(Place place, const std::vector<trace::KindInfo>& kinds) {
-  using trace::KindInfo;
-  detail::write_names(place, "name", column(kinds, [](const KindInfo& k) { return k.name; }));
-  write_array(place, "phase", "1",
-              column(kinds, [](const KindInfo& k) { return static_cast<std::uint8_t>(k.phase); }));
-  write_array(place, "blocked", "1",
-              column(kinds, [](const KindInfo& k) { return static_cast<std::uint8_t>(k.blocked); }));
-  write_array(place, "shared", "1",
-              column(kinds, [](const KindInfo& k) { return static_cast<std::uint8_t>(k.shared); }));
-}
-
-void write_tasks(Place place, std::int32_t rank, const std::vector<trace::Task>& tasks) {
-  using trace::Task;
-  write_attribute(place, "rank", std::int64_t{rank});
-  Lists before;
-  for (const Task& task : tasks) before.add(task.predecessors);
-  detail::write_names(place, "name", column(tasks, [](const Task& t) { return t.name; }));
-  write_array(place, "kind", "1",
-              column(tasks, [](const Task& t) { return static_cast<std::uint8_t>(t.kind); }));
-  write_array(place, "group", "1", column(tasks, [](const Task& t) { return t.group; }));
-  write_array(place, "team", "1",
-              column(tasks, [](const Task& t) { return static_cast<std::uint8_t>(t.team); }));
-  write_array(place, "offset", "1", before.offset);
-  write_array(place, "predecessor", "1", before.entry);
-}
-
-void write_plan(Place place, const trace::Plan& plan) {
-  write_attribute(place, "rank", std::int64_t{plan.rank});
-  write_attribute(place, "step", std::int64_t{plan.step});
-  write_array(place, "colour", "1", plan.colour);
-  write_array(place, "group", "1", plan.group);
-  write_array(place, "role", "1", plan.role);
-  write_array(place, "weight", "contacts", plan.weight);
-  write_array(place, "place", "1", plan.place);
-  write_array(place, "owner", "1", plan.owner);
-  write_array(place, "offset", "1", plan.offset);
-  write_array(place, "neighbour", "1", plan.neighbour);
-  std::vector<std::array<std::uint32_t, 3>> messages;
-  for (const trace::Message& m : plan.messages) messages.push_back({m.from, m.to, m.bytes});
-  write_array(place, "messages", "1, 1, byte", messages);
-}
-
-void write_machine(Place place, const trace::Machine& machine) {
-  write_attribute(place, "map", name_of(machine.map));
-  write_attribute(place, "ranks_per_node", std::int64_t{machine.ranks_per_node});
-  write_attribute(place, "node_latency", machine.node_latency);
-}
-
-[[noreturn]] void damaged(const std::string& file, const std::string& what) {
-  throw FileError(file, what + ": the file is damaged, or was written by another version; record it again");
-}
-
-/// Lengths that must agree, by name.
-void demand_length(const std::string& file, const std::string& where, std::size_t length,
-                   std::size_t expected) {
-  if (length != expected)
-    damaged(file, fmt::format("{} has {} entries, expected {}", where, length, expected));
-}
-
-std::vector<trace::KindInfo> read_kinds(Place place) {
-  const auto names = detail::read_names(place, "name");
-  const auto phase = read_array<std::uint8_t>(place, "phase"),
-             blocked = read_array<std::uint8_t>(place, "blocked"),
-             shared = read_array<std::uint8_t>(place, "shared");
-  for (std::size_t length : {phase.size(), blocked.size(), shared.size()})
-    demand_length(place.file, "/kinds", length, names.size());
-  std::vector<trace::KindInfo> kinds;
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    if (phase[k] >= trace::phase_count) damaged(place.file, "kind '" + names[k] + "'");
-    kinds.push_back({names[k], static_cast<trace::Phase>(phase[k]), blocked[k] != 0, shared[k] != 0});
-  }
-  return kinds;
-}
-
-trace::Machine read_machine(Place place) {
-  trace::Machine machine;
-  try {
-    machine.map = trace::rank_map_named(detail::read_text(place, "map"));
-  } catch (const std::invalid_argument& error) {
-    damaged(place.file, error.what());
-  }
-  machine.ranks_per_node = static_cast<int>(read_integer(place, "ranks_per_node"));
-  detail::read_attribute(place, "node_latency", H5T_NATIVE_DOUBLE, &machine.node_latency);
-  return machine;
-}
-
-std::vector<trace::Task> read_tasks(Place place) {
-  const auto names = detail::read_names(place, "name");
-  const auto kind = read_array<std::uint8_t>(place, "kind"), team = read_array<std::uint8_t>(place, "team");
-  const auto group = read_array<std::int32_t>(place, "group");
-  const auto offset = read_array<std::uint32_t>(place, "offset"),
-             before = read_array<std::uint32_t>(place, "predecessor");
-  for (std::size_t length : {kind.size(), team.size(), group.size(), offset.size() - 1})
-    demand_length(place.file, "/tasks", length, names.size());
-  if (!std::is_sorted(offset.begin(), offset.end()) || offset.back() != before.size())
-    damaged(place.file, "/tasks/offset");
-  std::vector<trace::Task> tasks;
-  for (std::size_t k = 0; k < names.size(); ++k)
-    tasks.push_back({names[k],
-                     static_cast<trace::Kind>(kind[k]),
-                     group[k],
-                     team[k] != 0,
-                     {before.begin() + offset[k], before.begin() + offset[k + 1]}});
-  return tasks;
-}
-
-trace::Plan read_plan(Place place) {
-  trace::Plan plan;
-  plan.rank = static_cast<std::int32_t>(read_integer(place, "rank"));
-  plan.step = static_cast<std::uint32_t>(read_integer(place, "step"));
-  plan.colour = read_array<std::uint32_t>(place, "colour");
-  plan.group = read_array<std::uint32_t>(place, "group");
-  plan.role = read_array<std::uint8_t>(place, "role");
-  plan.weight = read_array<std::uint32_t>(place, "weight");
-  plan.place = read_array<std::uint32_t>(place, "place");
-  plan.owner = read_array<std::uint32_t>(place, "owner");
-  plan.offset = read_array<std::uint32_t>(place, "offset");
-  plan.neighbour = read_array<std::uint32_t>(place, "neighbour");
-  for (const auto& m : read_array<std::array<std::uint32_t, 3>>(place, "messages", H5T_NATIVE_UINT32, 3))
-    plan.messages.push_back({static_cast<std::uint16_t>(m[0]), static_cast<std::uint16_t>(m[1]), m[2]});
-  return plan;
-}
-
-/// The group of the file's own making, for reading.
-Hdf5Object open_group(Place place, const std::string& name) {
-  return hold(H5Gopen2(place.group, name.c_str(), H5P_DEFAULT), H5Gclose, place.file, "opening " + name);
-}
-
-trace::Block read_records(Place root, const std::string& name) {
-  const Hdf5Object dataset =
-      hold(H5Dopen2(root.group, name.c_str(), H5P_DEFAULT), H5Dclose, root.file, "opening " + name);
-  const Place place{dataset.id(), root.file};
-  return {static_cast<std::int32_t>(read_integer(place, "rank")),
-          static_cast<std::int32_t>(read_integer(place, "thread")),
-          read_array<trace::Record>(root, name, record_type(root.file).id(), 1), std::nullopt};
-}
-
-RankClock read_clock(Place root, const std::string& name) {
-  const Hdf5Object group = open_group(root, name);
-  const Place place{group.id(), root.file};
-  const auto values = read_array<double>(place, "offsets");
-  demand_length(root.file, name, values.size(), 4);
-  return {static_cast<std::int32_t>(read_integer(place, "rank")),
-          {ClockOffset{values[0], values[1]}, ClockOffset{values[2], values[3]}}};
-}
 
 /// A trace file, opened and known to be one.
 Hdf5Object open_trace(const std::string& path) {
@@ -237,7 +72,7 @@ trace::Trace read_head(Place root) {
   const std::int64_t ranks = read_integer(root, "ranks"), threads = read_integer(root, "threads");
   const auto most = static_cast<std::int64_t>(largest_machine);
   if (ranks < 1 || threads < 1 || ranks > most || threads > most || ranks * threads > most)
-    damaged(root.file, fmt::format("{} ranks with {} threads", ranks, threads));
+    damaged_trace(root.file, fmt::format("{} ranks with {} threads", ranks, threads));
   trace.ranks = static_cast<int>(ranks);
   trace.threads = static_cast<int>(threads);
   trace.predicted = read_integer(root, "predicted") != 0;
@@ -254,9 +89,9 @@ trace::Trace read_head(Place root) {
   return trace;
 }
 
-trace::Track& lane_of(const std::string& file, trace::Trace& trace, std::int64_t rank, std::int64_t thread) {
+trace::Track& track_of(const std::string& file, trace::Trace& trace, std::int64_t rank, std::int64_t thread) {
   if (rank < 0 || rank >= trace.ranks || thread < 0 || thread >= trace.threads)
-    damaged(file, fmt::format("records of rank {}, thread {}", rank, thread));
+    damaged_trace(file, fmt::format("records of rank {}, thread {}", rank, thread));
   return trace.tracks[static_cast<std::size_t>(rank * trace.threads + thread)];
 }
 
@@ -265,14 +100,14 @@ void add_blocks(Place root, trace::Trace& trace) {
   for (const std::string& tasks : detail::names_in(root, "/tasks")) {
     const Hdf5Object group = open_group(root, "/tasks/" + tasks);
     const std::int64_t rank = read_integer({group.id(), root.file}, "rank");
-    lane_of(root.file, trace, rank, 0);
+    track_of(root.file, trace, rank, 0);
     trace.tasks[static_cast<std::size_t>(rank)] = read_tasks({group.id(), root.file});
   }
   for (const std::string& name : detail::names_in(root, "/plans"))
     trace.plans.push_back(read_plan({open_group(root, "/plans/" + name).id(), root.file}));
   for (const std::string& block : detail::names_in(root, "/records")) {
     const trace::Block read = read_records(root, "/records/" + block);
-    std::vector<trace::Record>& records = lane_of(root.file, trace, read.rank, read.thread).records;
+    std::vector<trace::Record>& records = track_of(root.file, trace, read.rank, read.thread).records;
     records.insert(records.end(), read.records.begin(), read.records.end());
   }
 }
@@ -437,14 +272,14 @@ trace::Trace read_trace(const fs::path& path) {
   for (const std::string& of_rank : clocks) {
     const RankClock clock = read_clock(root, "/clocks/" + of_rank);
     for (std::int32_t thread = 0; thread < trace.threads; ++thread)
-      turn_clock(clock, lane_of(name, trace, clock.rank, thread));
+      turn_clock(clock, track_of(name, trace, clock.rank, thread));
   }
   if (cut) drop_cut_steps(name, trace);
   try {
     trace::sort_tracks(trace);
     trace::validate(trace);
   } catch (const trace::TraceError& error) {
-    damaged(name, error.what());
+    damaged_trace(name, error.what());
   }
   return trace;
 }

@@ -190,7 +190,7 @@ class Player {
       all[r] = tasks_[r].size();
       behind[r] = std::min(loop[r] + 1, all[r]);
     }
-    now = play_tasks(stage_, tasks_, timed, none, loop, now);
+    now = play_tasks(stage_, {tasks_, timed, none, loop}, now);
     if (const std::vector<SimEpoch> epochs = epochs_of(index); !epochs.empty()) {
       const std::vector<double> begun = now;
       now = machine_.schedule == Schedule::list || machine_.unbounded
@@ -198,10 +198,10 @@ class Player {
                 : play_fixed(stage_, index, layout_, epochs, begun);
       for (std::uint32_t r = 0; r < ranks; ++r)
         for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(machine_.threads); ++t)
-          stage_.log.span(stage_.log.worker(r, t), begun[r], now[r], static_cast<std::uint32_t>(loop[r]), -1,
-                          kind_team);
+          stage_.log.span(stage_.log.worker(r, t), begun[r], now[r],
+                          {static_cast<std::uint32_t>(loop[r]), -1, kind_team});
     }
-    now = play_tasks(stage_, tasks_, timed, behind, all, now);
+    now = play_tasks(stage_, {tasks_, timed, behind, all}, now);
   }
 
   /// What the program does outside of the graph.
@@ -222,7 +222,7 @@ class Player {
     const double last = *std::max_element(worked.begin(), worked.end());
     for (std::uint32_t r = 0; r < now.size(); ++r) {
       const double end = meet ? last + stage_.network.time_of(calls) : worked[r];
-      stage_.log.task(stage_.log.worker(r, 0), now[r], end, end - worked[r], 0, -1, kind_outside);
+      stage_.log.task(stage_.log.worker(r, 0), {now[r], end, end - worked[r]}, {0, -1, kind_outside});
       stage_.log.calls(stage_.log.worker(r, 0), now[r], worked[r], end, calls);
       now[r] = end;
     }

@@ -35,7 +35,7 @@ void LoopEvents::message_left(std::uint32_t number, std::uint32_t worker, std::u
   agenda_.add(
       stage_.network.arrival(layout_.nodes[left.from].rank, layout_.nodes[left.to].rank, left.bytes, now),
       message_comes, number, epoch);
-  stage_.log.span(worker, now, now, left.name, static_cast<std::int32_t>(epoch), kind_send);
+  stage_.log.span(worker, now, now, {left.name, static_cast<std::int32_t>(epoch), kind_send});
 }
 
 void LoopEvents::decide(std::uint32_t r, std::uint32_t e, double now) {
@@ -64,8 +64,8 @@ void LoopEvents::decide(std::uint32_t r, std::uint32_t e, double now) {
 
 bool LoopEvents::open_gate(std::uint32_t r, std::uint32_t e, double now) {
   Rank& rank = ranks_[r];
-  log_check(stage_, stage_.log.worker(r, 0), static_cast<std::int32_t>(e), epochs_[e], epochs_[e].own[r],
-            rank.began, rank.decided, now);
+  log_check(stage_, stage_.log.worker(r, 0), static_cast<std::int32_t>(e), epochs_[e],
+            {epochs_[e].own[r], rank.began, rank.decided, now});
   if (e + 1 < epochs_.size()) return true;
   rank.left = now;
   return false;

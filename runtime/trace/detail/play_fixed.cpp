@@ -166,9 +166,9 @@ class FixedLoop {
                  worked = me.taken + recorded.work + exchange.shares, end = worked + exchange.sends;
     if (recorded.recorded) {
       const auto number = static_cast<std::int32_t>(me.epoch);
-      stage_.log.task(w, me.time, end, waited, node - layout_.rank_begin[me.rank], number, recorded.kind);
+      stage_.log.task(w, {me.time, end, waited}, {node - layout_.rank_begin[me.rank], number, recorded.kind});
       if (waited > 0)
-        stage_.log.span(w, me.waited_to - waited, me.waited_to, me.last_name, number, kind_receive);
+        stage_.log.span(w, me.waited_to - waited, me.waited_to, {me.last_name, number, kind_receive});
     }
     me.time = end + (recorded.recorded ? stage_.dispatch : 0);
     if (epoch.exchange) events_.send(node, w, me.epoch, worked);

@@ -146,9 +146,9 @@ class ListLoop {
       // A thread without work lacked the node's last message only.
       const double waited = now - std::max(thread.since, ready_[n]);
       const auto number = static_cast<std::int32_t>(e);
-      stage_.log.task(thread.worker, now - waited, end, waited, n - layout_.rank_begin[layout_.nodes[n].rank],
-                      number, recorded.kind);
-      if (waited > 0) stage_.log.span(thread.worker, now - waited, now, last_name_, number, kind_receive);
+      const std::uint32_t own_number = n - layout_.rank_begin[layout_.nodes[n].rank];
+      stage_.log.task(thread.worker, {now - waited, end, waited}, {own_number, number, recorded.kind});
+      if (waited > 0) stage_.log.span(thread.worker, now - waited, now, {last_name_, number, kind_receive});
     }
     ready_[n] = never;
     events_.end_node(n, thread.worker, end);

@@ -7,20 +7,19 @@
 
 namespace talus::trace::detail {
 
-void Log::span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
-               Kind kind) {
+void Log::span(std::uint32_t worker, double begin, double end, const What& what) {
   if (!trace_) return;
   // Ends in whole nanoseconds too: one that lay behind the next beginning would take it for a part of itself.
   const std::int64_t from = std::llround(begin);
   trace_->tracks[worker].records.push_back(
-      {from, static_cast<float>(std::llround(end) - from), node, epoch, pack(step_, kind)});
+      {from, static_cast<float>(std::llround(end) - from), what.node, what.epoch, pack(step_, what.kind)});
 }
 
 void Log::calls(std::uint32_t worker, double begin, double end, double known, const Calls& calls) {
   const double at = known > end ? end : begin;
   for (int k = 0; k < calls.count; ++k)
-    span(worker, at, at + (k == 0 ? known - end : 0), k == 0 ? static_cast<std::uint32_t>(calls.bytes) : 0,
-         -1, kind_collective);
+    span(worker, at, at + (k == 0 ? known - end : 0),
+         {k == 0 ? static_cast<std::uint32_t>(calls.bytes) : 0, -1, kind_collective});
 }
 
 double Stage::stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const {
@@ -154,18 +153,19 @@ double alone_work(const Stage& stage, const StepIndex& index, std::size_t source
          stage.speed_of(stage.timeline.record(alone[e]).kind());
 }
 
-void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double own,
-               double begin, double decided, double end) {
+void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch,
+               const CheckTime& time) {
+  const auto& [own, begin, decided, end] = time;
   const double waited = end - decided - epoch.whole, from = end - epoch.whole;
-  stage.log.task(worker, begin, end, waited, epoch.settles ? check_settles : 0, number, kind_check);
-  if (own > 0) stage.log.span(worker, begin, begin + own, 0, -1, epoch.own_kind);
+  stage.log.task(worker, {begin, end, waited}, {epoch.settles ? check_settles : 0, number, kind_check});
+  if (own > 0) stage.log.span(worker, begin, begin + own, {0, -1, epoch.own_kind});
   // One wait, and what else is read takes no time; where nobody waited it stands where it is within.
   const std::size_t calls = std::max({epoch.calls, epoch.awaits.size(), std::size_t{waited > 0}});
   const double at = waited > 0 ? decided : begin;
   for (std::size_t call = 0; call < calls; ++call)
-    stage.log.span(worker, at, waited > 0 && call == 0 ? from : at, 0, number, kind_collective);
+    stage.log.span(worker, at, waited > 0 && call == 0 ? from : at, {0, number, kind_collective});
   for (const SimEpoch::Span& span : epoch.spans)
-    stage.log.span(worker, from + span.begin, from + span.end, span.meetings, -1, span.kind);
+    stage.log.span(worker, from + span.begin, from + span.end, {span.meetings, -1, span.kind});
 }
 
 }  // namespace talus::trace::detail

@@ -20,16 +20,23 @@ class Log {
   Log(const Machine& machine, Trace* trace)
       : threads_(static_cast<std::uint32_t>(machine.threads)), trace_(trace) {}
   void begin_step(std::uint32_t step) { step_ = step; }
+  /// What a record is of: a node or task of an epoch (-1: outside the loop).
+  struct What {
+    std::uint32_t node;
+    std::int32_t epoch;
+    Kind kind;
+  };
   /// [begin, end) of a task, of which `waited` was waiting. [ns]
-  void task(std::uint32_t worker, double begin, double end, double waited, std::uint32_t node,
-            std::int32_t epoch, Kind kind) {
-    work_ += end - begin - waited;
+  struct TaskTime {
+    double begin, end, waited;
+  };
+  void task(std::uint32_t worker, const TaskTime& time, const What& what) {
+    work_ += time.end - time.begin - time.waited;
     ++tasks_;
-    span(worker, begin, end, node, epoch, kind);
+    span(worker, time.begin, time.end, what);
   }
-  /// A part of a task, or a thread's stay in a team.
-  void span(std::uint32_t worker, double begin, double end, std::uint32_t node, std::int32_t epoch,
-            Kind kind);
+  /// A part of a task, or a thread's stay in a team. [ns]
+  void span(std::uint32_t worker, double begin, double end, const What& what);
   /// Calls of all ranks in what began at `begin`, had done its own work at `end` and knew what it had asked
   /// for at `known`: one wait, and what else is called takes no time. One rank knows at once; its calls stand
   /// at the beginning, where they are within.
@@ -113,12 +120,15 @@ struct TimedTask {
   Calls calls{};
 };
 
-/// Tasks [begin[r], end[r]) of each rank from `start`, each thread taking the ready task that was submitted
-/// first; returns when all tasks of a rank have ended.
-std::vector<double> play_tasks(Stage& stage, const std::vector<std::vector<SimTask>>& tasks,
-                               const std::vector<std::vector<TimedTask>>& timed,
-                               const std::vector<std::size_t>& begin, const std::vector<std::size_t>& end,
-                               const std::vector<double>& start);
+/// Tasks [begin[r], end[r]) of each rank r, and what they take. References are kept.
+struct StepTasks {
+  const std::vector<std::vector<SimTask>>& tasks;
+  const std::vector<std::vector<TimedTask>>& timed;
+  const std::vector<std::size_t>&begin, &end;
+};
+/// Plays them from `start` [ns] per rank, each thread taking the ready task that was submitted first; returns
+/// when all tasks of a rank have ended.
+std::vector<double> play_tasks(Stage& stage, const StepTasks& tasks, const std::vector<double>& start);
 
 /// Work and kind of a node in an epoch; no work and no kind where nothing was recorded.
 struct NodeWork {
@@ -139,9 +149,12 @@ ExchangeWork exchange_work(const Stage& stage, const LoopLayout& layout, std::ui
 double check_work(const Stage& stage, const StepIndex& index, const SimEpoch& epoch);
 /// What recorded rank `source` did for its own part in the check of recorded epoch `e`. [ns]
 double alone_work(const Stage& stage, const StepIndex& index, std::size_t source, std::size_t e);
-/// The decision of a worker's rank: it began, had done its own part, `own` of it first, and was known, with
-/// all that follows.
-void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch, double own,
-               double begin, double decided, double end);
+/// When the decision of a rank behind an epoch began, when the rank had done its own part of it, of which
+/// `own` was work of its own, and when all that follows was known. [ns]
+struct CheckTime {
+  double own, begin, decided, end;
+};
+void log_check(Stage& stage, std::uint32_t worker, std::int32_t number, const SimEpoch& epoch,
+               const CheckTime& time);
 
 }  // namespace talus::trace::detail
