@@ -1,6 +1,6 @@
 #pragma once
 
-/// Where the time of a trace went, recorded or predicted alike.
+/// Analyses where the time of a trace went. Recorded and predicted traces are treated alike.
 
 #include <array>
 #include <cstdint>
@@ -19,7 +19,7 @@ struct KindSummary {
   std::array<std::uint32_t, 32> histogram{};  ///< of durations, in powers of 2 ns
 };
 
-/// Hop of the critical path: so much of the path was spent in tasks of a kind, or in a wait.
+/// Share of the critical path that was spent in tasks of one kind, or in waits.
 struct PathShare {
   std::string what;
   double time = 0;  ///< [ns]
@@ -69,8 +69,9 @@ struct PathHop {
   double from = 0, until = 0;
 };
 
-/// What the makespan hung on, from the last record backwards: each went on when the one before it on the path
-/// had ended, or its message had come. Per step, since steps meet at their ends.
+/// The critical path, followed backwards from the last record: each record could go on when the one before it
+/// on the path had ended, or its message had come. It is followed step by step, since all ranks meet at the
+/// end of a step.
 std::vector<PathHop> critical_path(const Timeline& timeline, const StepIndex& index);
 
 }  // namespace talus::trace

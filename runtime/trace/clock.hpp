@@ -5,15 +5,15 @@
 
 namespace talus::trace {
 
-/// What must be added to the clock of this rank's recorder, at `time`, for that of rank 0. [ns]
+/// Offset to be added to the clock of this rank's recorder, at `time`, to get that of rank 0. [ns]
 struct ClockReading {
   double time = 0;
   double offset = 0;
 };
 
-/// Collective, by one thread of each rank. Rank 0 asks every other rank for its time, again and again; of the
-/// answers the fastest counts, taken to be half-way old (Cristian 1989). Error: half the difference of the
-/// two ways of that one message, some 0.2 us in shared memory.
+/// Collective, by one thread of each rank. Rank 0 asks every other rank for its time repeatedly and uses the
+/// fastest answer, assuming that the time was read half-way between question and answer (Cristian 1989).
+/// Error: half the difference of the two ways of that one message, some 0.2 us in shared memory.
 ClockReading read_clock(const graph::Communicator& ranks, const Recorder& recorder);
 
 }  // namespace talus::trace

@@ -10,7 +10,7 @@
 
 namespace talus::trace {
 
-/// A node of a loop on the machine: what it was in the trace.
+/// A node of a loop on the machine, and the node of the trace that it stands for.
 struct SimNode {
   std::int32_t source_rank = -1;  ///< -1: nothing was recorded
   std::uint32_t source_node = 0;

@@ -12,14 +12,14 @@ namespace talus::trace {
 
 struct Trace;
 
-/// Which subdomains a rank gets.
+/// How subdomains are mapped to ranks.
 enum class RankMap : std::uint8_t {
   block,   ///< consecutive ones, as many each: what the program does
   cyclic,  ///< dealt out one by one
   weight,  ///< consecutive ones of nearly equal planned work
 };
 
-/// Who sweeps what, when.
+/// How the nodes of a rank are scheduled on its threads.
 enum class Schedule : std::uint8_t {
   fixed,  ///< what the program does: owners by weight, each walks its nodes by (colour, index)
   list,   ///< any thread of the rank takes the ready node that is first by (epoch, colour, index)
@@ -63,7 +63,7 @@ struct Machine {
   bool unbounded = false;  ///< as many threads as there is work for (schedule list), and messages that do not
                            ///< share links: the longest chain of tasks
   bool operator==(const Machine&) const = default;
-  /// What the faces of subdomains, and with them copies and messages, grow by.
+  /// Factor by which the faces of subdomains grow, and with them copies and messages.
   double faces() const { return std::pow(contacts, 2.0 / 3); }
 };
 

@@ -10,25 +10,25 @@
 namespace talus::trace {
 
 /// When messages arrive. A message leaves through the link of its node when those before it have left, is
-/// under way for the latency, and takes the link of the other node in subdomain colour: alone on the network
-/// it needs latency + bytes/bandwidth. Inside a node nothing is shared, and nowhere where the machine is
-/// unbounded: whoever shares a link in another order may be the sooner for it, and a bound must hold for
-/// every order.
+/// under way for the latency, and then takes the link of the receiving node, in order of arrival: alone on
+/// the network it needs latency + bytes/bandwidth. Links are not shared inside a node, nor on an unbounded
+/// machine: with another order on a shared link a run could end sooner, and the bound must hold for every
+/// order.
 class Network {
  public:
   explicit Network(const Machine& machine);
   /// `now` must not decrease from call to call. [ns]
   double arrival(std::uint32_t from_rank, std::uint32_t to_rank, std::uint32_t bytes, double now);
-  /// What all ranks need from when the last has come to know what each brought: log2(ranks) messages, one
-  /// behind the other (Communicator::start_gather). [ns]
+  /// Time of a gather on all ranks, from the arrival of the last rank: log2(ranks) messages, one behind the
+  /// other (Communicator::start_gather). [ns]
   double collective() const { return collective_; }
-  /// Of calls of all ranks, one behind the other. What a call adds up is in each of its messages, and the
-  /// ranks of a node share its link. [ns]
+  /// Time of collective calls, one behind the other. Each message of a call holds all that it adds up, and
+  /// the ranks of a node share its link. [ns]
   double time_of(const Calls& calls) const {
     return calls.count * collective_ + calls.bytes * collective_byte_;
   }
-  /// Of collective(), what comes when all ranks wait: the first message of each leaves before
-  /// (Communicator::start_gather).
+  /// The part of collective() that follows once all ranks wait: the first message of each rank has left
+  /// before (Communicator::start_gather).
   double collective_rest() const { return collective_ - first_; }
   /// Between ranks that are farthest from each other.
   double latency() const { return out_free_.size() > 1 ? latency_ : node_latency_; }

@@ -1,7 +1,7 @@
 #pragma once
 
 /// A run made to follow a recorded one: every node of the loop begins in the order in which the recorded
-/// nodes began, so that a schedule that went wrong once goes wrong again, under a debugger.
+/// nodes began, so that a fault that depends on the schedule can be repeated under a debugger.
 
 #include <atomic>
 #include <cstdint>
@@ -38,15 +38,15 @@ class Order {
   /// its loop is not the recorded one: another scene, partition or number of threads.
   bool begin_step(std::uint32_t step);
 
-  /// Where in the order the `done`-th node of a thread begins in this step. Called for each node that the
-  /// thread comes to; none when it does nothing there, neither in the run (`works`) nor in the recording.
-  /// Throws TraceError where they differ: others would wait for ever for a turn that nobody takes.
+  /// The place in the recorded order of the `done`-th node of a thread in this step. Called for each node
+  /// that the thread comes to; none when the node does nothing, neither in the run (`works`) nor in the
+  /// recording. Throws TraceError where the two differ: other nodes would wait for ever for that place.
   std::optional<std::size_t> place(int thread, std::size_t done, Turn turn, bool works) const;
-  /// Throws TraceError when the run decides behind an epoch and the recording had gone on: its order may need
-  /// nodes of both sides in turn.
+  /// Throws TraceError when the run decides after an epoch and the recording did not: its order may mix nodes
+  /// of before and after the decision.
   void check_gate(int epoch) const;
-  /// True when it is the turn of that place, and the next one's from then on. Called by one thread, until
-  /// true.
+  /// True when all earlier places have begun; the next place may begin from then on. Called by one thread,
+  /// until true.
   bool take(std::size_t place) {
     // Relaxed: the order of beginnings is all it says; what nodes share is guarded by the loop itself.
     if (turn_.load(std::memory_order_relaxed) != place) return false;
@@ -75,14 +75,14 @@ class Order {
   std::atomic<std::size_t> turn_{0};  ///< written by the thread whose turn it is, read by all
 };
 
-/// One thread's view of a program of the epoch loop whose nodes wait for their turn.
+/// One thread's view of a program of the epoch loop whose nodes wait for their place in the recorded order.
 template <NamedProgram Program>
 class Ordered : public View<Program> {
  public:
   Ordered(Program& program, Order& order, const graph::Worker& me)
       : View<Program>(program), order_(order), me_(me) {}
   void node(std::uint32_t node, int epoch) {
-    // What leaves no record has no turn.
+    // A node that leaves no record has no place in the order.
     const bool works = program_.kind(node, epoch).has_value();
     if (const auto place = order_.place(me_.thread(), done_, {epoch, node}, works)) {
       // A run that was stopped elsewhere ends by itself.

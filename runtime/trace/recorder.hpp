@@ -1,6 +1,6 @@
 #pragma once
 
-/// Writes down what a run does while it runs:
+/// Records the tasks of a run while it runs:
 ///
 ///     trace::Recorder recorder({.rank = 0, .threads = 2, .sink = [&](trace::Block&& block) { ... }});
 ///     recorder.begin_step(7);                       // ends the step before
@@ -12,8 +12,8 @@
 ///     recorder.finish();                            // hands over what is left
 ///
 /// Each thread writes to a buffer of its own; a full one goes to the sink, on the thread that filled it, and
-/// the sink may block: memory stays bounded, nothing is lost. Cost (bench_trace, bench_tracing): a look at
-/// the clock a task, a second one where it had to wait.
+/// the sink may block: memory stays bounded, nothing is lost. Cost (bench_trace, bench_tracing): one reading
+/// of the clock for each task, a second one where it had to wait.
 
 #include <omp.h>
 
@@ -44,8 +44,8 @@ struct RecorderOptions {
   int threads = 1;
   std::uint32_t first_step = 1, last_step = largest_step;  ///< the steps that are recorded
   std::size_t block = 1U << 16;                            ///< records in a buffer
-  /// Before a thread begins with the nodes of another subdomain it reads what they will, outside of all
-  /// records: times are those of a core whose caches hold one subdomain.
+  /// Before a thread begins with the nodes of another subdomain it reads the data that they will read,
+  /// outside of all records. Recorded times are then those of a core whose caches hold one subdomain.
   bool own_caches = false;
   std::function<void(Block&&)> sink;  ///< may throw; by any thread
 };
@@ -61,7 +61,7 @@ class Recorder {
       __builtin_prefetch(records_.data() + records_.size() + records_ahead, 1);
       if (records_.size() == owner_->options_.block) owner_->hand_over(*this);
     }
-    /// A span within the task that the thread is at.
+    /// Adds a span within the task that the thread is running.
     void add_span(std::int64_t begin, std::int64_t end, std::uint32_t node, Kind kind) {
       add(begin, end, node, epoch_, kind);
     }
@@ -88,9 +88,9 @@ class Recorder {
   const std::vector<Task>& tasks() const { return tasks_; }
   int rank() const { return options_.rank; }
 
-  /// Called by one thread, between steps: all that follows belongs to `step`, up to end_step. What the sink
-  /// has thrown since, on whatever thread, end_step throws, once: a task or a span must not fail for it.
-  /// Nothing more is handed over then.
+  /// Called by one thread, between steps: all that follows belongs to `step`, up to end_step. An exception of
+  /// the sink, on any thread, is thrown once by end_step, since a task or a span must not fail for it. After
+  /// that nothing more is handed over.
   void begin_step(std::uint32_t step);
   void end_step();
   /// The loop's plan, from this step on. `plan.rank` and `plan.step` are filled in.
@@ -99,7 +99,7 @@ class Recorder {
   void finish();
 
   bool own_caches() const { return options_.own_caches; }
-  /// False outside the steps that are wanted: then nothing is to be recorded.
+  /// False outside the steps to be recorded.
   bool active() const { return active_; }
   /// [ns] since the recorder was made.
   std::int64_t now() const { return ticks_.now(); }
@@ -135,7 +135,7 @@ class Recorder {
 /// Records the time from here to the end of the block; nothing without a recorder or when it does not record.
 class Span {
  public:
-  /// Parts of a check, like those of the step's tasks, are of no epoch: they are no node's.
+  /// Spans in a check, like those in the step's tasks, belong to no node and have epoch -1.
   enum Where { here, in_check };
   Span(Recorder* recorder, Kind kind, std::uint32_t node = 0, Where where = here)
       : recorder_(recorder && recorder->active() ? recorder : nullptr),

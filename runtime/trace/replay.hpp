@@ -1,7 +1,7 @@
 #pragma once
 
-/// A recorded run on a machine that is not there: every task takes the time it took, what waits for what
-/// follows from the plan, and messages between ranks are modelled (docs/theory.md, "Replay").
+/// Predicts a recorded run on another machine: every task takes its recorded time, dependencies follow from
+/// the plan, and messages between ranks are modelled (docs/theory.md, "Replay").
 
 #include <cstdint>
 #include <vector>
@@ -22,9 +22,9 @@ struct Replay {
   double dispatch = 0;  ///< between two nodes of a thread that need not wait, not within them [ns]
 };
 
-/// Plays all steps of a trace. `keep`: the records of what would have been, for pictures and shares. Throws
-/// TraceError when steps were recorded in part, or the trace has no order that can be played. Cost
-/// (bench_trace): 0.2-0.5 us a task; memory: the trace itself once more if kept.
+/// Plays all steps of a trace. `keep`: whether to keep the predicted records, for pictures and shares of
+/// time. Throws TraceError when steps were recorded in part, or the trace has no order that can be played.
+/// Cost (bench_trace): 0.2-0.5 us a task; memory: the trace itself once more if kept.
 Replay replay(const Timeline& timeline, const Machine& machine, bool keep);
 
 }  // namespace talus::trace

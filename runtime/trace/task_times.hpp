@@ -1,8 +1,8 @@
 #pragma once
 
-/// What tasks take by a recording, for a run on simulated ranks: its host goes from rank to rank at every
-/// message and measures the caches of all of them. With given times a run and a replay of the same recording
-/// differ in their models of the machine only.
+/// Recorded durations of tasks, for a run on simulated ranks: its host switches between ranks at every
+/// message, and its own times would be those of cold caches. With given times a run and a replay of the same
+/// recording differ in their models of the machine only.
 
 #include <cstdint>
 #include <map>

@@ -11,8 +11,8 @@ namespace talus::trace {
 
 /// Time since it was made. Where the system takes its own time from the processor's counter (which it does
 /// when that is the same on all cores and never changes its pace), the counter is read as it is. The system's
-/// clock waits until all instructions before it are through, so that the loads of a task cannot begin while
-/// the last sums of the one before are out: with tasks of 2 us that was half of what a trace costs.
+/// clock waits for all earlier instructions, so that the loads of a task could not begin before the last sums
+/// of the task before had been completed: with tasks of 2 us that was half of the cost of a trace.
 class Ticks {
  public:
   /// Takes a millisecond to measure a tick, to 1e-4 of it or better.

@@ -31,7 +31,7 @@ struct Place {
   bool exists() const { return track != 0xffffffffU; }
 };
 
-/// Calls of all ranks.
+/// Collective calls.
 struct Calls {
   int count = 0;
   double bytes = 0;  ///< that they add up
@@ -39,7 +39,7 @@ struct Calls {
     ++count;
     bytes += of_one;
   }
-  /// Ranks call together: what one of them made more often counts.
+  /// Ranks call together, so the larger number of calls counts.
   void raise_to(const Calls& other) {
     if (other.count > count) *this = other;
   }
@@ -72,7 +72,7 @@ struct StepIndex {
 /// The tree of ranks over which the step's loop glued walls.
 graph::Tree tree_of(const StepIndex& index);
 
-/// For all steps, one after the other; keeps what is common.
+/// For all steps, one after the other; keeps what steps have in common.
 class Timeline {
  public:
   /// Keeps the reference. Throws TraceError when there is no step.

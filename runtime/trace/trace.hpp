@@ -23,8 +23,8 @@ namespace talus::trace {
 /// Place of a kind in Trace::kinds.
 enum class Kind : std::uint8_t {};
 
-/// Where the time of a kind belongs; the first five are the columns of Table 3 of Visseq, Alart and
-/// Dureisseix (2013).
+/// The phase to which the time of a kind counts; the first five are the columns of Table 3 of Visseq, Alart
+/// and Dureisseix (2013).
 enum class Phase : std::uint8_t {
   partitioning,
   detection,
@@ -37,13 +37,13 @@ enum class Phase : std::uint8_t {
 inline constexpr std::size_t phase_count = 7;
 const char* name_of(Phase phase);
 
-/// What kinds of records there are is up to the program that is traced.
+/// The program that is traced defines the kinds of records.
 struct KindInfo {
   std::string name;
   Phase phase = Phase::outside;
   bool blocked = false;  ///< waits for messages and does no work of its own
-  /// What a rank does once, by one thread, and whose work grows with the rank's part: a task, or a span
-  /// within a check, where others are work of all ranks and threads.
+  /// True for work that one thread of a rank does once and that grows with the rank's part of the sample: a
+  /// task, or a span within a check. Other kinds are work of all ranks and threads.
   bool shared = false;
   bool operator==(const KindInfo&) const = default;
 };
@@ -58,13 +58,13 @@ inline constexpr Kind kind_check{5};       ///< decides after an epoch; node = 0
 /// A check that reads its own sums at once on any number of ranks; others are read a sweep later by several.
 inline constexpr std::uint32_t check_settles = 1;
 std::vector<KindInfo> runtime_kinds();
-/// What ranks say to one another: never a task, but a span within one.
+/// Communication between ranks: never a task, but a span within one.
 inline bool is_communication(Kind kind) {
   return kind == kind_send || kind == kind_receive || kind == kind_collective;
 }
 
-/// How often all ranks meet in a task that they share: numbers that everybody learns, and copies that all
-/// subdomains exchange. Within a check it is Record::node of its span.
+/// How often all ranks communicate in a task that they do together: gathers of numbers on all ranks, and
+/// exchanges of copies between all subdomains. Within a check it is Record::node of its span.
 struct Meetings {
   std::uint16_t gathers = 0, exchanges = 0;
   std::uint32_t packed() const { return std::uint32_t{gathers} << 16 | exchanges; }
@@ -92,15 +92,15 @@ inline std::uint32_t pack(std::uint32_t step, Kind kind) {
   return step << 8 | static_cast<std::uint32_t>(kind);
 }
 
-/// What a node of the loop does for the messages.
+/// Part of a node of the loop in the exchange of messages.
 enum class Role : std::uint8_t {
   compute,  ///< nothing
-  publish,  ///< sends what its group shows to others
+  publish,  ///< sends what its group publishes to other groups
   root,     ///< of a rank: what goes through one rank; before it, on ranks between, what goes up to it
-  glue,     ///< takes what others have published
-  take,     ///< of a group whose subdomain colour is not 0, before its border: takes what those of earlier
-            ///< subdomain colours published
-  tell,     ///< its group's part for the root leaves, which without one its publish sends
+  glue,     ///< receives what others have published
+  take,     ///< of a group of a later subdomain colour, before its border: receives what groups of earlier
+            ///< colours published
+  tell,     ///< sends its group's part to the root; without a tell, publish sends it
 };
 
 /// Names the root as the end of a message.
@@ -185,7 +185,7 @@ struct Trace {
   std::size_t record_count() const;
 };
 
-/// A trace that makes no sense: not a trace, cut off, or steps that were recorded in part only.
+/// The trace cannot be used: it is not a trace, is cut off, or has steps that were recorded in part only.
 class TraceError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -13,12 +13,12 @@ namespace talus::trace {
 template <class Program>
 concept NamedProgram = graph::EpochProgram<Program> &&
     requires(const Program& program, std::uint32_t node, int epoch) {
-  /// Nothing: the node does nothing in this epoch, and leaves no record.
+  /// An empty result: the node does nothing in this epoch, and leaves no record.
   { program.kind(node, epoch) } -> std::convertible_to<std::optional<Kind>>;
 };
 
-/// A program of the epoch loop as it is: what a view of it has that changes one thing only, and says so by a
-/// member of its own that hides the one here.
+/// Forwards to a program of the epoch loop. A view that changes one thing derives from it and hides the one
+/// member that differs.
 template <NamedProgram Program>
 class View {
  public:
@@ -33,7 +33,7 @@ class View {
     return false;
   }
   std::optional<Kind> kind(std::uint32_t node, int epoch) const { return program_.kind(node, epoch); }
-  /// Nothing: a node of no subdomain, or a program that knows of none.
+  /// Empty for a node of no subdomain, or a program without subdomains.
   std::optional<std::size_t> subdomain_of(std::uint32_t node) const {
     if constexpr (requires { program_.subdomain_of(node); }) return program_.subdomain_of(node);
     return std::nullopt;
@@ -47,8 +47,8 @@ class View {
 };
 
 /// One thread's view of a program of the epoch loop that records each node: the loop itself stays as it is,
-/// so a run without a trace has not one instruction more per node. Looks at the clock are most of what it
-/// costs: a node that nothing was waited for begins where the last one ended.
+/// so a run without a trace has not one instruction more per node. Reading the clock is most of its cost, so
+/// a node that waited for nothing begins where the last one ended, without a reading of its own.
 template <NamedProgram Program>
 class Traced : public View<Program> {
  public:

@@ -1,6 +1,7 @@
 #pragma once
 
-/// What a loop does alike under every schedule: messages, decisions, and the order of what happens.
+/// The part of a loop's replay that is the same under every schedule: messages, decisions, and the order of
+/// events.
 
 #include <cstdint>
 #include <vector>
@@ -15,14 +16,14 @@ class LoopEvents {
   LoopEvents(Stage& stage, const StepIndex& index, const LoopLayout& layout,
              const std::vector<SimEpoch>& epochs);
 
-  /// Plays until nothing happens any more and returns when each rank has left the loop [ns]. The schedule's
+  /// Plays until no event is left and returns the times at which the ranks left the loop [ns]. The schedule's
   /// part is done by `loop`:
   ///
   ///     node_ended(node, worker, now), thread_freed(worker, now)
   ///     message_came(message, epoch, now)      // counted by now
   ///     goes_on(rank, now)                     // behind a decision, with the epoch after it
   ///
-  /// Throws TraceError when a rank stands still.
+  /// Throws TraceError when a rank waits for ever.
   template <class Loop>
   std::vector<double> run(Loop& loop) {
     while (!agenda_.empty()) {
@@ -77,7 +78,7 @@ class LoopEvents {
     return layout_.send_begin[node + 1] > layout_.send_begin[node] ||
            (layout_.nodes[node].tells && layout_.to_root[layout_.nodes[node].rank].bytes > 0);
   }
-  /// Its messages leave one after the other from when it has done its work, `worked`.
+  /// Its messages leave one after the other, from the end of its work, `worked`.
   void send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked);
   /// At the end of a node in an epoch that exchanges: the last of a leaf of the tree that tells sends for
   /// all.
@@ -91,8 +92,8 @@ class LoopEvents {
     double decided = 0;      ///< but for the sums of others
     double left = -1;        ///< the loop
   };
-  /// Sums that all ranks post and some later decision of each waits for. What a rank posts is on its way to
-  /// one other rank; the rest of the way is gone when all ranks wait for it.
+  /// Sums that all ranks post and some later decision of each waits for. The first message of a posted sum
+  /// travels at once; the others leave when all ranks wait for it.
   struct Round {
     int waiting = 0;
     double known = 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What the parts of a replay share: the machine, what was recorded, and what is written down.
+/// State that the parts of a replay share: the machine, the recording, and the prediction.
 
 #include <algorithm>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace talus::trace::detail {
 
-/// Writes down what happens on the machine, and adds it up.
+/// Records what happens on the machine, and adds up its times.
 class Log {
  public:
   Log(const Machine& machine, Trace* trace)
@@ -71,10 +71,10 @@ struct Stage {
   double stretch(std::uint64_t step, std::uint64_t worker, std::uint64_t what) const;
 };
 
-/// What Stage::speed holds.
+/// Computes Stage::speed.
 std::vector<double> speeds(const Machine& machine, const Trace& trace);
 
-/// What Stage::typical holds for a step.
+/// Computes Stage::typical for a step.
 std::vector<std::map<Kind, std::vector<float>>> typical_times(const Timeline& timeline,
                                                               const StepIndex& index, double quantile);
 
@@ -92,7 +92,8 @@ struct SimEpoch {
   std::vector<std::size_t> awaits{};  ///< rounds that it waits for, one after the other
   std::size_t calls = 0;              ///< of all ranks, where the one that there is knows at once
   bool settles = false;               ///< its record says so (check_settles)
-  /// What all ranks do together then: work, and waits where they meet [ns]; its parts, one after the other.
+  /// What all ranks do together at that decision: work, and waits for one another [ns]; its parts, one after
+  /// the other.
   struct Span {
     double begin = 0, end = 0;  ///< in `whole`
     std::uint32_t meetings = 0;
