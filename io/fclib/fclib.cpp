@@ -102,7 +102,7 @@ GlobalProblem read_global(hid_t file, const std::string& path) {
 }
 
 /// Results and traces, which stand beside the problems that a run has dumped. A file that cannot be read is
-/// none of them: whoever reads it next says what is wrong with it.
+/// none of them: the function that reads the file next says what is wrong with it.
 bool belongs_to_a_run(const std::filesystem::path& path) {
   const detail::QuietHdf5 quiet;
   try {

@@ -1,6 +1,6 @@
 #pragma once
 
-/// The directory of a run: who may be overwritten, and how files appear in it.
+/// The directory of a run: which files may be overwritten, and how files appear in it.
 
 #include <filesystem>
 #include <functional>
@@ -18,11 +18,12 @@ using IsOutputName = bool (*)(const std::string& name);
 /// True for `prefix`, six digits or more, `suffix`.
 bool is_numbered_name(std::string_view name, std::string_view prefix, std::string_view suffix);
 
-/// A directory as long as a run writes there. The system takes the lock away when the process ends, however
-/// it ends, and nothing is left in the directory.
+/// Locks a directory while a run writes to it. The system releases the lock when the process ends, however it
+/// ends, and nothing is left in the directory.
 class DirectoryLock {
  public:
-  /// Throws FileError when another holds the lock. Where a file system has no such locks there is none.
+  /// Throws FileError when another process holds the lock. On file systems without such locks nothing is
+  /// locked.
   explicit DirectoryLock(const std::filesystem::path& directory);
   DirectoryLock(DirectoryLock&& other) noexcept;
   DirectoryLock& operator=(DirectoryLock&&) = delete;
@@ -57,7 +58,7 @@ class ScratchFolder {
 
 /// Throws FileError when one of `outs` cannot be meant as a file to write: it is one of the inputs or of the
 /// other outs (under whatever name), no regular file, or a file that is there already and `force` is false,
-/// or its folder is not there. Empty names are passed over. To be asked before long work.
+/// or its folder is not there. Empty names are skipped. Call it before long work.
 void check_output_files(const std::vector<std::filesystem::path>& inputs,
                         const std::vector<std::filesystem::path>& outs, bool force);
 

@@ -5,7 +5,7 @@
 
 namespace talus::io {
 
-/// Where text goes as it is made, in order.
+/// Receives text in pieces, in order, as it is made.
 using WriteText = std::function<void(std::string_view)>;
 
 }  // namespace talus::io

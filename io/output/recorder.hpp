@@ -43,11 +43,11 @@ class Recorder {
   /// Hands the lines so far to the system: a run that is killed later has them.
   void flush();
 
-  /// Writes a state, of which each rank has its part, and lets go of it. Throws std::invalid_argument when
-  /// its arrays do not fit together.
+  /// Writes a state, of which each rank has its part, and releases it. Throws std::invalid_argument when its
+  /// arrays do not fit together.
   void record_frame(Frame&& frame);
 
-  /// Completes the files. What is destroyed unclosed writes what it can.
+  /// Completes the files. A recorder that is destroyed without it writes what it can.
   void close();
 
   /// Says what came of the run, also where a call before failed.

@@ -32,7 +32,7 @@ class CsvFile {
  public:
   /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.
   CsvFile(const std::filesystem::path& path, std::string_view header);
-  /// Writes what is left. A failure cannot be told from here: call close() to hear of it.
+  /// Writes what is left. A destructor cannot report a failure: call close() to be told of one.
   ~CsvFile();
 
   /// Place to append whole lines.

@@ -4,9 +4,10 @@
 ///
 ///   /walls/name                  names, in the order of the setup
 ///   /frames/000000               attributes step, time, stage
-///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3], omega [n,3] and orientation [n,4]
-///   where computed /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force
-///   [m,3] /frames/000000/walls         position [w], velocity [w], force [w,3]
+///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3]; where computed omega [n,3] and
+///                                orientation [n,4]
+///   /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force [m,3]
+///   /frames/000000/walls         position [w], velocity [w], force [w,3]
 ///
 /// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain: the
 /// low bits of doubles do not compress, and a plain array can be read by anything.
@@ -29,7 +30,7 @@ namespace talus::io {
 /// `orientation` may be empty.
 void validate(const Frame& frame);
 
-/// Who writes a file of several ranks.
+/// How several ranks write one file.
 enum class SharedWriting {
   parallel,  ///< every rank its rows, through MPI; HDF5 must be built for it
   gathered,  ///< rank 0, which gets the rows of the others in pieces

@@ -55,7 +55,7 @@ constexpr std::uint32_t event_names = 2, name_iid = 1, name_name = 2, default_ev
 constexpr std::uint64_t slice_begin = 1, slice_end = 2;
 constexpr std::uint64_t state_cleared = 1, needs_state = 2;
 
-/// Names of the records of one track, with a look at the plan per step only.
+/// Names of the records of one track; the plan is read once for each step.
 class Namer {
  public:
   Namer(const trace::Trace& trace, const trace::Track& track) : trace_(trace), track_(track) {}
