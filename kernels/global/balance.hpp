@@ -11,10 +11,10 @@
 
 namespace talus {
 
-/// Problems of fewer sweeps are none that sweeps cannot see through.
+/// Number of sweeps that a problem needs. Below it NLGS alone converges, and ADMM is not tried.
 constexpr double stiff = 1000;
 
-/// What is left of a change when it goes on as it went: the larger of `change`, over the second half of the
+/// The change still to come if changes go on as they did: the larger of `change`, over the second half of the
 /// sweeps, and its extrapolation from the change `before`, over the second quarter. An error that decays as
 /// exp(-k/t) changes by s (1 + s) as much over the second half as over the quarter before, with s =
 /// exp(-n/4t); what is left is s^2/(1 - s^2) of the last change. Where changes still grow nothing has
@@ -28,15 +28,16 @@ inline double left_over(double change, double before) {
 
 /// Estimate of the relative error of the forces that the walls carry, from their relative `change` over the
 /// second half of `sweeps` sweeps in a problem that takes about `sweeps_needed` of them (estimate_stiffness).
-/// What converges in k sweeps changes by about half of its error over k/2; over fewer it changes by that part
-/// of it only, and a plate that sweeps leave falling looks still: 10^6 grain masses on a pile, k = 8e4; after
-/// 1000 sweeps the force is 0.7 % of the weight, its change 0.5, and the estimate 80.
+/// A quantity that converges in k sweeps changes by about half of its error over k/2 sweeps, and over fewer
+/// sweeps by proportionally less. So a plate that the sweeps let fall seems to be at rest: 10^6 grain masses
+/// on a pile, k = 8e4; after 1000 sweeps the force is 0.7 % of the weight, its change 0.5, and the estimate
+/// 80.
 inline double unbalance(double change, int sweeps, double sweeps_needed) {
   if (sweeps == 0 || sweeps >= sweeps_needed) return change;
   return change * std::max(1.0, 2 * sweeps_needed / sweeps);
 }
 
-/// How far the velocities that a step's impulses give are from those of its answer.
+/// Distance of the velocities that a step's impulses give from those of the exact solution.
 struct VelocityError {
   double relative = 0;        ///< sum m |V(r) - V*| over the scale of the step
   int linear_iterations = 0;  ///< conjugate gradients

@@ -1,9 +1,9 @@
 #pragma once
 
-/// The contact problem over bodies in parts, one per subdomain, and what holds the parts together. Copies of
-/// a body stand in several parts; of each exactly one counts. A solver written over parts gives the same bits
-/// wherever they lie: what happens within a part depends on the part alone, and sums over parts are added in
-/// order of subdomain.
+/// The contact problem over bodies in parts, one per subdomain, and the communication between the parts.
+/// Copies of a body stand in several parts; of each exactly one counts. A solver written over parts gives the
+/// same bits wherever they lie: what happens within a part depends on the part alone, and sums over parts are
+/// added in order of subdomain.
 
 #include <cstddef>
 #include <functional>
@@ -17,26 +17,26 @@ namespace talus {
 /// Per part, a twist per unknown. Of velocities all copies of a body hold the same bits.
 using PartField = std::vector<std::vector<Twist>>;
 
-/// What the parts of this process do with one another and with those of others. Every process makes the same
-/// calls in the same order. As it stands: one part, nothing to do.
+/// Communication interface of the solvers over parts, between those of this process and of others. Every
+/// process makes the same calls in the same order. The base class serves a single part and does nothing.
 class PartLink {
  public:
   virtual ~PartLink() = default;
 
-  /// Calls work(p) for each of `parts` parts here; perhaps several at a time.
+  /// Calls work(p) for each of the `parts` parts here, possibly in parallel.
   virtual void each(std::size_t parts, const std::function<void(std::size_t)>& work) const;
 
   /// Each copy of a shared unknown gets the sum of all copies, added in order of subdomain; w only where
-  /// grains turn.
+  /// grains rotate.
   virtual void sum_copies(PartField& field) const;
 
-  /// From a row of each part here, all equally long, everywhere: the rows of all parts of all processes, in
-  /// order of subdomain, one after the other.
+  /// Takes one row of numbers of each part here, all of the same length, and returns on every process the
+  /// rows of all parts of all processes, concatenated in order of subdomain.
   virtual std::vector<double> gather(std::vector<std::vector<double>> rows) const;
 };
 
-/// Of each of `parts` parts here `fill(part, row)` fills a row of `width` numbers: all rows, as
-/// PartLink::gather.
+/// Calls `fill(part, row)` to fill a row of `width` numbers for each of the `parts` parts here, and returns
+/// all rows as PartLink::gather does.
 using PartRow = std::function<void(std::size_t, std::span<double>)>;
 std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill);
 /// The same, added up in order of subdomain.

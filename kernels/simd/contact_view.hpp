@@ -21,7 +21,7 @@ struct ContactViewOf {
   const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
-  bool far;  ///< so many bodies that a core's first cache misses most: ask for them ahead
+  bool far;  ///< prefetch bodies: their records exceed the first cache of a core
 };
 
 using ContactView = ContactViewOf<double>;

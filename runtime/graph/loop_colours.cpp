@@ -75,7 +75,7 @@ LoopColours loop_colours(std::span<const ChunkOrder> subdomain_colours,
                                           : border,
         chunk.colour);
   }
-  // What is not there begins nothing more.
+  // Subdomains without such a node reuse the colour of `publish`.
   for (std::uint32_t e = 0; e < subdomains; ++e) add(e, publish, 0);
   for (std::uint32_t e = 0; e < subdomains; ++e) add(e, subdomain_colour_of[e] > 0 ? take : publish, 0);
   for (std::uint32_t e = 0; e < subdomains; ++e) add(e, tells[e] != 0 ? tell : publish, 0);

@@ -491,7 +491,7 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
   if (mode == Mode::measured) jumps_[e] = jump;
 }
 
-/// The velocities of the shared copies lend themselves as what is exchanged.
+/// Uses the velocities of the shared copies as buffers of the exchange.
 void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
   const Decomposition& all = state_.decomposition;
   const auto each_shared = [&](const auto& work) {
