@@ -16,7 +16,7 @@
 #include "io/results/vtk.hpp"
 #include "io/scene/scene.hpp"
 #include "kernels/detection/broad_phase.hpp"
-#include "kernels/detection/domain.hpp"
+#include "kernels/detection/wall_pairs.hpp"
 #include "partition/interface.hpp"
 #include "partition/load_table.hpp"
 #include "partition/partitioner.hpp"
@@ -55,12 +55,8 @@ ContactPairs find_contacts(const io::Scene& scene, const Bodies& bodies, int thr
   executor.run(detection);
   contacts.grains = sort_pairs(parts, bodies.size());
 
-  for (std::size_t w = 0; w < scene.setup.walls.size(); ++w) {
-    const Wall& wall = scene.setup.walls[w];
-    for (std::size_t s = 0; s < bodies.size(); ++s)
-      if (wall.normal.dot(Domain{}.separation(bodies.x[s], wall.point)) < bodies.radius[s] + contacts.alert)
-        contacts.walls.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
-  }
+  const std::vector<double> margin(scene.setup.walls.size(), contacts.alert);
+  contacts.walls = find_wall_pairs(bodies.x, bodies.radius, scene.setup.walls, margin);
   return contacts;
 }
 

@@ -8,7 +8,7 @@
 
 #include "io/scene/bodies_file.hpp"
 #include "kernels/detection/broad_phase.hpp"
-#include "kernels/detection/domain.hpp"
+#include "kernels/detection/wall_pairs.hpp"
 #include "kernels/samples/sample.hpp"
 
 namespace talus {
@@ -59,6 +59,16 @@ void check(const io::Scene& scene, const Sample& sample) {
   }
 }
 
+/// By how much a sphere overlaps a wall [m]; 0 or less where it does not.
+double depth_at(const Wall& wall, const Vec3& x, double radius) {
+  if (wall.surface() == nullptr) return radius - wall_point(wall, x, 0, Domain{}).distance;
+  std::vector<SurfacePoint> points;
+  wall.surface()->collide(x, radius, points);
+  double depth = 0;
+  for (const SurfacePoint& point : points) depth = std::max(depth, radius - point.distance);
+  return depth;
+}
+
 struct Overlaps {
   std::size_t count = 0;
   double worst = 0.1;  ///< depth over the smaller radius; less is none
@@ -98,8 +108,8 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   }
   for (const Wall& wall : scene.setup.walls)
     for (std::size_t k = 0; k < sample.size(); ++k)
-      overlaps.add(sample.radius[k] - wall.normal.dot(Domain{}.separation(sample.x[k], wall.point)),
-                   sample.radius[k], [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
+      overlaps.add(depth_at(wall, sample.x[k], sample.radius[k]), sample.radius[k],
+                   [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
   if (overlaps.count == 0) return "";
   return fmt::format(
       "{} overlap{} of more than 10 % of the smaller radius, the deepest of {:.0f} % between {}; {}",

@@ -92,7 +92,7 @@ std::optional<std::pair<Point, Point>> clipped(const HalfPlane& line, std::span<
 void draw_walls(Svg& svg, const View& view, const Frame& frame, std::span<const Wall> walls) {
   std::vector<HalfPlane> cut;
   for (std::size_t k = 0; k < std::min(walls.size(), frame.walls.size()); ++k) {
-    if (std::abs(walls[k].normal.y()) < 1e-9) {
+    if (walls[k].surface() == nullptr && std::abs(walls[k].normal.y()) < 1e-9) {
       cut.push_back({walls[k].normal.x(), walls[k].normal.z(), frame.walls[k].position});
     }
   }

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "io/scene/detail/scene_read.hpp"
+#include "io/scene/detail/shape_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
 
 namespace talus::io {
@@ -162,8 +163,13 @@ class SceneReader {
       fail_at(*table.get("normal"), path + ".normal", "give side or normal, not both");
     if (table.get("position") && table.get("point"))
       fail_at(*table.get("point"), path + ".point", "give position or point, not both");
+    refuse_load(table, path, table["shape"].value_or(std::string("plane")));
     read_table(table, path, keys_.wall, {}, wall);
     check_name(table, path, wall.name);
+    if (wall.shape.name != "plane") {
+      read_shape(table, path, wall);
+      return;
+    }
     if (wall.normal.norm() == 0)
       fail_at(table, path + ".side",
               fmt::format("wall '{}' needs a side or a normal that is not zero", wall.name));
@@ -179,6 +185,27 @@ class SceneReader {
     if (sideways.norm() > 1e-9 * wall.velocity.norm())
       fail_at(*table.get("initial_velocity"), path + ".initial_velocity",
               "a wall driven by pressure or force moves along its normal only");
+  }
+
+  /// Surfaces stay where they are.
+  static void refuse_load(const toml::table& table, const std::string& path, const std::string& shape) {
+    const toml::node* drive = table.get("drive");
+    if (shape != "plane" && drive != nullptr && drive->value<std::string>() != "fixed")
+      fail_at(*drive, path + ".drive",
+              fmt::format("only planes can be driven or pushed; a wall with shape = \"{}\" is fixed", shape));
+  }
+
+  void read_shape(const toml::table& table, const std::string& path, Wall& wall) {
+    wall.normal.setZero();
+    wall.point.setZero();
+    std::string& file = wall.shape.values.file;
+    if (!file.empty()) file = (folder_ / file).lexically_normal().string();
+    try {
+      read_surface(wall);
+    } catch (const std::exception& error) {
+      const toml::node* at = table.get(file.empty() ? "shape" : "file");
+      fail_at(at ? *at : table, path, fmt::format("wall '{}': {}", wall.name, error.what()));
+    }
   }
 
   void require_face(std::size_t wall, const toml::table& at, const std::string& path) {
@@ -229,6 +256,7 @@ class SceneReader {
       for (const NamedLoad& earlier : stage.loads)
         if (earlier.first == load.first)
           fail_at(named, load_path + ".wall", fmt::format("this stage loads wall '{}' twice", load.first));
+      refuse_load(*entry, load_path, walls[index].shape.name);
       if (load.second.drive == WallDrive::pressure) require_face(index, *entry, load_path);
       in_force[index] = load.second;
       stage.loads.push_back(std::move(load));

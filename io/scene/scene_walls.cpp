@@ -40,6 +40,16 @@ double automatic_position(const Wall& wall, int axis, const SampleSpec& sample, 
   return face;
 }
 
+/// How deep a centre lies in what is solid behind a wall [m]; 0 or less elsewhere.
+double depth_behind(const Wall& wall, const Vec3& x) {
+  if (wall.surface() == nullptr) return wall.normal.dot(Domain{}.separation(wall.point, x));
+  std::vector<SurfacePoint> points;
+  wall.surface()->collide(x, 0, points);
+  double depth = 0;
+  for (const SurfacePoint& point : points) depth = std::max(depth, -point.distance);
+  return depth;
+}
+
 void give_mass(WallLoad& load, double mass) {
   if (load.pushed() && load.mass == 0) load.mass = mass;
 }
@@ -66,7 +76,7 @@ void place_walls(Scene& scene, const Sample& grains) {
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);
   for (const Wall& wall : walls)
     for (std::size_t k = 0; k < grains.size(); ++k)
-      if (const double depth = wall.normal.dot(Domain{}.separation(wall.point, grains.x[k])); depth > 0)
+      if (const double depth = depth_behind(wall, grains.x[k]); depth > 0)
         refuse(fmt::format("the centre of grain {} lies {} m behind wall '{}'",
                            static_cast<std::int64_t>(grains.id_of(k)), depth, wall.name));
   try {

@@ -23,7 +23,7 @@ double face_area(const std::vector<Wall>& walls, std::size_t index) {
   double area = 1;
   int pairs = 0;
   for (std::size_t k = 0; k < walls.size(); ++k) {
-    if (std::abs(walls[k].normal.dot(wall.normal)) > 1e-12) continue;
+    if (walls[k].surface() != nullptr || std::abs(walls[k].normal.dot(wall.normal)) > 1e-12) continue;
     bool counted = false;  // the opposite wall came first
     for (std::size_t earlier = 0; earlier < k; ++earlier)
       counted |= (walls[earlier].normal + walls[k].normal).norm() < 1e-12;
@@ -48,7 +48,8 @@ Vec3 box_lengths(const std::vector<Wall>& walls) {
 }
 
 double box_volume(const std::vector<Wall>& walls) {
-  return box_lengths(walls).prod();
+  const bool planes = std::ranges::all_of(walls, [](const Wall& wall) { return wall.surface() == nullptr; });
+  return planes ? box_lengths(walls).prod() : 0;
 }
 
 }  // namespace talus

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/shapes/shape.hpp"
 
 namespace talus {
 
@@ -27,8 +28,9 @@ struct WallLoad {
   bool pushed() const { return drive == WallDrive::pressure || drive == WallDrive::force; }
 };
 
-/// A plane wall: the half space normal . (x - point) < 0 is solid. A pressed wall has one degree of freedom,
-/// its displacement along `normal`; walls never rotate.
+/// A wall: a plane, whose half space normal . (x - point) < 0 is solid, or a surface
+/// (kernels/shapes/shape.hpp). A pressed wall has one degree of freedom, its displacement along `normal`;
+/// walls never rotate. Only planes move: a surface is fixed, its normal is 0, and its point has no meaning.
 struct Wall {
   std::string name;
   Vec3 point = Vec3::Zero();     ///< a point of the plane [m]
@@ -37,6 +39,9 @@ struct Wall {
   WallLoad load;                 ///< in force now
   Vec3 velocity = Vec3::Zero();  ///< [m/s] now
   Vec3 gain = Vec3::Zero();      ///< what the load adds to it within the step, without contacts [m/s]
+  WallShape shape = {};          ///< a plane unless it says otherwise
+  /// Null for a plane.
+  const Surface* surface() const { return shape.surface.get(); }
   /// 1/M [1/kg] of a pushed wall; 0 for one that is fixed or driven, whatever mass its load names.
   double inv_mass() const { return load.pushed() && load.mass > 0 ? 1 / load.mass : 0; }
 };
@@ -46,7 +51,8 @@ struct Wall {
 /// naming the wall when there are no such pairs.
 double face_area(const std::vector<Wall>& walls, std::size_t index);
 
-/// Volume between the three pairs of opposite axis-aligned walls [m^3]; 0 when the walls do not close a box.
+/// Volume between the three pairs of opposite axis-aligned walls [m^3]; 0 when the walls do not close a box,
+/// or when a wall that is no plane takes room in it.
 double box_volume(const std::vector<Wall>& walls);
 
 /// Distances between opposite walls along x, y, z [m]; 0 along an axis without a pair of walls.

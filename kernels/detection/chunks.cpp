@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "kernels/detection/wall_pairs.hpp"
+
 namespace talus {
 
 namespace {
@@ -179,11 +181,21 @@ void merge_walk(const std::vector<Pair>& old, const std::vector<Pair>& fresh, Le
   }
 }
 
+/// Wall pairs by (wall, body, feature), whatever the layers they stand in, with their places.
+struct PlacedPair {
+  WallPair pair;
+  std::size_t place;
+};
+std::vector<PlacedPair> without_layers(std::span<const WallPair> pairs) {
+  std::vector<PlacedPair> placed;
+  for (std::size_t k = 0; k < pairs.size(); ++k) placed.push_back({pairs[k], k});
+  const auto less = [](const PlacedPair& a, const PlacedPair& b) { return before(a.pair, b.pair); };
+  if (!std::ranges::is_sorted(placed, less)) std::ranges::sort(placed, less);
+  return placed;
+}
+
 bool before(const GrainPair& a, const GrainPair& b) {
   return a.first != b.first ? a.first < b.first : a.second < b.second;
-}
-bool before(const WallPair& a, const WallPair& b) {
-  return a.wall != b.wall ? a.wall < b.wall : a.body < b.body;
 }
 
 }  // namespace
@@ -197,7 +209,9 @@ std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates
   for (std::int32_t from = grains; from < all;) {
     const std::int32_t wall = candidates.wall_pairs[index(from - grains)].wall;
     std::int32_t to = from;
-    while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall) ++to;
+    while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall &&
+           (to == from || !begins_layer(candidates.wall_pairs, index(to - grains))))
+      ++to;
     const bool at_glued = !glued.empty() && glued[index(wall)] != 0;
     groups.push_back({from, to, wall, 0, at_glued ? ChunkSide::wall : ChunkSide::inside, target});
     from = to;
@@ -235,9 +249,12 @@ void match_impulses(const Candidates& old, Candidates& fresh) {
   };
   merge_walk(
       old.grain_pairs, fresh.grain_pairs, [](const auto& a, const auto& b) { return before(a, b); }, carry);
+  const std::vector<PlacedPair> from = without_layers(old.wall_pairs), to = without_layers(fresh.wall_pairs);
   merge_walk(
-      old.wall_pairs, fresh.wall_pairs, [](const auto& a, const auto& b) { return before(a, b); },
-      [&](std::size_t a, std::size_t b) { carry(old.grain_pairs.size() + a, fresh.grain_pairs.size() + b); });
+      from, to, [](const auto& a, const auto& b) { return before(a.pair, b.pair); },
+      [&](std::size_t a, std::size_t b) {
+        carry(old.grain_pairs.size() + from[a].place, fresh.grain_pairs.size() + to[b].place);
+      });
 }
 
 void renumber(Candidates& candidates, std::span<const Slot> place) {
@@ -267,9 +284,8 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
               [&](std::size_t a, std::size_t b) {
                 return candidates.grain_pairs[a].second < candidates.grain_pairs[b].second;
               });
-  std::sort(split, order.end(), [&](std::size_t a, std::size_t b) {
-    return before(candidates.wall_pairs[a - grains], candidates.wall_pairs[b - grains]);
-  });
+  std::ranges::transform(layered_order(candidates.wall_pairs), split,
+                         [grains](std::size_t k) { return grains + k; });
   Candidates sorted;
   sorted.components = candidates.components;
   sorted.grain_pairs.reserve(grains);

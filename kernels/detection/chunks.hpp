@@ -10,16 +10,18 @@
 
 namespace talus {
 
-/// A grain near a wall.
+/// A grain near a wall, or near one feature of its surface (kernels/shapes/surface.hpp); 0 at a plane.
 struct WallPair {
   std::int32_t wall;
   Slot body;
+  std::int32_t feature = 0;
   bool operator==(const WallPair&) const = default;
 };
 
 /// Candidates of the broad phase, cut into chunks. Grain pairs come first, sorted by (first, second); then
-/// wall pairs, sorted by (wall, body). Candidate k is grain pair k, or wall pair k - grain_pairs.size().
-/// `impulse` outlives the step: it is the warm start.
+/// wall pairs, sorted by (wall, layer, body): the first features of all grains at a wall are its first layer,
+/// the second features the next, so that no layer has a grain twice. A plane has one layer. Candidate k is
+/// grain pair k, or wall pair k - grain_pairs.size(). `impulse` outlives the step: it is the warm start.
 struct Candidates {
   std::vector<GrainPair> grain_pairs;
   std::vector<WallPair> wall_pairs;
@@ -39,8 +41,8 @@ enum class ChunkSide : std::uint8_t {
   late,    ///< at a border that waits for others
 };
 
-/// Candidates [begin, end) that may share a chunk: of one subdomain, of one wall or of none, and of one side.
-/// Groups follow one another, and together hold all candidates.
+/// Candidates [begin, end) that may share a chunk: of one subdomain, of one layer at one wall or of none, and
+/// of one side. Groups follow one another, and together hold all candidates.
 struct CandidateGroup {
   std::int32_t begin;
   std::int32_t end;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "kernels/detection/wall_pairs.hpp"
+
 namespace talus {
 
 namespace {
@@ -87,7 +89,10 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
                                        x[static_cast<std::size_t>(pair.second)]);
       normal = unit_normal(d, d.norm());
     } else {
-      normal = walls[static_cast<std::size_t>(candidates.wall_pairs[k - grains].wall)].normal;
+      const WallPair& pair = candidates.wall_pairs[k - grains];
+      normal = wall_point(walls[static_cast<std::size_t>(pair.wall)], x[static_cast<std::size_t>(pair.body)],
+                          pair.feature, domain)
+                   .normal;
     }
     if (components == 3)
       for (std::size_t c = 0; c < 3; ++c)

@@ -28,7 +28,7 @@ struct Contacts {
   std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
   std::vector<double> rx, ry, rz;   ///< impulse on the first body [N s]; empty without friction
   std::vector<double> rn;           ///< normal impulse [N s]; empty with friction
-  std::vector<Slot> first, second;  ///< second is -1 at a wall
+  std::vector<Slot> first, second;  ///< second is -1 - feature at a wall: -1 at a plane
   /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.
   std::vector<std::uint32_t> first_record, second_record;
   std::vector<std::int32_t> candidate;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "kernels/detection/wall_pairs.hpp"
+
 namespace talus {
 
 namespace {
@@ -42,8 +44,8 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
     const Wall& wall = walls[static_cast<std::size_t>(chunks.wall[chunk])];
     for (std::size_t k = begin; k < end; ++k) {
       const auto i = static_cast<std::size_t>(contacts.first[k]);
-      const double distance = wall.normal.dot(domain.separation(x[i], wall.point));
-      add(k, distance * wall.normal, distance - radius[i]);
+      const SurfacePoint point = wall_point(wall, x[i], -1 - contacts.second[k], domain);
+      add(k, point.distance * point.normal, point.distance - radius[i]);
     }
   } else {
     for (std::size_t k = begin; k < end; ++k) {

@@ -23,7 +23,7 @@ struct ContactSums {
 };
 
 /// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the
-/// plane to the centre.
+/// nearest point of the plane or surface to the centre.
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              std::span<const Vec3> x, std::span<const double> radius,
                              std::span<const Wall> walls, const Domain& domain = {});

@@ -101,7 +101,17 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
   if (!detail::repair_groups(places)) detail::deal_groups(places);
 }
 
-/// At a wall: a grain meets it once, so that any contacts may share a group.
+/// A chunk at a wall has its contacts up to `end`. Each grain stands in it once, so that any contacts may
+/// share a group.
+void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Contacts& contacts) {
+  const std::size_t begin = index(chunks.begin[chunk]);
+  contacts.count[chunk] = static_cast<std::int32_t>(end - begin);
+  std::uint8_t* size = contacts.group.data() + begin;
+  for (std::size_t k = begin; k < end; k += group_size)
+    *size++ = static_cast<std::uint8_t>(std::min(group_size, end - k));
+}
+
+/// At a plane.
 void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
                  const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
   const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
@@ -125,10 +135,50 @@ void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& c
     contacts.candidate[at++] = static_cast<std::int32_t>(k);
   }
   contacts.passed[chunk] = through;
-  contacts.count[chunk] = static_cast<std::int32_t>(at - begin);
-  std::uint8_t* size = contacts.group.data() + begin;
-  for (std::size_t k = begin; k < at; k += group_size)
-    *size++ = static_cast<std::uint8_t>(std::min(group_size, at - k));
+  close_groups(chunks, chunk, at, contacts);
+}
+
+/// True when a body that has come by `way` to `x` was deep in a surface on it: such a step is too long, and a
+/// thin surface may be behind the body by now.
+bool passed_surface(const Surface& surface, const Vec3& x, const Vec3& way, double radius) {
+  if (!came_far(way, radius)) return false;
+  std::vector<SurfacePoint> points;
+  constexpr double most = 256;  // looks: a body that came further is told by its energy
+  const double looks = std::ceil(std::min(most, 4 * way.norm() / radius));
+  for (double look = 0; look < looks; ++look) surface.collide(x - look / looks * way, 0.5 * radius, points);
+  return !points.empty();
+}
+
+/// At a surface: a chunk has each grain once, with one of the features that it may touch.
+void narrow_surface(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
+                    const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
+  const Surface& surface = *in.walls[index(chunks.wall[chunk])].surface();
+  std::int32_t through = 0;
+  std::size_t at = begin;
+  std::vector<SurfacePoint> points;
+  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+    const auto [wall, body, feature] = candidates.wall_pairs[k - grains];
+    const std::size_t i = index(body);
+    const Vec3 v = Eigen::Map<const Vec3>(in.velocity[i].u), free = v + in.time_step * in.gravity;
+    points.clear();
+    surface.collide(in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
+    const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
+    if (point == points.end()) continue;
+    through += passed_surface(surface, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
+    if (!constrain(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),
+                   contacts.bias[at]))
+      continue;
+    contacts.nx[at] = point->normal[0];
+    contacts.ny[at] = point->normal[1];
+    contacts.nz[at] = point->normal[2];
+    contacts.first[at] = body;
+    contacts.first_record[at] = record_of(body);
+    contacts.second[at] = -1 - feature;
+    contacts.candidate[at++] = static_cast<std::int32_t>(k);
+  }
+  contacts.passed[chunk] = through;
+  close_groups(chunks, chunk, at, contacts);
 }
 
 }  // namespace
@@ -139,8 +189,10 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
                      2 * in.time_step * in.gravity.norm()};
   if (chunks.wall[chunk] < 0)
     narrow_grains(in, rule, chunks, chunk, kernels, contacts);
-  else
+  else if (in.walls[index(chunks.wall[chunk])].surface() == nullptr)
     narrow_wall(in, rule, candidates, chunks, chunk, contacts);
+  else
+    narrow_surface(in, rule, candidates, chunks, chunk, contacts);
   restore_impulses(candidates, chunks, chunk, contacts);
 }
 

@@ -41,6 +41,19 @@ void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, 
   }
 }
 
+/// Appends the features of wall w, which is no plane, that a grain may touch.
+void compare_at_surface(const Escape& escape, std::int64_t w, const Wall& wall, const Margins& margins,
+                        std::vector<Encounter>& needed) {
+  const Vec3 v = Eigen::Map<const Vec3>(escape.u) + margins.time_step * margins.gravity;
+  std::vector<SurfacePoint> points;
+  wall.surface()->collide(Eigen::Map<const Vec3>(escape.x),
+                          escape.radius + margins.alert + margins.time_step * v.norm(), points);
+  for (const SurfacePoint& point : points)
+    if (may_touch(point.distance - escape.radius - rounding * std::abs(point.distance), point.normal.dot(v),
+                  margins.time_step, margins.alert))
+      needed.push_back({-1 - w, escape.id, point.feature});
+}
+
 }  // namespace
 
 void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& margins,
@@ -91,6 +104,10 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
   for (const Escape& escape : skin_escapes)
     for (std::size_t w = 0; w < margins.walls.size(); ++w) {
       const Wall& wall = margins.walls[w];
+      if (wall.surface() != nullptr) {
+        compare_at_surface(escape, static_cast<std::int64_t>(w), wall, margins, needed);
+        continue;
+      }
       const double distance = wall.normal.dot(margins.domain.separation(Vec3(Map(escape.x)), wall.point));
       const double v_n = wall.normal.dot(Map(escape.u) - wall.velocity - wall.gain + h * margins.gravity);
       if (may_touch(distance - escape.radius - rounding * std::abs(distance), v_n, h, margins.alert))
@@ -102,7 +119,7 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
       known.push_back({std::min(id(pair.first), id(pair.second)), std::max(id(pair.first), id(pair.second))});
   for (const WallPair& pair : candidates.wall_pairs)
     if (left[static_cast<std::size_t>(pair.body)] != 0)
-      known.push_back({-1 - std::int64_t{pair.wall}, id(pair.body)});
+      known.push_back({-1 - std::int64_t{pair.wall}, id(pair.body), pair.feature});
 }
 
 bool all_known(std::vector<Encounter> needed, std::vector<Encounter> known) {

@@ -29,9 +29,10 @@ struct Escape {
   auto operator<=>(const Escape&) const = default;
 };
 
-/// Two grains by their ids, the smaller first; or wall w, as -1 - w, and a grain.
+/// Two grains by their ids, the smaller first; or wall w, as -1 - w, and a grain at one of its features.
 struct Encounter {
   std::int64_t a, b;
+  std::int64_t feature = 0;
   auto operator<=>(const Encounter&) const = default;
 };
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "kernels/bodies/release.hpp"
-#include "kernels/detection/domain.hpp"
+#include "kernels/detection/wall_pairs.hpp"
 #include "partition/subdomain_colours.hpp"
 #include "runtime/step/decomposition.hpp"
 
@@ -18,8 +18,9 @@ namespace {
 /// A warm start on its way.
 struct ImpulseRecord {
   std::int64_t first;
-  std::int64_t second;  ///< -1 - wall at a wall
-  double r[3];          ///< on the first body; r[0] alone without friction
+  std::int64_t second;   ///< -1 - wall at a wall
+  std::int64_t feature;  ///< of the wall's surface; 0 elsewhere
+  double r[3];           ///< on the first body; r[0] alone without friction
 };
 
 std::size_t at(std::int32_t k) {
@@ -62,7 +63,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
                   .rank_of[at(decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x)))];
     if (rank == ranks.rank()) {
       if (wall)
-        old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)]});
+        old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)], at_wall.feature});
       else
         old.grain_pairs.push_back({around.of_slot[at(pair.first)], around.of_slot[at(pair.second)]});
       push(wall ? at_walls : old.impulse, r);
@@ -72,6 +73,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     record.first = static_cast<std::int64_t>(bodies.id[at(wall ? at_wall.body : pair.first)]);
     record.second =
         wall ? -1 - std::int64_t{at_wall.wall} : static_cast<std::int64_t>(bodies.id[at(pair.second)]);
+    record.feature = at_wall.feature;
     std::copy_n(r, components, record.r);
     to[at(rank)].push_back(record);
   }
@@ -81,7 +83,8 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
       const Slot first = around.find(record.first);
       const bool wall = record.second < 0;
       if (wall)
-        old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first});
+        old.wall_pairs.push_back({static_cast<std::int32_t>(-1 - record.second), first,
+                                  static_cast<std::int32_t>(record.feature)});
       else
         old.grain_pairs.push_back({first, around.find(record.second)});
       push(wall ? at_walls : old.impulse, record.r);
@@ -316,6 +319,14 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
     // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
     const int target = chunk_target(given.all, given.load[at(decomposition.here[local])]);
     groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
+    const std::size_t first_at_wall = cut.wall_pairs.size();
+    const auto push_at_wall = [&](const WallPair& pair, std::int32_t place) {
+      cut.wall_pairs.push_back({wall, slot[at(pair.body)], pair.feature});
+      const std::size_t last = cut.wall_pairs.size() - 1;
+      if (last == first_at_wall || !begins_layer(cut.wall_pairs, last)) return;
+      groups.back().end = place;
+      groups.push_back({place, end, wall, static_cast<std::int32_t>(local), side, target});
+    };
     auto next = static_cast<Slot>(decomposition.slot_begin[local]);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
     for (std::int32_t place = begin; place < end; ++place) {
@@ -324,7 +335,7 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
         cut.grain_pairs.push_back(
             {slot[at(found.grain_pairs[k].first)], slot[at(found.grain_pairs[k].second)]});
       else
-        cut.wall_pairs.push_back({wall, slot[at(found.wall_pairs[k - found.grain_pairs.size()].body)]});
+        push_at_wall(found.wall_pairs[k - found.grain_pairs.size()], place);
       for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
     }
   }

@@ -5,7 +5,7 @@
 
 #include "kernels/bodies/permute.hpp"
 #include "kernels/bodies/release.hpp"
-#include "kernels/detection/domain.hpp"
+#include "kernels/detection/wall_pairs.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
@@ -72,9 +72,9 @@ ContactRow contact_row(const StepState& state, const Active& active, double time
   const auto wall =
       static_cast<std::size_t>(std::max(state.chunks.wall[static_cast<std::size_t>(active.chunk)], 0));
   const double gap =
-      second >= 0 ? Domain{}.separation(bodies.x[i], bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
-                  : state.walls[wall].normal.dot(Domain{}.separation(bodies.x[i], state.walls[wall].point)) -
-                        bodies.radius[i];
+      second >= 0
+          ? Domain{}.separation(bodies.x[i], bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
+          : wall_point(state.walls[wall], bodies.x[i], -1 - second, Domain{}).distance - bodies.radius[i];
   ContactRow row;
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
   row.bodies[1] =
@@ -129,7 +129,8 @@ template <class Key>
 std::vector<Slot> ascending(std::span<const Key> keys) {
   std::vector<Slot> order(keys.size());
   std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](Slot a, Slot b) {
+  // Contacts of one grain with one wall have equal keys, and come from one rank in one order.
+  std::stable_sort(order.begin(), order.end(), [&](Slot a, Slot b) {
     return keys[static_cast<std::size_t>(a)] < keys[static_cast<std::size_t>(b)];
   });
   return order;

@@ -13,7 +13,10 @@ void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument(message);
 }
 
-void validate_load(const std::string& where, const WallLoad& load) {
+void validate_load(const std::string& where, const Wall& wall, const WallLoad& load) {
+  require(wall.surface() == nullptr || load.drive == WallDrive::fixed,
+          fmt::format("{}: only planes can be driven or pushed; a wall with shape = \"{}\" is fixed", where,
+                      wall.shape.name));
   require(load.velocity.allFinite(), where + ": velocity must be finite [m/s]");
   require(std::isfinite(load.pressure),
           fmt::format("{}: pressure must be finite [Pa], got {}", where, load.pressure));
@@ -38,11 +41,11 @@ const char* name_of(Coupling coupling) {
 
 void validate(const Setup& setup) {
   for (const Wall& wall : setup.walls) {
-    require(std::abs(wall.normal.norm() - 1) < 1e-9,
+    require(wall.surface() != nullptr || std::abs(wall.normal.norm() - 1) < 1e-9,
             fmt::format("wall '{}': normal must be a unit vector", wall.name));
     require(wall.point.allFinite() && wall.velocity.allFinite(),
             fmt::format("wall '{}': point and velocity must be finite", wall.name));
-    validate_load(fmt::format("wall '{}'", wall.name), wall.load);
+    validate_load(fmt::format("wall '{}'", wall.name), wall, wall.load);
   }
   require(!setup.stages.empty(), "at least one stage is needed");
   for (const Stage& stage : setup.stages) {
@@ -64,10 +67,10 @@ void validate(const Setup& setup) {
             "stage '{}': end.time = {} s is not more than half a time step of {} s: no step would be made",
             stage.name, stage.end.time.value_or(0), stage.time_step));
     for (const auto& [name, load] : stage.loads) {
-      const bool known =
-          std::any_of(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
-      require(known, fmt::format("stage '{}': no wall is named '{}'", stage.name, name));
-      validate_load(fmt::format("stage '{}', wall '{}'", stage.name, name), load);
+      const auto wall =
+          std::find_if(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
+      require(wall != setup.walls.end(), fmt::format("stage '{}': no wall is named '{}'", stage.name, name));
+      validate_load(fmt::format("stage '{}', wall '{}'", stage.name, name), *wall, load);
     }
   }
   require(setup.solver.tolerance >= 0 && setup.solver.balance_tolerance >= 0,

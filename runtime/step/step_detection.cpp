@@ -5,6 +5,7 @@
 
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/narrow_phase.hpp"
+#include "kernels/detection/wall_pairs.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
@@ -15,16 +16,6 @@ namespace {
 
 double speed(const Velocity& v) {
   return std::sqrt(v.u[0] * v.u[0] + v.u[1] * v.u[1] + v.u[2] * v.u[2]);
-}
-
-std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, const std::vector<Wall>& walls,
-                                      std::span<const double> reach, std::span<const double> margin) {
-  std::vector<WallPair> pairs;
-  for (std::size_t w = 0; w < walls.size(); ++w)
-    for (std::size_t s = 0; s < x.size(); ++s)
-      if (walls[w].normal.dot(Domain{}.separation(x[s], walls[w].point)) < reach[s] + margin[w])
-        pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
-  return pairs;
 }
 
 }  // namespace
@@ -161,8 +152,8 @@ void StepGraph::make_chunks() {
   fresh.components = parameters_.friction ? 3 : 1;
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
   for (auto& part : pairs_) release(part);
-  fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x, state_.walls,
-                                     several ? around_.reach : state_.reach_then, wall_margin_);
+  fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x,
+                                     several ? around_.reach : state_.reach_then, state_.walls, wall_margin_);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;

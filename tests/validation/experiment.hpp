@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/simulation.hpp"
@@ -16,6 +18,8 @@ namespace talus::validation {
 constexpr double g_earth = 9.81;  // [m/s^2]
 constexpr double pi = 3.14159265358979324;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+using ShapeNumbers = std::map<std::string, std::vector<double>>;
 
 /// A scene under construction: one stage, solved nearly exactly.
 struct Scene {
@@ -42,6 +46,15 @@ struct Scene {
     wall.point = point;
     wall.normal = normal.normalized();
     return setup.walls.emplace_back(std::move(wall));
+  }
+  /// A wall that is no plane, named as its shape.
+  void surface(const std::string& shape, ShapeNumbers numbers, std::vector<Triangle> triangles = {}) {
+    Wall wall;
+    wall.name = shape;
+    wall.normal.setZero();
+    wall.shape = {shape, {std::move(numbers), "", std::move(triangles)}, nullptr};
+    make_surface(wall.shape);
+    setup.walls.push_back(std::move(wall));
   }
   /// Floor z = 0 under gravity turned by `angle` about y: a slope that descends along +x.
   void slope(double angle) {

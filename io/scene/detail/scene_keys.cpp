@@ -3,6 +3,8 @@
 #include <cctype>
 #include <cmath>
 
+#include "io/scene/detail/shape_keys.hpp"
+
 namespace talus::io::detail {
 
 namespace {
@@ -180,6 +182,7 @@ std::vector<Key<WallLoad>> load_keys() {
 }
 
 Section<Wall> wall_keys() {
+  std::vector<Key<Wall>> shapes = shape_keys();
   auto name = bound<std::string, Wall>(
       "name", "", any, "Name, unique among the walls.",
       [](Wall& wall, const std::string& text) {
@@ -217,7 +220,6 @@ Section<Wall> wall_keys() {
       [](Wall& wall, const Vec3& place) { wall.point = place; },
       [](const Wall& wall) { return axis_of(wall) < 0 ? Held<Vec3>::out(wall.point) : Value{}; });
   std::vector<Key<Wall>> keys = {
-      std::move(name).need(),
       std::move(side).or_else("the name, if it is one of these; else `normal` is given"),
       std::move(normal).or_else("from `side`"),
       std::move(position)
@@ -230,10 +232,11 @@ Section<Wall> wall_keys() {
   keys.push_back(key<Wall>("initial_velocity", "m/s", any, "Velocity at the beginning, along the normal.",
                            &Wall::velocity)
                      .only("drive = pressure or force", [](const Wall& wall) { return wall.load.pushed(); }));
-  return {"[[wall]]",
-          "A plane wall: everything behind it is solid. Its load holds from the beginning, until a stage "
-          "changes it.",
-          std::move(keys)};
+  keep_for_planes(keys);
+  std::vector<Key<Wall>> all = {std::move(name).need()};
+  for (std::vector<Key<Wall>>* some : {&shapes, &keys})
+    for (Key<Wall>& one : *some) all.push_back(std::move(one));
+  return {"[[wall]]", "A wall. Its load holds from the beginning, until a stage changes it.", std::move(all)};
 }
 
 Section<Stage> stage_keys() {

@@ -1,0 +1,42 @@
+#pragma once
+
+/// Which grains stand near which walls, planes or surfaces alike.
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/walls.hpp"
+#include "kernels/detection/chunks.hpp"
+#include "kernels/detection/domain.hpp"
+
+namespace talus {
+
+/// The point of a wall, of one feature of its surface, for a sphere with its centre at x.
+inline SurfacePoint wall_point(const Wall& wall, const Vec3& x, std::int32_t feature, const Domain& domain) {
+  if (wall.surface() != nullptr) return wall.surface()->at(x, feature);
+  return {0, wall.normal.dot(domain.separation(x, wall.point)), wall.normal};
+}
+
+/// By (wall, body, feature).
+inline bool before(const WallPair& a, const WallPair& b) {
+  if (a.wall != b.wall) return a.wall < b.wall;
+  return a.body != b.body ? a.body < b.body : a.feature < b.feature;
+}
+
+/// Whether pair k > 0 stands in another layer than the one before it, in pairs sorted by (wall, layer, body).
+inline bool begins_layer(std::span<const WallPair> pairs, std::size_t k) {
+  return pairs[k].wall != pairs[k - 1].wall || pairs[k].body <= pairs[k - 1].body;
+}
+
+/// The places of the pairs in the order of (wall, layer, body): a pair with l pairs of the same wall and body
+/// and lower features is of layer l.
+std::vector<std::size_t> layered_order(std::span<const WallPair> pairs);
+
+/// The candidates at walls, in that order: bodies whose centre x [m] is nearer to a wall than their `reach`
+/// plus the wall's `margin` [m].
+std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, std::span<const double> reach,
+                                      std::span<const Wall> walls, std::span<const double> margin,
+                                      const Domain& domain = {});
+
+}  // namespace talus

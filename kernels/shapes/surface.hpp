@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/bodies/types.hpp"
+
+namespace talus {
+
+/// Where a sphere may touch a surface.
+struct SurfacePoint {
+  std::int32_t feature = 0;     ///< which part of the surface: the same one from step to step (warm start)
+  double distance = 0;          ///< [m] of the sphere's centre from the surface; below 0 inside a solid
+  Vec3 normal = Vec3::UnitZ();  ///< unit, from the surface to the centre
+};
+
+/// Axis-parallel box [m].
+struct Bounds {
+  Vec3 low = Vec3::Zero();
+  Vec3 high = Vec3::Zero();
+  /// Whether a point lies less than `reach` from the box. False for a point that is not finite.
+  bool near(const Vec3& point, double reach) const {
+    return (point - point.cwiseMax(low).cwiseMin(high)).squaredNorm() < reach * reach;
+  }
+};
+
+/// The surface of a wall that is no plane. It does not move. A sphere may touch it in several points at once:
+/// each is a contact of its own, told by its feature. The functions here suit convex bodies and thin plates,
+/// which a sphere touches in one point, feature 0; other surfaces override `near` and `collide`.
+class Surface {
+ public:
+  virtual ~Surface() = default;
+
+  virtual Bounds bounds() const = 0;
+  /// The point of a feature for a sphere with this centre, at whatever distance.
+  virtual SurfacePoint at(const Vec3& centre, std::int32_t feature) const = 0;
+  /// Appends, ascending, every feature in which a sphere can touch that has its centre within a way s of
+  /// `centre`, and reaches `reach` - s: what the broad phase asks for.
+  virtual void near(const Vec3& centre, double reach, std::vector<std::int32_t>& features) const {
+    if (at(centre, 0).distance < reach) features.push_back(0);
+  }
+  /// Appends, with ascending features, the points nearer than `reach` [m] in which a sphere touches: what the
+  /// narrow phase asks for. `near` finds their features with the same centre and reach, or a larger reach.
+  virtual void collide(const Vec3& centre, double reach, std::vector<SurfacePoint>& points) const {
+    if (const SurfacePoint point = at(centre, 0); point.distance < reach) points.push_back(point);
+  }
+};
+
+}  // namespace talus

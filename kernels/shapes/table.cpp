@@ -1,0 +1,31 @@
+#include "kernels/shapes/shape.hpp"
+
+namespace talus {
+
+extern const ShapeEntry rectangle_shape, disc_shape, cylinder_shape, mesh_shape;
+
+namespace {
+/// A shape is picked by its row; its column is the sphere, the only shape of a body.
+constexpr const ShapeEntry* table[] = {
+    &rectangle_shape, &disc_shape, &cylinder_shape, &mesh_shape,
+};
+}  // namespace
+
+std::span<const ShapeEntry* const> wall_shapes() {
+  return table;
+}
+
+const ShapeEntry* wall_shape(const std::string& name) {
+  for (const ShapeEntry* shape : table)
+    if (name == shape->name) return shape;
+  return nullptr;
+}
+
+void make_surface(WallShape& shape) {
+  const ShapeEntry* entry = wall_shape(shape.name);
+  if (entry == nullptr) return;
+  shape.surface = entry->make(shape.values);
+  shape.values.triangles = {};
+}
+
+}  // namespace talus

@@ -1,0 +1,106 @@
+/// Walls that are no planes, on several ranks: same bits as on one.
+
+#include <algorithm>
+
+#include "io/results/results.hpp"
+#include "tests/mpi/launcher.hpp"
+#include "tests/unit/mesh_makers.hpp"
+
+namespace talus::test {
+namespace {
+
+std::string stl_text(const std::vector<Triangle>& triangles) {
+  std::string text = "solid funnel\n";
+  for (const Triangle& triangle : triangles) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const Vec3& p : triangle) text += fmt::format("vertex {} {} {}\n", p[0], p[1], p[2]);
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid\n";
+}
+
+/// Grains that fall through a funnel of triangles onto a plate in a tube.
+const std::string funnel_scene = R"(name = "funnel"
+time_step = 1e-3
+gravity = [0, 0, -9.81]
+allow_unconverged = true
+[material]
+density = 2600
+friction = 0.3
+[sample]
+kind = "lattice"
+cells = [5, 5, 6]
+spacing = 1.02
+radius = 0.01
+[[wall]]
+name = "funnel"
+shape = "mesh"
+file = "funnel.stl"
+[[wall]]
+name = "tube"
+shape = "cylinder"
+start = [0.05, 0.05, -0.2]
+end = [0.05, 0.05, -0.06]
+radius = 0.05
+inside = true
+[[wall]]
+name = "plate"
+shape = "disc"
+centre = [0.05, 0.05, -0.08]
+axis = [0, 0, 1]
+radius = 0.02
+[[wall]]
+name = "floor"
+side = "z-"
+position = -0.2
+[[stage]]
+end = { steps = 160 }
+[solver]
+max_iterations = 60
+[decomposition]
+repartition_every = 7
+[output]
+every_steps = 80
+contacts = true
+pictures = false
+)";
+
+class SurfacesOnRanks : public OnRanks {
+ protected:
+  void SetUp() override {
+    std::vector<Triangle> triangles = funnel_mesh(0.03, 0.09, 0.06, 0.01, 16);
+    for (Triangle& triangle : triangles)
+      for (Vec3& p : triangle) p += Vec3(0.05, 0.05, -0.06);
+    // Its grains stand above the funnel's mouth.
+    write(at("funnel.stl"), stl_text(triangles));
+    write(at("scene.toml"), funnel_scene);
+  }
+};
+
+TEST_F(SurfacesOnRanks, ChangeNoBitWithRanksAndThreads) {
+  for (const int subdomains : {2, 8}) {
+    const std::string command = fmt::format("run scene.toml --set decomposition.subdomains={}", subdomains);
+    const std::string one = fmt::format("one{}", subdomains);
+    const Outcome alone = run(1, fmt::format("{} --out {} --threads 1", command, one));
+    ASSERT_EQ(alone.code, 0) << alone.messages;
+    for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {2, 2}}) {
+      const std::string out = fmt::format("s{}r{}x{}", subdomains, ranks, threads);
+      const Outcome other = run(ranks, fmt::format("{} --out {} --threads {}", command, out, threads));
+      ASSERT_EQ(other.code, 0) << out << ": " << other.messages;
+      EXPECT_EQ(digest_of(out), digest_of(one)) << out;
+      EXPECT_EQ(file(out, "walls.csv"), file(one, "walls.csv")) << out;
+      const std::size_t last = io::frame_count(at(one) / "results.h5") - 1;
+      const Frame a = io::read_frame(at(one) / "results.h5", last),
+                  b = io::read_frame(at(out) / "results.h5", last);
+      EXPECT_EQ(a.contact_bodies, b.contact_bodies) << out;
+      EXPECT_EQ(a.contact_force, b.contact_force) << out;
+    }
+  }
+  const Frame end = io::read_frame(at("one8") / "results.h5", io::frame_count(at("one8") / "results.h5") - 1);
+  for (const std::int64_t w : {0, 2})
+    EXPECT_TRUE(std::ranges::any_of(end.contact_bodies, [&](const auto& pair) { return pair[1] == -1 - w; }))
+        << "grains touch wall " << w;
+}
+
+}  // namespace
+}  // namespace talus::test

@@ -1,0 +1,89 @@
+/// Walls that are no planes: closed forms of a ball in a cone, in a cylinder and on the rim of a disc, and a
+/// mesh against the plane that it is made of.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/mesh_makers.hpp"
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation {
+namespace {
+
+constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
+
+TEST(BallInACylinder, RestsAtTheBottomAndSwingsAboutIt) {
+  const double tube = 0.5, arm = tube - radius, angle = 0.05;
+  Scene scene(h / 4);
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.surface("cylinder", {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {tube}}, {"inside", {1}}});
+  scene.sphere({arm * std::sin(angle), 0, -arm * std::cos(angle)}, radius, mass);
+  Experiment run(std::move(scene));
+  // Without friction it slides as a pendulum; the first crossing of the middle takes a quarter of the period.
+  while (run.x()[0] > 0) run.step();
+  const double quarter = 0.5 * pi * std::sqrt(arm / g_earth) * (1 + angle * angle / 16);
+  EXPECT_NEAR(run.time(), quarter, 0.02 * quarter);
+  EXPECT_NEAR(std::hypot(run.x()[0], run.x()[2]), arm, 1e-3 * radius);
+}
+
+TEST(BallOnTheRimOfADisc, FeelsTheDirectionFromTheRimToItsCentre) {
+  // Pressed to the rim by gravity along the line from the centre to the rim: it stays, and the rim carries
+  // its weight.
+  const Vec3 out = Vec3(0.6, 0, 0.8), rim(0.5, 0, 0);
+  Scene scene(h);
+  scene.stage().gravity = -g_earth * out;
+  scene.surface("disc", {{"centre", {0, 0, 0}}, {"axis", {0, 0, 1}}, {"radius", {0.5}}});
+  scene.sphere(rim + radius * out, radius, mass);
+  Experiment run(std::move(scene));
+  run.steps(20);
+  EXPECT_TRUE(run.simulation().report().converged);
+  EXPECT_LT((run.wall_force(0) - mass * g_earth * out).norm(), 1e-7);
+  EXPECT_LT((run.x() - rim - radius * out).norm(), 1e-9);
+}
+
+/// A ball that rolls and slides over a floor, made of a plane or of triangles, with the velocity of every
+/// step.
+std::vector<Vec3> roll(bool of_triangles) {
+  Scene scene(h);
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.friction(0.2);
+  if (of_triangles)
+    scene.surface("mesh", {}, test::box_mesh({-1, -1, -0.1}, {1, 1, 0}, 9));
+  else
+    scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.sphere({-0.4, -0.3, radius}, radius, mass, {0.9, 0.65, 0});
+  Experiment run(std::move(scene));
+  std::vector<Vec3> velocities;
+  for (int k = 0; k < 600; ++k) {
+    run.step();
+    velocities.push_back(run.u());
+    velocities.push_back(run.w());
+  }
+  return velocities;
+}
+
+TEST(BallOnAMesh, FeelsNoEdgeBetweenTrianglesOfAPlane) {
+  const std::vector<Vec3> plane = roll(false), mesh = roll(true);
+  ASSERT_EQ(plane.size(), mesh.size());
+  double worst = 0;
+  for (std::size_t k = 0; k < plane.size(); ++k) worst = std::max(worst, (plane[k] - mesh[k]).norm());
+  EXPECT_LT(worst, 1000 * epsilon) << "of velocities of about 1 m/s, over 600 steps";
+  EXPECT_LT(std::abs(mesh.back()[2]), 1e-12);
+}
+
+TEST(BallInAMeshCorner, IsHeldByItsFacesAndNotByTheirEdge) {
+  Scene scene(h);
+  scene.stage().gravity = {-g_earth, 0, -g_earth};
+  scene.surface("mesh", {{"inside", {1}}}, test::box_mesh({0, 0, 0}, {1, 1, 1}, 5));
+  scene.sphere({radius, 0.47, radius}, radius, mass);
+  Experiment run(std::move(scene));
+  run.steps(10);
+  const Frame frame = run.simulation().frame();
+  ASSERT_EQ(frame.contact_force.size(), 2u);
+  EXPECT_LT((run.wall_force(0) - mass * g_earth * Vec3(1, 0, 1)).norm(), 1e-8);
+  EXPECT_LT((run.x() - Vec3(radius, 0.47, radius)).norm(), 1e-10);
+}
+
+}  // namespace
+}  // namespace talus::validation
