@@ -2,12 +2,12 @@
 
 namespace talus {
 
-extern const ShapeEntry rectangle_shape, disc_shape, cylinder_shape, mesh_shape;
+extern const ShapeEntry rectangle_shape, disc_shape, cylinder_shape, cone_shape, mesh_shape;
 
 namespace {
 /// A shape is picked by its row; its column is the sphere, the only shape of a body.
 constexpr const ShapeEntry* table[] = {
-    &rectangle_shape, &disc_shape, &cylinder_shape, &mesh_shape,
+    &rectangle_shape, &disc_shape, &cylinder_shape, &cone_shape, &mesh_shape,
 };
 }  // namespace
 

@@ -32,6 +32,9 @@ end = { steps = 1 }
 
 const std::string tube =
     "shape = \"cylinder\"\nstart = [0, 0, -1]\nend = [0, 0, 1]\nradius = 0.5\ninside = true";
+const std::string cone =
+    "shape = \"cone\"\nstart = [0, 0, -1]\nend = [0, 0, 1]\nstart_radius = 0\nend_radius = 0.5\ninside = "
+    "true";
 const std::string disc = "shape = \"disc\"\ncentre = [0, 0, -1]\naxis = [0, 0, 1]\nradius = 0.5";
 const std::string rectangle =
     "shape = \"rectangle\"\ncorner = [0, 0, -1]\nedge_a = [1, 0, 0]\nedge_b = [0, 2, 0]";
@@ -51,7 +54,7 @@ void expect_refused(const std::string& text, const std::string& said) {
 }
 
 TEST(WallShapes, OfASceneAreMadeAndWrittenBack) {
-  for (const std::string& wall : {tube, disc, rectangle}) {
+  for (const std::string& wall : {tube, cone, disc, rectangle}) {
     const Scene scene = parse_scene(scene_with_wall(wall), "test.toml", {});
     ASSERT_EQ(scene.setup.walls.size(), 1u);
     const Wall& read = scene.setup.walls[0];
@@ -71,8 +74,7 @@ TEST(WallShapes, PlanesHaveNone) {
 }
 
 TEST(WallShapes, KeysOfAnotherShapeAreRefused) {
-  expect_refused(scene_with_wall(disc + "\nedge_a = [1, 0, 0]"),
-                 "has a meaning only with: shape = rectangle");
+  expect_refused(scene_with_wall(disc + "\nend_radius = 1"), "has a meaning only with: shape = cone");
   expect_refused(scene_with_wall(disc + "\nnormal = [0, 0, 1]"), "has a meaning only with: shape = plane");
   expect_refused(scene_with_wall("side = \"z-\"\nradius = 1"), "shape = disc or cylinder");
   expect_refused(scene_with_wall("shape = \"disc\"\naxis = [0, 0, 1]\nradius = 1"), "wall[0].centre");
