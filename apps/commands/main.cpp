@@ -19,6 +19,7 @@
 #include "io/scene/detail/spelling.hpp"
 #include "io/scene/scene.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/mpi_communicator.hpp"
 
 #include <cstdio>
 #include <cstdlib>
@@ -311,12 +312,13 @@ int main(int argc, char** argv) {
     const graph::MpiSession session(&argc, &argv);
     double delay = 0;  // a slow network on one machine, for tests and benchmarks
     if (const char* seconds = std::getenv("TALUS_MESSAGE_DELAY")) delay = std::atof(seconds);
-    const graph::Communicator ranks(session, {.delay = delay});
-    return run_command(run, ranks);
+    const auto ranks = graph::make_communicator(session, {.delay = delay});
+    return run_command(run, *ranks);
   }
   if (*plan_app) {
     const graph::MpiSession session(&argc, &argv, plan.measure);  // what messages cost is measured with MPI
-    return plan_command(plan, graph::Communicator(session));
+    const auto ranks = plan.measure ? graph::plain_mpi(session) : graph::make_communicator(session);
+    return plan_command(plan, *ranks);
   }
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);

@@ -55,7 +55,7 @@ Cost sweep_first_step(Setup setup, const Bodies& bodies, graph::Executor& execut
 /// Time of sending and taking a message of `bytes` bytes to oneself [s].
 double message_seconds(std::size_t bytes, const graph::Communicator& ranks) {
   constexpr int turns = 200;
-  std::vector<double> out(std::max<std::size_t>(bytes / sizeof(double), 1) + 1), in(out.size());
+  std::vector<double> out(std::max<std::size_t>(bytes / sizeof(double), 1)), in(out.size());
   const auto receive = ranks.open_receive(ranks.rank(), graph::Communicator::first_tag, in),
              send = ranks.open_send(ranks.rank(), graph::Communicator::first_tag, out);
   std::vector<double> seconds;

@@ -28,6 +28,7 @@
 #include "io/scene/scene.hpp"
 #include "kernels/bodies/larger.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "runtime/trace/order.hpp"

@@ -146,13 +146,13 @@ void Gluing::plan_sides(std::size_t e) {
     side.subdomain_colour = all.subdomain_colour_of(neighbour.subdomain);
     const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
     const std::size_t length = side.slots.size() * width_;
-    side.link.out.resize(length + 1);
+    side.link.out.resize(length);
     if (rank == ranks_.rank()) {
       side.local = static_cast<std::int32_t>(
           std::lower_bound(all.here.begin(), all.here.end(), neighbour.subdomain) - all.here.begin());
       continue;
     }
-    side.link.in.resize(length + 1);
+    side.link.in.resize(length);
     side.source = detail::bytes_of(side.link.in);
     const std::int32_t count = all.partition.subdomains;
     side.link.sender =
@@ -242,7 +242,7 @@ void Gluing::count_messages() {
   }
   if (root_ && root_->up) {
     count[2] += 2;
-    count[3] += static_cast<std::int64_t>(8 * (root_->up->out.size() + root_->up->in.size() - 2));
+    count[3] += static_cast<std::int64_t>(8 * (root_->up->out.size() + root_->up->in.size()));
   }
   ranks_.sum(count);
   messages_ = {count[0], count[1], count[2], count[3]};

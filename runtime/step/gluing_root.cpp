@@ -78,8 +78,8 @@ void Gluing::plan_tree(std::uint64_t contacts) {
     const auto open = [&](int child, std::size_t out, std::size_t in) {
       const int other = child == me ? tree_.parent[at(me)] : child;
       auto link = std::make_unique<Link>();
-      link->out.resize(out + 1);
-      link->in.resize(in + 1);
+      link->out.resize(out);
+      link->in.resize(in);
       link->sender = ranks_.open_send(other, root_tag, link->out);
       link->receiver = ranks_.open_receive(other, root_tag, link->in);
       const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), child) -
@@ -147,7 +147,7 @@ void Gluing::send_up() {
   auto out = link.out.begin();
   for (const Subdomain& subdomain : subdomains_)
     out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  for (const auto& child : root_->links) out = std::copy(child->in.begin(), child->in.end() - 1, out);
+  for (const auto& child : root_->links) out = std::copy(child->in.begin(), child->in.end(), out);
   start(*link.sender, ranks_.trace(), link.out_name);
 }
 

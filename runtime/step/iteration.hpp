@@ -213,7 +213,7 @@ class Iteration {
     double error_rms = 0, error = 0;
   };
   Look looked_;
-  std::unique_ptr<graph::Communicator::PendingGather> pending_;
+  std::unique_ptr<graph::PendingGather> pending_;
   // Written at gates only, when every thread waits:
   int sweeps_from_ = 0;     ///< epoch of the first sweep of the segment
   int segment_ = 0;         ///< epoch of the next accumulate

@@ -10,6 +10,7 @@
 #include "kernels/bodies/larger.hpp"
 #include "kernels/detection/domain.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 
 namespace talus {

@@ -18,6 +18,7 @@
 
 #include "apps/shared/sample_builder.hpp"
 #include "io/scene/scene.hpp"
+#include "runtime/graph/mpi_communicator.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 
@@ -73,7 +74,8 @@ Measured measure(const Setup& setup, const Sample& sample, std::int64_t steps,
 
 int main(int argc, char** argv) {
   const graph::MpiSession session(&argc, &argv);
-  const graph::Communicator ranks(session);
+  const auto world = graph::make_communicator(session);
+  const graph::Communicator& ranks = *world;
   if (argc < 2) {
     if (ranks.rank() == 0) fmt::print(stderr, "bench_exchange SCENE.toml [STEPS] [SWEEPS]\n");
     return 2;
