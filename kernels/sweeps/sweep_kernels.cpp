@@ -7,7 +7,6 @@
 #include <string>
 
 #include "kernels/simd/contact_view.hpp"
-#include "kernels/sweeps/fetch_lines.hpp"
 
 namespace talus {
 
@@ -286,17 +285,5 @@ template ErrorSums SweepKernels::error_grains<false>(const Contacts&, ContactRan
                                                      double, Multiplicities) const;
 template ErrorSums SweepKernels::error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>,
                                                    double, const WallCopy&, double, Multiplicities) const;
-
-void SweepKernels::fetch_code(bool friction) const {
-  const auto fetch = [](auto*... kernels) {
-    constexpr std::size_t longest = 14 << 10;  // a sweep with friction (AVX-512) [byte]
-    for (const auto* begin : {reinterpret_cast<const char*>(kernels)...})
-      fetch_lines(std::span(begin, longest));
-  };
-  if (const LaneKernels* const k = lanes_[friction ? 1 : 0])
-    fetch(k->accumulate_grains, k->accumulate_wall, k->error_grains, k->error_wall, k->sweep_grains,
-          k->sweep_wall, k->momentum_grains, k->momentum_wall, k->single_wall, k->single_grains,
-          k->advance_bodies, k->advance_single);
-}
 
 }  // namespace talus

@@ -81,9 +81,6 @@ class SweepKernels {
   void advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
                std::span<SingleVelocity> last, double beta) const;
 
-  /// Brings the code of the kernels with or without friction into the caches that hold code and data.
-  void fetch_code(bool friction) const;
-
  private:
   InstructionSet set_;
   const LaneKernels* lanes_[2];  ///< without and with friction; null: the scalar kernels

@@ -306,7 +306,6 @@ void Iteration::fetch(std::size_t subdomain) const {
               contacts.rz, contacts.rn);
     }
   fetch(first, last, state_.single.velocity, state_.single.last_v);
-  kernels_.fetch_code(parameters_.friction);
   gluing_.fetch(subdomain);
 }
 
