@@ -110,10 +110,10 @@ int study_scene(const StudyErrorOptions& options) {
   }
   const io::Scene& scene = samples.front().scene;
   const std::string title = fmt::format("{}: error against run time", scene.name);
-  const std::string introduction =
-      (scene.description.empty() ? "" : scene.description + ". ") + where_and_when() +
-      " Times are medians of three where a solve takes less than " +
-      fmt::format("{:g} s. The tables are beside this page; plot.gp draws them.", cheap_solve);
+  const std::string introduction = (scene.description.empty() ? "" : scene.description + ". ") +
+                                   where_and_when() +
+                                   " Times are medians of three where a solve takes less than " +
+                                   fmt::format("{:g} s. The tables are beside this page.", cheap_solve);
   say(fmt::format("{}: {} grains, {} ways to solve", scene.name, samples.front().bodies.size(),
                   plan.variants.size()));
   ProblemStudy problem;
@@ -161,7 +161,7 @@ int study_folder(const StudyErrorOptions& options) {
   const std::string introduction =
       where_and_when() + fmt::format(
                              " A solve may take {:g} s; times are medians of three where it takes less than "
-                             "{:g} s. The tables are beside this page; plot.gp draws them.",
+                             "{:g} s. The tables are beside this page.",
                              options.max_seconds, cheap_solve);
   std::vector<ProfileRow> rows;
   const auto keep = [&] {
