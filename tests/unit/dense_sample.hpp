@@ -23,6 +23,10 @@ namespace talus::test {
 
 using Random = std::mt19937_64;
 
+/// Why tests that compare instruction sets are skipped.
+inline constexpr const char* no_other_instruction_set =
+    "this processor has neither AVX2 nor AVX-512: there is nothing to compare the portable kernels with";
+
 /// What this processor runs, the scalar kernels first.
 inline std::vector<InstructionSet> sets_to_test() {
   std::vector<InstructionSet> sets;

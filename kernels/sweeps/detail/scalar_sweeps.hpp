@@ -94,7 +94,7 @@ inline void add_to(N* p, N s, V3<N> a) {
 /// `Arrays` are Contacts or SingleContacts.
 template <class Arrays>
 inline auto normal_of(const Arrays& c, std::size_t k) {
-  return V3{c.nx[k], c.ny[k], c.nz[k]};
+  return V3<std::remove_cvref_t<decltype(c.nx[k])>>{c.nx[k], c.ny[k], c.nz[k]};
 }
 
 template <bool Friction>

@@ -77,6 +77,7 @@ Sample fresh_sample(bool friction, int target, std::uint64_t seed) {
 
 // Chunks from one pair to many groups, and every length behind the last full vector.
 TEST(NarrowPhase, FindsTheSameBitsOnEveryInstructionSet) {
+  if (best_instruction_set() == InstructionSet::portable) GTEST_SKIP() << test::no_other_instruction_set;
   for (int target : {1, 5, 7, 16, 37, 100, 384})
     for (const bool friction : {false, true}) {
       SCOPED_TRACE(testing::Message() << "chunks of " << target);
@@ -90,6 +91,7 @@ TEST(NarrowPhase, FindsTheSameBitsOnEveryInstructionSet) {
 }
 
 TEST(NarrowPhase, FindsTheSameBitsOfPairsThatPassCoincideOrAreNoNumbers) {
+  if (best_instruction_set() == InstructionSet::portable) GTEST_SKIP() << test::no_other_instruction_set;
   Sample sample = fresh_sample(true, 50, 5);
   for (std::size_t s = 0; s < sample.bodies.size(); s += 7)
     for (double& u : sample.bodies.velocity[s].u) u *= 2000;

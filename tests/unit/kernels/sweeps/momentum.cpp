@@ -110,6 +110,7 @@ TEST(Momentum, TakesARefreshForNoMotion) {
 }
 
 TEST(Momentum, OfBodiesIsTheSameToTheBitOnEveryInstructionSet) {
+  if (best_instruction_set() == InstructionSet::portable) GTEST_SKIP() << test::no_other_instruction_set;
   for (const InstructionSet set : {InstructionSet::avx2, InstructionSet::avx512}) {
     if (set > best_instruction_set()) continue;
     std::vector<Velocity> velocity[2], last[2];
