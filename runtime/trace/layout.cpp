@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <set>
 
 #include "runtime/graph/epoch_graph.hpp"
 #include "runtime/graph/loop_colours.hpp"
@@ -20,6 +19,29 @@ constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
 std::uint32_t scaled_bytes(std::uint32_t bytes, double factor) {
   return static_cast<std::uint32_t>(std::min(4e9, std::round(factor * bytes)));
+}
+
+/// The plan of each rank of `out` as the program would have made it, without its messages.
+void describe_plans(const std::vector<const Plan*>& plans, int threads, LoopLayout& out) {
+  out.plans.resize(out.rank_begin.size() - 1);
+  for (std::size_t r = 0; r < out.plans.size(); ++r) {
+    Plan& plan = out.plans[r];
+    plan.rank = static_cast<std::int32_t>(r);
+    plan.offset.push_back(0);
+    for (std::uint32_t n = out.rank_begin[r]; n < out.rank_begin[r + 1]; ++n) {
+      const SimNode& node = out.nodes[n];
+      plan.colour.push_back(node.colour);
+      plan.group.push_back(node.group);
+      plan.role.push_back(static_cast<std::uint8_t>(node.role));
+      const Plan* source =
+          node.source_rank >= 0 ? plans[static_cast<std::size_t>(node.source_rank)] : nullptr;
+      plan.weight.push_back(source ? source->weight[node.source_node] : 0);
+      plan.place.push_back(source ? source->place[node.source_node] : 0);
+      plan.owner.push_back(node.worker % static_cast<std::uint32_t>(threads));
+      for (std::uint32_t other : out.neighbours(n)) plan.neighbour.push_back(other - out.rank_begin[r]);
+      plan.offset.push_back(static_cast<std::uint32_t>(plan.neighbour.size()));
+    }
+  }
 }
 
 /// Builds a LoopLayout; the steps of build() say what comes after what.
@@ -37,7 +59,8 @@ class Builder {
     connect();
     route_messages();
     sort_walks();
-    describe_plans();
+    describe_plans(plans_, machine_.threads, out_);
+    add_messages();
     return std::move(out_);
   }
 
@@ -381,26 +404,8 @@ class Builder {
     std::partial_sum(out_.walk_begin.begin(), out_.walk_begin.end(), out_.walk_begin.begin());
   }
 
-  void describe_plans() {
-    out_.plans.resize(static_cast<std::size_t>(machine_.ranks));
-    for (std::size_t r = 0; r < out_.plans.size(); ++r) {
-      Plan& plan = out_.plans[r];
-      plan.rank = static_cast<std::int32_t>(r);
-      plan.offset.push_back(0);
-      for (std::uint32_t n = out_.rank_begin[r]; n < out_.rank_begin[r + 1]; ++n) {
-        const SimNode& node = out_.nodes[n];
-        plan.colour.push_back(node.colour);
-        plan.group.push_back(node.group);
-        plan.role.push_back(static_cast<std::uint8_t>(node.role));
-        const Plan* source =
-            node.source_rank >= 0 ? plans_[static_cast<std::size_t>(node.source_rank)] : nullptr;
-        plan.weight.push_back(source ? source->weight[node.source_node] : 0);
-        plan.place.push_back(source ? source->place[node.source_node] : 0);
-        plan.owner.push_back(node.worker % static_cast<std::uint32_t>(machine_.threads));
-        for (std::uint32_t other : out_.neighbours(n)) plan.neighbour.push_back(other - out_.rank_begin[r]);
-        plan.offset.push_back(static_cast<std::uint32_t>(plan.neighbour.size()));
-      }
-    }
+  /// Those of the recording, at the rank that has their subdomain.
+  void add_messages() {
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {
         const std::uint16_t group = m.from == root_group ? m.to : m.from;
@@ -426,82 +431,9 @@ class Builder {
 
 }  // namespace
 
-std::vector<std::uint32_t> groups_of(const Trace& trace) {
-  std::set<std::uint32_t> groups;
-  for (const Plan& plan : trace.plans)
-    for (std::uint32_t group : plan.group)
-      if (group != root_group) groups.insert(group);
-  for (const auto& tasks : trace.tasks)
-    for (const Task& task : tasks)
-      if (task.group >= 0) groups.insert(static_cast<std::uint32_t>(task.group));
-  return {groups.begin(), groups.end()};
-}
-
-std::vector<std::uint32_t> map_groups(const std::vector<std::uint64_t>& weight, const Machine& machine) {
-  const std::size_t groups = weight.size();
-  const auto ranks = static_cast<std::size_t>(machine.ranks);
-  std::vector<std::uint32_t> rank_of(groups);
-  if (machine.map == RankMap::weight) {
-    const std::uint64_t most = std::max<std::uint64_t>(1, *std::max_element(weight.begin(), weight.end()));
-    std::vector<std::uint32_t> small;
-    for (std::uint64_t w : weight) small.push_back(static_cast<std::uint32_t>(1 + w * 1000000 / most));
-    graph::assign_owners(small, machine.ranks, rank_of);
-    // No rank may be left without: the last groups move up.
-    for (std::size_t g = groups; g-- > 0;) {
-      const auto at_most = static_cast<std::uint32_t>(std::min(ranks - 1, g));
-      const auto at_least = static_cast<std::uint32_t>(ranks - std::min(ranks, groups - g));
-      rank_of[g] = std::clamp(rank_of[g], std::min(at_least, at_most), at_most);
-    }
-    for (std::size_t g = 1; g < groups; ++g) rank_of[g] = std::min(rank_of[g], rank_of[g - 1] + 1);
-    return rank_of;
-  }
-  for (std::size_t g = 0; g < groups; ++g)
-    rank_of[g] = static_cast<std::uint32_t>(machine.map == RankMap::cyclic ? g % ranks : g * ranks / groups);
-  return rank_of;
-}
-
 LoopLayout lay_out(const std::vector<const Plan*>& plans, const std::vector<std::uint32_t>& groups,
                    const std::vector<std::uint32_t>& rank_of, const Machine& machine) {
   return Builder(plans, groups, rank_of, machine).build();
-}
-
-std::vector<std::vector<SimTask>> lay_out_tasks(const Trace& trace, const std::vector<std::uint32_t>& groups,
-                                                const std::vector<std::uint32_t>& rank_of, int ranks) {
-  std::vector<std::vector<SimTask>> all(static_cast<std::size_t>(ranks));
-  for (std::uint32_t r = 0; r < all.size(); ++r) {
-    std::set<std::int32_t> mine;
-    for (std::size_t g = 0; g < groups.size(); ++g)
-      if (rank_of[g] == r) mine.insert(static_cast<std::int32_t>(groups[g]));
-    std::vector<SimTask>& tasks = all[r];
-    std::map<std::pair<std::size_t, std::uint32_t>, std::uint32_t> place;  // recorded (rank, task) -> task
-    // All recorded ranks have the same kinds in the same order, each with its own subdomains' tracks.
-    std::vector<std::size_t> next(trace.tasks.size(), 0);
-    while (next[0] < trace.tasks[0].size()) {
-      const Kind kind = trace.tasks[0][next[0]].kind;
-      for (std::size_t s = 0; s < trace.tasks.size(); ++s)
-        for (const auto& recorded = trace.tasks[s];
-             next[s] < recorded.size() && recorded[next[s]].kind == kind; ++next[s]) {
-          const Task& task = recorded[next[s]];
-          if (task.group >= 0 && !mine.count(task.group)) continue;
-          const bool merged = task.group < 0 && !tasks.empty() && tasks.back().task.kind == kind &&
-                              tasks.back().task.group < 0;
-          if (!merged) {
-            tasks.push_back({{task.name, kind, task.group, task.team, {}}, {}});
-          }
-          tasks.back().sources.push_back({static_cast<std::int32_t>(s), static_cast<std::uint32_t>(next[s])});
-          place[{s, static_cast<std::uint32_t>(next[s])}] = static_cast<std::uint32_t>(tasks.size() - 1);
-        }
-    }
-    for (SimTask& task : tasks) {
-      std::set<std::uint32_t> before;
-      for (const SimTask::Source& source : task.sources)
-        for (std::uint32_t p : trace.tasks[static_cast<std::size_t>(source.rank)][source.task].predecessors)
-          if (const auto found = place.find({static_cast<std::size_t>(source.rank), p}); found != place.end())
-            before.insert(found->second);
-      task.task.predecessors.assign(before.begin(), before.end());
-    }
-  }
-  return all;
 }
 
 }  // namespace talus::trace
