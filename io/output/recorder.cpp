@@ -4,7 +4,6 @@
 
 #include "io/output/sinks.hpp"
 #include "io/results/results.hpp"
-#include "runtime/graph/one_rank.hpp"
 
 namespace talus::io {
 namespace {
