@@ -229,7 +229,7 @@ void StepGraph::narrow_share(std::uint32_t share) {
                        settings_.overlap_correction};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c)
-    narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels(), state_.contacts);
+    narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels().set(), state_.contacts);
 }
 
 }  // namespace talus

@@ -347,8 +347,8 @@ Section<SolverSettings> solver_keys() {
               &SolverSettings::precision),
           choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
                                  "Instructions of the sweeps; `auto`: the widest that the processors of all "
-                                 "ranks have. AVX2 and AVX-512 give the same bits, the portable sweeps round "
-                                 "otherwise.",
+                                 "ranks have. All give the same bits; `portable` is slow where the processor "
+                                 "has no fused product.",
                                  &SolverSettings::simd),
       }};
 }
