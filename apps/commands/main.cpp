@@ -1,6 +1,7 @@
 #include <hdf5.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 
@@ -18,6 +19,7 @@
 #include "io/results/version.hpp"
 #include "io/scene/detail/spelling.hpp"
 #include "io/scene/scene.hpp"
+#include "partition/partitioners.hpp"
 #include "runtime/graph/clock.hpp"
 
 #include <cstdio>
@@ -197,8 +199,9 @@ int main(int argc, char** argv) {
       ->required()
       ->check(CLI::Range(1, most_subdomains));
   partition_app
-      ->add_option("--partitioner", partition.partitioners,
-                   "boxes, fitted, rcb, metis or auto, may be repeated [all but auto]")
+      ->add_option(
+          "--partitioner", partition.partitioners,
+          fmt::format("{}, may be repeated [all but auto]", fmt::join(partitioner_registry().names(), ", ")))
       ->type_name("NAME")
       ->allow_extra_args(false);
   partition_app->add_option("--out", partition.out, "directory of the files [out/partition-NAME]")

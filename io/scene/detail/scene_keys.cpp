@@ -3,6 +3,9 @@
 #include <cctype>
 #include <cmath>
 
+#include "io/scene/detail/spelling.hpp"
+#include "partition/partitioners.hpp"
+
 namespace talus::io::detail {
 
 namespace {
@@ -353,6 +356,16 @@ Section<SolverSettings> solver_keys() {
       }};
 }
 
+/// "auto, boxes or fitted": the partitioners that cut boxes.
+std::string box_cutters() {
+  std::vector<std::string> names;
+  for (const auto& partitioner : partitioner_registry())
+    if (partitioner.make->takes_boxes) names.emplace_back(partitioner.name);
+  const std::string last = names.back();
+  names.pop_back();
+  return listed(names) + " or " + last;
+}
+
 Section<DecompositionSettings> decomposition_keys() {
   using D = DecompositionSettings;
   const auto schwarz = [](const D& d) { return d.coupling == Coupling::schwarz; };
@@ -365,15 +378,11 @@ Section<DecompositionSettings> decomposition_keys() {
                  "Number of subdomains, at least one per rank.", &D::subdomains)
               .blank_when_zero()
               .or_else("product of `boxes`, else one per rank"),
-          choice<D>(
-              "partitioner", {"auto", "boxes", "fitted", "rcb", "metis"},
-              "`boxes`: equal boxes; `fitted`: boxes of equal work; `rcb`: recursive bisection; `metis`: "
-              "a graph of cells; `auto`: boxes where they are balanced or given, else rcb.",
-              &D::partitioner),
+          choice<D>("partitioner", partitioner_registry(), &D::partitioner),
           key<D>("boxes", "", countable,
                  "Boxes along x, y and z; their product is `subdomains`, which need not be given.", &D::boxes)
               .blank_when_zero()
-              .only("partitioner = auto, boxes or fitted", in_boxes),
+              .only("partitioner = " + box_cutters(), in_boxes),
           choice<D>(
               "coupling", {"nscdd", "alternating", "schwarz"},
               "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <set>
 
-#include "partition/partitioner.hpp"
+#include "partition/partitioners.hpp"
 #include "tests/unit/dense_sample.hpp"
 #include "tests/unit/pretend_ranks.hpp"
 
@@ -17,8 +17,12 @@ using test::Random;
 using test::uniform;
 using test::uniform_vector;
 
-constexpr std::array<PartitionKind, 5> kinds{PartitionKind::automatic, PartitionKind::boxes,
-                                             PartitionKind::fitted, PartitionKind::rcb, PartitionKind::metis};
+/// Every way there is: a new one has to pass what all pass.
+const std::vector<PartitionKind> kinds = [] {
+  std::vector<PartitionKind> all;
+  for (const auto& partitioner : partitioner_registry()) all.push_back(partitioner.kind);
+  return all;
+}();
 
 PartitionPoints random_points(std::size_t n, std::uint64_t seed, bool weights = false) {
   Random random(seed);
