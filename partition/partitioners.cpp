@@ -15,6 +15,7 @@ constexpr PartitionerRegistry::Item partitioners[] = {
     named<PartitionKind>("fitted", "boxes of equal work", &fitted_partitioner),
     named<PartitionKind>("rcb", "recursive bisection at weighted medians", &rcb_partitioner),
     named<PartitionKind>("metis", "a graph of cells, cut by METIS", &metis_partitioner),
+    named<PartitionKind>("hilbert", "stretches of equal work of a Hilbert curve", &hilbert_partitioner),
 };
 
 std::int64_t heaviest(const PartitionPoints& points, const Reduction& reduction) {

@@ -32,6 +32,7 @@ extern const Partitioner boxes_partitioner;
 extern const Partitioner fitted_partitioner;
 extern const Partitioner rcb_partitioner;
 extern const Partitioner metis_partitioner;
+extern const Partitioner hilbert_partitioner;
 
 using PartitionerRegistry = Registry<PartitionKind, const Partitioner*>;
 const PartitionerRegistry& partitioner_registry();
