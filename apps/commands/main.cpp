@@ -1,6 +1,7 @@
 #include <hdf5.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 
@@ -19,6 +20,7 @@
 #include "io/scene/detail/spelling.hpp"
 #include "io/scene/scene.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/step/methods/method.hpp"
 
 #include <cstdio>
 #include <cstdlib>
@@ -31,6 +33,12 @@ void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "threads [one per core]")
       ->type_name("N")
       ->check(talus::thread_count());
+}
+
+std::map<std::string, talus::SolverMethod> methods_by_name() {
+  std::map<std::string, talus::SolverMethod> known;
+  for (const auto& method : talus::methods()) known.emplace(method.name, method.kind);
+  return known;
 }
 
 /// The commands of `app` as far as they were recognised, "talus study error", and the last of them.
@@ -278,13 +286,8 @@ int main(int argc, char** argv) {
       ->type_name("NAME")
       ->allow_extra_args(false);
   stability_app->add_option("--method", stability.settings.method, "solver.method of every scene")
-      ->type_name("auto|nlgs|nlgs+momentum|nncg|admm")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, SolverMethod>{{"auto", SolverMethod::automatic},
-                                              {"nlgs", SolverMethod::nlgs},
-                                              {"nlgs+momentum", SolverMethod::momentum},
-                                              {"nncg", SolverMethod::nncg},
-                                              {"admm", SolverMethod::admm}}));
+      ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")))
+      ->transform(CLI::CheckedTransformer(methods_by_name()));
   stability_app
       ->add_option("--tolerance", stability.settings.tolerance,
                    "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")

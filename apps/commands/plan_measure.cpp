@@ -41,7 +41,7 @@ Cost sweep_first_step(Setup setup, const Bodies& bodies, graph::Executor& execut
   const StepReport& report = simulation.step();
   Cost cost;
   cost.contacts = static_cast<double>(std::max<std::int64_t>(report.contacts, 1));
-  const std::vector<Iteration::Check>& checks = simulation.error_history();
+  const std::vector<ErrorCheck>& checks = simulation.error_history();
   double fastest = checks.size() > 1 ? std::numeric_limits<double>::infinity() : 0;
   for (std::size_t k = 1; k < checks.size(); ++k)
     fastest = std::min(fastest, (checks[k].seconds - checks[k - 1].seconds) /

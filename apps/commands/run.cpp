@@ -186,7 +186,8 @@ void print_start(const io::Scene& scene, std::size_t grains, int threads, const 
   if (scene.setup.decomposition.subdomains > 1 || ranks.ranks() > 1)
     fmt::print(stderr, "talus: {} by {}, {}, {}\n",
                count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
-               name_of(scene.setup.decomposition.partitioner), name_of(scene.setup.decomposition.coupling),
+               name_of(scene.setup.decomposition.partitioner),
+               couplings().of(scene.setup.decomposition.coupling).name,
                scene.setup.decomposition.exchange == ExchangeScheme::dcs ? "DCS" : "CCS");
   // Ranks that are bound have cores of their own; unbound ones share those of the machine.
   const bool bound = cores < io::collect_provenance().cores_online;

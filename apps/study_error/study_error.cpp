@@ -22,6 +22,7 @@
 #include "io/files/output_directory.hpp"
 #include "io/results/run_json.hpp"
 #include "io/results/version.hpp"
+#include "runtime/step/methods/method.hpp"
 
 namespace talus {
 
@@ -60,8 +61,8 @@ StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   plan.steps = options.steps;
   plan.max_sweeps = options.max_sweeps;
   plan.max_seconds = options.max_seconds;
-  const std::vector<std::string> methods = or_else(options.methods, io::solver_methods());
-  for (const std::string& method : methods) io::solver_method(method);  // refuses unknown names
+  const std::vector<std::string> methods = or_else(options.methods, talus::methods().names());
+  for (const std::string& method : methods) talus::methods().named(method);  // refuses unknown names
   for (const std::uint64_t seed : or_else(options.seeds, {scene_seed}))
     for (const std::string& method : methods)
       for (const int subdomains : or_else(options.subdomains, {1}))

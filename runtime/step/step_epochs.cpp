@@ -35,10 +35,10 @@ void StepGraph::plan_iteration() {
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
   if (!planned_) {
     const double planning = graph::seconds_now();
-    iteration_.plan_tree();
+    loop_.plan_tree();
     if (state_.decomposition.several()) sums_.times.dealing += graph::seconds_now() - planning;
   }
-  iteration_.begin();
+  loop_.begin();
   if (!planned_) plan_epochs();
   followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));
   iterating_ = graph::seconds_now();
@@ -47,10 +47,10 @@ void StepGraph::plan_iteration() {
 /// Chunks as they conflict; and, where copies are glued, tell[e] behind the chunks of e at glued walls,
 /// publish[e] behind those at its border, too, the root and, where the tree has one, collect behind tells,
 /// glue[e] last; of those e whose subdomain colour is not the first take[e] before the border
-/// (iteration.hpp).
+/// (solver_loop.hpp).
 void StepGraph::plan_epochs() {
   const Chunks& chunks = state_.chunks;
-  const Gluing& gluing = iteration_.gluing();
+  const Gluing& gluing = loop_.gluing();
   const std::size_t count = chunks.size(), here = state_.decomposition.here.size();
   const std::size_t of_rank = gluing.tasks_of_rank(), followers = gluing.followers().size(),
                     nodes = count +

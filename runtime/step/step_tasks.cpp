@@ -32,9 +32,9 @@ bool StepGraph::partition_due() const {
 bool StepGraph::out_of_balance() const {
   constexpr std::int64_t few = 16;
   if (!state_.decomposition.several()) return false;
-  const std::int64_t contacts = iteration_.result().contacts;
+  const std::int64_t contacts = loop_.result().contacts;
   if (state_.decomposition.blind && contacts > 0) return true;
-  const double imbalance = iteration_.imbalance();
+  const double imbalance = loop_.imbalance();
   return contacts > few * state_.decomposition.partition.subdomains &&
          imbalance > decomposition_.max_imbalance && imbalance > 1.25 * imbalance_then_;
 }

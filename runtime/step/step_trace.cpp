@@ -71,13 +71,13 @@ trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
     using enum trace::Role;
     // In the order of Gluing::Task.
     constexpr trace::Role roles[] = {publish, root, root, glue, take, tell};
-    const auto [task, e] = iteration_.gluing().node(node - count);
+    const auto [task, e] = loop_.gluing().node(node - count);
     plan.role.push_back(static_cast<std::uint8_t>(roles[static_cast<std::size_t>(task)]));
     plan.group.push_back(e ? static_cast<std::uint32_t>(here[*e]) : trace::root_group);
-    plan.place.push_back(e ? static_cast<std::uint32_t>(iteration_.gluing().subdomain_colour(*e)) : 0);
+    plan.place.push_back(e ? static_cast<std::uint32_t>(loop_.gluing().subdomain_colour(*e)) : 0);
     plan.weight.push_back(0);
   }
-  plan.messages = iteration_.gluing().message_plan();
+  plan.messages = loop_.gluing().message_plan();
   return plan;
 }
 
@@ -101,11 +101,11 @@ void StepGraph::iterate(graph::Worker& worker) {
     graph::run_epochs(epochs_, worker, traced);
   };
   if (const trace::TaskTimes* const times = executor_.times(); times && times->active()) {
-    trace::Timed timed(iteration_, *times);
+    trace::Timed timed(loop_, *times);
     return run(timed);
   }
-  if (!followed_) return run(iteration_);
-  trace::Ordered ordered(iteration_, *order_, worker);
+  if (!followed_) return run(loop_);
+  trace::Ordered ordered(loop_, *order_, worker);
   run(ordered);
 }
 

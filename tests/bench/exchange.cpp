@@ -118,8 +118,8 @@ int main(int argc, char** argv) {
         const bool in_paper = !(central && coupling == Coupling::schwarz);
         say(fmt::format(
             "| {} | {} | {} | {} | {:.1f} | {} | {:.1f} | {:.1f} % | {} | {:.2f} % | {:.2f} % | {} | {} |\n",
-            setup.decomposition.subdomains, name_of(coupling), central ? "CCS" : "DCS", m.messages.messages,
-            static_cast<double>(m.messages.bytes) / 1e3, m.messages.between_ranks,
+            setup.decomposition.subdomains, couplings().of(coupling).name, central ? "CCS" : "DCS",
+            m.messages.messages, static_cast<double>(m.messages.bytes) / 1e3, m.messages.between_ranks,
             static_cast<double>(m.messages.bytes_between_ranks) / 1e3, 100 * m.waited,
             in_paper ? fmt::format("{:g} %", central ? row.paper_ccs : row.paper_dcs) : "", 100 * m.dealing,
             100 * m.detection, m.broad_phases, m.migrants));

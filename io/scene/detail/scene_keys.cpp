@@ -3,6 +3,8 @@
 #include <cctype>
 #include <cmath>
 
+#include "runtime/step/methods/method.hpp"
+
 namespace talus::io::detail {
 
 namespace {
@@ -314,12 +316,7 @@ Section<SolverSettings> solver_keys() {
       "[solver]",
       "When a step counts as solved, and how hard to try.",
       {
-          choice<SolverSettings>(
-              "method", {"auto", "nlgs", "nlgs+momentum", "nncg", "admm"},
-              "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
-              "ended; `nncg`: nonsmooth conjugate gradients; `admm`: for long chains and heavy bodies, "
-              "then sweeps; `auto`: momentum, and admm where sweeps leave forces out of balance.",
-              &SolverSettings::method),
+          choice<SolverSettings>("method", methods(), &SolverSettings::method),
           key<SolverSettings>("tolerance", "", positive,
                               "Bound on the relative error of the contact law (error_rms).",
                               &SolverSettings::tolerance),
@@ -374,14 +371,7 @@ Section<DecompositionSettings> decomposition_keys() {
                  "Boxes along x, y and z; their product is `subdomains`, which need not be given.", &D::boxes)
               .blank_when_zero()
               .only("partitioner = auto, boxes or fitted", in_boxes),
-          choice<D>(
-              "coupling", {"nscdd", "alternating", "schwarz"},
-              "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "
-              "turns: half "
-              "of the subdomains sweep their borders when they know what the others did, and it takes "
-              "as many sweeps as with one subdomain; `schwarz`: copies have the whole mass and exchange what "
-              "they gain.",
-              &D::coupling),
+          choice<D>("coupling", couplings(), &D::coupling),
           choice<D>("exchange", {"dcs", "ccs"},
                     "`dcs`: between the subdomains that share a body; `ccs`: through one rank.",
                     &D::exchange),
