@@ -16,7 +16,9 @@ using detail::start;
 
 void Gluing::plan_tree(std::uint64_t contacts) {
   const Decomposition& all = state_.decomposition;
-  graph::RankLoad load{contacts, !followers_.empty()};
+  graph::RankLoad load{contacts, false};
+  for (std::size_t e = 0; e < subdomains_.size(); ++e)
+    load.waits = load.waits || (needed_ && subdomain_colour(e) > 0);
   for (const Subdomain& subdomain : subdomains_)
     load.work += graph::load_of_neighbour * subdomain.sides.size();
   tree_ = graph::grow_tree(ranks_.gather_records(std::span<const graph::RankLoad>(&load, 1)));
@@ -125,19 +127,8 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   }
 }
 
-std::size_t Gluing::tasks_of_rank() const {
-  return root_ && root_->up && !root_->links.empty() ? 2 : 1;
-}
-
-Gluing::Node Gluing::node(std::size_t number) const {
-  const std::size_t here = subdomains_.size(), of_rank = tasks_of_rank();
-  if (number < here) return {Task::publish, number};
-  if (number < here + of_rank - 1) return {Task::collect, std::nullopt};
-  if (number < here + of_rank) return {Task::root, std::nullopt};
-  if (number < 2 * here + of_rank) return {Task::glue, number - here - of_rank};
-  const std::size_t rest = number - 2 * here - of_rank;
-  if (rest < followers_.size()) return {Task::take, followers_[rest]};
-  return {Task::tell, tellers_[rest - followers_.size()]};
+bool Gluing::collects() const {
+  return root_ && root_->up && !root_->links.empty();
 }
 
 /// The parts of this rank's subdomains, then the messages of its children as they came.

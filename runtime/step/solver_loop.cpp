@@ -9,6 +9,7 @@
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/check_spacing.hpp"
 #include "runtime/step/check_sums.hpp"
+#include "runtime/step/loop_nodes.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -26,6 +27,39 @@ struct SinglePrecisionUse {
   double least_candidates = 1000;
 };
 constexpr SinglePrecisionUse single_use;
+
+TaskKind kind_of_work(Work work) {
+  switch (work) {
+    case Work::accumulate:
+      return TaskKind::accumulate;
+    case Work::measure:
+      return TaskKind::measure;
+    case Work::restore:
+      return TaskKind::restore;
+    case Work::sweep:
+      break;
+  }
+  return TaskKind::sweep;
+}
+
+/// Of what is no work of a chunk.
+TaskKind kind_of_role(graph::LoopRole role) {
+  switch (role) {
+    case graph::LoopRole::publish:
+      return TaskKind::publish;
+    case graph::LoopRole::glue:
+      return TaskKind::glue;
+    case graph::LoopRole::take:
+      return TaskKind::take;
+    case graph::LoopRole::tell:
+      return TaskKind::tell;
+    case graph::LoopRole::work:
+    case graph::LoopRole::collect:
+    case graph::LoopRole::root:
+      break;
+  }
+  return TaskKind::root;
+}
 
 /// A step as its method sees it.
 class StepView final : public MethodView {
@@ -88,6 +122,11 @@ void SolverLoop::plan_tree() {
   for (std::size_t c = 0; c < state_.chunks.size(); ++c)
     contacts += 1 + static_cast<std::uint64_t>(state_.contacts.count[c]);
   gluing_.plan_tree(contacts);
+}
+
+const graph::LoopPlan& SolverLoop::plan_nodes(int threads) {
+  plan_ = graph::plan_loop(loop_spec(state_, gluing_, decomposition_, ranks_, threads), gluing_.tree());
+  return plan_;
 }
 
 /// Each chunk at a wall that has contacts holds a copy of it. Collective.
@@ -155,8 +194,8 @@ Gluing::Mode SolverLoop::gluing_mode(int epoch) const {
 }
 
 void SolverLoop::node(std::uint32_t node, int epoch) {
-  const std::size_t chunks = state_.chunks.size();
-  if (node < chunks) {
+  const auto [role, e] = plan_.nodes[node];
+  if (role == graph::LoopRole::work) {
     work_.run(node, epoch);
     // Long messages advance only while somebody calls MPI.
     if (ranks_.ranks() > 1 && node % 4 == 0 && ranks_.any_thread()) ranks_.progress();
@@ -165,20 +204,21 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
   if (schedule_.work(epoch) == Work::measure) return;
   const Gluing::Mode mode = gluing_mode(epoch);
   const bool single = work_.single(epoch);
-  const auto [task, subdomain] = gluing_.node(node - chunks);
-  switch (task) {
-    case Gluing::Task::publish:
-      return gluing_.publish(*subdomain, mode, single);
-    case Gluing::Task::collect:
+  switch (role) {
+    case graph::LoopRole::work:
+      return;
+    case graph::LoopRole::publish:
+      return gluing_.publish(e, mode, single);
+    case graph::LoopRole::collect:
       return gluing_.collect(mode);
-    case Gluing::Task::root:
+    case graph::LoopRole::root:
       return gluing_.root(mode);
-    case Gluing::Task::glue:
-      return gluing_.glue(*subdomain, mode, single);
-    case Gluing::Task::take:
-      return take(*subdomain, epoch);
-    case Gluing::Task::tell:
-      return gluing_.tell(*subdomain, mode);
+    case graph::LoopRole::glue:
+      return gluing_.glue(e, mode, single);
+    case graph::LoopRole::take:
+      return take(e, epoch);
+    case graph::LoopRole::tell:
+      return gluing_.tell(e, mode);
   }
 }
 
@@ -193,31 +233,15 @@ void SolverLoop::take(std::size_t e, int epoch) {
 
 std::optional<trace::Kind> SolverLoop::kind(std::uint32_t node, int epoch) const {
   const Work now = schedule_.work(epoch);
-  const std::size_t chunks = state_.chunks.size();
-  if (node >= chunks) {
-    if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
-    // In the order of Gluing::Task.
-    constexpr TaskKind kinds[] = {TaskKind::publish, TaskKind::root, TaskKind::root,
-                                  TaskKind::glue,    TaskKind::take, TaskKind::tell};
-    return kind_of(kinds[static_cast<std::size_t>(gluing_.node(node - chunks).task)]);
-  }
-  switch (now) {
-    case Work::accumulate:
-      return kind_of(TaskKind::accumulate);
-    case Work::measure:
-      return kind_of(TaskKind::measure);
-    case Work::restore:
-      return kind_of(TaskKind::restore);
-    case Work::sweep:
-      break;
-  }
-  return kind_of(TaskKind::sweep);
+  const graph::LoopRole role = plan_.nodes[node].role;
+  if (role == graph::LoopRole::work) return kind_of(kind_of_work(now));
+  if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
+  return kind_of(kind_of_role(role));
 }
 
 std::optional<std::size_t> SolverLoop::subdomain_of(std::uint32_t node) const {
-  const std::size_t chunks = state_.chunks.size();
-  if (node < chunks) return static_cast<std::size_t>(state_.chunks.subdomain[node]);
-  return gluing_.node(node - chunks).subdomain;
+  const std::uint32_t group = plan_.nodes[node].group;
+  return group == graph::LoopPlan::none ? std::nullopt : std::optional<std::size_t>(group);
 }
 
 void SolverLoop::fetch(std::size_t subdomain) const {

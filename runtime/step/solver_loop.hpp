@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/sweeps/sweep_kernels.hpp"
+#include "runtime/graph/loop_plan.hpp"
 #include "runtime/step/admm.hpp"
 #include "runtime/step/certificate.hpp"
 #include "runtime/step/chunk_work.hpp"
@@ -33,10 +34,10 @@ InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
 /// gate behind that sweep, so that results are the bits of one rank, where nothing has to be waited for.
 /// Where ADMM is called, it is by the gate's threads of all ranks, on the impulses that were certified.
 ///
-/// Nodes 0..k-1 are the chunks; where something is to be glued (gluing.hpp), publish of every subdomain, the
-/// root, and glue of every subdomain follow, take of every one whose subdomain colour is not the first, and
-/// tell. The order in a subdomain is chunks at glued walls, tell, those at the border, publish, those inside,
-/// which hide the messages; in a later subdomain colour the inside comes before take, the border and publish.
+/// The nodes are those of a graph::LoopPlan whose work is the chunks and whose groups are the subdomains
+/// here; where nothing is glued (gluing.hpp) there are chunks only. The order in a subdomain is chunks at
+/// glued walls, tell, those at the border, publish, those inside, which hide the messages; in a later
+/// subdomain colour the inside comes before take, the border and publish.
 class SolverLoop {
  public:
   /// References are kept. `state.contacts` holds the narrow phase's contacts.
@@ -71,6 +72,8 @@ class SolverLoop {
   void plan();
   /// Collective, behind plan() and the first narrow phase, before begin().
   void plan_tree();
+  /// Behind plan_tree(): the nodes, on so many threads.
+  const graph::LoopPlan& plan_nodes(int threads);
 
   const Gluing& gluing() const { return gluing_; }
   const SweepKernels& kernels() const { return kernels_; }
@@ -114,6 +117,7 @@ class SolverLoop {
   ChunkWork work_;
   Certificate certificate_;
   PresentProblem problem_;
+  graph::LoopPlan plan_;
   std::unique_ptr<Method> method_;  ///< of the step
   std::unique_ptr<graph::Communicator::PendingGather> pending_;
   double imbalance_ = 0;

@@ -78,11 +78,10 @@ class StepGraph {
   void renew_slots();
   void narrow_share(std::uint32_t share);
   void plan_iteration();
-  void plan_epochs();
   void iterate(graph::Worker& worker);
   std::vector<trace::Task> declared_tasks() const;
-  void note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner);
-  trace::Plan describe_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) const;
+  void note_plan(const graph::LoopPlan& loop);
+  trace::Plan describe_plan(const graph::LoopPlan& loop) const;
   void finish_share(std::uint32_t share);
   void finish_walls();
   void measure_share(std::uint32_t share);
