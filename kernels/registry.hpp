@@ -26,10 +26,10 @@ struct Entry {
   Maker make = {};
 };
 
-/// A way that only its name tells from the others, for a Registry<std::string_view, Maker>.
-template <class Maker>
-constexpr Entry<std::string_view, Maker> named(std::string_view name, std::string_view sentence, Maker make) {
-  return {name, name, sentence, make};
+/// A way that only its name tells from the others; `Kind` is made from the name.
+template <class Kind = std::string_view, class Maker>
+constexpr Entry<Kind, Maker> named(std::string_view name, std::string_view sentence, Maker make) {
+  return {Kind(name), name, sentence, make};
 }
 
 /// A view of entries that outlive it, in the order in which they are listed to users.

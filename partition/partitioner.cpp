@@ -6,18 +6,11 @@
 #include <string>
 
 #include "kernels/detection/domain.hpp"
-#include "partition/detail/bisection.hpp"
-#include "partition/detail/cell_graph.hpp"
+#include "partition/partitioners.hpp"
 
 namespace talus {
 
 namespace {
-
-/// Cells with weight per subdomain that METIS works on. Of 90 to 2000 none gave a better cut; the fewer, the
-/// faster and the smaller the sums over ranks. Parts are balanced to about one cell.
-constexpr std::int64_t cells_per_subdomain = 128;
-
-constexpr std::array<std::string_view, 5> names{"auto", "boxes", "fitted", "rcb", "metis"};
 
 void check_weights(const PartitionPoints& points, const Reduction& reduction) {
   std::array<std::int64_t, 2> sums{0, 0};  // total, negative ones
@@ -33,36 +26,18 @@ void check_weights(const PartitionPoints& points, const Reduction& reduction) {
                                 std::to_string(sums[0]));
 }
 
-std::int64_t heaviest(const PartitionPoints& points, const Reduction& reduction) {
-  std::array<double, 1> most{points.weight.empty() ? 1.0 : 0.0};
-  for (std::int32_t weight : points.weight) most[0] = std::max(most[0], static_cast<double>(weight));
-  reduction.max(most);
-  return static_cast<std::int64_t>(most[0]);
-}
-
-std::array<std::int32_t, 3> boxes_of(const PartitionOptions& options, const IntegerFrame& frame) {
-  const auto& boxes = options.boxes;
-  if (boxes == std::array<std::int32_t, 3>{}) return box_factors(options.subdomains, frame.lengths);
-  const auto [x, y, z] = boxes;
-  if (x < 1 || y < 1 || z < 1 || std::int64_t{x} * y * z != options.subdomains)
-    throw std::invalid_argument("partition: " + std::to_string(x) + " x " + std::to_string(y) + " x " +
-                                std::to_string(z) + " boxes are not " + std::to_string(options.subdomains) +
-                                " subdomains");
-  return boxes;
-}
-
 }  // namespace
 
+bool cuts_boxes(PartitionKind kind) {
+  return partitioner_registry().of(kind).make->takes_boxes;
+}
+
 std::string_view name_of(PartitionKind kind) {
-  return names[static_cast<std::size_t>(kind)];
+  return kind.name();
 }
 
 PartitionKind partition_kind(std::string_view name) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    throw std::invalid_argument("partitioner \"" + std::string(name) +
-                                "\" is none of auto, boxes, fitted, rcb, metis");
-  return static_cast<PartitionKind>(found - names.begin());
+  return partitioner_registry().named(name).kind;
 }
 
 PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainPair> grain_pairs,
@@ -86,7 +61,7 @@ PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainP
 std::int32_t Partition::subdomain_of(const Vec3& point) const {
   if (subdomains == 1) return 0;
   const auto q = frame.coordinates(point);
-  return kind == PartitionKind::metis ? table.subdomain[table.cell_of(q)] : detail::leaf_of(tree, q);
+  return table.subdomain.empty() ? detail::leaf_of(tree, q) : table.subdomain[table.cell_of(q)];
 }
 
 Partition make_partition(const PartitionPoints& points, const PartitionOptions& options,
@@ -102,36 +77,7 @@ Partition make_partition(const PartitionPoints& points, const PartitionOptions& 
   partition.subdomains = options.subdomains;
   partition.kind = options.kind;
   partition.frame = make_frame(points.x, reduction);
-  if (options.kind == PartitionKind::automatic && previous != nullptr &&
-      previous->kind != PartitionKind::boxes)
-    partition.kind = previous->kind;  // a change of partitioner would move nearly every body
-  if (partition.kind == PartitionKind::automatic || partition.kind == PartitionKind::boxes) {
-    partition.kind = PartitionKind::boxes;
-    partition.tree = detail::regular_boxes(boxes_of(options, partition.frame));
-    if (options.kind == PartitionKind::boxes ||
-        imbalance(weight_per_subdomain(partition, points, reduction)) <= options.auto_imbalance)
-      return partition;
-    partition.kind = PartitionKind::rcb;
-  }
-  if (partition.kind == PartitionKind::metis) {
-    const auto graph = detail::build_cell_graph(points, partition.frame,
-                                                cells_per_subdomain * options.subdomains, reduction);
-    partition.table = detail::cut_cell_graph(graph, options.subdomains, reduction);
-    if (previous != nullptr)
-      detail::keep_numbers(partition.table, *previous, points, partition.frame, options.subdomains,
-                           reduction);
-    return partition;
-  }
-  detail::WeightedPoints weighted{{}, points.weight, heaviest(points, reduction)};
-  weighted.q.reserve(points.x.size());
-  for (const Vec3& point : points.x) weighted.q.push_back(partition.frame.coordinates(point));
-  if (partition.kind == PartitionKind::fitted) {
-    partition.tree = detail::fitted_boxes(weighted, boxes_of(options, partition.frame), reduction);
-  } else {
-    const bool same = previous != nullptr && previous->kind == PartitionKind::rcb;
-    partition.tree = detail::recursive_bisection(weighted, options.subdomains, partition.frame,
-                                                 same ? &previous->tree : nullptr, reduction);
-  }
+  partitioner_registry().of(options.kind).make->cut({points, options, previous, reduction}, partition);
   return partition;
 }
 

@@ -19,33 +19,39 @@
 
 namespace talus {
 
-enum class PartitionKind {
-  automatic,  ///< `boxes` if they are balanced within `auto_imbalance`, else `rcb`; once not `boxes`, as
-              ///< before
-  boxes,      ///< n_x x n_y x n_z equal boxes: the paper's regular grid
-  fitted,     ///< n_x x n_y x n_z boxes with their planes shifted to equal weights, column by column
-  rcb,        ///< recursive coordinate bisection at weighted medians
-  metis,      ///< k-way partition of a graph of cells (METIS)
-};
+/// A way of cutting space, known by its name in the registry (partition/partitioners.hpp). The constants are
+/// those that code asks for.
+class PartitionKind {
+ public:
+  static const PartitionKind automatic;  ///< "auto"
+  static const PartitionKind boxes, fitted, rcb, metis;
 
-inline constexpr std::array<PartitionKind, 5> partition_kinds{PartitionKind::automatic, PartitionKind::boxes,
-                                                              PartitionKind::fitted, PartitionKind::rcb,
-                                                              PartitionKind::metis};
+  /// `name` is that of a line of the registry, and lives as long as the program.
+  constexpr explicit PartitionKind(std::string_view name) : name_(name) {}
+  constexpr std::string_view name() const { return name_; }
+  friend constexpr bool operator==(PartitionKind, PartitionKind) = default;
+
+ private:
+  std::string_view name_;
+};
+inline constexpr PartitionKind PartitionKind::automatic("auto");
+inline constexpr PartitionKind PartitionKind::boxes("boxes");
+inline constexpr PartitionKind PartitionKind::fitted("fitted");
+inline constexpr PartitionKind PartitionKind::rcb("rcb");
+inline constexpr PartitionKind PartitionKind::metis("metis");
 
 /// Whether the partitioner cuts a grid of boxes, whose numbers per axis may be given.
-constexpr bool cuts_boxes(PartitionKind kind) {
-  return kind != PartitionKind::rcb && kind != PartitionKind::metis;
-}
+bool cuts_boxes(PartitionKind kind);
 
-/// "auto", "boxes", "fitted", "rcb", "metis". `partition_kind` throws std::invalid_argument naming the five.
+/// The name in the registry; `partition_kind` throws std::invalid_argument naming those there are.
 std::string_view name_of(PartitionKind kind);
 PartitionKind partition_kind(std::string_view name);
 
 /// The points of this rank; all ranks together hold every candidate exactly once.
 struct PartitionPoints {
   std::vector<Vec3> x;     ///< midpoint of the centres; at a wall, the grain's centre [m]
-  std::vector<Vec3> half;  ///< from the midpoint to one of the centres [m]; 0 at a wall. Read by metis
-                           ///< only; may be empty for the others
+  std::vector<Vec3> half;  ///< from the midpoint to one of the centres [m]; 0 at a wall. May be empty
+                           ///< where the partitioner does not read it (Partitioner::reads_halves)
   std::vector<std::int32_t> weight;  ///< >= 0; empty: all 1. All ranks together: below 2^31
 };
 
@@ -84,8 +90,8 @@ struct Partition {
   std::int32_t subdomains = 1;
   PartitionKind kind = PartitionKind::boxes;  ///< never `automatic`
   IntegerFrame frame;
-  CutTree tree;     ///< boxes, fitted, rcb
-  CellTable table;  ///< metis; else empty
+  CutTree tree;     ///< of partitioners that cut along planes
+  CellTable table;  ///< of partitioners that deal out cells; else empty
 
   /// Subdomain 0 .. subdomains - 1 of a finite point [m], inside or outside the box of the sample.
   std::int32_t subdomain_of(const Vec3& point) const;

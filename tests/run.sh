@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Every test: installs what is missing, checks the format of the sources, builds preset `ci` (warnings are errors), runs ctest.
-# Further arguments go to ctest, e.g. -L unit. With TALUS_SANITIZERS=1 the tests of units and of several ranks run again
-# under the address and undefined-behaviour sanitizers; with TALUS_SMPI=1 the command is built for simulated ranks as well (some
-# minutes), and its tests are not skipped. Exit code 0 only if all of it passed.
+# Further arguments go to ctest, e.g. -L unit. With CI_LONG=1 the command is built for simulated ranks as well, whose tests are
+# skipped otherwise; tests of units and of several ranks run again under the address and undefined-behaviour sanitizers, those of
+# graph, executor, communicator and step under the thread sanitizer, in a build by clang. Exit code 0 only if all of it passed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -21,7 +21,7 @@ else
   status=1
 fi
 
-if [ "${TALUS_SMPI:-0}" = 1 ]; then
+if [ "${CI_LONG:-0}" = 1 ]; then
   cmake --preset smpi
   cmake --build --preset smpi
 fi
@@ -29,9 +29,18 @@ cmake --preset ci
 cmake --build --preset ci
 ctest --preset ci -j2 "$@" || status=$?
 
-if [ "${TALUS_SANITIZERS:-0}" = 1 ]; then
+if [ "${CI_LONG:-0}" = 1 ]; then
   cmake --preset asan
   cmake --build --preset asan
   ctest --preset asan -j2 -L 'unit|mpi' || status=$?
+  if command -v clang++-14 >/dev/null; then
+    cmake --preset tsan
+    cmake --build --preset tsan
+    # libomp tells Archer what it orders; libraries that clang has not built are not looked at.
+    TSAN_OPTIONS=ignore_noninstrumented_modules=1 OMP_TOOL_LIBRARIES=/usr/lib/llvm-14/lib/libarcher.so \
+      build/tsan/tests/test_runtime --gtest_brief=1 || status=$?
+  else
+    echo "tests: no clang++-14, so that nothing ran under the thread sanitizer" >&2
+  fi
 fi
 exit "$status"

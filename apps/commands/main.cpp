@@ -1,6 +1,7 @@
 #include <hdf5.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 
@@ -18,7 +19,10 @@
 #include "io/results/version.hpp"
 #include "io/scene/detail/spelling.hpp"
 #include "io/scene/scene.hpp"
+#include "partition/partitioners.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/mpi_communicator.hpp"
+#include "runtime/step/methods/method.hpp"
 
 #include <cstdio>
 #include <cstdlib>
@@ -31,6 +35,12 @@ void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "threads [one per core]")
       ->type_name("N")
       ->check(talus::thread_count());
+}
+
+std::map<std::string, talus::SolverMethod> methods_by_name() {
+  std::map<std::string, talus::SolverMethod> known;
+  for (const auto& method : talus::methods()) known.emplace(method.name, method.kind);
+  return known;
 }
 
 /// The commands of `app` as far as they were recognised, "talus study error", and the last of them.
@@ -197,8 +207,9 @@ int main(int argc, char** argv) {
       ->required()
       ->check(CLI::Range(1, most_subdomains));
   partition_app
-      ->add_option("--partitioner", partition.partitioners,
-                   "boxes, fitted, rcb, metis or auto, may be repeated [all but auto]")
+      ->add_option(
+          "--partitioner", partition.partitioners,
+          fmt::format("{}, may be repeated [all but auto]", fmt::join(partitioner_registry().names(), ", ")))
       ->type_name("NAME")
       ->allow_extra_args(false);
   partition_app->add_option("--out", partition.out, "directory of the files [out/partition-NAME]")
@@ -278,13 +289,8 @@ int main(int argc, char** argv) {
       ->type_name("NAME")
       ->allow_extra_args(false);
   stability_app->add_option("--method", stability.settings.method, "solver.method of every scene")
-      ->type_name("auto|nlgs|nlgs+momentum|nncg|admm")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, SolverMethod>{{"auto", SolverMethod::automatic},
-                                              {"nlgs", SolverMethod::nlgs},
-                                              {"nlgs+momentum", SolverMethod::momentum},
-                                              {"nncg", SolverMethod::nncg},
-                                              {"admm", SolverMethod::admm}}));
+      ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")))
+      ->transform(CLI::CheckedTransformer(methods_by_name()));
   stability_app
       ->add_option("--tolerance", stability.settings.tolerance,
                    "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
@@ -311,12 +317,13 @@ int main(int argc, char** argv) {
     const graph::MpiSession session(&argc, &argv);
     double delay = 0;  // a slow network on one machine, for tests and benchmarks
     if (const char* seconds = std::getenv("TALUS_MESSAGE_DELAY")) delay = std::atof(seconds);
-    const graph::Communicator ranks(session, {.delay = delay});
-    return run_command(run, ranks);
+    const auto ranks = graph::make_communicator(session, {.delay = delay});
+    return run_command(run, *ranks);
   }
   if (*plan_app) {
     const graph::MpiSession session(&argc, &argv, plan.measure);  // what messages cost is measured with MPI
-    return plan_command(plan, graph::Communicator(session));
+    const auto ranks = plan.measure ? graph::plain_mpi(session) : graph::make_communicator(session);
+    return plan_command(plan, *ranks);
   }
   if (*partition_app) return partition_command(partition);
   if (*solve_app) return solve_command(solve);

@@ -19,7 +19,7 @@
 #include "kernels/detection/wall_pairs.hpp"
 #include "partition/interface.hpp"
 #include "partition/load_table.hpp"
-#include "partition/partitioner.hpp"
+#include "partition/partitioners.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/decomposition.hpp"
 
@@ -103,7 +103,9 @@ std::vector<PartitionKind> kinds_of(const std::vector<std::string>& names) {
     const PartitionKind kind = partition_kind(name);
     if (std::ranges::find(kinds, kind) == kinds.end()) kinds.push_back(kind);
   }
-  if (kinds.empty()) kinds.assign(partition_kinds.begin() + 1, partition_kinds.end());
+  if (!kinds.empty()) return kinds;
+  for (const auto& partitioner : partitioner_registry())
+    if (partitioner.kind != PartitionKind::automatic) kinds.push_back(partitioner.kind);
   return kinds;
 }
 
@@ -136,8 +138,8 @@ void print_table(const io::Scene& scene, std::size_t grains, const ContactPairs&
 
 /// Whether `name` is one that write_files gives to a file.
 bool is_partition_name(const std::string& name) {
-  return std::ranges::any_of(partition_kinds, [&](PartitionKind kind) {
-    const std::string stem = "partition_" + std::string(name_of(kind));
+  return std::ranges::any_of(partitioner_registry(), [&](const auto& partitioner) {
+    const std::string stem = "partition_" + std::string(partitioner.name);
     return name == stem + ".vtp" || name == stem + ".svg";
   });
 }

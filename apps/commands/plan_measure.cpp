@@ -41,7 +41,7 @@ Cost sweep_first_step(Setup setup, const Bodies& bodies, graph::Executor& execut
   const StepReport& report = simulation.step();
   Cost cost;
   cost.contacts = static_cast<double>(std::max<std::int64_t>(report.contacts, 1));
-  const std::vector<Iteration::Check>& checks = simulation.error_history();
+  const std::vector<ErrorCheck>& checks = simulation.error_history();
   double fastest = checks.size() > 1 ? std::numeric_limits<double>::infinity() : 0;
   for (std::size_t k = 1; k < checks.size(); ++k)
     fastest = std::min(fastest, (checks[k].seconds - checks[k - 1].seconds) /
@@ -55,7 +55,7 @@ Cost sweep_first_step(Setup setup, const Bodies& bodies, graph::Executor& execut
 /// Time of sending and taking a message of `bytes` bytes to oneself [s].
 double message_seconds(std::size_t bytes, const graph::Communicator& ranks) {
   constexpr int turns = 200;
-  std::vector<double> out(std::max<std::size_t>(bytes / sizeof(double), 1) + 1), in(out.size());
+  std::vector<double> out(std::max<std::size_t>(bytes / sizeof(double), 1)), in(out.size());
   const auto receive = ranks.open_receive(ranks.rank(), graph::Communicator::first_tag, in),
              send = ranks.open_send(ranks.rank(), graph::Communicator::first_tag, out);
   std::vector<double> seconds;

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <set>
@@ -28,6 +29,7 @@
 #include "io/scene/scene.hpp"
 #include "kernels/bodies/larger.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "runtime/trace/order.hpp"
@@ -186,7 +188,8 @@ void print_start(const io::Scene& scene, std::size_t grains, int threads, const 
   if (scene.setup.decomposition.subdomains > 1 || ranks.ranks() > 1)
     fmt::print(stderr, "talus: {} by {}, {}, {}\n",
                count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
-               name_of(scene.setup.decomposition.partitioner), name_of(scene.setup.decomposition.coupling),
+               name_of(scene.setup.decomposition.partitioner),
+               couplings().of(scene.setup.decomposition.coupling).name,
                scene.setup.decomposition.exchange == ExchangeScheme::dcs ? "DCS" : "CCS");
   // Ranks that are bound have cores of their own; unbound ones share those of the machine.
   const bool bound = cores < io::collect_provenance().cores_online;
@@ -452,6 +455,7 @@ bool any_refused(const std::string& why, const graph::Communicator& ranks) {
   std::fflush(nullptr);
   ranks.meet(ranks.rank() == 0 ? 1 : 20);
   ranks.abort(code);
+  std::exit(code);  // g++ 12 does not see that the virtual call above never returns
 }
 
 int threads_of(const RunOptions& options) {

@@ -15,17 +15,14 @@ void write_report(const std::filesystem::path& directory, const ReportPage& repo
   for (const auto& [name, text] : report.tables) io::write_whole(directory / name, text);
   for (const io::Chart& chart : report.charts)
     io::write_whole(directory / (chart.name + ".svg"), io::draw_chart(chart));
-  io::write_whole(directory / "plot.gp", io::gnuplot_script(report.charts));
   io::write_whole(directory / "report.html",
                   io::html_page(report.title, report.introduction, report.sections));
 }
 
 bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
                     std::span<const std::string_view> charts) {
-  const auto is_chart = [&](std::string_view chart) {
-    return name == std::string(chart) + ".svg" || name == std::string(chart) + ".gnuplot.svg";
-  };
-  return name == "plot.gp" || name == "report.html" || std::ranges::find(tables, name) != tables.end() ||
+  const auto is_chart = [&](std::string_view chart) { return name == std::string(chart) + ".svg"; };
+  return name == "report.html" || std::ranges::find(tables, name) != tables.end() ||
          std::ranges::any_of(charts, is_chart);
 }
 

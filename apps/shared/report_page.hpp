@@ -1,7 +1,6 @@
 #pragma once
 
-/// The page that a study leaves: tables, pictures, a gnuplot script that draws the tables, and text that
-/// explains each picture.
+/// The page that a study leaves: tables, pictures, and text that explains each picture.
 
 #include <filesystem>
 #include <span>
@@ -26,11 +25,10 @@ struct ReportPage {
 /// A picture, on the page under its title with a sentence above and a table below.
 void add_chart(ReportPage& report, io::Chart chart, const std::string& sentence, io::HtmlTable table = {});
 
-/// Writes the tables, NAME.svg for every chart, plot.gp and report.html. Throws io::FileError.
+/// Writes the tables, NAME.svg for every chart and report.html. Throws io::FileError.
 void write_report(const std::filesystem::path& directory, const ReportPage& report);
 
-/// True for the names of what write_report makes of `tables` (names of files) and `charts` (their names), and
-/// of what its plot.gp draws.
+/// True for the names of what write_report makes of `tables` (names of files) and `charts` (their names).
 bool is_report_name(std::string_view name, std::span<const std::string_view> tables,
                     std::span<const std::string_view> charts);
 

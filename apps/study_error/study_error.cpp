@@ -22,6 +22,7 @@
 #include "io/files/output_directory.hpp"
 #include "io/results/run_json.hpp"
 #include "io/results/version.hpp"
+#include "runtime/step/methods/method.hpp"
 
 namespace talus {
 
@@ -60,8 +61,8 @@ StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   plan.steps = options.steps;
   plan.max_sweeps = options.max_sweeps;
   plan.max_seconds = options.max_seconds;
-  const std::vector<std::string> methods = or_else(options.methods, io::solver_methods());
-  for (const std::string& method : methods) io::solver_method(method);  // refuses unknown names
+  const std::vector<std::string> methods = or_else(options.methods, talus::methods().names());
+  for (const std::string& method : methods) talus::methods().named(method);  // refuses unknown names
   for (const std::uint64_t seed : or_else(options.seeds, {scene_seed}))
     for (const std::string& method : methods)
       for (const int subdomains : or_else(options.subdomains, {1}))
@@ -110,10 +111,10 @@ int study_scene(const StudyErrorOptions& options) {
   }
   const io::Scene& scene = samples.front().scene;
   const std::string title = fmt::format("{}: error against run time", scene.name);
-  const std::string introduction =
-      (scene.description.empty() ? "" : scene.description + ". ") + where_and_when() +
-      " Times are medians of three where a solve takes less than " +
-      fmt::format("{:g} s. The tables are beside this page; plot.gp draws them.", cheap_solve);
+  const std::string introduction = (scene.description.empty() ? "" : scene.description + ". ") +
+                                   where_and_when() +
+                                   " Times are medians of three where a solve takes less than " +
+                                   fmt::format("{:g} s. The tables are beside this page.", cheap_solve);
   say(fmt::format("{}: {} grains, {} ways to solve", scene.name, samples.front().bodies.size(),
                   plan.variants.size()));
   ProblemStudy problem;
@@ -161,7 +162,7 @@ int study_folder(const StudyErrorOptions& options) {
   const std::string introduction =
       where_and_when() + fmt::format(
                              " A solve may take {:g} s; times are medians of three where it takes less than "
-                             "{:g} s. The tables are beside this page; plot.gp draws them.",
+                             "{:g} s. The tables are beside this page.",
                              options.max_seconds, cheap_solve);
   std::vector<ProfileRow> rows;
   const auto keep = [&] {

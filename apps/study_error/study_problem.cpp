@@ -12,6 +12,7 @@
 
 #include "apps/shared/median.hpp"
 #include "runtime/step/decomposition.hpp"
+#include "runtime/step/methods/method.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -44,7 +45,7 @@ double distance(const Motion& a, const Motion& b) {
 
 /// One solve of the step.
 struct Solve {
-  std::vector<Iteration::Check> history;
+  std::vector<ErrorCheck> history;
   StepReport report;
   double seconds = 0;  ///< of the iterations
   Motion motion;
@@ -90,7 +91,7 @@ class Problem {
     Setup setup = setup_;
     setup.decomposition = with_subdomains(setup.decomposition, variant.subdomains);
     setup.solver = solver;
-    setup.solver.method = io::solver_method(variant.method);
+    setup.solver.method = methods().named(variant.method).kind;
     setup.solver.warm_start = warm;
     setup.solver.max_iterations = sweeps;
     Simulation simulation(setup, saved_, executor);
@@ -250,7 +251,7 @@ void study_problem(const StudySample& sample, const StudyPlan& plan, const Say& 
       } catch (const std::exception& error) {
         say(fmt::format("{} failed: {}", name, error.what()));
       }
-      for (const Iteration::Check& check : last.history)
+      for (const ErrorCheck& check : last.history)
         study.residual.push_back({variant, warm, check.iterations, check.seconds, check.error_rms});
       if (!last.history.empty())
         say(fmt::format("{}: {} sweeps, {:.3g} s, residual {:.1e}, velocity error {:.1e}, wall forces {:.1e}",

@@ -23,35 +23,20 @@ std::size_t place_in(std::vector<T>& seen, const T& value) {
   return place;
 }
 
-/// The text of a cell as the tables have it.
-template <class T>
-std::string cell(const T& value) {
-  std::string text;
-  io::detail::put(text, value);
-  return text;
-}
-
-std::vector<std::pair<std::string, std::string>> cells_of(const StudyVariant& v) {
-  return {{"method", v.method},
-          {"subdomains", cell(v.subdomains)},
-          {"threads", cell(v.threads)},
-          {"seed", cell(static_cast<std::int64_t>(v.seed))}};
-}
-
 const char* start_of(bool warm) {
   return warm ? "warm" : "cold";
 }
 
 /// Rows that follow one another and belong to one curve become a series: colour by method, dashes by the
 /// rest. `rest(row)` is the text of the latter, "" for nothing to say; `point(row)` the point.
-template <class Row, class Rest, class Where, class PointOf>
-std::vector<io::ChartSeries> series_of(const std::vector<Row>& rows, Rest rest, Where where, PointOf point) {
+template <class Row, class Rest, class PointOf>
+std::vector<io::ChartSeries> series_of(const std::vector<Row>& rows, Rest rest, PointOf point) {
   std::vector<io::ChartSeries> all;
   std::vector<std::string> methods, rests;
   for (const Row& row : rows) {
     const std::string more = rest(row), name = row.method() + (more.empty() ? "" : ", " + more);
     if (all.empty() || all.back().name != name)
-      all.push_back({name, {}, place_in(methods, row.method()), place_in(rests, more), where(row)});
+      all.push_back({name, {}, place_in(methods, row.method()), place_in(rests, more)});
     all.back().points.push_back(point(row));
   }
   return all;
@@ -80,11 +65,6 @@ io::Chart solve_chart(const std::vector<Row>& rows, const StudyPlan& plan, io::C
         std::string rest = rest_of_label(row.variant, plan);
         if (both) rest += (rest.empty() ? "" : ", ") + std::string(start_of(row.warm));
         return rest;
-      },
-      [](const Named<Row>& row) {
-        auto cells = cells_of(row.variant);
-        cells.emplace_back("start", start_of(row.warm));
-        return cells;
       },
       point);
   return chart;
@@ -148,26 +128,16 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage
     return std::array<double, 2>{static_cast<double>(r.sweeps), r.error_rms};
   };
   const auto chart = [&](const char* name, const std::string& title, const std::string& x,
-                         const std::string& y, const char* table, const char* x_column,
-                         const char* y_column) {
-    return io::Chart{.name = name,
-                     .title = title,
-                     .subtitle = subtitle,
-                     .x_label = x,
-                     .y_label = y,
-                     .table = table,
-                     .x_column = x_column,
-                     .y_column = y_column,
-                     .series = {}};
+                         const std::string& y) {
+    return io::Chart{
+        .name = name, .title = title, .subtitle = subtitle, .x_label = x, .y_label = y, .series = {}};
   };
-  io::Chart sweeps = solve_chart(study.residual, plan,
-                                 chart("residual_sweeps", "Residual against sweeps", sweeps_label,
-                                       residual_label, "residual.csv", "sweeps", "error_rms"),
-                                 by_sweeps);
-  io::Chart seconds = solve_chart(study.residual, plan,
-                                  chart("residual_seconds", "Residual against run time", seconds_label,
-                                        residual_label, "residual.csv", "seconds", "error_rms"),
-                                  by_seconds);
+  io::Chart sweeps = solve_chart(
+      study.residual, plan, chart("residual_sweeps", "Residual against sweeps", sweeps_label, residual_label),
+      by_sweeps);
+  io::Chart seconds = solve_chart(
+      study.residual, plan,
+      chart("residual_seconds", "Residual against run time", seconds_label, residual_label), by_seconds);
   for (io::Chart* of : {&sweeps, &seconds})
     for (const double tolerance : plan.tolerances)
       of->levels.push_back({tolerance, fmt::format("tol. {:g}", tolerance)});
@@ -181,31 +151,30 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage
             "The same against the number of sweeps over all contacts: what is left of a difference when the "
             "cost of "
             "a sweep is taken out.");
-  add_chart(report,
-            solve_chart(study.truth, plan,
-                        chart("velocity_seconds", "Velocity error against run time", seconds_label,
-                              velocity_label, "true_error.csv", "seconds", "velocity_error"),
-                        [](const TrueErrorRow& r) {
-                          return std::array<double, 2>{r.seconds, r.velocity_error};
-                        }),
-            "How far the velocities that a solve hands back after a given time are from the reference, over "
-            "the largest of the velocities themselves, what the contacts changed in them, and what a wall's "
-            "impulse would give to all grains." +
-                honesty);
-  add_chart(report,
-            solve_chart(study.truth, plan,
-                        chart("velocity_sweeps", "Velocity error against sweeps", sweeps_label,
-                              velocity_label, "true_error.csv", "sweeps", "velocity_error"),
-                        [](const TrueErrorRow& r) {
-                          return std::array<double, 2>{static_cast<double>(r.sweeps), r.velocity_error};
-                        }),
-            "The same against sweeps.");
+  add_chart(
+      report,
+      solve_chart(study.truth, plan,
+                  chart("velocity_seconds", "Velocity error against run time", seconds_label, velocity_label),
+                  [](const TrueErrorRow& r) {
+                    return std::array<double, 2>{r.seconds, r.velocity_error};
+                  }),
+      "How far the velocities that a solve hands back after a given time are from the reference, over "
+      "the largest of the velocities themselves, what the contacts changed in them, and what a wall's "
+      "impulse would give to all grains." +
+          honesty);
+  add_chart(
+      report,
+      solve_chart(study.truth, plan,
+                  chart("velocity_sweeps", "Velocity error against sweeps", sweeps_label, velocity_label),
+                  [](const TrueErrorRow& r) {
+                    return std::array<double, 2>{static_cast<double>(r.sweeps), r.velocity_error};
+                  }),
+      "The same against sweeps.");
   if (std::ranges::any_of(study.truth, [](const auto& r) { return !std::isnan(r.wall_force_error); }))
     add_chart(report,
               solve_chart(study.truth, plan,
                           chart("wall_forces_seconds", "Error of the wall forces against run time",
-                                seconds_label, "largest error of a wall's force, relative  [1]",
-                                "true_error.csv", "seconds", "wall_force_error"),
+                                seconds_label, "largest error of a wall's force, relative  [1]"),
                           [](const TrueErrorRow& r) {
                             return std::array<double, 2>{r.seconds, r.wall_force_error};
                           }),
@@ -214,7 +183,7 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage
   add_chart(report,
             solve_chart(study.truth, plan,
                         chart("velocity_residual", "Does the residual tell the truth?", residual_label,
-                              velocity_label, "true_error.csv", "error_rms", "velocity_error"),
+                              velocity_label),
                         [](const TrueErrorRow& r) {
                           return std::array<double, 2>{r.error_rms, r.velocity_error};
                         }),
@@ -233,8 +202,7 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
   const RunReference& reference = study.references.front();
   const std::string subtitle = fmt::format("{:.4g} s simulated; points: tolerances {:g} to {:g}",
                                            reference.time, plan.tolerances.front(), plan.tolerances.back());
-  const auto chart = [&](const char* name, const char* title, const char* y_label, const char* y_column,
-                         double RunRow::*value) {
+  const auto chart = [&](const char* name, const char* title, const char* y_label, double RunRow::*value) {
     std::vector<Named<RunRow>> named;
     for (const RunRow& row : study.rows) named.push_back({row});
     io::Chart out{.name = name,
@@ -242,9 +210,6 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
                   .subtitle = subtitle,
                   .x_label = "elapsed time of all steps  [s]",
                   .y_label = y_label,
-                  .table = "runs.csv",
-                  .x_column = "seconds",
-                  .y_column = y_column,
                   .series = {}};
     out.series = series_of(
         named,
@@ -253,11 +218,6 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
           if (plan.time_steps.size() > 1)
             rest += (rest.empty() ? "" : ", ") + fmt::format("Δt × {:g}", row.time_step);
           return rest;
-        },
-        [](const Named<RunRow>& row) {
-          auto cells = cells_of(row.variant);
-          cells.emplace_back("time_step", cell(row.time_step));
-          return cells;
         },
         [&](const Named<RunRow>& row) {
           return std::array<double, 2>{row.seconds, row.*value};
@@ -280,7 +240,7 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
                           fmt::format("{:.2e}", r.position_error)});
   if (std::ranges::any_of(study.rows, [](const RunRow& r) { return !std::isnan(r.stress_error); })) {
     io::Chart stress = chart("run_stress_seconds", "Error of q/p over a run against run time",
-                             "rms difference in q/p  [1]", "stress_error", &RunRow::stress_error);
+                             "rms difference in q/p  [1]", &RunRow::stress_error);
     if (const double scatter = scatter_of_seeds(study); scatter > 0)
       stress.levels.push_back({scatter, "seed to seed"});
     add_chart(report, std::move(stress),
@@ -292,7 +252,7 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
   add_chart(
       report,
       chart("run_position_seconds", "Error of the grains' positions after a run against run time",
-            "rms distance over mean diameter  [1]", "position_error", &RunRow::position_error),
+            "rms distance over mean diameter  [1]", &RunRow::position_error),
       "How far the grains end up from where they are in the reference; trajectories of dense flows part "
       "exponentially, so that over long runs no method keeps this small." +
           of_reference,
@@ -322,9 +282,6 @@ void report_profile(const std::vector<ProfileRow>& rows, ReportPage& report) {
                   .y_label = "problems solved  [1]",
                   .log_y = false,
                   .staircase = true,
-                  .table = "profile.csv",
-                  .x_column = "ratio",
-                  .y_column = "solved_part",
                   .series = {}};
   io::HtmlTable table{{"method", "tolerance", "solved", "problems", "geometric mean of the times [s]"}, {}};
   double slowest = 1;
@@ -337,11 +294,8 @@ void report_profile(const std::vector<ProfileRow>& rows, ReportPage& report) {
       // All curves are drawn as far as the longest.
       if (!points.empty() && points.back()[0] < slowest) points.push_back({slowest, points.back()[1]});
       for (const auto& [ratio, part] : points) profile.row(method, tolerances[t], ratio, part);
-      chart.series.push_back({fmt::format("{}, {:g}", method, tolerances[t]),
-                              points,
-                              place_in(methods, method),
-                              t,
-                              {{"method", method}, {"tolerance", cell(tolerances[t])}}});
+      chart.series.push_back(
+          {fmt::format("{}, {:g}", method, tolerances[t]), points, place_in(methods, method), t});
       double logarithms = 0;
       int solved = 0, problems = 0;
       for (const SolveRow& r : solves_to[t]) {

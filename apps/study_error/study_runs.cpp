@@ -9,6 +9,7 @@
 
 #include "apps/shared/median.hpp"
 #include "runtime/step/decomposition.hpp"
+#include "runtime/step/methods/method.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -39,7 +40,7 @@ Outcome run_once(const StudySample& sample, const StudyPlan& plan, const StudyVa
   }
   setup.decomposition = with_subdomains(setup.decomposition, variant.subdomains);
   setup.solver = at_tolerance(setup.solver, tolerance);
-  setup.solver.method = io::solver_method(variant.method);
+  setup.solver.method = methods().named(variant.method).kind;
   graph::Executor executor({.threads = variant.threads});
   Simulation simulation(setup, sample.bodies, executor);
   Outcome out;

@@ -14,7 +14,7 @@ namespace talus {
 
 /// One way to solve.
 struct StudyVariant {
-  std::string method;  ///< a name of io::solver_methods()
+  std::string method;  ///< a name of methods()
   int subdomains = 1;
   int threads = 1;
   std::uint64_t seed = 1;

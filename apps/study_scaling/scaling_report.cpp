@@ -70,23 +70,19 @@ void add_curves(const std::vector<ScalingRow>& rows, ScalingKind kind, X x, Y y,
     auto found = std::ranges::find(chart.series, name, &io::ChartSeries::name);
     if (found == chart.series.end()) {
       const std::size_t number = chart.series.size();
-      chart.series.push_back({name, {}, number, row.predicted() ? 1U : 0U, {{"curve", name}}});
+      chart.series.push_back({name, {}, number, row.predicted() ? 1U : 0U});
       found = chart.series.end() - 1;
     }
     found->points.push_back({x(row), y(row)});
   }
 }
 
-io::Chart chart_of(const char* name, const std::string& title, const std::string& x, const std::string& y,
-                   const char* table, const char* x_column, const char* y_column) {
+io::Chart chart_of(const char* name, const std::string& title, const std::string& x, const std::string& y) {
   return io::Chart{.name = name,
                    .title = title,
                    .subtitle = "dashed: predicted, nothing of it was measured",
                    .x_label = x,
                    .y_label = y,
-                   .table = table,
-                   .x_column = x_column,
-                   .y_column = y_column,
                    .series = {}};
 }
 
@@ -172,8 +168,7 @@ void add_other_curves(const std::vector<OtherSpeedup>& beside, bool efficiency, 
   for (const OtherSpeedup& other : beside) {
     auto found = std::ranges::find(chart.series, other.name, &io::ChartSeries::name);
     if (found == chart.series.end()) {
-      chart.series.push_back({other.name, {}, chart.series.size(), 2, {{"name", other.name}}});
-      chart.series.back().table = "beside.csv";
+      chart.series.push_back({other.name, {}, chart.series.size(), 2});
       found = chart.series.end() - 1;
     }
     found->points.push_back({other.cores, efficiency ? other.speedup / other.cores : other.speedup});
@@ -182,15 +177,14 @@ void add_other_curves(const std::vector<OtherSpeedup>& beside, bool efficiency, 
 
 void add_strong(const ScalingReport& report, ReportPage& page) {
   const std::vector<ScalingRow>& rows = report.rows;
-  io::Chart speedup = chart_of("speedup", "Strong scaling: speedup", "cores", "speedup  [1]",
-                               "strong_scaling.csv", "cores", "speedup");
+  io::Chart speedup = chart_of("speedup", "Strong scaling: speedup", "cores", "speedup  [1]");
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.speedup; }, speedup);
   add_other_curves(report.beside, false, speedup);
   add_chart(page, std::move(speedup), "Time of a step on one core over that on more, for the same sample.",
             efficiency_table(rows, ScalingKind::strong));
-  io::Chart efficiency = chart_of("efficiency", "Strong scaling: efficiency", "cores",
-                                  "speedup over cores  [1]", "strong_scaling.csv", "cores", "efficiency");
+  io::Chart efficiency =
+      chart_of("efficiency", "Strong scaling: efficiency", "cores", "speedup over cores  [1]");
   efficiency.log_y = false;
   io::Chart iterations = efficiency, sweeps = efficiency;
   add_curves(
@@ -201,7 +195,6 @@ void add_strong(const ScalingReport& report, ReportPage& page) {
   iterations.levels = sweeps.levels = {{1, "ideal"}};
   iterations.name = "efficiency_iterations";
   iterations.title = "Strong scaling: iterations on one core over those on more";
-  iterations.y_column = "of_iterations";
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.of_iterations; }, iterations);
   add_chart(
@@ -209,7 +202,6 @@ void add_strong(const ScalingReport& report, ReportPage& page) {
       "What more subdomains cost in convergence: a matter of the method and the sample, not of the machine.");
   sweeps.name = "efficiency_sweeps";
   sweeps.title = "Strong scaling: efficiency of an iteration";
-  sweeps.y_column = "of_sweeps";
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.of_sweeps; }, sweeps);
   add_chart(
@@ -242,9 +234,8 @@ ReportPage page_of(ScalingReport report) {
   add_strong(report, page);
   if (any_of_kind(rows, ScalingKind::weak)) {
     page.tables.emplace_back("weak_scaling.csv", table_of(rows, ScalingKind::weak));
-    io::Chart weak =
-        chart_of("weak_efficiency", "Weak scaling: efficiency", "cores",
-                 "speed per core over that of one core  [1]", "weak_scaling.csv", "cores", "efficiency");
+    io::Chart weak = chart_of("weak_efficiency", "Weak scaling: efficiency", "cores",
+                              "speed per core over that of one core  [1]");
     weak.log_y = false;
     weak.levels.push_back({1, "ideal"});
     add_curves(
@@ -256,8 +247,8 @@ ReportPage page_of(ScalingReport report) {
   }
   if (any_of_kind(rows, ScalingKind::hybrid)) {
     page.tables.emplace_back("hybrid.csv", table_of(rows, ScalingKind::hybrid));
-    io::Chart hybrid = chart_of("hybrid", "Ranks x threads on the same cores", "threads of a rank",
-                                "time of a step  [s]", "hybrid.csv", "threads", "seconds");
+    io::Chart hybrid =
+        chart_of("hybrid", "Ranks x threads on the same cores", "threads of a rank", "time of a step  [s]");
     add_curves(
         rows, ScalingKind::hybrid, [](const ScalingRow& r) { return static_cast<double>(r.threads); },
         [](const ScalingRow& r) { return r.seconds; }, hybrid);

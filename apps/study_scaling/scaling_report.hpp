@@ -48,7 +48,7 @@ struct ScalingReport {
 /// and scenes and traces.
 bool is_study_scaling_name(const std::string& name);
 
-/// Writes commands.sh and slurm.sh, and once there are rows the tables, pictures, plot.gp and report.html.
+/// Writes commands.sh and slurm.sh, and once there are rows the tables, pictures and report.html.
 /// Throws io::FileError.
 void write_scaling_report(const std::filesystem::path& directory, const ScalingReport& report);
 

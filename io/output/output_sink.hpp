@@ -25,8 +25,8 @@
 
 #include "io/results/run_json.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/step/error_history.hpp"
 #include "runtime/step/frame.hpp"
-#include "runtime/step/iteration.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::io {
@@ -46,7 +46,7 @@ struct StepRecord {
   StepReport step = {};
   std::vector<WallReport> walls = {};           ///< in the order of the setup
   std::optional<TriaxialReport> triaxial = {};  ///< of a stage that has one
-  std::vector<Iteration::Check> errors = {};    ///< checks of the error, where asked for
+  std::vector<ErrorCheck> errors = {};          ///< checks of the error, where asked for
 };
 
 class OutputSink {

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "io/output/output_sink.hpp"
+#include "runtime/graph/one_rank.hpp"
 
 namespace talus::io {
 

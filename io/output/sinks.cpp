@@ -14,6 +14,7 @@ constexpr SinkRegistry::Item sinks[] = {
     named("frames", "results.h5: the state at every output time, in full precision", &frame_sink),
     named("fields", "write frames as .vtp files for ParaView", &field_sink),
     named("pictures", "draw curves and the force network", &picture_sink),
+    named("xyz", "write the grains of frames as frames.xyz, for OVITO, VMD and ASE", &xyz_sink),
 };
 
 }  // namespace

@@ -17,6 +17,7 @@ extern const SinkKind frame_sink;
 extern const SinkKind run_json_sink;
 extern const SinkKind field_sink;
 extern const SinkKind picture_sink;
+extern const SinkKind xyz_sink;
 
 /// By name: no code asks for one of them.
 using SinkRegistry = Registry<std::string_view, const SinkKind*>;

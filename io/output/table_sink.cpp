@@ -33,7 +33,7 @@ class TableSink : public OutputSink {
     }
     if (record.errors.empty()) return;
     if (!errors_) errors_.emplace(directory_ / names[3], error_history_csv_header());
-    for (const Iteration::Check& check : record.errors)
+    for (const ErrorCheck& check : record.errors)
       append_error_history_row(errors_->pending(), record.step.step, check);
   }
 

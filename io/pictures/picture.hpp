@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "kernels/bodies/walls.hpp"
+#include "kernels/shapes/walls.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
 

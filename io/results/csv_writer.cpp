@@ -30,7 +30,7 @@ struct WallRow {
 
 struct ErrorRow {
   std::int64_t step;
-  const Iteration::Check& check;
+  const ErrorCheck& check;
 };
 
 constexpr Column<StepReport> steps_columns[] = {
@@ -138,7 +138,7 @@ void append_triaxial_row(std::string& text, const TriaxialReport& report) {
   append_line<TriaxialReport>(text, triaxial_columns, report);
 }
 
-void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check) {
+void append_error_history_row(std::string& text, std::int64_t step, const ErrorCheck& check) {
   append_line<ErrorRow>(text, error_history_columns, ErrorRow{step, check});
 }
 

@@ -8,8 +8,8 @@
 #include <string_view>
 
 #include "io/files/detail/descriptor.hpp"
+#include "runtime/step/error_history.hpp"
 #include "runtime/step/frame.hpp"
-#include "runtime/step/iteration.hpp"
 
 namespace talus::io {
 
@@ -24,7 +24,7 @@ std::string error_history_csv_header();
 void append_steps_row(std::string& text, const StepReport& report);
 void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall);
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
-void append_error_history_row(std::string& text, std::int64_t step, const Iteration::Check& check);
+void append_error_history_row(std::string& text, std::int64_t step, const ErrorCheck& check);
 
 /// A file that grows by whole lines: what a killed run leaves lacks those that were not flushed (a kill in
 /// the middle of a write may cut one).

@@ -10,6 +10,7 @@
 #include "io/files/detail/hdf5_write.hpp"
 #include "io/files/error.hpp"
 #include "io/results/version.hpp"
+#include "runtime/graph/one_rank.hpp"
 
 namespace talus::io {
 namespace {

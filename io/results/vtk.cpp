@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "io/results/detail/body_index.hpp"
+#include "runtime/graph/one_rank.hpp"
 
 namespace talus::io {
 namespace {

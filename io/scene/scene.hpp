@@ -85,12 +85,6 @@ void place_walls(Scene& scene, const Sample& grains);
 /// The scene as TOML with every default spelled out; parse_scene gives the same scene back.
 std::string resolved_scene(const Scene& scene);
 
-/// The names that solver.method takes, in the order of the reference.
-std::vector<std::string> solver_methods();
-
-/// The method of that name. Throws std::invalid_argument that lists the names there are.
-SolverMethod solver_method(const std::string& name);
-
 /// docs/scenes.md: every key with type, unit, default, range and meaning.
 std::string scene_reference();
 

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "kernels/bodies/motion.hpp"
-#include "kernels/bodies/walls.hpp"
 #include "kernels/delassus/delassus.hpp"
 #include "kernels/detection/contacts.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus {
 

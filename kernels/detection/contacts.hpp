@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "kernels/bodies/bodies.hpp"
-#include "kernels/bodies/walls.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/domain.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus {
 

@@ -4,8 +4,8 @@
 #include <concepts>
 #include <vector>
 
-#include "kernels/bodies/walls.hpp"
 #include "kernels/detection/separation.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus {
 

@@ -1,9 +1,10 @@
 #include "kernels/detection/narrow_phase.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "kernels/detection/detail/contact_groups.hpp"
+#include "kernels/detection/detail/gap_kernels.hpp"
+#include "kernels/law/gap_law.hpp"
 #include "kernels/simd/contact_view.hpp"
 
 namespace talus {
@@ -12,20 +13,6 @@ namespace {
 
 std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
-}
-
-/// Bias of a contact, or false when it constrains nothing in this step. `v_n` is the normal velocity at the
-/// beginning of the step, `v_n_free` the one at its end without contacts.
-bool constrain(const GapRule& in, double gap, double v_n, double v_n_free, double& bias) {
-  bias = (gap > 0 ? gap : in.overlap_correction * gap) / in.time_step;
-  if (!may_touch(gap, v_n_free, in.time_step, in.alert)) return false;
-  // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
-  // between both would gain energy.
-  if (in.restitution > 0 && std::abs(v_n) > in.slow) {
-    bias = in.restitution * v_n;
-    if (gap > 0) return false;
-  }
-  return true;
 }
 
 struct Pairing {
@@ -66,26 +53,15 @@ std::int32_t count_passed(const PairView& pairs, double time_step) {
   return through;
 }
 
-/// The kernel find_gaps without lanes.
-bool find_gaps(const PairView& pairs, const GapRule& rule, const GapTarget& out) {
-  bool far = false;
-  for (std::size_t k = 0; k < pairs.count; ++k) {
-    const Pairing pair = meet(pairs, k);
-    const double distance = pair.d.norm();
-    const Vec3 normal = distance > 0 ? Vec3(pair.d / distance) : Vec3::UnitZ();
-    const double v_n = normal.dot(pair.v);  // gravity moves both alike
-    out.nx[k] = normal[0];
-    out.ny[k] = normal[1];
-    out.nz[k] = normal[2];
-    out.contact[k] =
-        constrain(rule, distance - pair.radius_i - pair.radius_j, v_n, v_n, out.bias[k]) ? -1 : 0;
-    far |= came_far(rule.time_step * pair.v, std::min(pair.radius_i, pair.radius_j));
-  }
-  return far;
+/// The kernel that `set` means; `automatic` is the strongest that runs here.
+FindGaps kernel_of(InstructionSet set) {
+  if (set == InstructionSet::automatic) set = best_instruction_set();
+  if (set == InstructionSet::portable) return gap_kernels_portable;
+  return set == InstructionSet::avx2 ? gap_kernels_avx2 : gap_kernels_avx512;
 }
 
 void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chunks, std::size_t chunk,
-                   const SweepKernels& kernels, Contacts& contacts) {
+                   InstructionSet set, Contacts& contacts) {
   const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
   Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
@@ -94,8 +70,7 @@ void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chu
       in.x.data()->data(), in.radius.data(), in.velocity.data()->u, first, second, count, in.domain};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
-  const bool far =
-      kernels.lanes() ? kernels.lanes()->find_gaps(pairs, rule, target) : find_gaps(pairs, rule, target);
+  const bool far = kernel_of(set)(pairs, rule, target);
   contacts.passed[chunk] = far ? count_passed(pairs, in.time_step) : 0;
   const detail::ChunkPlaces places{chunks, chunk, contacts, contact};
   if (!detail::repair_groups(places)) detail::deal_groups(places);
@@ -125,7 +100,9 @@ void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& c
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
-    if (!constrain(rule, gap, v_n, v_n + fall, contacts.bias[at])) continue;
+    const GapResult<double> found = solve_gap(rule, gap, v_n, v_n + fall);
+    if (found.absent) continue;
+    contacts.bias[at] = found.bias;
     contacts.nx[at] = wall.normal[0];
     contacts.ny[at] = wall.normal[1];
     contacts.nz[at] = wall.normal[2];
@@ -166,9 +143,10 @@ void narrow_surface(const NarrowPhase& in, const GapRule& rule, const Candidates
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
     through += passed_surface(surface, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
-    if (!constrain(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free),
-                   contacts.bias[at]))
-      continue;
+    const GapResult<double> found =
+        solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free));
+    if (found.absent) continue;
+    contacts.bias[at] = found.bias;
     contacts.nx[at] = point->normal[0];
     contacts.ny[at] = point->normal[1];
     contacts.nz[at] = point->normal[2];
@@ -184,11 +162,11 @@ void narrow_surface(const NarrowPhase& in, const GapRule& rule, const Candidates
 }  // namespace
 
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
-                  std::size_t chunk, const SweepKernels& kernels, Contacts& contacts) {
+                  std::size_t chunk, InstructionSet set, Contacts& contacts) {
   const GapRule rule{in.time_step, in.alert, in.restitution, in.overlap_correction,
                      2 * in.time_step * in.gravity.norm()};
   if (chunks.wall[chunk] < 0)
-    narrow_grains(in, rule, chunks, chunk, kernels, contacts);
+    narrow_grains(in, rule, chunks, chunk, set, contacts);
   else if (in.walls[index(chunks.wall[chunk])].surface() == nullptr)
     narrow_wall(in, rule, candidates, chunks, chunk, contacts);
   else

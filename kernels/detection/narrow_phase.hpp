@@ -4,7 +4,7 @@
 
 #include "kernels/detection/contacts.hpp"
 #include "kernels/detection/domain.hpp"
-#include "kernels/sweeps/sweep_kernels.hpp"
+#include "kernels/simd/instruction_set.hpp"
 
 namespace talus {
 
@@ -23,12 +23,6 @@ struct NarrowPhase {
   [[no_unique_address]] Domain domain = {};
 };
 
-/// Whether a pair may be a contact of this step: nearer than the alert distance, or to be closed within the
-/// step. `v_n` [m/s] is that at its end without contacts.
-inline bool may_touch(double gap, double v_n, double time_step, double alert) {
-  return !(gap >= alert && gap >= -time_step * v_n);
-}
-
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.
 /// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
 /// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
@@ -39,7 +33,9 @@ inline bool may_touch(double gap, double v_n, double time_step, double alert) {
 /// A chunk whose contacts are the candidates that they were keeps their places and groups; where a few came
 /// or went these are repaired, else dealt anew (kernels/detection/detail/contact_groups.hpp). So groups
 /// follow from the steps since allocate(), the first of which deals.
+///
+/// `set` runs on this processor; which one it is changes no bit.
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
-                  std::size_t chunk, const SweepKernels& kernels, Contacts& contacts);
+                  std::size_t chunk, InstructionSet set, Contacts& contacts);
 
 }  // namespace talus

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/detection/narrow_phase.hpp"
+#include "kernels/law/gap_law.hpp"
 
 namespace talus {
 
@@ -36,7 +36,7 @@ void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, 
     const Vec3 v = Map(bodies.velocity[s].u) - Map(escape->u);
     const double v_n = distance > 0 ? d.dot(v) / distance : 0;
     // Rounded otherwise than in the narrow phase: a little more than it asks for.
-    if (may_touch(gap - rounding * distance, v_n, margins.time_step, margins.alert))
+    if (!stays_apart(gap - rounding * distance, v_n, margins.time_step, margins.alert))
       needed.push_back({std::min(id, escape->id), std::max(id, escape->id)});
   }
 }
@@ -49,8 +49,8 @@ void compare_at_surface(const Escape& escape, std::int64_t w, const Wall& wall, 
   wall.surface()->collide(Eigen::Map<const Vec3>(escape.x),
                           escape.radius + margins.alert + margins.time_step * v.norm(), points);
   for (const SurfacePoint& point : points)
-    if (may_touch(point.distance - escape.radius - rounding * std::abs(point.distance), point.normal.dot(v),
-                  margins.time_step, margins.alert))
+    if (!stays_apart(point.distance - escape.radius - rounding * std::abs(point.distance),
+                     point.normal.dot(v), margins.time_step, margins.alert))
       needed.push_back({-1 - w, escape.id, point.feature});
 }
 
@@ -110,7 +110,7 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
       }
       const double distance = wall.normal.dot(margins.domain.separation(Vec3(Map(escape.x)), wall.point));
       const double v_n = wall.normal.dot(Map(escape.u) - wall.velocity - wall.gain + h * margins.gravity);
-      if (may_touch(distance - escape.radius - rounding * std::abs(distance), v_n, h, margins.alert))
+      if (!stays_apart(distance - escape.radius - rounding * std::abs(distance), v_n, h, margins.alert))
         needed.push_back({-1 - static_cast<std::int64_t>(w), escape.id});
     }
   const auto id = [&](Slot s) { return static_cast<std::int64_t>(bodies.id[static_cast<std::size_t>(s)]); };

@@ -14,9 +14,9 @@
 
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/bodies/motion.hpp"
-#include "kernels/bodies/walls.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/domain.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus {
 

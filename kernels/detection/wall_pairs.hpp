@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "kernels/bodies/walls.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/domain.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus {
 

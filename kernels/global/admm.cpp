@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "kernels/global/body_solver.hpp"
+#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -29,10 +30,10 @@ struct PartState {
   void begin(const BodyProblem& problem, std::span<const Twist> V, std::span<Vec3> r) {
     for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
-      r[k] = project_on_cone(c, r[k]);
+      r[k] = project_on_cone(r[k], c.normal, c.mu);
       const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
       shift[k] = c.mu * tangential(c, v).norm();
-      y[k] = v + shift[k] * c.normal + project_on_cone(c, -v);
+      y[k] = v + shift[k] * c.normal + project_on_cone(-v, c.normal, c.mu);
     }
   }
 
@@ -53,7 +54,7 @@ struct PartState {
       const ContactEquation& c = problem.contacts[k];
       const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset) + shift[k] * c.normal;
       const Vec3 x = relaxation * v + (1 - relaxation) * y[k];
-      const Vec3 r_new = project_on_cone(c, r[k] - rho[k] * x);
+      const Vec3 r_new = project_on_cone(r[k] - rho[k] * x, c.normal, c.mu);
       y[k] = x + (r_new - r[k]) / rho[k];
       r[k] = r_new;
       const double m = rho[k] / kappa;

@@ -7,6 +7,7 @@
 
 #include "kernels/global/body_solver.hpp"
 #include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -51,7 +52,7 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
     wishes.fastest = std::max(wishes.fastest, c.offset.norm());
     const double m = effective_mass(problem, c);
     const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
-    const Vec3 carried = project_on_cone(c, r - m * shifted);
+    const Vec3 carried = project_on_cone(r - m * shifted, c.normal, c.mu);
     const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
     Vec3 change = y - c.mu * slip.norm() * c.normal - v;
     const double most = c.mu * c.normal.dot(carried);

@@ -185,15 +185,4 @@ std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec
   return V;
 }
 
-Vec3 project_on_cone(const ContactEquation& c, const Vec3& z) {
-  const double z_n = c.normal.dot(z);
-  if (c.mu == 0) return std::max(0.0, z_n) * c.normal;
-  const Vec3 t = z - z_n * c.normal;
-  const double length = t.norm();
-  if (c.mu * length <= -z_n) return Vec3::Zero();
-  if (length <= c.mu * z_n) return z;
-  const double r_n = (z_n + c.mu * length) / (1 + c.mu * c.mu);
-  return r_n * c.normal + (c.mu * r_n / length) * t;
-}
-
 }  // namespace talus

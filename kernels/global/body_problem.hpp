@@ -145,9 +145,6 @@ inline Vec3 tangential(const ContactEquation& c, const Vec3& v) {
   return v - c.normal.dot(v) * c.normal;
 }
 
-/// Projection of z on the Coulomb cone of the contact.
-Vec3 project_on_cone(const ContactEquation& c, const Vec3& z);
-
 /// m |u|^2 + (I/R^2) |w|^2 [J].
 inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
   return body.mass * u.squaredNorm() + body.spin_mass * w.squaredNorm();

@@ -139,20 +139,37 @@ Vec3 best_of_all_roots(const SlidingEquation& e, const Mat3& W, const Vec3& q, d
   return best;
 }
 
+/// Which part of the cone is nearest to z; on the edge, the factors of n and of the tangential part of z.
+struct OnCone {
+  enum { apex, inside, edge } part;
+  double normal = 0, tangential = 0;
+};
+
+/// `length` [N s] is that of the tangential part of z.
+OnCone project(double z_n, double length, double mu) {
+  if (mu * length <= -z_n)
+    return {OnCone::apex};  // first: with mu = 0 = length the other one would hold, too
+  if (length <= mu * z_n) return {OnCone::inside};
+  // A large mu must not overflow in its square.
+  const double r_n = mu < 1e8 ? (z_n + mu * length) / (1 + mu * mu) : (z_n / mu + length) / mu;
+  return {OnCone::edge, r_n, mu * r_n / length};
+}
+
 }  // namespace
 
 Vec3 project_on_cone(const Vec3& z, double mu) {
-  const double zt = z.tail<2>().norm();
-  if (mu * zt <= -z[0]) return Vec3::Zero();  // first: with mu = 0 = zt the other one would hold, too
-  if (zt <= mu * z[0]) return z;
-  // Unit generatrix (c, s): c = 1/sqrt(1 + mu^2), written so that a large mu does not overflow; std::hypot
-  // would cost more than all the rest.
-  const double c = mu < 1e8 ? 1 / std::sqrt(1 + mu * mu) : 1 / mu, s = mu * c;
-  const double along = c * z[0] + s * zt;
-  Vec3 p;
-  p[0] = c * along;
-  p.tail<2>() = z.tail<2>() * (s * along / zt);
-  return p;
+  const OnCone p = project(z[0], z.tail<2>().norm(), mu);
+  if (p.part != OnCone::edge) return p.part == OnCone::apex ? Vec3(Vec3::Zero()) : z;
+  return {p.normal, p.tangential * z[1], p.tangential * z[2]};
+}
+
+Vec3 project_on_cone(const Vec3& z, const Vec3& n, double mu) {
+  const double z_n = n.dot(z);
+  if (mu == 0) return std::max(0.0, z_n) * n;
+  const Vec3 t = z - z_n * n;
+  const OnCone p = project(z_n, t.norm(), mu);
+  if (p.part != OnCone::edge) return p.part == OnCone::apex ? Vec3(Vec3::Zero()) : z;
+  return p.normal * n + p.tangential * t;
 }
 
 Vec3 de_saxce_velocity(const Vec3& u, double mu) {

@@ -21,6 +21,8 @@ using Mat3 = Eigen::Matrix3d;
 
 /// Orthogonal projection on K_mu. mu >= 0 and finite, without an upper limit.
 Vec3 project_on_cone(const Vec3& z, double mu);
+/// The same in space, on the cone about the unit vector n.
+Vec3 project_on_cone(const Vec3& z, const Vec3& n, double mu);
 
 /// The De Saxce velocity u + mu |u_T| n [m/s].
 Vec3 de_saxce_velocity(const Vec3& u, double mu);

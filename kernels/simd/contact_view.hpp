@@ -6,8 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "kernels/detection/separation.hpp"
-
 namespace talus {
 
 inline constexpr std::size_t group_size = 16;  ///< contacts of a full group
@@ -35,28 +33,6 @@ struct ImpulseViewOf {
 };
 using ImpulseView = ImpulseViewOf<double>;
 using SingleImpulseView = ImpulseViewOf<float>;
-
-/// Pairs of grains whose gaps are asked for.
-struct PairView {
-  const double* x;                     ///< 3 per body: its centre
-  const double* radius;                ///< 1 per body
-  const double* velocity;              ///< 8 per body: its record
-  const std::int32_t *first, *second;  ///< per pair: slots of its bodies
-  std::size_t count;                   ///< of pairs
-  [[no_unique_address]] WalledSpace domain = {};
-};
-
-/// When a pair is a contact, and its bias: `NarrowPhase`.
-struct GapRule {
-  double time_step, alert, restitution, overlap_correction;
-  double slow;  ///< [m/s] no restitution up to here
-};
-
-/// What is found, per pair.
-struct GapTarget {
-  double *nx, *ny, *nz, *bias;
-  std::int64_t* contact;  ///< -1 for contacts, 0 for others
-};
 
 /// SweepMomentum, its steps in the layout of `ImpulseView`.
 struct MomentumView {
@@ -99,13 +75,12 @@ struct LaneKernels {
                          double beta);
   void (*advance_single)(float* bodies, float* last, const std::int32_t* slots, std::size_t count,
                          double beta);
-  /// Narrow phase: true when a pair came half the smaller radius nearer on its way here, or further.
-  bool (*find_gaps)(const PairView&, const GapRule&, const GapTarget&);
 };
 
 /// Constants, and no functions: whoever called one to see what there is would run instructions that the
 /// processor may not have.
-extern const LaneKernels lane_kernels_avx2[2];  ///< without friction, and with
-extern const LaneKernels lane_kernels_avx512;   ///< with friction
+extern const LaneKernels lane_kernels_portable[2];  ///< without friction, and with
+extern const LaneKernels lane_kernels_avx2[2];      ///< without friction, and with
+extern const LaneKernels lane_kernels_avx512;       ///< with friction
 
 }  // namespace talus

@@ -8,13 +8,15 @@
 /// instruction set, and a function shared between them would be kept by the linker in one version, that may
 /// be one that the processor does not know.
 ///
-/// Nothing is fused that does not say so (-ffp-contract=off): a lane computes to the bit what the scalar
-/// kernel with the same rounding computes for the same contact (docs/decisions/0008-lanes.md).
+/// Nothing is fused that does not say so (-ffp-contract=off), and `fused` rounds once on every processor: a
+/// lane computes the same bits on all of them (docs/decisions/0008-lanes.md).
 
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
+
+#include "kernels/simd/fused_product.hpp"
 // Vectors pass between inlined functions only, so that it does not matter how a call would pass them.
 #pragma GCC diagnostic ignored "-Wpsabi"
 #ifdef __AVX__
@@ -27,11 +29,21 @@ namespace {
 /// Half a body record.
 typedef double Quad __attribute__((vector_size(32)));
 typedef double Octet __attribute__((vector_size(64)));
+typedef unsigned long long QuadOfBits __attribute__((vector_size(32)));
+typedef unsigned long long OctetOfBits __attribute__((vector_size(64)));
 typedef float NarrowQuad __attribute__((vector_size(16)));
 typedef float NarrowOctet __attribute__((vector_size(32)));
-/// An element of V.
 template <class V>
-using NumberOf = std::remove_cvref_t<decltype(V{}[0])>;
+struct ElementOf {
+  using Type = std::remove_cvref_t<decltype(V{}[0])>;
+};
+template <std::floating_point V>
+struct ElementOf<V> {
+  using Type = V;
+};
+/// An element of V; a number is a vector of one lane.
+template <class V>
+using NumberOf = typename ElementOf<V>::Type;
 
 template <int W>
 struct LanesOf;
@@ -122,7 +134,20 @@ template <class Number, class V>
   store(to + at, v);
 }
 
-#ifdef __AVX2__
+#ifndef __AVX2__
+template <class V, class Number>
+[[gnu::always_inline]] inline V load(const Number* from, std::size_t at, FirstLanes lanes) {
+  V v{};
+  for (std::size_t l = 0; l < sizeof(V) / sizeof(NumberOf<V>) && at + l < lanes.count; ++l)
+    v[l] = from[at + l];
+  return v;
+}
+template <class V, class Number>
+[[gnu::always_inline]] inline void store(Number* to, std::size_t at, V v, FirstLanes lanes) {
+  for (std::size_t l = 0; l < sizeof(V) / sizeof(NumberOf<V>) && at + l < lanes.count; ++l)
+    to[at + l] = static_cast<Number>(v[l]);
+}
+#else
 /// All bits of the lanes at, at + 1, ... that are meant.
 [[gnu::always_inline]] inline __m256i mask_of(std::size_t at, FirstLanes lanes) {
   const auto left = static_cast<long long>(lanes.count) - static_cast<long long>(at);
@@ -216,7 +241,18 @@ template <std::same_as<NarrowOctet> V>
 #endif
 }
 
+[[gnu::always_inline]] inline double root(double v) {
+  return __builtin_sqrt(v);
+}
+
 /// a b + c, rounded once.
+template <std::floating_point Number>
+[[gnu::always_inline]] inline Number fused(Number a, Number b, Number c) {
+  if constexpr (std::same_as<Number, float>)
+    return __builtin_fmaf(a, b, c);
+  else
+    return __builtin_fma(a, b, c);
+}
 template <class V>
 [[gnu::always_inline]] inline V fused(V a, V b, V c) {
 #ifdef __FMA__
@@ -232,13 +268,16 @@ template <class V>
     return reinterpret_cast<V>(_mm512_fmadd_pd(reinterpret_cast<__m512d>(a), reinterpret_cast<__m512d>(b),
                                                reinterpret_cast<__m512d>(c)));
 #endif
+#ifdef __FP_FAST_FMA
   V sum{};
-  for (std::size_t l = 0; l < sizeof(V) / sizeof(NumberOf<V>); ++l)
-    if constexpr (std::same_as<NumberOf<V>, float>)
-      sum[l] = __builtin_fmaf(a[l], b[l], c[l]);
-    else
-      sum[l] = __builtin_fma(a[l], b[l], c[l]);
+  for (std::size_t l = 0; l < sizeof(V) / sizeof(NumberOf<V>); ++l) sum[l] = fused(a[l], b[l], c[l]);
   return sum;
+#else
+  if constexpr (std::same_as<V, Quad>)
+    return fused_doubles<QuadOfBits>(a, b, c);
+  else
+    return fused_floats<OctetOfBits, Octet>(a, b, c);
+#endif
 }
 
 /// The larger of 0 and v; a NaN stays one.
@@ -257,6 +296,9 @@ template <class V>
   return V{} > v ? V{} : v;
 }
 
+[[gnu::always_inline]] inline double absolute(double v) {
+  return __builtin_fabs(v);
+}
 template <class V>
 [[gnu::always_inline]] inline V absolute(V v) {
   using Bits = decltype(v < v);
@@ -284,6 +326,10 @@ template <class V>
 [[gnu::always_inline]] inline V dot(const Space<V>& a, const Space<V>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
+template <class V>
+[[gnu::always_inline]] inline Space<V> cross(const Space<V>& a, const Space<V>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
 /// s a + b, and products of which all but the first is fused.
 template <class V>
 [[gnu::always_inline]] inline Space<V> add_scaled(V s, const Space<V>& a, const Space<V>& b) {
@@ -302,92 +348,6 @@ template <class V>
 [[gnu::always_inline]] inline Space<V> less_cross(const Space<V>& v, const Space<V>& w, const Space<V>& n) {
   return {fused(w.z, n.y, fused(-w.y, n.z, v.x)), fused(w.x, n.z, fused(-w.z, n.x, v.y)),
           fused(w.y, n.x, fused(-w.x, n.y, v.z))};
-}
-
-/// 4 x 4: swaps rows and columns: c0 becomes the first elements of the rows, and so on.
-[[gnu::always_inline]] inline void swap_rows_and_columns(Quad& c0, Quad& c1, Quad& c2, Quad& c3) {
-  const Quad a = __builtin_shufflevector(c0, c1, 0, 4, 2, 6), b = __builtin_shufflevector(c0, c1, 1, 5, 3, 7);
-  const Quad c = __builtin_shufflevector(c2, c3, 0, 4, 2, 6), d = __builtin_shufflevector(c2, c3, 1, 5, 3, 7);
-  c0 = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-  c1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-  c2 = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-  c3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
-}
-/// The same on the left and on the right half at once.
-[[gnu::always_inline]] inline void swap_rows_and_columns(NarrowOctet& c0, NarrowOctet& c1, NarrowOctet& c2,
-                                                         NarrowOctet& c3) {
-  const NarrowOctet a = __builtin_shufflevector(c0, c1, 0, 8, 1, 9, 4, 12, 5, 13),
-                    b = __builtin_shufflevector(c0, c1, 2, 10, 3, 11, 6, 14, 7, 15),
-                    c = __builtin_shufflevector(c2, c3, 0, 8, 1, 9, 4, 12, 5, 13),
-                    d = __builtin_shufflevector(c2, c3, 2, 10, 3, 11, 6, 14, 7, 15);
-  c0 = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
-  c1 = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
-  c2 = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
-  c3 = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
-}
-/// 8 x 8: rows become columns, in 24 shuffles.
-[[gnu::always_inline]] inline void transpose(Octet (&v)[8]) {
-  Octet pair[8], four[8];
-#pragma GCC unroll 4
-  for (int k = 0; k < 8; k += 2) {
-    pair[k] = __builtin_shufflevector(v[k], v[k + 1], 0, 8, 2, 10, 4, 12, 6, 14);
-    pair[k + 1] = __builtin_shufflevector(v[k], v[k + 1], 1, 9, 3, 11, 5, 13, 7, 15);
-  }
-#pragma GCC unroll 2
-  for (int k = 0; k < 8; k += 4)
-#pragma GCC unroll 2
-    for (int odd = 0; odd < 2; ++odd) {
-      four[k + odd] = __builtin_shufflevector(pair[k + odd], pair[k + 2 + odd], 0, 1, 4, 5, 8, 9, 12, 13);
-      four[k + 2 + odd] =
-          __builtin_shufflevector(pair[k + odd], pair[k + 2 + odd], 2, 3, 6, 7, 10, 11, 14, 15);
-    }
-#pragma GCC unroll 4
-  for (int k = 0; k < 4; ++k) {
-    v[k] = __builtin_shufflevector(four[k], four[k + 4], 0, 1, 4, 5, 8, 9, 12, 13);
-    v[k + 4] = __builtin_shufflevector(four[k], four[k + 4], 2, 3, 6, 7, 10, 11, 14, 15);
-  }
-}
-
-/// The same with floats, whose shuffles stay within 128 bits as long as they can.
-[[gnu::always_inline]] inline void transpose(NarrowOctet (&v)[8]) {
-  NarrowOctet pair[8], four[8];
-#pragma GCC unroll 4
-  for (int k = 0; k < 8; k += 2) {
-    pair[k] = __builtin_shufflevector(v[k], v[k + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-    pair[k + 1] = __builtin_shufflevector(v[k], v[k + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-  }
-#pragma GCC unroll 2
-  for (int k = 0; k < 8; k += 4)
-#pragma GCC unroll 2
-    for (int half = 0; half < 2; ++half) {
-      const NarrowOctet a = pair[k + half], b = pair[k + 2 + half];
-      four[k + 2 * half] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
-      four[k + 2 * half + 1] = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
-    }
-#pragma GCC unroll 4
-  for (int k = 0; k < 4; ++k) {
-    v[k] = __builtin_shufflevector(four[k], four[k + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-    v[k + 4] = __builtin_shufflevector(four[k], four[k + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-  }
-}
-
-/// The last element of each half record in all its places.
-[[gnu::always_inline]] inline Quad spread_last(Quad v) {
-  return __builtin_shufflevector(v, v, 3, 3, 3, 3);
-}
-[[gnu::always_inline]] inline Octet spread_last(Octet v) {
-  return __builtin_shufflevector(v, v, 3, 3, 3, 3, 7, 7, 7, 7);
-}
-
-[[gnu::always_inline]] inline NarrowOctet spread_last(NarrowOctet v) {
-  return __builtin_shufflevector(v, v, 3, 3, 3, 3, 7, 7, 7, 7);
-}
-
-/// Flips the sign of every element whose pattern is -0.0.
-template <class V>
-[[gnu::always_inline]] inline V flip(V v, V pattern) {
-  using Bits = decltype(v < v);
-  return reinterpret_cast<V>(reinterpret_cast<Bits>(v) ^ reinterpret_cast<Bits>(pattern));
 }
 
 }  // namespace

@@ -38,46 +38,6 @@ struct SweepMomentum {
   SweepSteps& steps;  ///< read, and made anew
 };
 
-/// One pass of nonlinear Gauss-Seidel over grain-grain contacts (docs/theory.md; Jean 1999, closed form for
-/// spheres):
-///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
-///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
-/// `Friction` false: only r_n exists and only u is read and written. Per contact: reads 2 body records (128
-/// bytes) and 56 bytes of contact, writes 128 + 24; about 108 flop, 2 divisions and a square root.
-/// Momentum reads and writes 12 more.
-template <bool Friction>
-void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu);
-template <bool Friction>
-void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  const SweepMomentum& momentum);
-
-/// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i. A copy of finite
-/// mass is split once more, contact k of the range against part k mod 8, and glued at the end: 8 contacts
-/// that do not wait for one another.
-template <bool Friction>
-void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                WallCopy& wall);
-template <bool Friction>
-void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                WallCopy& wall, const SweepMomentum& momentum);
-
-/// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
-/// (single_precision.hpp); `contacts` lends groups and bodies. The steps are in the units of `single`.
-template <bool Friction>
-void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
-                  std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum);
-template <bool Friction>
-void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
-                std::span<SingleVelocity> velocity, double mu, WallCopy& wall, const SweepMomentum& momentum);
-
-/// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
-/// r.
-template <bool Friction>
-void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity);
-template <bool Friction>
-void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
-                     WallCopy& wall);
-
 /// Sums of the certificate over some contacts. Add them in a fixed order only.
 struct ErrorSums {
   double residual2 = 0;      ///< sum of e^2 [m^2/s^2]
@@ -90,15 +50,6 @@ struct ErrorSums {
 
   void add(const ErrorSums& other);
 };
-
-/// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and rho
-/// = 1/W_nn [m/s] (docs/theory.md). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
-template <bool Friction>
-ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                       double mu, Multiplicities parts = {});
-template <bool Friction>
-ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                     double mu, const WallCopy& wall, double wall_inv_mass, Multiplicities parts = {});
 
 /// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies
 /// have equal masses. Summed in order.

@@ -1,19 +1,15 @@
 #include "kernels/sweeps/sweep_kernels.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
 
 #include "kernels/simd/contact_view.hpp"
-#include "kernels/sweeps/fetch_lines.hpp"
 
 namespace talus {
 
 namespace {
-
-constexpr std::array<std::string_view, 4> names = {"auto", "portable", "avx2", "avx512"};
 
 /// Lane kernels see a body as 8 doubles.
 static_assert(offsetof(Velocity, u) == 0 && offsetof(Velocity, inv_mass) == 24 &&
@@ -65,21 +61,6 @@ SingleImpulseView impulses(SingleContacts& c) {
   return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
 }
 
-/// Of whole records at `slots`, as LaneKernels::advance_bodies does it.
-template <class Number>
-void advance_records(std::span<const Slot> slots, std::span<VelocityOf<Number>> velocity,
-                     std::span<VelocityOf<Number>> last, Number beta) {
-  for (const Slot slot : slots) {
-    const auto s = static_cast<std::size_t>(slot);
-    const VelocityOf<Number> now = velocity[s];
-    for (std::size_t k = 0; k < 3; ++k) {
-      velocity[s].u[k] = now.u[k] + beta * (now.u[k] - last[s].u[k]);
-      velocity[s].w[k] = now.w[k] + beta * (now.w[k] - last[s].w[k]);
-    }
-    last[s] = now;
-  }
-}
-
 MomentumView view(const SweepMomentum& m) {
   return {m.steps.x.data(), m.steps.y.data(), m.steps.z.data(), m.steps.n.data(), m.beta, m.omega};
 }
@@ -96,16 +77,6 @@ ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
   return sums;
 }
 
-bool runs(InstructionSet set) {
-#ifdef __x86_64__
-  if (set == InstructionSet::avx512)
-    return runs(InstructionSet::avx2) && __builtin_cpu_supports("avx512f") &&
-           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
-  if (set == InstructionSet::avx2) return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#endif
-  return set == InstructionSet::portable;
-}
-
 /// Half records in lanes of 4 are swept faster than in lanes of 8: 3.5 against 4.2 ns per contact. V afresh
 /// takes few registers: 3.0 against 4.1 ns.
 LaneKernels friction_in_avx512() {
@@ -117,26 +88,11 @@ LaneKernels friction_in_avx512() {
 
 }  // namespace
 
-std::string_view name_of(InstructionSet set) {
-  return names[static_cast<std::size_t>(set)];
-}
-
-std::optional<InstructionSet> instruction_set_of(std::string_view name) {
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) return {};
-  return static_cast<InstructionSet>(found - names.begin());
-}
-
-InstructionSet best_instruction_set() {
-  for (const InstructionSet set : {InstructionSet::avx512, InstructionSet::avx2})
-    if (runs(set)) return set;
-  return InstructionSet::portable;
-}
-
 SweepKernels::SweepKernels(InstructionSet set)
-    : set_(set == InstructionSet::automatic ? best_instruction_set() : set), lanes_{nullptr, nullptr} {
-  if (!runs(set_))
-    throw std::invalid_argument("instruction set '" + std::string(name_of(set)) +
+    : set_(set == InstructionSet::automatic ? best_instruction_set() : set),
+      lanes_{&lane_kernels_portable[0], &lane_kernels_portable[1]} {
+  if (!runs_here(set_))
+    throw std::invalid_argument("instruction set '" + std::string(name_of(set_)) +
                                 "': this processor runs at most '" +
                                 std::string(name_of(best_instruction_set())) + "'");
   if (set_ == InstructionSet::portable) return;
@@ -148,14 +104,12 @@ SweepKernels::SweepKernels(InstructionSet set)
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 double mu) const {
-  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu);
   lanes_[Friction]->sweep_grains(view(contacts, range, velocity), impulses(contacts), records(velocity), mu);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 double mu, const SweepMomentum& momentum) const {
-  if (!lanes_[Friction]) return talus::sweep_grains<Friction>(contacts, range, velocity, mu, momentum);
   lanes_[Friction]->momentum_grains(view(contacts, range, velocity), impulses(contacts), records(velocity),
                                     mu, view(momentum));
 }
@@ -163,7 +117,6 @@ void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::spa
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                               WallCopy& wall) const {
-  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall);
   lanes_[Friction]->sweep_wall(view(contacts, range, velocity), impulses(contacts), records(velocity), mu,
                                wall.velocity, wall.inv_mass);
 }
@@ -171,7 +124,6 @@ void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                               WallCopy& wall, const SweepMomentum& momentum) const {
-  if (!lanes_[Friction]) return talus::sweep_wall<Friction>(contacts, range, velocity, mu, wall, momentum);
   lanes_[Friction]->momentum_wall(view(contacts, range, velocity), impulses(contacts), records(velocity), mu,
                                   wall.velocity, wall.inv_mass, view(momentum));
 }
@@ -180,8 +132,6 @@ template <bool Friction>
 void SweepKernels::sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                                 std::span<SingleVelocity> velocity, double mu,
                                 const SweepMomentum& momentum) const {
-  if (!lanes_[Friction])
-    return talus::sweep_grains<Friction>(contacts, single, range, velocity, mu, momentum);
   lanes_[Friction]->single_grains(view(contacts, single, range, velocity), impulses(single),
                                   records(velocity), mu, view(momentum));
 }
@@ -190,8 +140,6 @@ template <bool Friction>
 void SweepKernels::sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                               std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
                               const SweepMomentum& momentum) const {
-  if (!lanes_[Friction])
-    return talus::sweep_wall<Friction>(contacts, single, range, velocity, mu, wall, momentum);
   lanes_[Friction]->single_wall(view(contacts, single, range, velocity), impulses(single), records(velocity),
                                 mu, wall.velocity, wall.inv_mass * single.unit, view(momentum));
 }
@@ -199,14 +147,12 @@ void SweepKernels::sweep_wall(const Contacts& contacts, SingleContacts& single, 
 template <bool Friction>
 void SweepKernels::accumulate_grains(const Contacts& contacts, ContactRange range,
                                      std::span<Velocity> velocity) const {
-  if (!lanes_[Friction]) return talus::accumulate_grains<Friction>(contacts, range, velocity);
   lanes_[Friction]->accumulate_grains(view(contacts, range, velocity), records(velocity));
 }
 
 template <bool Friction>
 void SweepKernels::accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                    WallCopy& wall) const {
-  if (!lanes_[Friction]) return talus::accumulate_wall<Friction>(contacts, range, velocity, wall);
   lanes_[Friction]->accumulate_wall(view(contacts, range, velocity), records(velocity), wall.velocity,
                                     wall.inv_mass);
 }
@@ -215,7 +161,6 @@ template <bool Friction>
 ErrorSums SweepKernels::error_grains(const Contacts& contacts, ContactRange range,
                                      std::span<const Velocity> velocity, double mu,
                                      Multiplicities parts) const {
-  if (!lanes_[Friction]) return talus::error_grains<Friction>(contacts, range, velocity, mu, parts);
   return sums_of(
       lanes_[Friction]->error_grains(view(contacts, range, velocity), records(velocity), mu, parts.data()),
       range);
@@ -225,8 +170,6 @@ template <bool Friction>
 ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
                                    std::span<const Velocity> velocity, double mu, const WallCopy& wall,
                                    double wall_inv_mass, Multiplicities parts) const {
-  if (!lanes_[Friction])
-    return talus::error_wall<Friction>(contacts, range, velocity, mu, wall, wall_inv_mass, parts);
   return sums_of(lanes_[Friction]->error_wall(view(contacts, range, velocity), records(velocity), mu,
                                               wall.velocity, wall_inv_mass, parts.data()),
                  range);
@@ -234,16 +177,12 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
 
 void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velocity,
                            std::span<Velocity> last, double beta) const {
-  if (lanes_[1])
-    return lanes_[1]->advance_bodies(records(velocity), records(last), slots.data(), slots.size(), beta);
-  advance_records(slots, velocity, last, beta);
+  lanes_[1]->advance_bodies(records(velocity), records(last), slots.data(), slots.size(), beta);
 }
 
 void SweepKernels::advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
                            std::span<SingleVelocity> last, double beta) const {
-  if (lanes_[1])
-    return lanes_[1]->advance_single(records(velocity), records(last), slots.data(), slots.size(), beta);
-  advance_records(slots, velocity, last, static_cast<float>(beta));
+  lanes_[1]->advance_single(records(velocity), records(last), slots.data(), slots.size(), beta);
 }
 
 template void SweepKernels::sweep_grains<true>(const Contacts&, SingleContacts&, ContactRange,
@@ -286,17 +225,5 @@ template ErrorSums SweepKernels::error_grains<false>(const Contacts&, ContactRan
                                                      double, Multiplicities) const;
 template ErrorSums SweepKernels::error_wall<false>(const Contacts&, ContactRange, std::span<const Velocity>,
                                                    double, const WallCopy&, double, Multiplicities) const;
-
-void SweepKernels::fetch_code(bool friction) const {
-  const auto fetch = [](auto*... kernels) {
-    constexpr std::size_t longest = 14 << 10;  // a sweep with friction (AVX-512) [byte]
-    for (const auto* begin : {reinterpret_cast<const char*>(kernels)...})
-      fetch_lines(std::span(begin, longest));
-  };
-  if (const LaneKernels* const k = lanes_[friction ? 1 : 0])
-    fetch(k->accumulate_grains, k->accumulate_wall, k->error_grains, k->error_wall, k->sweep_grains,
-          k->sweep_wall, k->momentum_grains, k->momentum_wall, k->single_wall, k->single_grains,
-          k->advance_bodies, k->advance_single);
-}
 
 }  // namespace talus

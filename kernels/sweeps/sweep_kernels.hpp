@@ -5,34 +5,16 @@
 ///     const SweepKernels kernels(best_instruction_set());
 ///     kernels.sweep_grains<true>(contacts, range, velocity, mu);
 
-#include <optional>
-#include <string_view>
-
+#include "kernels/simd/instruction_set.hpp"
 #include "kernels/sweeps/sweep.hpp"
 
 namespace talus {
 
 struct LaneKernels;
 
-/// From the weakest to the strongest. Those on vectors give the same bits, as every lane does what the scalar
-/// kernel does; but they fuse products into sums, which the portable one does not
-/// (docs/decisions/0008-lanes.md).
-enum class InstructionSet {
-  automatic,  ///< the strongest that runs here, and in a simulation on all ranks (`settled`)
-  portable,   ///< the scalar kernels
-  avx2,       ///< 4 contacts at a time (AVX2, FMA)
-  avx512,     ///< 8 contacts at a time (F, DQ, VL)
-};
-
-std::string_view name_of(InstructionSet set);
-/// "auto", "portable", "avx2" or "avx512"; nothing for other names.
-std::optional<InstructionSet> instruction_set_of(std::string_view name);
-
-/// The strongest that the processor and the operating system run.
-InstructionSet best_instruction_set();
-
-/// A choice of kernels. Each does what its namesake in kernels/sweeps/sweep.hpp does, but for rounding; a
-/// range is that of a whole chunk, and `contacts.group` holds its groups (narrow_chunk).
+/// The kernels of one instruction set. Which one it is changes no bit of what they compute. A range is that
+/// of a whole chunk, and `contacts.group` holds its groups (narrow_chunk); `Friction` false: only r_n exists
+/// and only u is read and written.
 class SweepKernels {
  public:
   /// Throws std::invalid_argument when this processor does not run `set`.
@@ -40,20 +22,32 @@ class SweepKernels {
 
   /// What was chosen, never `automatic`.
   InstructionSet set() const { return set_; }
-  /// For the narrow phase; null: the scalar one.
-  const LaneKernels* lanes() const { return lanes_[1]; }
 
+  /// One pass of nonlinear Gauss-Seidel over grain-grain contacts (docs/theory.md; Jean 1999, closed form for
+  /// spheres: kernels/law/contact_law.hpp):
+  ///   r_n <- max(0, r_n - (v_n + b)/W_nn), W_nn = 1/m_i + 1/m_j,
+  ///   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt), W_tt = W_nn + R_i^2/I_i + R_j^2/I_j,  V += M^-1 H dr.
+  /// Per contact: reads 2 body records (128 bytes) and 56 bytes of contact, writes 128 + 24; about 108 flop,
+  /// 2 divisions and a square root. Momentum reads and writes 12 bytes more.
   template <bool Friction>
   void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) const;
   template <bool Friction>
   void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                     const SweepMomentum& momentum) const;
+
+  /// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i. A copy of finite
+  /// mass is split once more, contact k of the range against part k mod 8, and glued at the end: 8 contacts
+  /// that do not wait for one another.
   template <bool Friction>
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                   WallCopy& wall) const;
   template <bool Friction>
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
                   WallCopy& wall, const SweepMomentum& momentum) const;
+
+  /// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
+  /// (single_precision.hpp); of `contacts` groups and bodies are read. The steps are in the units of
+  /// `single`.
   template <bool Friction>
   void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
                     std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum) const;
@@ -61,11 +55,17 @@ class SweepKernels {
   void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
                   std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
                   const SweepMomentum& momentum) const;
+
+  /// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
+  /// r.
   template <bool Friction>
   void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) const;
   template <bool Friction>
   void accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                        WallCopy& wall) const;
+
+  /// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and
+  /// rho = 1/W_nn [m/s] (docs/theory.md). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
   template <bool Friction>
   ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                          double mu, Multiplicities parts = {}) const;
@@ -81,12 +81,9 @@ class SweepKernels {
   void advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,
                std::span<SingleVelocity> last, double beta) const;
 
-  /// Brings the code of the kernels with or without friction into the caches that hold code and data.
-  void fetch_code(bool friction) const;
-
  private:
   InstructionSet set_;
-  const LaneKernels* lanes_[2];  ///< without and with friction; null: the scalar kernels
+  const LaneKernels* lanes_[2];  ///< without and with friction
 };
 
 }  // namespace talus

@@ -65,22 +65,6 @@ std::int64_t neighbour(const CellTable& table, const std::array<std::int32_t, 3>
   return c[0] + std::int64_t{table.cells[0]} * (c[1] + std::int64_t{table.cells[1]} * c[2]);
 }
 
-/// The grid, and its weights over all ranks.
-CellTable choose_cells(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
-                       const Reduction& reduction, std::vector<std::int64_t>& weight) {
-  CellTable table;
-  for (double cells = static_cast<double>(std::min(wanted, most_cells));; cells *= 2) {
-    table = empty_table(frame, cells);
-    weight.assign(at(size_of(table)), 0);
-    for (std::size_t k = 0; k < points.x.size(); ++k)
-      weight[table.cell_of(frame.coordinates(points.x[k]))] += points.weight.empty() ? 1 : points.weight[k];
-    reduction.sum(weight);
-    const auto occupied =
-        static_cast<std::int64_t>(weight.size()) - std::count(weight.begin(), weight.end(), std::int64_t{0});
-    if (occupied >= wanted || 2 * cells > static_cast<double>(most_cells)) return table;
-  }
-}
-
 /// The graph of the cells with weight, as METIS reads it; its weights are 32-bit.
 struct Compressed {
   std::vector<std::int32_t> cell;  ///< of vertex
@@ -168,6 +152,21 @@ std::vector<idx_t> call_metis(Compressed& graph, std::int32_t n) {
 }
 
 }  // namespace
+
+CellTable choose_cells(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
+                       const Reduction& reduction, std::vector<std::int64_t>& weight) {
+  CellTable table;
+  for (double cells = static_cast<double>(std::min(wanted, most_cells));; cells *= 2) {
+    table = empty_table(frame, cells);
+    weight.assign(at(size_of(table)), 0);
+    for (std::size_t k = 0; k < points.x.size(); ++k)
+      weight[table.cell_of(frame.coordinates(points.x[k]))] += points.weight.empty() ? 1 : points.weight[k];
+    reduction.sum(weight);
+    const auto occupied =
+        static_cast<std::int64_t>(weight.size()) - std::count(weight.begin(), weight.end(), std::int64_t{0});
+    if (occupied >= wanted || 2 * cells > static_cast<double>(most_cells)) return table;
+  }
+}
 
 CellGraph build_cell_graph(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
                            const Reduction& reduction) {

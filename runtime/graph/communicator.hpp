@@ -1,7 +1,14 @@
 #pragma once
 
-/// Ranks as the rest of the program sees them: collective calls for what happens once a step or more rarely,
-/// and channels for what travels every iteration. With one rank nothing is sent and MPI is not called.
+/// Communication interface of the program: collective calls for what happens once a step or more rarely, and
+/// channels for what travels in every iteration. Who implements it:
+///
+///   OneRank             one_rank.hpp           a rank alone: nothing is sent, MPI is not called
+///   make_communicator   mpi_communicator.hpp   the ranks of mpirun
+///   PretendRanks        pretend_ranks.hpp      threads of one process that take each other for ranks, for
+///   tests DelayedMessages     delayed_messages.hpp   a decorator: messages of any other arrive later
+///   simulated_time()    simulated_time.hpp     a decorator: calls of any other take time of a simulated
+///   machine
 
 #include <algorithm>
 #include <cstddef>
@@ -13,6 +20,7 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace talus::trace {
@@ -25,81 +33,105 @@ namespace talus::graph {
 /// `level`, as Communicator::thread_level gives it, below "serialized". Tasks that call it run on any thread.
 void demand_thread_level(const std::string& level, int ranks, int threads);
 
-/// Starts MPI for the life of the object when the process was started by mpirun or srun (or `always`), and
-/// ends it. Create one, in main.
-class MpiSession {
+/// A message of fixed length that is sent again and again. A sender calls `start` when its buffer is full,
+/// and `done` until true before it fills it again; a receiver calls `start` when its buffer may be
+/// overwritten, then `done` until true. Used by one thread at a time.
+class Channel {
  public:
-  MpiSession(int* argc, char*** argv, bool always = false);
-  ~MpiSession();
-  MpiSession(const MpiSession&) = delete;
-  MpiSession& operator=(const MpiSession&) = delete;
-  bool started() const { return started_; }
-
- private:
-  bool started_ = false;
+  Channel() = default;
+  virtual ~Channel() = default;
+  Channel(const Channel&) = delete;
+  Channel& operator=(const Channel&) = delete;
+  virtual void start() = 0;
+  /// True when the message has left, or has come; true as well when none was started. A receiver on a
+  /// simulated machine (clock.hpp) is done only when it has waited.
+  virtual bool done() = 0;
+  /// Until done; ranks that share a core give way to one another. Returns what it took [s].
+  virtual double wait();
 };
 
-struct CommunicatorOptions {
-  /// Every channel message is held back until this time after it was sent [s]: a slow network on one machine,
-  /// for tests and benchmarks. Ranks must share a clock then, as those of one machine do. Simulated ranks
-  /// have a network of their own.
-  double delay = 0;
+/// Messages of one round of a gather, which may have another length each time.
+class Round {
+ public:
+  Round() = default;
+  virtual ~Round() = default;
+  Round(const Round&) = delete;
+  Round& operator=(const Round&) = delete;
+  /// Sends `out` to rank `to`, and takes what rank `from` sends into `in`; both must stay until end().
+  virtual void begin(int to, std::span<const double> out, int from, std::span<double> in) = 0;
+  /// Returns when both are done.
+  virtual void end() = 0;
+};
+
+/// A barrier that this rank has come to.
+class Meeting {
+ public:
+  Meeting() = default;
+  virtual ~Meeting() = default;
+  Meeting(const Meeting&) = delete;
+  Meeting& operator=(const Meeting&) = delete;
+  /// True when all ranks have come.
+  virtual bool complete() = 0;
+};
+
+class PendingGather;
+
+/// What a rank knows of itself and the others.
+struct RankProperties {
+  int rank = 0, ranks = 1;
+  int ranks_on_node = 1;              ///< on this machine
+  std::string thread_level = "none";  ///< MPI grants "none", "single", "funneled", "serialized", "multiple"
+  bool any_thread = true;             ///< may use channels; else thread 0 only
+  int largest_tag = 32767;            ///< of a channel; MPI promises no more, Open MPI has 2^31 - 1
 };
 
 class Communicator {
  public:
-  /// One rank.
-  Communicator();
-  /// All ranks of the session; one rank when MPI was not started.
-  explicit Communicator(const MpiSession& session, CommunicatorOptions options = {});
-  ~Communicator();
+  virtual ~Communicator() = default;
   Communicator(const Communicator&) = delete;
   Communicator& operator=(const Communicator&) = delete;
 
-  int rank() const noexcept { return rank_; }
-  int ranks() const noexcept { return ranks_; }
-  /// What MPI grants: "none", "single", "funneled", "serialized" or "multiple".
-  std::string thread_level() const;
-  /// Any thread may use channels; else thread 0 only.
-  bool any_thread() const noexcept { return any_thread_; }
-  /// Of a channel; MPI promises 32,767, Open MPI has 2^31 - 1.
-  int largest_tag() const noexcept { return largest_tag_; }
-  /// Ranks on this machine.
-  int ranks_on_node() const noexcept { return ranks_on_node_; }
+  int rank() const noexcept { return properties_.rank; }
+  int ranks() const noexcept { return properties_.ranks; }
+  const std::string& thread_level() const noexcept { return properties_.thread_level; }
+  bool any_thread() const noexcept { return properties_.any_thread; }
+  int largest_tag() const noexcept { return properties_.largest_tag; }
+  int ranks_on_node() const noexcept { return properties_.ranks_on_node; }
+  const RankProperties& properties() const noexcept { return properties_; }
   /// Collective calls leave spans in `trace` from now on; null: no more. It must outlive them. Those of
   /// channels are left by who uses them. Calls of one rank, which do nothing, leave theirs too (start_gather
   /// none): replay counts them for many. Exchanges and gathers are two calls, the first of lengths. Only
   /// threads of the recorder's team may make calls then.
-  void record_to(trace::Recorder* trace) const { trace_ = trace; }
-  trace::Recorder* trace() const { return trace_; }
+  virtual void record_to(trace::Recorder* trace) const { trace_ = trace; }
+  trace::Recorder* trace() const noexcept { return trace_; }
 
   // Collective: every rank calls, in the same order.
   /// Sends to[r] to rank r. `room(r, bytes)` gives the place for what rank r sends here, and is not asked for
   /// this rank itself, whose own part is nobody's message. One part per rank, each below 2 GiB.
-  void exchange(std::span<const std::span<const std::byte>> to,
-                const std::function<std::byte*(std::size_t, std::size_t)>& room) const;
-  void sum(std::span<std::int64_t> values) const;
-  void max(std::span<double> values) const;
+  virtual void exchange(std::span<const std::span<const std::byte>> to,
+                        const std::function<std::byte*(std::size_t, std::size_t)>& room) const = 0;
+  /// Of each value over all ranks, in place; all bring as many.
+  virtual void sum(std::span<std::int64_t> values) const = 0;
+  virtual void max(std::span<double> values) const = 0;
   /// The parts of all ranks in order of rank.
-  std::vector<std::byte> gather(std::span<const std::byte> part) const;
+  virtual std::vector<std::byte> gather(std::span<const std::byte> part) const = 0;
   /// The same, begun now and read later: its first message travels while other work goes on, the other
   /// log2(ranks) are waited for. `lengths`: how many numbers each rank brings.
-  class PendingGather;
   std::unique_ptr<PendingGather> start_gather(std::vector<double> part,
                                               std::span<const std::size_t> lengths) const;
   /// The parts of all ranks in order of rank go to rank 0, whose `take` gets them in pieces of at most
   /// `piece` > 0 bytes, of one rank each; the others' is not called.
-  void to_first(std::span<const std::byte> part, std::size_t piece,
-                const std::function<void(std::span<const std::byte>)>& take) const;
+  virtual void to_first(std::span<const std::byte> part, std::size_t piece,
+                        const std::function<void(std::span<const std::byte>)>& take) const = 0;
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
-  void progress() const;
+  virtual void progress() const {}
   /// Returns when all ranks have called it, or after `seconds` if some have not come, since they are dead or
   /// wait for one that has failed. Nothing but abort() is left then.
   void meet(double seconds) const;
   /// Ends all ranks with exit code `code`: what is left when one of several ranks has failed and the others
   /// wait for it.
-  [[noreturn]] void abort(int code) const;
+  [[noreturn]] virtual void abort(int code) const = 0;
 
   /// Sends to[r] to rank r and returns what each rank sent here. Nothing is copied on the way, and what is
   /// for this rank is moved.
@@ -111,63 +143,45 @@ class Communicator {
   template <class Record, class Take>
   void records_to_first(std::span<const Record> part, const Take& take) const;
 
-  // Channels. Of one rank: used by one thread at a time. Tags from first_tag on are theirs.
+  // Messages of single ranks. Tags from first_tag on are for the channels of who calls.
   static constexpr int gather_tag = 1, first_tag = 2;
-  /// A message of fixed length that is sent again and again (MPI's persistent requests).
-  class Channel;
   /// Opens the sending and the receiving end; both ranks must name the same tag and length. `buffer` must
-  /// outlive the channel; with a delay the last entry is the time stamp, so make it `payload + 1` long.
-  std::unique_ptr<Channel> open_send(int to, int tag, std::span<double> buffer) const;
-  std::unique_ptr<Channel> open_receive(int from, int tag, std::span<double> buffer) const;
+  /// outlive the channel.
+  virtual std::unique_ptr<Channel> open_send(int to, int tag, std::span<double> buffer) const = 0;
+  virtual std::unique_ptr<Channel> open_receive(int from, int tag, std::span<double> buffer) const = 0;
+  virtual std::unique_ptr<Round> open_round() const = 0;
+  /// Collective, though it does not wait.
+  virtual std::unique_ptr<Meeting> start_meeting() const = 0;
+
+ protected:
+  explicit Communicator(RankProperties properties) : properties_(std::move(properties)) {}
 
  private:
-  /// In the trace, what a single rank would have called.
-  void note_calls(int count, std::uint32_t bytes = 0) const;
-  int rank_ = 0, ranks_ = 1, ranks_on_node_ = 1;
-  bool any_thread_ = true;
-  int largest_tag_ = 32767;
+  RankProperties properties_;
   mutable trace::Recorder* trace_ = nullptr;  ///< watches; changes nothing of what is sent
-  CommunicatorOptions options_;
-};
-
-/// For programs of one rank: no MPI call is ever made through it.
-const Communicator& one_rank();
-
-/// See Communicator::open_send. A sender calls `start` when its buffer is full, and `done` until true before
-/// it fills it again; a receiver calls `start` when its buffer may be overwritten, then `done` until true.
-class Communicator::Channel {
- public:
-  ~Channel();
-  Channel(const Channel&) = delete;
-  Channel& operator=(const Channel&) = delete;
-  void start();
-  /// True when the message has left, or has come; true as well when none was started. A simulated receiver
-  /// (clock.hpp) is done only when it has waited.
-  bool done();
-  /// Until done; ranks that share a core give way to one another. Returns what it took [s].
-  double wait();
-
- private:
-  friend class Communicator;
-  struct Request;
-  explicit Channel(std::unique_ptr<Request> request);
-  std::unique_ptr<Request> request_;
 };
 
 /// See Communicator::start_gather. Must be waited for before it is destroyed, on every rank.
-class Communicator::PendingGather {
+class PendingGather {
  public:
-  ~PendingGather();
-  PendingGather(const PendingGather&) = delete;
-  PendingGather& operator=(const PendingGather&) = delete;
+  PendingGather(const Communicator& ranks, std::vector<double> part, std::span<const std::size_t> lengths);
   /// The parts of all ranks in order of rank.
   const std::vector<double>& wait();
 
  private:
-  friend class Communicator;
-  struct Request;
-  explicit PendingGather(std::unique_ptr<Request> request);
-  std::unique_ptr<Request> request_;
+  std::size_t back(std::size_t from, std::size_t places) const { return (from + ranks_ - places) % ranks_; }
+  /// In the message of a round.
+  std::size_t parts() const { return std::min(have_, ranks_ - have_); }
+  std::size_t length(std::size_t of) const { return begin_[of + 1] - begin_[of]; }
+  void begin_round();
+  void end_round();
+
+  std::size_t rank_, ranks_;
+  std::size_t have_ = 1;            ///< parts: this rank's and those of the ranks before it, around the ring
+  std::vector<std::size_t> begin_;  ///< ranks + 1, in all_
+  std::vector<double> all_, out_, in_;
+  std::unique_ptr<Round> round_;
+  trace::Recorder* trace_;
 };
 
 template <class Record>
@@ -180,7 +194,7 @@ std::vector<std::vector<Record>> Communicator::exchange_records(std::vector<std:
     from[r].resize(size / sizeof(Record));
     return reinterpret_cast<std::byte*>(from[r].data());
   });
-  from[static_cast<std::size_t>(rank_)] = std::move(to[static_cast<std::size_t>(rank_)]);
+  from[static_cast<std::size_t>(rank())] = std::move(to[static_cast<std::size_t>(rank())]);
   return from;
 }
 

@@ -1,102 +1,112 @@
-#include "runtime/graph/loop_colours.hpp"
-
 #include <algorithm>
 #include <array>
+
+#include "runtime/graph/loop_plan.hpp"
 
 namespace talus::graph {
 
 namespace {
 
-/// What a rank goes through one after the other. Turn t > 0 is phase first_colour + t.
+/// What a rank goes through one after the other. Group colour t is phase first_colour + t.
 enum Phase : std::uint32_t {
   telling,
   inside_of_later,
   first_colour,
   early_glue = 1000,
   inside_of_first,
-  glue
+  last_glue
 };
 
-/// Of a subdomain, within a phase.
+/// Of a group, within a phase.
 enum Part : std::uint32_t { early, tell, inner, take, border, publish, inner_behind };
 
-/// What comes first, by its numbers from the left: phase, subdomain, part, colour.
+/// What comes first, by its numbers from the left: phase, group, part, colour within the part.
 using Position = std::array<std::uint32_t, 4>;
 
-std::vector<Position> sorted(std::vector<Position> subdomain_colours) {
-  std::sort(subdomain_colours.begin(), subdomain_colours.end());
-  subdomain_colours.erase(std::unique(subdomain_colours.begin(), subdomain_colours.end()),
-                          subdomain_colours.end());
-  return subdomain_colours;
+std::vector<Position> sorted(std::vector<Position> positions) {
+  std::sort(positions.begin(), positions.end());
+  positions.erase(std::unique(positions.begin(), positions.end()), positions.end());
+  return positions;
 }
 
-std::uint32_t place_in(const std::vector<Position>& order, const Position& subdomain_colour) {
-  return static_cast<std::uint32_t>(std::lower_bound(order.begin(), order.end(), subdomain_colour) -
-                                    order.begin());
+std::uint32_t rank_in(const std::vector<Position>& order, const Position& position) {
+  return static_cast<std::uint32_t>(std::lower_bound(order.begin(), order.end(), position) - order.begin());
 }
 
-/// Colours that count from 0 in each part of a subdomain, subdomains alike.
-void go_abreast(std::vector<Position>& subdomain_colours) {
-  const std::vector<Position> order = sorted(subdomain_colours);
-  for (Position& subdomain_colour : subdomain_colours)
-    subdomain_colour = {
-        subdomain_colour[0], 0, subdomain_colour[2],
-        place_in(order, subdomain_colour) -
-            place_in(order, {subdomain_colour[0], subdomain_colour[1], subdomain_colour[2], 0})};
+/// Colours that count from 0 in each part of a group, groups alike.
+void go_abreast(std::vector<Position>& positions) {
+  const std::vector<Position> order = sorted(positions);
+  for (Position& position : positions)
+    position = {position[0], 0, position[2],
+                rank_in(order, position) - rank_in(order, {position[0], position[1], position[2], 0})};
 }
+
+/// Where the nodes of a rank stand.
+class Positions {
+ public:
+  Positions(const LoopSpec& spec, bool alone) : spec_(spec), alone_(alone) {
+    const bool later = std::ranges::any_of(spec.groups, [](const LoopGroup& g) { return g.colour > 0; });
+    // One group after another as a whole, but where others wait for all publishes of a rank that has nothing
+    // else to do in between.
+    const bool whole = spec.overlap && spec.threads == 1 && (alone || later || !spec.in_colours);
+    behind_ = whole ? first_colour : inside_of_first;
+  }
+
+  Position of(std::uint32_t group, Part part, std::uint32_t colour) const {
+    return {phase_of(colour_of(group), part), group, part, colour};
+  }
+  Position of(const LoopWork& work) const { return of(work.group, part_of(work), work.colour); }
+
+ private:
+  std::uint32_t colour_of(std::uint32_t group) const {
+    return static_cast<std::uint32_t>(spec_.groups[group].colour);
+  }
+  Part part_of(const LoopWork& work) const {
+    if (work.side == LoopWork::inside) return colour_of(work.group) == 0 ? inner_behind : inner;
+    return work.side == LoopWork::early ? early : border;
+  }
+  std::uint32_t phase_of(std::uint32_t colour, Part part) const {
+    if (part == inner_behind) return behind_;
+    if (part <= tell && !alone_) return telling;
+    return colour > 0 && part <= inner && !spec_.overlap ? inside_of_later : first_colour + colour;
+  }
+
+  const LoopSpec& spec_;
+  bool alone_;
+  Phase behind_;
+};
 
 }  // namespace
 
-LoopColours loop_colours(std::span<const ChunkOrder> subdomain_colours,
-                         std::span<const char> subdomain_colour_of, std::span<const char> tells,
-                         bool in_colours, bool overlap, int threads, int rank, const Tree& tree) {
-  const auto subdomains = static_cast<std::uint32_t>(subdomain_colour_of.size());
-  // One after another as a whole, but where others wait for all publishes of a rank that has nothing else to
-  // do in between.
-  const bool alone = tree.order.size() == 1,
-             later = std::ranges::any_of(subdomain_colour_of,
-                                         [](char subdomain_colour) { return subdomain_colour > 0; });
-  const Phase behind =
-      overlap && threads == 1 && (alone || later || !in_colours) ? first_colour : inside_of_first;
+LoopColours loop_colours(const LoopSpec& spec, const Tree& tree) {
+  const Positions positions(spec, tree.order.size() == 1);
+  const auto groups = static_cast<std::uint32_t>(spec.groups.size());
   std::vector<Position> own;
-  const auto phase_of = [&](std::uint32_t subdomain_colour, Part part) -> std::uint32_t {
-    if (part == inner_behind) return behind;
-    if (part <= tell && !alone) return telling;
-    return subdomain_colour > 0 && part <= inner && !overlap ? inside_of_later
-                                                             : first_colour + subdomain_colour;
-  };
-  const auto add = [&](std::uint32_t e, Part part, std::uint32_t colour) {
-    own.push_back({phase_of(static_cast<std::uint32_t>(subdomain_colour_of[e]), part), e, part, colour});
-  };
-  for (const ChunkOrder& chunk : subdomain_colours) {
-    add(chunk.subdomain,
-        chunk.side == ChunkOrder::inside  ? (subdomain_colour_of[chunk.subdomain] == 0 ? inner_behind : inner)
-        : chunk.side == ChunkOrder::early ? early
-                                          : border,
-        chunk.colour);
-  }
-  // Subdomains without such a node reuse the colour of `publish`.
-  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, publish, 0);
-  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, subdomain_colour_of[e] > 0 ? take : publish, 0);
-  for (std::uint32_t e = 0; e < subdomains; ++e) add(e, tells[e] != 0 ? tell : publish, 0);
-  if (threads > 1) go_abreast(own);
-  own.push_back({overlap ? glue : early_glue, 0, 0, 0});
+  for (const LoopWork& work : spec.work) own.push_back(positions.of(work));
+  // A group without a take or a tell reuses the colour of its publish for it.
+  for (std::uint32_t e = 0; e < groups; ++e) own.push_back(positions.of(e, publish, 0));
+  for (std::uint32_t e = 0; e < groups; ++e)
+    own.push_back(positions.of(e, spec.groups[e].colour > 0 ? take : publish, 0));
+  for (std::uint32_t e = 0; e < groups; ++e)
+    own.push_back(positions.of(e, spec.groups[e].tells ? tell : publish, 0));
+  if (spec.threads > 1) go_abreast(own);
+  own.push_back({spec.overlap ? last_glue : early_glue, 0, 0, 0});
   const std::vector<Position> order = sorted(own);
   std::vector<std::uint32_t> colours;
-  for (const Position& subdomain_colour : own) colours.push_back(2 * place_in(order, subdomain_colour));
-  const auto publish_at = colours.begin() + static_cast<std::ptrdiff_t>(subdomain_colours.size()),
-             take_at = publish_at + subdomains, tell_at = take_at + subdomains, end = tell_at + subdomains;
+  for (const Position& position : own) colours.push_back(2 * rank_in(order, position));
+  const auto publish_at = colours.begin() + static_cast<std::ptrdiff_t>(spec.work.size()),
+             take_at = publish_at + groups, tell_at = take_at + groups, end = tell_at + groups;
   LoopColours result{{colours.begin(), publish_at},
                      {publish_at, take_at},
                      {take_at, tell_at},
                      {tell_at, end},
                      colours.back(),
                      {}};
-  const std::uint32_t last_tell = subdomains > 0 ? std::ranges::max(result.tell) : 0;
-  result.tree = tree_colours(tree, rank, last_tell, result.glue);
-  for (std::uint32_t e = 0; e < subdomains; ++e) {
-    if (subdomain_colour_of[e] > 0) result.tree.up = std::min(result.tree.up, result.take[e] - 1);
-    if (in_colours) result.tree.down = std::max(result.tree.down, result.publish[e] + 1);
+  const std::uint32_t last_tell = groups > 0 ? std::ranges::max(result.tell) : 0;
+  result.tree = tree_colours(tree, spec.rank, last_tell, result.glue);
+  for (std::uint32_t e = 0; e < groups; ++e) {
+    if (spec.groups[e].colour > 0) result.tree.up = std::min(result.tree.up, result.take[e] - 1);
+    if (spec.in_colours) result.tree.down = std::max(result.tree.down, result.publish[e] + 1);
   }
   return result;
 }

@@ -6,90 +6,66 @@
 #include <utility>
 
 #include "runtime/graph/communicator.hpp"
-#include "runtime/graph/detail/mpi_check.hpp"
 #include "runtime/trace/recorder.hpp"
 
 namespace talus::graph {
 
-using detail::check;
-
-struct Communicator::PendingGather::Request {
-  std::size_t rank = 0, ranks = 1;
-  std::size_t have = 1;            ///< parts: this rank's and those of the ranks before it, around the ring
-  std::vector<std::size_t> begin;  ///< ranks + 1, in `all`
-  std::vector<double> all, out, in;
-  MPI_Request handles[2] = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
-  trace::Recorder* trace = nullptr;
-
-  std::size_t back(std::size_t from, std::size_t places) const { return (from + ranks - places) % ranks; }
-  std::size_t parts() const { return std::min(have, ranks - have); }  ///< in the message of a round
-  std::size_t length(std::size_t of) const { return begin[of + 1] - begin[of]; }
-
-  void begin_round() {
-    const detail::MpiCall call;
-    const std::size_t to = (rank + have) % ranks, from = back(rank, have);
-    out.clear();
-    std::size_t incoming = 0;
-    for (std::size_t k = 0; k < parts(); ++k) {
-      const auto part = all.begin() + static_cast<std::ptrdiff_t>(begin[back(rank, k)]);
-      out.insert(out.end(), part, part + static_cast<std::ptrdiff_t>(length(back(rank, k))));
-      incoming += length(back(from, k));
-    }
-    in.resize(incoming);
-    check(MPI_Irecv(in.data(), static_cast<int>(in.size()), MPI_DOUBLE, static_cast<int>(from), gather_tag,
-                    MPI_COMM_WORLD, &handles[0]),
-          "MPI_Irecv");
-    check(MPI_Isend(out.data(), static_cast<int>(out.size()), MPI_DOUBLE, static_cast<int>(to), gather_tag,
-                    MPI_COMM_WORLD, &handles[1]),
-          "MPI_Isend");
+PendingGather::PendingGather(const Communicator& ranks, std::vector<double> part,
+                             std::span<const std::size_t> lengths)
+    : rank_(static_cast<std::size_t>(ranks.rank())),
+      ranks_(static_cast<std::size_t>(ranks.ranks())),
+      trace_(ranks.trace()) {
+  if (ranks_ == 1) {
+    all_ = std::move(part);
+    return;
   }
-  void end_round() {
-    const detail::MpiCall call(true);
-    check(MPI_Waitall(2, handles, MPI_STATUSES_IGNORE), "MPI_Waitall");
-    const std::size_t from = back(rank, have);
-    auto part = in.begin();
-    for (std::size_t k = 0; k < parts(); ++k) {
-      const std::size_t of = back(from, k);
-      const auto end = part + static_cast<std::ptrdiff_t>(length(of));
-      std::copy(part, end, all.begin() + static_cast<std::ptrdiff_t>(begin[of]));
-      part = end;
-    }
-    have += parts();
+  begin_.push_back(0);
+  for (const std::size_t length : lengths) begin_.push_back(begin_.back() + length);
+  all_.resize(begin_.back());
+  std::copy(part.begin(), part.end(), all_.begin() + static_cast<std::ptrdiff_t>(begin_[rank_]));
+  round_ = ranks.open_round();
+  begin_round();
+}
+
+void PendingGather::begin_round() {
+  const std::size_t to = (rank_ + have_) % ranks_, from = back(rank_, have_);
+  out_.clear();
+  std::size_t incoming = 0;
+  for (std::size_t k = 0; k < parts(); ++k) {
+    const auto part = all_.begin() + static_cast<std::ptrdiff_t>(begin_[back(rank_, k)]);
+    out_.insert(out_.end(), part, part + static_cast<std::ptrdiff_t>(length(back(rank_, k))));
+    incoming += length(back(from, k));
   }
-};
+  in_.resize(incoming);
+  round_->begin(static_cast<int>(to), out_, static_cast<int>(from), in_);
+}
 
-Communicator::PendingGather::PendingGather(std::unique_ptr<Request> request) : request_(std::move(request)) {}
+void PendingGather::end_round() {
+  round_->end();
+  const std::size_t from = back(rank_, have_);
+  auto part = in_.begin();
+  for (std::size_t k = 0; k < parts(); ++k) {
+    const std::size_t of = back(from, k);
+    const auto end = part + static_cast<std::ptrdiff_t>(length(of));
+    std::copy(part, end, all_.begin() + static_cast<std::ptrdiff_t>(begin_[of]));
+    part = end;
+  }
+  have_ += parts();
+}
 
-Communicator::PendingGather::~PendingGather() = default;
-
-const std::vector<double>& Communicator::PendingGather::wait() {
-  Request& r = *request_;
-  if (r.have == r.ranks) return r.all;
-  const trace::Span span(r.trace, trace::kind_collective);
+const std::vector<double>& PendingGather::wait() {
+  if (have_ == ranks_) return all_;
+  const trace::Span span(trace_, trace::kind_collective);
   for (;;) {
-    r.end_round();
-    if (r.have == r.ranks) return r.all;
-    r.begin_round();
+    end_round();
+    if (have_ == ranks_) return all_;
+    begin_round();
   }
 }
 
-std::unique_ptr<Communicator::PendingGather> Communicator::start_gather(
-    std::vector<double> part, std::span<const std::size_t> lengths) const {
-  auto request = std::make_unique<PendingGather::Request>();
-  PendingGather::Request& r = *request;
-  if (ranks_ == 1) {
-    r.all = std::move(part);
-    return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
-  }
-  r.rank = static_cast<std::size_t>(rank_);
-  r.ranks = static_cast<std::size_t>(ranks_);
-  r.trace = trace_;
-  r.begin.push_back(0);
-  for (const std::size_t length : lengths) r.begin.push_back(r.begin.back() + length);
-  r.all.resize(r.begin.back());
-  std::copy(part.begin(), part.end(), r.all.begin() + static_cast<std::ptrdiff_t>(r.begin[r.rank]));
-  r.begin_round();
-  return std::unique_ptr<PendingGather>(new PendingGather(std::move(request)));
+std::unique_ptr<PendingGather> Communicator::start_gather(std::vector<double> part,
+                                                          std::span<const std::size_t> lengths) const {
+  return std::make_unique<PendingGather>(*this, std::move(part), lengths);
 }
 
 }  // namespace talus::graph

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "partition/partitioner.hpp"
+#include "partition/partitioners.hpp"
 #include "runtime/step/decomposition.hpp"
 
 namespace talus {
@@ -45,7 +45,8 @@ std::vector<std::int32_t> receivers(Sample& sample, const DecompositionSettings&
   const Decomposition decomposition = make_decomposition(settings, ranks);
   PartitionPoints points;
   points.x.swap(sample.x);
-  if (settings.partitioner == PartitionKind::metis) points.half.assign(points.x.size(), Vec3::Zero());
+  if (partitioner_registry().of(settings.partitioner).make->reads_halves)
+    points.half.assign(points.x.size(), Vec3::Zero());
   const Partition partition = make_partition(
       points, partition_options(settings, decomposition.partition.subdomains), reduction_over(ranks));
   points.x.swap(sample.x);

@@ -101,17 +101,13 @@ void Gluing::plan(bool rotation) {
   subdomains_.clear();
   root_.reset();
   subdomains_.resize(all.here.size());
-  followers_.clear();
-  tellers_.clear();
   jumps_.assign(all.here.size(), {});
   messages_ = {};
   if (!needed_) return;
   for (std::size_t e = 0; e < subdomains_.size(); ++e) {
     plan_sides(e);
     plan_copies(e);
-    if (subdomain_colour(e) > 0) followers_.push_back(static_cast<std::uint32_t>(e));
     subdomains_[e].tells = all.several() && !walls_.empty() && all.interfaces[e].hubs.empty();
-    if (subdomains_[e].tells) tellers_.push_back(static_cast<std::uint32_t>(e));
   }
   for (Subdomain& subdomain : subdomains_)
     for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
@@ -146,13 +142,13 @@ void Gluing::plan_sides(std::size_t e) {
     side.subdomain_colour = all.subdomain_colour_of(neighbour.subdomain);
     const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
     const std::size_t length = side.slots.size() * width_;
-    side.link.out.resize(length + 1);
+    side.link.out.resize(length);
     if (rank == ranks_.rank()) {
       side.local = static_cast<std::int32_t>(
           std::lower_bound(all.here.begin(), all.here.end(), neighbour.subdomain) - all.here.begin());
       continue;
     }
-    side.link.in.resize(length + 1);
+    side.link.in.resize(length);
     side.source = detail::bytes_of(side.link.in);
     const std::int32_t count = all.partition.subdomains;
     side.link.sender =
@@ -242,7 +238,7 @@ void Gluing::count_messages() {
   }
   if (root_ && root_->up) {
     count[2] += 2;
-    count[3] += static_cast<std::int64_t>(8 * (root_->up->out.size() + root_->up->in.size() - 2));
+    count[3] += static_cast<std::int64_t>(8 * (root_->up->out.size() + root_->up->in.size()));
   }
   ranks_.sum(count);
   messages_ = {count[0], count[1], count[2], count[3]};
@@ -269,6 +265,10 @@ std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
   for (const Side& side : subdomains_[e].sides)
     if (side.local >= 0) readers.push_back(static_cast<std::uint32_t>(side.local));
   return readers;
+}
+
+bool Gluing::tells(std::size_t e) const {
+  return subdomains_[e].tells;
 }
 
 std::span<const Slot> Gluing::taken(std::size_t e) const {
@@ -514,7 +514,7 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
       std::copy_n(wall(e, g).data(), 3, &subdomains_[e].partial[3 * g]);
     publish(e, Mode::sum);
   }
-  if (tasks_of_rank() > 1) collect(Mode::sum);
+  if (collects()) collect(Mode::sum);
   root(Mode::sum);
   for (std::size_t e = 0; e < subdomains_.size(); ++e) {
     glue(e, Mode::sum);

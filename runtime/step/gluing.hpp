@@ -80,22 +80,10 @@ class Gluing {
   int subdomain_colour(std::size_t e) const;
   /// Slots of the copies that its take writes.
   std::span<const Slot> taken(std::size_t e) const;
-  /// Subdomains here whose subdomain colour is not the first, ascending: those that have a take.
-  std::span<const std::uint32_t> followers() const { return followers_; }
-
-  /// Subdomains here with something for the root that need not wait for publish, ascending: they have a
-  /// tell.
-  std::span<const std::uint32_t> tellers() const { return tellers_; }
-  /// Tasks between publish and glue: the root, behind collect where there is one.
-  std::size_t tasks_of_rank() const;
-  enum class Task : std::uint8_t { publish, collect, root, glue, take, tell };
-  /// What the loop's node behind the chunks is, `number` from 0: publish of all subdomains here, the rank's
-  /// tasks, glue of all, take of the followers, tell of the tellers. Those of the rank have no subdomain.
-  struct Node {
-    Task task;
-    std::optional<std::size_t> subdomain;
-  };
-  Node node(std::size_t number) const;
+  /// The part of a subdomain for the root leaves with its tell; else with its publish.
+  bool tells(std::size_t e) const;
+  /// This rank stands between the top and the leaves of the tree of ranks, so that collect is called.
+  bool collects() const;
 
   enum class Mode {
     fresh,     ///< velocities were made afresh from the impulses
@@ -165,7 +153,6 @@ class Gluing {
   std::size_t width_ = 6;  ///< numbers per body
   std::vector<std::int32_t> walls_;
   std::vector<Subdomain> subdomains_;  ///< per subdomain here
-  std::vector<std::uint32_t> followers_, tellers_;
   graph::Tree tree_;
   std::unique_ptr<Root> root_;
   std::vector<JumpSums> jumps_;

@@ -16,7 +16,9 @@ using detail::start;
 
 void Gluing::plan_tree(std::uint64_t contacts) {
   const Decomposition& all = state_.decomposition;
-  graph::RankLoad load{contacts, !followers_.empty()};
+  graph::RankLoad load{contacts, false};
+  for (std::size_t e = 0; e < subdomains_.size(); ++e)
+    load.waits = load.waits || (needed_ && subdomain_colour(e) > 0);
   for (const Subdomain& subdomain : subdomains_)
     load.work += graph::load_of_neighbour * subdomain.sides.size();
   tree_ = graph::grow_tree(ranks_.gather_records(std::span<const graph::RankLoad>(&load, 1)));
@@ -78,8 +80,8 @@ void Gluing::plan_tree(std::uint64_t contacts) {
     const auto open = [&](int child, std::size_t out, std::size_t in) {
       const int other = child == me ? tree_.parent[at(me)] : child;
       auto link = std::make_unique<Link>();
-      link->out.resize(out + 1);
-      link->in.resize(in + 1);
+      link->out.resize(out);
+      link->in.resize(in);
       link->sender = ranks_.open_send(other, root_tag, link->out);
       link->receiver = ranks_.open_receive(other, root_tag, link->in);
       const auto first = static_cast<std::uint32_t>(std::find(all.rank_of.begin(), all.rank_of.end(), child) -
@@ -125,19 +127,8 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   }
 }
 
-std::size_t Gluing::tasks_of_rank() const {
-  return root_ && root_->up && !root_->links.empty() ? 2 : 1;
-}
-
-Gluing::Node Gluing::node(std::size_t number) const {
-  const std::size_t here = subdomains_.size(), of_rank = tasks_of_rank();
-  if (number < here) return {Task::publish, number};
-  if (number < here + of_rank - 1) return {Task::collect, std::nullopt};
-  if (number < here + of_rank) return {Task::root, std::nullopt};
-  if (number < 2 * here + of_rank) return {Task::glue, number - here - of_rank};
-  const std::size_t rest = number - 2 * here - of_rank;
-  if (rest < followers_.size()) return {Task::take, followers_[rest]};
-  return {Task::tell, tellers_[rest - followers_.size()]};
+bool Gluing::collects() const {
+  return root_ && root_->up && !root_->links.empty();
 }
 
 /// The parts of this rank's subdomains, then the messages of its children as they came.
@@ -147,7 +138,7 @@ void Gluing::send_up() {
   auto out = link.out.begin();
   for (const Subdomain& subdomain : subdomains_)
     out = std::copy(subdomain.partial.begin(), subdomain.partial.end(), out);
-  for (const auto& child : root_->links) out = std::copy(child->in.begin(), child->in.end() - 1, out);
+  for (const auto& child : root_->links) out = std::copy(child->in.begin(), child->in.end(), out);
   start(*link.sender, ranks_.trace(), link.out_name);
 }
 

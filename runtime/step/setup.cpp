@@ -27,16 +27,15 @@ void validate_load(const std::string& where, const Wall& wall, const WallLoad& l
 }
 }  // namespace
 
-const char* name_of(Coupling coupling) {
-  switch (coupling) {
-    case Coupling::nscdd:
-      return "NSCDD";
-    case Coupling::alternating:
-      return "alternating NSCDD";
-    case Coupling::schwarz:
-      break;
-  }
-  return "Schwarz";
+const Registry<Coupling>& couplings() {
+  static constexpr Entry<Coupling> entries[] = {
+      {Coupling::nscdd, "nscdd", "copies of a body share its mass and are glued"},
+      {Coupling::alternating, "alternating",
+       "likewise, but in turns: half of the subdomains sweep their borders when they know what the others "
+       "did, and it takes as many sweeps as with one subdomain"},
+      {Coupling::schwarz, "schwarz", "copies have the whole mass and exchange what they gain"}};
+  static constexpr Registry<Coupling> registry("coupling", entries);
+  return registry;
 }
 
 void validate(const Setup& setup) {

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
-#include "kernels/bodies/walls.hpp"
+#include "kernels/registry.hpp"
+#include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
 
@@ -56,7 +57,7 @@ struct DetectionSettings {
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
 
-/// What makes of sweeps a solver.
+/// What makes of sweeps a solver: runtime/step/methods/ has a file for each, and their names.
 enum class SolverMethod {
   automatic,  ///< momentum (plain sweeps for Schwarz, whose damped iteration is no descent);
               ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
@@ -99,7 +100,8 @@ enum class Coupling {
   schwarz,      ///< copies carry M and add up what each gained (the paper's (16)-(27))
 };
 
-const char* name_of(Coupling coupling);
+/// decomposition.coupling in scenes.
+const Registry<Coupling>& couplings();
 
 /// Which way interface velocities travel.
 enum class ExchangeScheme {

@@ -10,6 +10,7 @@
 #include "kernels/bodies/larger.hpp"
 #include "kernels/detection/domain.hpp"
 #include "runtime/graph/clock.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 
 namespace talus {
@@ -165,17 +166,16 @@ struct Simulation::Implementation {
   void check_for_runaway(double wall_energy_free) const {
     const MotionSums& motion = graph.sums().motion;
     const std::int64_t step = report.step + 1;
-    if (graph.iteration().result().diverged)
-      throw RunawayError(
-          fmt::format("step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. {}", step,
-                      setup.stages[stage_index].name, graph.iteration().result().error_rms,
-                      graph.iteration().result().iterations,
-                      setup.decomposition.coupling == Coupling::schwarz && !setup.decomposition.damping
-                          ? "Undamped Schwarz does so where bodies stand in more than two subdomains: set "
-                            "decomposition.damping = true or coupling = \"nscdd\""
-                          : "Reduce the time step, or look for masses too far apart"));
+    if (graph.loop().result().diverged)
+      throw RunawayError(fmt::format(
+          "step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. {}", step,
+          setup.stages[stage_index].name, graph.loop().result().error_rms, graph.loop().result().iterations,
+          setup.decomposition.coupling == Coupling::schwarz && !setup.decomposition.damping
+              ? "Undamped Schwarz does so where bodies stand in more than two subdomains: set "
+                "decomposition.damping = true or coupling = \"nscdd\""
+              : "Reduce the time step, or look for masses too far apart"));
     if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) ||
-        std::isnan(graph.iteration().result().error_rms))
+        std::isnan(graph.loop().result().error_rms))
       throw RunawayError(fmt::format(
           "step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping "
           "grains",
@@ -205,7 +205,7 @@ struct Simulation::Implementation {
 
   void write_report(double elapsed) {
     const StepSums& sums = graph.sums();
-    const IterationResult& result = graph.iteration().result();
+    const IterationResult& result = graph.loop().result();
     // Grains at rest between pressed walls gain nothing, and what the walls give cancels: the walls' impulses
     // are the measure then.
     double impulse_unit = std::max(sums.motion.impulse_scale, std::numeric_limits<double>::min());
@@ -243,7 +243,7 @@ struct Simulation::Implementation {
     const double box = Domain{}.volume(state.walls);
     report.solid_fraction = box > 0 ? size.volume / box : 0;
     report.wall_s = elapsed;
-    report.converged = result.converged && defect <= setup.solver.balance_tolerance && report.passed == 0;
+    report.converged = certified(result, defect, report.passed, setup.solver);
   }
 
   /// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x
@@ -420,14 +420,14 @@ const StepState& Simulation::state() const {
 const StepParameters& Simulation::parameters() const {
   return impl_->parameters;
 }
-const std::vector<Iteration::Check>& Simulation::error_history() const {
-  return impl_->graph.iteration().history();
+const std::vector<ErrorCheck>& Simulation::error_history() const {
+  return impl_->graph.loop().history();
 }
 const StepReport& Simulation::report() const {
   return impl_->report;
 }
 const IterationResult& Simulation::iterations() const {
-  return impl_->graph.iteration().result();
+  return impl_->graph.loop().result();
 }
 const StepSums& Simulation::sums() const {
   return impl_->graph.sums();
@@ -482,10 +482,10 @@ std::int64_t Simulation::bodies() const {
   return impl_->size.bodies;
 }
 const MessageCount& Simulation::messages() const {
-  return impl_->graph.iteration().gluing().messages();
+  return impl_->graph.loop().gluing().messages();
 }
 double Simulation::exposed() const {
-  return impl_->graph.iteration().gluing().exposed();
+  return impl_->graph.loop().gluing().exposed();
 }
 
 Frame Simulation::frame(bool contacts) const {

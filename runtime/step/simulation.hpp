@@ -10,8 +10,8 @@
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/frame.hpp"
-#include "runtime/step/iteration.hpp"
 #include "runtime/step/setup.hpp"
+#include "runtime/step/solver_loop.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/step_graph.hpp"
 
@@ -89,7 +89,7 @@ class Simulation {
   const Setup& setup() const;
   const StepState& state() const;
   const StepParameters& parameters() const;
-  const std::vector<Iteration::Check>& error_history() const;
+  const std::vector<ErrorCheck>& error_history() const;
   const StepReport& report() const;
   /// How the last step's iterations ended.
   const IterationResult& iterations() const;

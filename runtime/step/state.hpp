@@ -5,10 +5,10 @@
 
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/bodies/motion.hpp"
-#include "kernels/bodies/walls.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/contacts.hpp"
 #include "kernels/detection/measures.hpp"
+#include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/single_precision.hpp"
 #include "kernels/sweeps/sweep.hpp"
 #include "runtime/step/decomposition.hpp"

@@ -87,8 +87,7 @@ bool StepGraph::candidates_hold() const {
 void StepGraph::make_cells() {
   const double h = parameters_.time_step;
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
-  if (steps_ == partitioned_ + 1 || iteration_.imbalance() < imbalance_then_)
-    imbalance_then_ = iteration_.imbalance();
+  if (steps_ == partitioned_ + 1 || loop_.imbalance() < imbalance_then_) imbalance_then_ = loop_.imbalance();
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   Bodies& bodies = state_.bodies;
@@ -118,8 +117,7 @@ void StepGraph::make_cells() {
     if (anew) {
       partitioned_ = steps_;
       if (!first && decomposition_.balance != BalanceBy::contacts)
-        state_.decomposition.cost =
-            costs(decomposition_.balance == BalanceBy::time ? iteration_.busy() : work());
+        state_.decomposition.cost = costs(decomposition_.balance == BalanceBy::time ? loop_.busy() : work());
     }
     make_room();
     const double began = graph::seconds_now();
@@ -174,7 +172,7 @@ void StepGraph::make_chunks() {
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
   const double planning = graph::seconds_now();
-  iteration_.plan();
+  loop_.plan();
   if (several) sums_.times.dealing += graph::seconds_now() - planning;
   std::int64_t candidates[1] = {static_cast<std::int64_t>(state_.candidates.size())};
   ranks_.sum(candidates);
@@ -220,7 +218,7 @@ void StepGraph::narrow_share(std::uint32_t share) {
                        settings_.overlap_correction};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c)
-    narrow_chunk(in, state_.candidates, state_.chunks, c, iteration_.kernels(), state_.contacts);
+    narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);
 }
 
 }  // namespace talus

@@ -31,7 +31,7 @@ StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const S
       shares_per_subdomain_(lanes_for(
           static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
       shares_(shares_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
-      iteration_(state, parameters, settings, decomposition, ranks),
+      loop_(state, parameters, settings, decomposition, ranks),
       left_(shares_),
       pairs_(shares_),
       motion_(shares_) {

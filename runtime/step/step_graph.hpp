@@ -7,7 +7,7 @@
 #include "runtime/graph/epoch_loop.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/graph/graph.hpp"
-#include "runtime/step/iteration.hpp"
+#include "runtime/step/solver_loop.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -62,7 +62,7 @@ class StepGraph {
   void follow(trace::Order* order);
 
   const StepSums& sums() const { return sums_; }
-  const Iteration& iteration() const { return iteration_; }
+  const SolverLoop& loop() const { return loop_; }
   const graph::Graph& graph() const { return graph_; }
   std::uint32_t shares() const { return shares_; }
 
@@ -78,11 +78,10 @@ class StepGraph {
   void renew_slots();
   void narrow_share(std::uint32_t share);
   void plan_iteration();
-  void plan_epochs();
   void iterate(graph::Worker& worker);
   std::vector<trace::Task> declared_tasks() const;
-  void note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner);
-  trace::Plan describe_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) const;
+  void note_plan(const graph::LoopPlan& loop);
+  trace::Plan describe_plan(const graph::LoopPlan& loop) const;
   void finish_share(std::uint32_t share);
   void finish_walls();
   void measure_share(std::uint32_t share);
@@ -104,7 +103,7 @@ class StepGraph {
   std::uint32_t shares_per_subdomain_;
   std::uint32_t shares_;
   graph::Graph graph_;
-  Iteration iteration_;
+  SolverLoop loop_;
   graph::EpochGraph epochs_;
   trace::Order* order_ = nullptr;
   bool followed_ = false;                              ///< this step goes by order_

@@ -1,11 +1,11 @@
-/// What the tasks of a step do but detection (step_detection.cpp) and the plan of the loop (step_epochs.cpp);
-/// their order stands in step_graph.cpp.
+/// What the tasks of a step do but detection (step_detection.cpp); their order stands in step_graph.cpp.
 
 #include <algorithm>
 #include <limits>
 
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
+#include "runtime/trace/order.hpp"
 
 namespace talus {
 
@@ -32,9 +32,9 @@ bool StepGraph::partition_due() const {
 bool StepGraph::out_of_balance() const {
   constexpr std::int64_t few = 16;
   if (!state_.decomposition.several()) return false;
-  const std::int64_t contacts = iteration_.result().contacts;
+  const std::int64_t contacts = loop_.result().contacts;
   if (state_.decomposition.blind && contacts > 0) return true;
-  const double imbalance = iteration_.imbalance();
+  const double imbalance = loop_.imbalance();
   return contacts > few * state_.decomposition.partition.subdomains &&
          imbalance > decomposition_.max_imbalance && imbalance > 1.25 * imbalance_then_;
 }
@@ -82,6 +82,24 @@ std::vector<double> StepGraph::costs(std::span<const double> work) const {
     if (row.candidates > 0)
       cost[static_cast<std::size_t>(row.subdomain)] = row.work / row.candidates * (candidates / sum);
   return cost;
+}
+
+void StepGraph::plan_iteration() {
+  reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
+  if (!planned_) {
+    const double planning = graph::seconds_now();
+    loop_.plan_tree();
+    if (state_.decomposition.several()) sums_.times.dealing += graph::seconds_now() - planning;
+  }
+  loop_.begin();
+  if (!planned_) {
+    const graph::LoopPlan& plan = loop_.plan_nodes(executor_.threads());
+    epochs_.build(plan.conflicts(), plan.owner, executor_.threads());
+    if (executor_.trace() || executor_.times() || order_) note_plan(plan);
+    planned_ = true;
+  }
+  followed_ = order_ && order_->begin_step(static_cast<std::uint32_t>(steps_));
+  iterating_ = graph::seconds_now();
 }
 
 void StepGraph::finish_share(std::uint32_t share) {

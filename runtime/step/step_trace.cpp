@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "runtime/step/loop_nodes.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/order.hpp"
@@ -48,41 +49,30 @@ std::vector<trace::Task> StepGraph::declared_tasks() const {
   return tasks;
 }
 
-trace::Plan StepGraph::describe_plan(const graph::Conflicts& conflicts,
-                                     std::span<const std::uint32_t> owner) const {
+trace::Plan StepGraph::describe_plan(const graph::LoopPlan& loop) const {
   const Chunks& chunks = state_.chunks;
   const std::vector<std::int32_t>& here = state_.decomposition.here;
-  const std::size_t nodes = conflicts.colour.size(), count = chunks.size();
   trace::Plan plan;
-  plan.colour.assign(conflicts.colour.begin(), conflicts.colour.end());
-  plan.offset.assign(conflicts.offset.begin(), conflicts.offset.end());
-  plan.neighbour.assign(conflicts.neighbour.begin(), conflicts.neighbour.end());
-  plan.owner.assign(owner.begin(), owner.end());
-  for (std::size_t node = 0; node < nodes; ++node) {
-    if (node < count) {
-      plan.role.push_back(static_cast<std::uint8_t>(trace::Role::compute));
-      plan.group.push_back(
-          static_cast<std::uint32_t>(here[static_cast<std::size_t>(chunks.subdomain[node])]));
-      plan.weight.push_back(1 + static_cast<std::uint32_t>(state_.contacts.count[node]));
-      plan.place.push_back(
-          static_cast<std::uint32_t>(chunks.bodies[static_cast<std::size_t>(chunks.body_begin[node])]));
-      continue;
-    }
-    using enum trace::Role;
-    // In the order of Gluing::Task.
-    constexpr trace::Role roles[] = {publish, root, root, glue, take, tell};
-    const auto [task, e] = iteration_.gluing().node(node - count);
-    plan.role.push_back(static_cast<std::uint8_t>(roles[static_cast<std::size_t>(task)]));
-    plan.group.push_back(e ? static_cast<std::uint32_t>(here[*e]) : trace::root_group);
-    plan.place.push_back(e ? static_cast<std::uint32_t>(iteration_.gluing().subdomain_colour(*e)) : 0);
-    plan.weight.push_back(0);
+  plan.colour = loop.colour;
+  plan.offset = loop.offset;
+  plan.neighbour = loop.neighbour;
+  plan.owner = loop.owner;
+  for (std::size_t n = 0; n < loop.nodes.size(); ++n) {
+    const auto [role, group] = loop.nodes[n];
+    const bool chunk = role == graph::LoopRole::work, none = group == graph::LoopPlan::none;
+    plan.role.push_back(static_cast<std::uint8_t>(trace::role_of(role)));
+    plan.group.push_back(none ? trace::root_group : static_cast<std::uint32_t>(here[group]));
+    plan.weight.push_back(chunk ? work_of_chunk(state_, n) : 0);
+    plan.place.push_back(chunk  ? place_of_chunk(chunks, n)
+                         : none ? 0
+                                : static_cast<std::uint32_t>(loop_.gluing().subdomain_colour(group)));
   }
-  plan.messages = iteration_.gluing().message_plan();
+  plan.messages = loop_.gluing().message_plan();
   return plan;
 }
 
-void StepGraph::note_plan(const graph::Conflicts& conflicts, std::span<const std::uint32_t> owner) {
-  trace::Plan plan = describe_plan(conflicts, owner);
+void StepGraph::note_plan(const graph::LoopPlan& loop) {
+  trace::Plan plan = describe_plan(loop);
   if (order_) order_->plan(plan);
   if (executor_.times()) executor_.times()->plan(plan);
   if (executor_.trace()) executor_.trace()->plan(std::move(plan));
@@ -101,11 +91,11 @@ void StepGraph::iterate(graph::Worker& worker) {
     graph::run_epochs(epochs_, worker, traced);
   };
   if (const trace::TaskTimes* const times = executor_.times(); times && times->active()) {
-    trace::Timed timed(iteration_, *times);
+    trace::Timed timed(loop_, *times);
     return run(timed);
   }
-  if (!followed_) return run(iteration_);
-  trace::Ordered ordered(iteration_, *order_, worker);
+  if (!followed_) return run(loop_);
+  trace::Ordered ordered(loop_, *order_, worker);
   run(ordered);
 }
 

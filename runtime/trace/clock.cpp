@@ -9,7 +9,7 @@ namespace {
 constexpr int tag = 0;  ///< below those of the gluing
 constexpr int rounds = 32;
 
-/// Two numbers each way; one more for the time stamp of channels that delay.
+/// Two numbers each way.
 struct Line {
   Line(const graph::Communicator& ranks, int other)
       : sender(ranks.open_send(other, tag, out)), receiver(ranks.open_receive(other, tag, in)) {}
@@ -23,8 +23,8 @@ struct Line {
     receiver->start();
     receiver->wait();
   }
-  std::vector<double> out = std::vector<double>(3), in = std::vector<double>(3);
-  std::unique_ptr<graph::Communicator::Channel> sender, receiver;
+  std::vector<double> out = std::vector<double>(2), in = std::vector<double>(2);
+  std::unique_ptr<graph::Channel> sender, receiver;
 };
 
 }  // namespace

@@ -3,14 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "runtime/graph/epoch_graph.hpp"
-#include "runtime/graph/loop_colours.hpp"
+#include "runtime/graph/loop_plan.hpp"
 #include "runtime/graph/tree.hpp"
 
 namespace talus::trace {
@@ -22,6 +24,29 @@ std::uint32_t scaled_bytes(std::uint32_t bytes, double factor) {
   return static_cast<std::uint32_t>(std::min(4e9, std::round(factor * bytes)));
 }
 
+/// The plan of each rank of `out` as the program would have made it, without its messages.
+void describe_plans(const std::vector<const Plan*>& plans, int threads, LoopLayout& out) {
+  out.plans.resize(out.rank_begin.size() - 1);
+  for (std::size_t r = 0; r < out.plans.size(); ++r) {
+    Plan& plan = out.plans[r];
+    plan.rank = static_cast<std::int32_t>(r);
+    plan.offset.push_back(0);
+    for (std::uint32_t n = out.rank_begin[r]; n < out.rank_begin[r + 1]; ++n) {
+      const SimNode& node = out.nodes[n];
+      plan.colour.push_back(node.colour);
+      plan.group.push_back(node.group);
+      plan.role.push_back(static_cast<std::uint8_t>(node.role));
+      const Plan* source =
+          node.source_rank >= 0 ? plans[static_cast<std::size_t>(node.source_rank)] : nullptr;
+      plan.weight.push_back(source ? source->weight[node.source_node] : 0);
+      plan.place.push_back(source ? source->place[node.source_node] : 0);
+      plan.owner.push_back(node.worker % static_cast<std::uint32_t>(threads));
+      for (std::uint32_t other : out.neighbours(n)) plan.neighbour.push_back(other - out.rank_begin[r]);
+      plan.offset.push_back(static_cast<std::uint32_t>(plan.neighbour.size()));
+    }
+  }
+}
+
 /// Builds a LoopLayout; the steps of build() say what comes after what.
 class Builder {
  public:
@@ -30,31 +55,43 @@ class Builder {
       : plans_(plans), groups_(groups), rank_of_(rank_of), machine_(machine), faces_(machine.faces()) {}
 
   LoopLayout build() {
+    out_.offset.push_back(0);
     find_group_nodes();
+    find_readers();
     grow_tree();
     for (std::uint32_t r = 0; r < static_cast<std::uint32_t>(machine_.ranks); ++r) add_rank(r);
     out_.rank_begin.push_back(static_cast<std::uint32_t>(out_.nodes.size()));
-    connect();
     route_messages();
     sort_walks();
-    describe_plans();
+    describe_plans(plans_, machine_.threads, out_);
+    add_messages();
     return std::move(out_);
   }
 
  private:
+  /// Per role of a node; none where a group has no such node.
+  class GroupNodes {
+   public:
+    GroupNodes() { node_.fill(none); }
+    std::uint32_t& operator[](Role role) { return node_[static_cast<std::size_t>(role)]; }
+    std::uint32_t operator[](Role role) const { return node_[static_cast<std::size_t>(role)]; }
+
+   private:
+    std::array<std::uint32_t, static_cast<std::size_t>(Role::tell) + 1> node_;
+  };
   struct Group {
     std::int32_t source = -1;           ///< recorded rank
     std::vector<std::uint32_t> chunks;  ///< recorded nodes
-    std::uint32_t publish = none, glue = none, take = none, tell = none;
-    std::uint32_t new_publish = none, new_glue = none, new_take = none, new_tell = none;
-    bool publish_tells() const { return subdomain_colour == 0 && tell == none; }
-    std::uint32_t teller() const { return publish_tells() ? new_publish : new_tell; }
+    std::vector<std::size_t> readers;   ///< groups, as places in groups_, that read what it publishes
+    GroupNodes recorded, made;          ///< nodes that are no work
+    bool publish_tells() const { return subdomain_colour == 0 && recorded[Role::tell] == none; }
+    std::uint32_t teller() const { return made[publish_tells() ? Role::publish : Role::tell]; }
     std::uint32_t subdomain_colour = 0;
   };
 
   /// The node that takes a message.
   static std::uint32_t receiver(const Group& from, const Group& to) {
-    return from.subdomain_colour < to.subdomain_colour ? to.new_take : to.new_glue;
+    return from.subdomain_colour < to.subdomain_colour ? to.made[Role::take] : to.made[Role::glue];
   }
 
   std::size_t place_of(std::uint32_t group) const {
@@ -91,144 +128,131 @@ class Builder {
           throw TraceError(fmt::format("subdomain {} is on two ranks at once", plan.group[n]));
         group.source = static_cast<std::int32_t>(s);
         if (role == Role::compute) group.chunks.push_back(n);
-        if (role == Role::publish) group.publish = n;
-        if (role == Role::glue) group.glue = n;
+        if (role != Role::compute) group.recorded[role] = n;
         if (role == Role::take) {
-          group.take = n;
           group.subdomain_colour = plan.place[n];
           in_colours_ = in_colours_ || group.subdomain_colour > 0;
         }
-        if (role == Role::tell) group.tell = n;
       }
     }
-    for (const Group& group : group_)
-      for (std::uint32_t n : group.chunks)
-        if (const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
-            group.glue != none && group.subdomain_colour == 0 && plan.colour[group.glue] < plan.colour[n])
-          overlap_ = false;
+    for (const Group& group : group_) {
+      const std::uint32_t glue = group.recorded[Role::glue];
+      if (glue == none || group.subdomain_colour > 0) continue;
+      const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
+      for (const std::uint32_t n : group.chunks)
+        if (plan.colour[glue] < plan.colour[n]) overlap_ = false;
+    }
   }
 
-  graph::ChunkOrder::Side side_of(const Group& group, const SimNode& node) const {
+  /// By what it conflicts with: work inside has nothing to do with the exchange of its group.
+  graph::LoopWork::Side side_of(const Group& group, std::uint32_t recorded) const {
     const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
-    using enum graph::ChunkOrder::Side;
-    if (group.tell != none && node.colour < plan.colour[group.tell]) return early;
-    if (group.subdomain_colour > 0) return plan.colour[group.take] < node.colour ? late : inside;
-    return group.publish == none || plan.colour[group.publish] < node.colour ? inside : border;
+    using enum graph::LoopWork::Side;
+    const auto joined = [&](std::uint32_t node) {
+      const auto others = plan.neighbours(recorded);
+      return node != none && std::find(others.begin(), others.end(), node) != others.end();
+    };
+    if (joined(group.recorded[Role::tell])) return early;
+    if (!joined(group.recorded[Role::publish])) return inside;
+    return group.subdomain_colour > 0 ? late : border;
   }
 
-  std::uint32_t add_node(std::uint32_t rank, std::int32_t source, std::uint32_t n) {
-    const Plan& plan = *plans_[static_cast<std::size_t>(source)];
-    out_.nodes.push_back(
-        {source, n, static_cast<Role>(plan.role[n]), plan.group[n], rank, 0, plan.colour[n]});
-    return static_cast<std::uint32_t>(out_.nodes.size() - 1);
-  }
-
-  /// As the program would have them with these subdomains on one rank; `first`: the rank's first chunk, all
-  /// of which get theirs.
-  graph::LoopColours colours_of(std::uint32_t first, std::span<const std::size_t> mine) {
-    std::vector<graph::ChunkOrder> subdomain_colours;
-    std::vector<char> subdomain_colour_of, tells;
-    for (std::size_t g : mine) {
-      subdomain_colour_of.push_back(static_cast<char>(group_[g].subdomain_colour));
-      tells.push_back(group_[g].tell != none ? 1 : 0);
+  /// What the program would plan the loop of a rank from, with these groups (places in groups_) on it.
+  /// `recorded`: of each node of work, its place in groups_ and its recorded node.
+  graph::LoopSpec spec_of(std::uint32_t rank, const std::vector<std::size_t>& mine,
+                          std::vector<std::pair<std::size_t, std::uint32_t>>& recorded) const {
+    graph::LoopSpec spec;
+    spec.in_colours = in_colours_;
+    spec.overlap = overlap_;
+    spec.collects = has_centre_ && out_.tree.relays(static_cast<int>(rank));
+    spec.threads = machine_.threads;
+    spec.rank = static_cast<int>(rank);
+    for (const std::size_t g : mine) {
+      const Group& group = group_[g];
+      const auto here = static_cast<std::uint32_t>(spec.groups.size());
+      spec.groups.push_back({.colour = static_cast<char>(group.subdomain_colour),
+                             .exchanges = group.recorded[Role::publish] != none,
+                             .tells = group.recorded[Role::tell] != none,
+                             .readers = {}});
+      for (const std::size_t reader : group.readers)
+        if (const auto at = std::lower_bound(mine.begin(), mine.end(), reader);
+            at != mine.end() && *at == reader)
+          spec.groups.back().readers.push_back(static_cast<std::uint32_t>(at - mine.begin()));
+      for (const std::uint32_t n : group.chunks) {
+        const Plan& plan = *plans_[static_cast<std::size_t>(group.source)];
+        spec.work.push_back({side_of(group, n), here, plan.colour[n], plan.weight[n], plan.place[n]});
+        recorded.emplace_back(g, n);
+      }
     }
-    for (std::size_t n = first, at = 0; n < out_.nodes.size(); ++n) {
-      const SimNode& node = out_.nodes[n];
-      while (groups_[mine[at]] != node.group) ++at;
-      subdomain_colours.push_back(
-          {side_of(group_[mine[at]], node), static_cast<std::uint32_t>(at), node.colour});
-    }
-    graph::LoopColours colours =
-        graph::loop_colours(subdomain_colours, subdomain_colour_of, tells, in_colours_, overlap_,
-                            machine_.threads, static_cast<int>(out_.rank_begin.size()) - 1, out_.tree);
-    for (std::size_t k = 0; k < subdomain_colours.size(); ++k)
-      out_.nodes[first + k].colour = colours.chunk[k];
-    return colours;
+    keep_conflicts(recorded, spec);
+    return spec;
   }
 
-  /// Nodes of a rank in the program's order: chunks, publishes, the root, glues, takes, tells; and their
-  /// owners.
+  void find_readers() {
+    for (const Plan* plan : plans_)
+      for (const Message& m : plan->messages) {
+        if (m.from == root_group || m.to == root_group) continue;
+        const std::size_t from = place_of(m.from), to = place_of(m.to);
+        if (group_[from].recorded[Role::publish] == none || group_[to].recorded[Role::glue] == none)
+          throw TraceError("a message between subdomains without gluing");
+        group_[from].readers.push_back(to);
+      }
+  }
+
+  /// Those of the recorded work that comes to one rank.
+  void keep_conflicts(const std::vector<std::pair<std::size_t, std::uint32_t>>& recorded,
+                      graph::LoopSpec& spec) const {
+    std::map<std::pair<std::int32_t, std::uint32_t>, std::uint32_t> work;  // recorded rank and node -> node
+    for (std::uint32_t n = 0; n < recorded.size(); ++n)
+      work[{group_[recorded[n].first].source, recorded[n].second}] = n;
+    spec.offset.push_back(0);
+    for (const auto& [g, n] : recorded) {
+      const std::int32_t source = group_[g].source;
+      for (const std::uint32_t other : plans_[static_cast<std::size_t>(source)]->neighbours(n))
+        if (const auto found = work.find({source, other}); found != work.end())
+          spec.neighbour.push_back(found->second);
+      spec.offset.push_back(static_cast<std::uint32_t>(spec.neighbour.size()));
+    }
+  }
+
+  /// Nodes of a rank as the program would have them.
   void add_rank(std::uint32_t rank) {
     const auto first = static_cast<std::uint32_t>(out_.nodes.size());
     out_.rank_begin.push_back(first);
+    out_.tellers.push_back(0);
+    root_.push_back(none);
+    collect_.push_back(none);
     std::vector<std::size_t> mine;
     for (std::size_t g = 0; g < groups_.size(); ++g)
       if (rank_of_[g] == rank) mine.push_back(g);
-    struct Chunk {
-      std::size_t group;
-      std::uint32_t place, weight, node;
-    };
-    std::vector<Chunk> chunks;
-    for (std::size_t g : mine)
-      for (std::uint32_t n : group_[g].chunks) {
-        const Plan& plan = *plans_[static_cast<std::size_t>(group_[g].source)];
-        chunks.push_back({g, plan.place[n], plan.weight[n], add_node(rank, group_[g].source, n)});
+    std::vector<std::pair<std::size_t, std::uint32_t>> recorded;
+    const graph::LoopSpec spec = spec_of(rank, mine, recorded);
+    const graph::LoopPlan plan = graph::plan_loop(spec, out_.tree);
+    for (std::uint32_t n = 0; n < plan.nodes.size(); ++n) {
+      const auto [role, here] = plan.nodes[n];
+      if (here == graph::LoopPlan::none) {
+        (role == graph::LoopRole::root ? root_ : collect_).back() = first + n;
+        out_.nodes.push_back(root_node(rank, plan.colour[n]));
+      } else {
+        Group& group = group_[mine[here]];
+        const std::uint32_t source =
+            role == graph::LoopRole::work ? recorded[n].second : group.recorded[role_of(role)];
+        out_.nodes.push_back(
+            {group.source, source, role_of(role), groups_[mine[here]], rank, 0, plan.colour[n]});
+        if (role != graph::LoopRole::work) group.made[role_of(role)] = first + n;
       }
-    std::stable_sort(chunks.begin(), chunks.end(), [](const Chunk& a, const Chunk& b) {
-      return a.group != b.group ? a.group < b.group : a.place < b.place;
-    });
-    std::vector<std::uint32_t> weight, group_of, owner(chunks.size());
-    for (const Chunk& chunk : chunks) {
-      weight.push_back(chunk.weight);
-      group_of.push_back(static_cast<std::uint32_t>(chunk.group));
+      out_.nodes.back().worker = rank * static_cast<std::uint32_t>(machine_.threads) + plan.owner[n];
     }
-    graph::assign_owners(weight, group_of, machine_.threads, owner);
-    const auto worker = [&](std::uint32_t thread) {
-      return rank * static_cast<std::uint32_t>(machine_.threads) + thread;
-    };
-    std::map<std::size_t, std::uint32_t> first_owner;
-    for (std::size_t k = 0; k < chunks.size(); ++k) {
-      out_.nodes[chunks[k].node].worker = worker(owner[k]);
-      first_owner.try_emplace(chunks[k].group, owner[k]);
+    for (const std::size_t g : mine) {
+      const std::uint32_t teller = group_[g].teller();
+      if (teller == none) continue;
+      out_.nodes[teller].tells = true;
+      ++out_.tellers.back();
     }
-    const auto owner_of = [&](std::size_t g) {
-      const auto found = first_owner.find(g);
-      return worker(found == first_owner.end() ? 0 : found->second);
-    };
-    const graph::LoopColours colours = colours_of(first, mine);
-    std::uint32_t tellers = 0;
-    bool glued = false;
-    for (std::size_t at = 0; at < mine.size(); ++at) {
-      const std::size_t g = mine[at];
-      if (group_[g].publish == none) continue;
-      group_[g].new_publish = add_node(rank, group_[g].source, group_[g].publish);
-      out_.nodes.back().worker = owner_of(g);
-      out_.nodes.back().colour = colours.publish[at];
-      out_.nodes.back().tells = group_[g].publish_tells();
-      tellers += group_[g].publish_tells() || group_[g].tell != none ? 1 : 0;
-      glued = true;
-    }
-    out_.tellers.push_back(tellers);
-    root_.push_back(none);
-    collect_.push_back(none);
-    if (!glued) return;
-    const auto add = [&](std::uint32_t colour) {
-      out_.nodes.push_back(root_node(rank, colour));
-      out_.nodes.back().worker = worker(0);
-      return static_cast<std::uint32_t>(out_.nodes.size() - 1);
-    };
-    if (has_centre_ && out_.tree.relays(static_cast<int>(rank))) collect_.back() = add(colours.tree.up);
-    root_.back() = add(colours.tree.down);
-    for (std::size_t g : mine) {
-      if (group_[g].glue == none) continue;
-      group_[g].new_glue = add_node(rank, group_[g].source, group_[g].glue);
-      out_.nodes.back().worker = owner_of(g);
-      out_.nodes.back().colour = colours.glue;
-    }
-    for (std::size_t at = 0; at < mine.size(); ++at) {
-      Group& group = group_[mine[at]];
-      if (group.subdomain_colour == 0) continue;
-      group.new_take = add_node(rank, group.source, group.take);
-      out_.nodes.back().worker = owner_of(mine[at]);
-      out_.nodes.back().colour = colours.take[at];
-    }
-    for (std::size_t at = 0; at < mine.size(); ++at) {
-      Group& group = group_[mine[at]];
-      if (group.tell == none) continue;
-      group.new_tell = add_node(rank, group.source, group.tell);
-      out_.nodes.back().worker = owner_of(mine[at]);
-      out_.nodes.back().colour = colours.tell[at];
-      out_.nodes.back().tells = true;
+    for (std::size_t n = 0; n < plan.nodes.size(); ++n) {
+      for (std::size_t k = plan.offset[n]; k < plan.offset[n + 1]; ++k)
+        out_.neighbour.push_back(first + plan.neighbour[k]);
+      out_.offset.push_back(static_cast<std::uint32_t>(out_.neighbour.size()));
     }
   }
 
@@ -245,62 +269,6 @@ class Builder {
         node.source_node = n;
       }
     return node;
-  }
-
-  void connect() {
-    std::vector<std::vector<std::uint32_t>> place(plans_.size());  // recorded node -> node
-    for (std::size_t s = 0; s < plans_.size(); ++s) place[s].resize(plans_[s]->size(), none);
-    for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
-      const SimNode& node = out_.nodes[n];
-      if (node.role != Role::root) place[static_cast<std::size_t>(node.source_rank)][node.source_node] = n;
-    }
-    std::vector<std::vector<std::uint32_t>> extra(out_.nodes.size());
-    const auto join = [&](std::uint32_t a, std::uint32_t b) {
-      extra[a].push_back(b);
-      extra[b].push_back(a);
-    };
-    for (const Group& group : group_) {
-      if (group.new_publish == none) continue;
-      join(group.new_publish, group.new_glue);
-      if (group.subdomain_colour > 0) {
-        join(group.new_publish, group.new_take);
-        join(group.new_glue, group.new_take);
-      }
-      if (group.new_tell != none) join(group.new_glue, group.new_tell);
-      const std::uint32_t root = root_[out_.nodes[group.new_publish].rank];
-      join(group.new_glue, root);
-      if (group.teller() == none) continue;
-      join(group.teller(), root);
-      const std::uint32_t collect = collect_[out_.nodes[group.new_publish].rank];
-      if (collect != none) join(group.teller(), collect);
-    }
-    for (const Plan* plan : plans_)
-      for (const Message& m : plan->messages) {
-        if (m.from == root_group || m.to == root_group) continue;
-        const Group &from = group_[place_of(m.from)], &to = group_[place_of(m.to)];
-        if (from.new_publish == none || to.new_glue == none)
-          throw TraceError("a message between subdomains without gluing");
-        if (out_.nodes[from.new_publish].rank == out_.nodes[to.new_glue].rank)
-          join(from.new_publish, receiver(from, to));
-      }
-    out_.offset.push_back(0);
-    for (std::uint32_t n = 0; n < out_.nodes.size(); ++n) {
-      const SimNode& node = out_.nodes[n];
-      if (node.role != Role::root) {
-        const auto source = static_cast<std::size_t>(node.source_rank);
-        for (std::uint32_t other : plans_[source]->neighbours(node.source_node)) {
-          const std::uint32_t there = place[source][other];
-          // Edges of the gluing follow from the messages; those of chunks are kept.
-          if (there == none || out_.nodes[there].rank != node.rank) continue;
-          if (node.role == Role::compute || out_.nodes[there].role == Role::compute)
-            out_.neighbour.push_back(there);
-        }
-      }
-      std::sort(extra[n].begin(), extra[n].end());
-      extra[n].erase(std::unique(extra[n].begin(), extra[n].end()), extra[n].end());
-      out_.neighbour.insert(out_.neighbour.end(), extra[n].begin(), extra[n].end());
-      out_.offset.push_back(static_cast<std::uint32_t>(out_.neighbour.size()));
-    }
   }
 
   /// Two threads of the machine, of which one thread did the work when it was recorded: what it took to hand
@@ -325,7 +293,7 @@ class Builder {
           down[rank_of_[place_of(m.to)]] += bytes;
         } else {
           const Group &sender = group_[place_of(m.from)], &taker = group_[place_of(m.to)];
-          const std::uint32_t from = sender.new_publish, to = receiver(sender, taker);
+          const std::uint32_t from = sender.made[Role::publish], to = receiver(sender, taker);
           if (out_.nodes[from].rank == out_.nodes[to].rank) {
             if (!newly_shared(*plan, out_.nodes[from], out_.nodes[to])) continue;
             out_.handed[from] += bytes;
@@ -381,26 +349,8 @@ class Builder {
     std::partial_sum(out_.walk_begin.begin(), out_.walk_begin.end(), out_.walk_begin.begin());
   }
 
-  void describe_plans() {
-    out_.plans.resize(static_cast<std::size_t>(machine_.ranks));
-    for (std::size_t r = 0; r < out_.plans.size(); ++r) {
-      Plan& plan = out_.plans[r];
-      plan.rank = static_cast<std::int32_t>(r);
-      plan.offset.push_back(0);
-      for (std::uint32_t n = out_.rank_begin[r]; n < out_.rank_begin[r + 1]; ++n) {
-        const SimNode& node = out_.nodes[n];
-        plan.colour.push_back(node.colour);
-        plan.group.push_back(node.group);
-        plan.role.push_back(static_cast<std::uint8_t>(node.role));
-        const Plan* source =
-            node.source_rank >= 0 ? plans_[static_cast<std::size_t>(node.source_rank)] : nullptr;
-        plan.weight.push_back(source ? source->weight[node.source_node] : 0);
-        plan.place.push_back(source ? source->place[node.source_node] : 0);
-        plan.owner.push_back(node.worker % static_cast<std::uint32_t>(machine_.threads));
-        for (std::uint32_t other : out_.neighbours(n)) plan.neighbour.push_back(other - out_.rank_begin[r]);
-        plan.offset.push_back(static_cast<std::uint32_t>(plan.neighbour.size()));
-      }
-    }
+  /// Those of the recording, at the rank that has their subdomain.
+  void add_messages() {
     for (const Plan* plan : plans_)
       for (const Message& m : plan->messages) {
         const std::uint16_t group = m.from == root_group ? m.to : m.from;
@@ -426,82 +376,9 @@ class Builder {
 
 }  // namespace
 
-std::vector<std::uint32_t> groups_of(const Trace& trace) {
-  std::set<std::uint32_t> groups;
-  for (const Plan& plan : trace.plans)
-    for (std::uint32_t group : plan.group)
-      if (group != root_group) groups.insert(group);
-  for (const auto& tasks : trace.tasks)
-    for (const Task& task : tasks)
-      if (task.group >= 0) groups.insert(static_cast<std::uint32_t>(task.group));
-  return {groups.begin(), groups.end()};
-}
-
-std::vector<std::uint32_t> map_groups(const std::vector<std::uint64_t>& weight, const Machine& machine) {
-  const std::size_t groups = weight.size();
-  const auto ranks = static_cast<std::size_t>(machine.ranks);
-  std::vector<std::uint32_t> rank_of(groups);
-  if (machine.map == RankMap::weight) {
-    const std::uint64_t most = std::max<std::uint64_t>(1, *std::max_element(weight.begin(), weight.end()));
-    std::vector<std::uint32_t> small;
-    for (std::uint64_t w : weight) small.push_back(static_cast<std::uint32_t>(1 + w * 1000000 / most));
-    graph::assign_owners(small, machine.ranks, rank_of);
-    // No rank may be left without: the last groups move up.
-    for (std::size_t g = groups; g-- > 0;) {
-      const auto at_most = static_cast<std::uint32_t>(std::min(ranks - 1, g));
-      const auto at_least = static_cast<std::uint32_t>(ranks - std::min(ranks, groups - g));
-      rank_of[g] = std::clamp(rank_of[g], std::min(at_least, at_most), at_most);
-    }
-    for (std::size_t g = 1; g < groups; ++g) rank_of[g] = std::min(rank_of[g], rank_of[g - 1] + 1);
-    return rank_of;
-  }
-  for (std::size_t g = 0; g < groups; ++g)
-    rank_of[g] = static_cast<std::uint32_t>(machine.map == RankMap::cyclic ? g % ranks : g * ranks / groups);
-  return rank_of;
-}
-
 LoopLayout lay_out(const std::vector<const Plan*>& plans, const std::vector<std::uint32_t>& groups,
                    const std::vector<std::uint32_t>& rank_of, const Machine& machine) {
   return Builder(plans, groups, rank_of, machine).build();
-}
-
-std::vector<std::vector<SimTask>> lay_out_tasks(const Trace& trace, const std::vector<std::uint32_t>& groups,
-                                                const std::vector<std::uint32_t>& rank_of, int ranks) {
-  std::vector<std::vector<SimTask>> all(static_cast<std::size_t>(ranks));
-  for (std::uint32_t r = 0; r < all.size(); ++r) {
-    std::set<std::int32_t> mine;
-    for (std::size_t g = 0; g < groups.size(); ++g)
-      if (rank_of[g] == r) mine.insert(static_cast<std::int32_t>(groups[g]));
-    std::vector<SimTask>& tasks = all[r];
-    std::map<std::pair<std::size_t, std::uint32_t>, std::uint32_t> place;  // recorded (rank, task) -> task
-    // All recorded ranks have the same kinds in the same order, each with its own subdomains' tracks.
-    std::vector<std::size_t> next(trace.tasks.size(), 0);
-    while (next[0] < trace.tasks[0].size()) {
-      const Kind kind = trace.tasks[0][next[0]].kind;
-      for (std::size_t s = 0; s < trace.tasks.size(); ++s)
-        for (const auto& recorded = trace.tasks[s];
-             next[s] < recorded.size() && recorded[next[s]].kind == kind; ++next[s]) {
-          const Task& task = recorded[next[s]];
-          if (task.group >= 0 && !mine.count(task.group)) continue;
-          const bool merged = task.group < 0 && !tasks.empty() && tasks.back().task.kind == kind &&
-                              tasks.back().task.group < 0;
-          if (!merged) {
-            tasks.push_back({{task.name, kind, task.group, task.team, {}}, {}});
-          }
-          tasks.back().sources.push_back({static_cast<std::int32_t>(s), static_cast<std::uint32_t>(next[s])});
-          place[{s, static_cast<std::uint32_t>(next[s])}] = static_cast<std::uint32_t>(tasks.size() - 1);
-        }
-    }
-    for (SimTask& task : tasks) {
-      std::set<std::uint32_t> before;
-      for (const SimTask::Source& source : task.sources)
-        for (std::uint32_t p : trace.tasks[static_cast<std::size_t>(source.rank)][source.task].predecessors)
-          if (const auto found = place.find({static_cast<std::size_t>(source.rank), p}); found != place.end())
-            before.insert(found->second);
-      task.task.predecessors.assign(before.begin(), before.end());
-    }
-  }
-  return all;
 }
 
 }  // namespace talus::trace

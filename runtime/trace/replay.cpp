@@ -238,7 +238,7 @@ class Player {
 
   /// The recorded epochs, with decisions as the machine needs them: a run of one rank reads its sums at once;
   /// a run of several posts them and reads them a sweep later, so it has one sweep more in the end, and
-  /// undoes it (runtime/step/iteration.hpp).
+  /// undoes it (runtime/step/epoch_schedule.hpp).
   std::vector<SimEpoch> epochs_of(const StepIndex& index) const {
     const StepIndex::Rank& recorded = index.ranks[0];
     for (const StepIndex::Rank& rank : index.ranks)

@@ -12,7 +12,7 @@ namespace talus::trace {
 namespace {
 
 constexpr std::size_t role_count = static_cast<std::size_t>(Role::tell) + 1;
-constexpr std::uint32_t most_turn = std::numeric_limits<signed char>::max();  // graph::loop_colours has chars
+constexpr std::uint32_t most_turn = std::numeric_limits<signed char>::max();  // LoopGroup::colour is a char
 
 [[noreturn]] void refuse(const std::string& reason) {
   throw TraceError("the trace makes no sense: " + reason);
@@ -60,6 +60,25 @@ void check(const std::vector<Task>& tasks, std::size_t kinds) {
 }
 
 }  // namespace
+
+Role role_of(graph::LoopRole role) {
+  switch (role) {
+    case graph::LoopRole::work:
+      return Role::compute;
+    case graph::LoopRole::publish:
+      return Role::publish;
+    case graph::LoopRole::collect:
+    case graph::LoopRole::root:
+      return Role::root;
+    case graph::LoopRole::glue:
+      return Role::glue;
+    case graph::LoopRole::take:
+      return Role::take;
+    case graph::LoopRole::tell:
+      break;
+  }
+  return Role::tell;
+}
 
 const char* name_of(Phase phase) {
   switch (phase) {

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "runtime/graph/loop_plan.hpp"
 #include "runtime/graph/tree.hpp"
 #include "runtime/trace/machine.hpp"
 
@@ -102,6 +103,9 @@ enum class Role : std::uint8_t {
             ///< colours published
   tell,     ///< sends its group's part to the root; without a tell, publish sends it
 };
+
+/// Of a node of a loop as it is run. A trace calls collect a root, too: it is the rank's first of two.
+Role role_of(graph::LoopRole role);
 
 /// Names the root as the end of a message.
 inline constexpr std::uint16_t root_group = 0xffffU;

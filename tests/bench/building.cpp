@@ -16,6 +16,7 @@
 #include "apps/shared/sample_builder.hpp"
 #include "io/scene/scene.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/clocks.hpp"
@@ -68,7 +69,7 @@ int main(int argc, char** argv) {
   Sample sample = build_sample(scene);
   io::place_walls(scene, sample);
   graph::Executor executor({.threads = 1});
-  Simulation simulation(scene.setup, deal_out(sample, scene.setup.decomposition, graph::Communicator()),
+  Simulation simulation(scene.setup, deal_out(sample, scene.setup.decomposition, graph::one_rank()),
                         executor);
   fmt::print("{:>12} {:>6} {:>10} {:>14} {:>14} {:>12}\n", "stage", "step", "anew", "kept, sweeps",
              "anew, sweeps", "mean, sweeps");

@@ -62,7 +62,7 @@ struct Count {
   bool reached = false;
   double error = 0, seconds = 0;
   MessageCount messages;
-  std::vector<Iteration::Check> history;
+  std::vector<ErrorCheck> history;
 };
 
 Count solve(Setup setup, const Bodies& bodies, int max_iterations) {
@@ -121,11 +121,12 @@ void print_table(const Setup& given, const Bodies& bodies, PartitionKind kind) {
     setup.decomposition.exchange = row.exchange;
     setup.decomposition.sweeps_per_exchange = row.sweeps_per_exchange;
     const Count count = sweeps_to_tolerance(setup, bodies);
-    fmt::print(
-        "| {} | {} | {} | {} | {}{} | {:.1e} | {} | {:.1f} | {:.0f} |\n", row.subdomains,
-        row.sweeps_per_exchange, name_of(row.coupling), row.exchange == ExchangeScheme::dcs ? "DCS" : "CCS",
-        count.sweeps, count.reached ? "" : " (missed)", count.error, count.messages.messages,
-        static_cast<double>(count.messages.bytes) / 1e3, 1e6 * count.seconds / std::max(count.sweeps, 1));
+    fmt::print("| {} | {} | {} | {} | {}{} | {:.1e} | {} | {:.1f} | {:.0f} |\n", row.subdomains,
+               row.sweeps_per_exchange, couplings().of(row.coupling).name,
+               row.exchange == ExchangeScheme::dcs ? "DCS" : "CCS", count.sweeps,
+               count.reached ? "" : " (missed)", count.error, count.messages.messages,
+               static_cast<double>(count.messages.bytes) / 1e3,
+               1e6 * count.seconds / std::max(count.sweeps, 1));
     std::fflush(stdout);
   }
 }

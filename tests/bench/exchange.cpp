@@ -18,6 +18,7 @@
 
 #include "apps/shared/sample_builder.hpp"
 #include "io/scene/scene.hpp"
+#include "runtime/graph/mpi_communicator.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 
@@ -73,7 +74,8 @@ Measured measure(const Setup& setup, const Sample& sample, std::int64_t steps,
 
 int main(int argc, char** argv) {
   const graph::MpiSession session(&argc, &argv);
-  const graph::Communicator ranks(session);
+  const auto world = graph::make_communicator(session);
+  const graph::Communicator& ranks = *world;
   if (argc < 2) {
     if (ranks.rank() == 0) fmt::print(stderr, "bench_exchange SCENE.toml [STEPS] [SWEEPS]\n");
     return 2;
@@ -118,8 +120,8 @@ int main(int argc, char** argv) {
         const bool in_paper = !(central && coupling == Coupling::schwarz);
         say(fmt::format(
             "| {} | {} | {} | {} | {:.1f} | {} | {:.1f} | {:.1f} % | {} | {:.2f} % | {:.2f} % | {} | {} |\n",
-            setup.decomposition.subdomains, name_of(coupling), central ? "CCS" : "DCS", m.messages.messages,
-            static_cast<double>(m.messages.bytes) / 1e3, m.messages.between_ranks,
+            setup.decomposition.subdomains, couplings().of(coupling).name, central ? "CCS" : "DCS",
+            m.messages.messages, static_cast<double>(m.messages.bytes) / 1e3, m.messages.between_ranks,
             static_cast<double>(m.messages.bytes_between_ranks) / 1e3, 100 * m.waited,
             in_paper ? fmt::format("{:g} %", central ? row.paper_ccs : row.paper_dcs) : "", 100 * m.dealing,
             100 * m.detection, m.broad_phases, m.migrants));

@@ -1,5 +1,5 @@
 /// Time to an error, by method: one step of a packing of spheres that begins cold. The baseline is plain NLGS
-/// with the scalar kernel, in the same program.
+/// with the same instructions, in the same program.
 ///
 ///   bench_solvers SPHERES.csv [boxes|rcb|metis] [alternating|nscdd] [SUBDOMAINS...]
 ///
@@ -34,15 +34,13 @@ constexpr Case cases[] = {{"triaxial", false, 0.35, 1e-3},
 struct Method {
   const char* name;
   SolverMethod method;
-  InstructionSet simd;
   Precision precision = Precision::full;
 };
-constexpr Method methods[] = {{"NLGS, scalar", SolverMethod::nlgs, InstructionSet::portable},
-                              {"NLGS", SolverMethod::nlgs, InstructionSet::automatic},
-                              {"momentum", SolverMethod::momentum, InstructionSet::automatic},
-                              {"NNCG", SolverMethod::nncg, InstructionSet::automatic},
-                              {"auto, double", SolverMethod::automatic, InstructionSet::automatic},
-                              {"auto", SolverMethod::automatic, InstructionSet::automatic, Precision::mixed}};
+constexpr Method methods[] = {{"NLGS", SolverMethod::nlgs},
+                              {"momentum", SolverMethod::momentum},
+                              {"NNCG", SolverMethod::nncg},
+                              {"auto, double", SolverMethod::automatic},
+                              {"auto", SolverMethod::automatic, Precision::mixed}};
 
 struct Outcome {
   int sweeps = 0;
@@ -59,7 +57,6 @@ struct Cut {
 Outcome solve(const bench::Packing& packing, const Case& problem, const Method& method, const Cut& cut) {
   Setup setup = bench::packed_scene(packing, problem.pile, problem.tolerance, problem.mu);
   setup.solver.method = method.method;
-  setup.solver.simd = method.simd;
   setup.solver.precision = method.precision;
   setup.solver.balance_tolerance = 1e9;
   setup.solver.max_iterations = 20000;
@@ -99,12 +96,11 @@ int main(int argc, char** argv) {
   for (const Case& problem : cases) {
     fmt::print("\n{}, mu {}, error {:g}, {} grains\n", problem.name, problem.mu, problem.tolerance,
                packing.bodies.size());
-    fmt::print("| method | subdomains | sweeps | error | s | scalar NLGS over it |\n");
+    fmt::print("| method | subdomains | sweeps | error | s | NLGS over it |\n");
     fmt::print("| --- | ---: | ---: | ---: | ---: | ---: |\n");
     double baseline = 0;
     for (const int count : subdomains)
       for (const Method& method : methods) {
-        if (method.simd == InstructionSet::portable && baseline > 0) continue;
         std::vector<Outcome> runs;
         for (int run = 0; run < 3; ++run)
           runs.push_back(solve(packing, problem, method, {cut.partitioner, cut.coupling, count}));

@@ -6,8 +6,8 @@
 /// Columns have exact forces: the weight above. The heavy plate, 10^6 grain masses on a pile of 16,000
 /// spheres, has to come to rest, and the force on it is its weight, where the pile has settled under it (two
 /// minutes). Times are thread CPU seconds of one
-/// thread, and the number of plain scalar sweeps of the same contacts that fit into them (measured in the
-/// same run). SPHERES.csv as for bench_sweep; SWEEPS of plain Gauss-Seidel to compare with, default 10000 on
+/// thread, and the number of plain sweeps of the same contacts that fit into them (measured in the same
+/// run). SPHERES.csv as for bench_sweep; SWEEPS of plain Gauss-Seidel to compare with, default 10000 on
 /// columns and 1000 on the pile.
 
 #include <fmt/format.h>
@@ -34,6 +34,7 @@ using bench::cpu_now;
 using bench::Packing;
 
 constexpr double gravity = 9.81, mu = 0.35;
+const SweepKernels kernels(InstructionSet::automatic);
 
 /// One step's problem and plain Gauss-Seidel on it.
 struct Scene {
@@ -52,8 +53,7 @@ struct Scene {
         sample.bodies.x,     sample.bodies.radius, sample.bodies.velocity, sample.walls, time_step, alert, 0,
         Vec3(0, 0, -gravity)};
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-      narrow_chunk(in, sample.candidates, sample.chunks, c, SweepKernels(best_instruction_set()),
-                   sample.contacts);
+      narrow_chunk(in, sample.candidates, sample.chunks, c, best_instruction_set(), sample.contacts);
     if (closed) std::fill(sample.contacts.bias.begin(), sample.contacts.bias.end(), 0.0);
     free.u.resize(sample.bodies.size());
     free.w.resize(sample.bodies.size());
@@ -79,10 +79,10 @@ struct Scene {
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
       const std::int32_t w = sample.chunks.wall[c];
       if (w < 0) {
-        accumulate_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity);
+        kernels.accumulate_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity);
       } else {
         std::copy_n(walls[static_cast<std::size_t>(w)].free_velocity.data(), 3, copies[c].velocity);
-        accumulate_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, copies[c]);
+        kernels.accumulate_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, copies[c]);
       }
     }
     glue();
@@ -95,9 +95,9 @@ struct Scene {
     for (int k = 0; k < count; ++k) {
       for (std::size_t c = 0; c < sample.chunks.size(); ++c)
         if (sample.chunks.wall[c] < 0)
-          sweep_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu);
+          kernels.sweep_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu);
         else
-          sweep_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu, copies[c]);
+          kernels.sweep_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu, copies[c]);
       glue();
     }
   }
@@ -105,9 +105,10 @@ struct Scene {
     ErrorSums sums;
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
       const std::int32_t w = sample.chunks.wall[c];
-      sums.add(w < 0 ? error_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu)
-                     : error_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu,
-                                        copies[c], walls[static_cast<std::size_t>(w)].inv_mass));
+      sums.add(w < 0
+                   ? kernels.error_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu)
+                   : kernels.error_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu,
+                                              copies[c], walls[static_cast<std::size_t>(w)].inv_mass));
     }
     return std::sqrt(sums.residual2 / std::max(sums.impulse2, sums.velocity2));
   }

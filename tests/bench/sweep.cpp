@@ -134,7 +134,7 @@ void time_kernels(const StepState& state, Times& times, int repeats) {
     Contacts found = contacts;
     const auto narrow = [&] {
       for (std::size_t c = 0; c < state.chunks.size(); ++c)
-        narrow_chunk(in, state.candidates, state.chunks, c, kernels, found);
+        narrow_chunk(in, state.candidates, state.chunks, c, kernels.set(), found);
     };
     narrow();
     const double kept = cpu_time(narrow);

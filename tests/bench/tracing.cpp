@@ -17,6 +17,7 @@
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/trace_feed.hpp"
 #include "io/scene/scene.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/simulation.hpp"
 #include "tests/bench/clocks.hpp"
@@ -39,7 +40,7 @@ int main(int argc, char** argv) {
 
   const std::filesystem::path directory = std::filesystem::temp_directory_path() / "talus_bench_tracing";
   std::filesystem::create_directories(directory);
-  const graph::Communicator ranks;
+  const graph::OneRank ranks;
   TraceFeed feed(directory.string(), {}, false, threads, ranks);
   graph::Executor plain({.threads = threads}), traced({.threads = threads, .trace = &feed.recorder()});
   feed.start(traced);

@@ -10,32 +10,29 @@
 #include <vector>
 
 #include "kernels/bodies/bodies.hpp"
-#include "kernels/bodies/walls.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/narrow_phase.hpp"
-#include "kernels/sweeps/detail/scalar_sweeps.hpp"
+#include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "runtime/step/setup.hpp"
+#include "tests/unit/reference_sweeps.hpp"
 
 namespace talus::test {
 
 using Random = std::mt19937_64;
 
-/// What this processor runs, the scalar kernels first.
+/// Why tests that compare instruction sets are skipped.
+inline constexpr const char* no_other_instruction_set =
+    "this processor has neither AVX2 nor AVX-512: there is nothing to compare the portable kernels with";
+
+/// What this processor runs, the portable set first.
 inline std::vector<InstructionSet> sets_to_test() {
   std::vector<InstructionSet> sets;
   for (const InstructionSet set : {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512})
     if (set <= best_instruction_set()) sets.push_back(set);
   return sets;
-}
-
-/// Calls `work` with the scalar kernels that round as those of `set` do.
-template <class Work>
-auto with_scalar_kernels(InstructionSet set, const Work& work) {
-  return set == InstructionSet::portable ? work(scalar::Sweeps<scalar::Separate>{})
-                                         : work(scalar::Sweeps<scalar::Fused>{});
 }
 
 inline double uniform(Random& random, double low, double high) {
@@ -140,14 +137,13 @@ struct Sample {
 };
 
 /// Narrow phase over all chunks with h = 1 ms and the given alert distance; biases as IQS gives them.
-inline void find_contacts(Sample& sample, double alert,
-                          const SweepKernels& kernels = SweepKernels(InstructionSet::portable)) {
+inline void find_contacts(Sample& sample, double alert, InstructionSet set = InstructionSet::automatic) {
   allocate(sample.contacts, sample.candidates, sample.chunks, sample.candidates.components == 3);
   const NarrowPhase in{
       sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, 0,
       Vec3::Zero()};
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-    narrow_chunk(in, sample.candidates, sample.chunks, c, kernels, sample.contacts);
+    narrow_chunk(in, sample.candidates, sample.chunks, c, set, sample.contacts);
 }
 
 inline Sample dense_sample(int edge, std::uint64_t seed, bool friction, bool with_walls, int chunk_target) {

@@ -184,10 +184,10 @@ TEST_F(Command, NamesADirectoryItCannotWriteTo) {
   }
 }
 
-// No file may grow beyond 2 kB, 32 kB: what a full disk looks like at the start and in the middle.
+// No file may grow beyond 4 kB, 32 kB: what a full disk looks like at the start and in the middle.
 TEST_F(Command, EndsWithOneAndTheNameOfTheFileWhenTheDiskIsFull) {
   write(at("scene.toml"), pressed_box);
-  for (const std::string blocks : {"4", "64"}) {
+  for (const std::string blocks : {"8", "64"}) {
     const Outcome outcome =
         run("run scene.toml --out results --force", "trap '' XFSZ; ulimit -f " + blocks + ";");
     EXPECT_EQ(outcome.code, 1) << outcome.messages;

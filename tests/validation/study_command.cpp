@@ -70,10 +70,8 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
         EXPECT_EQ(truth.number(solves.back(), "error_rms"), residual.number(checks.back(), "error_rms"));
       }
   for (const std::string name : {"residual_seconds", "residual_sweeps", "velocity_seconds", "velocity_sweeps",
-                                 "wall_forces_seconds", "velocity_residual"}) {
+                                 "wall_forces_seconds", "velocity_residual"})
     EXPECT_TRUE(fs::exists(at("s/" + name + ".svg"))) << name;
-    EXPECT_NE(content(at("s/plot.gp")).find(name + ".gnuplot.svg"), std::string::npos) << name;
-  }
   EXPECT_FALSE(fs::exists(at("s/runs.csv")));
   const std::string page = content(at("s/report.html"));
   EXPECT_NE(page.find("<svg"), std::string::npos);
@@ -194,16 +192,6 @@ TEST_F(StudyError, AStudyThatIsStoppedLeavesWhatItHasMeasured) {
   EXPECT_FALSE(read_table(at("s/true_error.csv")).rows.empty());
   EXPECT_TRUE(fs::exists(at("s/report.html")));
   EXPECT_FALSE(fs::exists(at("s/runs.csv"))) << "it was not stopped";
-}
-
-TEST_F(StudyError, GnuplotDrawsTheTables) {
-  if (std::system("command -v gnuplot >/dev/null 2>&1") != 0) GTEST_SKIP() << "gnuplot is not installed";
-  ASSERT_NE(run(std::string(brief) + "--only step --at-step 2 --methods nlgs,nncg --tolerances 1e-2").code,
-            1);
-  const std::string line = "cd '" + at("s").string() + "' && gnuplot plot.gp >out.txt 2>&1";
-  ASSERT_EQ(std::system(line.c_str()), 0) << content(at("s/out.txt"));
-  EXPECT_EQ(content(at("s/out.txt")), "");
-  EXPECT_NE(content(at("s/residual_seconds.gnuplot.svg")).find("nncg, warm"), std::string::npos);
 }
 
 TEST_F(StudyError, RefusesWhatHasNoMeaningAndWritesNothing) {

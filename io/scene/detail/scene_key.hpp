@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/registry.hpp"
 
 namespace talus::io::detail {
 
@@ -192,6 +193,21 @@ Key<Part> choice(const char* name, std::vector<std::string> names, const char* m
   };
   result.get = [access, names](const Part& part) -> Value {
     return names[static_cast<std::size_t>(std::invoke(access, part))];
+  };
+  return result;
+}
+
+/// A key whose texts, and what is said of them, are those of a registry.
+template <class Part, class Kind, class Maker, class Access>
+Key<Part> choice(const char* name, const Registry<Kind, Maker>& registry, Access access) {
+  Key<Part> result{{name, "", any, registry.meaning()}};
+  result.kind = std::string();
+  result.choices = registry.names();
+  result.set = [access, &registry](Part& part, const Value& value) {
+    std::invoke(access, part) = registry.named(std::get<std::string>(value)).kind;
+  };
+  result.get = [access, &registry](const Part& part) -> Value {
+    return std::string(registry.of(std::invoke(access, part)).name);
   };
   return result;
 }

@@ -4,6 +4,9 @@
 #include <cmath>
 
 #include "io/scene/detail/shape_keys.hpp"
+#include "io/scene/detail/spelling.hpp"
+#include "partition/partitioners.hpp"
+#include "runtime/step/methods/method.hpp"
 
 namespace talus::io::detail {
 
@@ -317,12 +320,7 @@ Section<SolverSettings> solver_keys() {
       "[solver]",
       "When a step counts as solved, and how hard to try.",
       {
-          choice<SolverSettings>(
-              "method", {"auto", "nlgs", "nlgs+momentum", "nncg", "admm"},
-              "`nlgs`: sweeps as they are; `nlgs+momentum`: each sweep begins beyond where the last one "
-              "ended; `nncg`: nonsmooth conjugate gradients; `admm`: for long chains and heavy bodies, "
-              "then sweeps; `auto`: momentum, and admm where sweeps leave forces out of balance.",
-              &SolverSettings::method),
+          choice<SolverSettings>("method", methods(), &SolverSettings::method),
           key<SolverSettings>("tolerance", "", positive,
                               "Bound on the relative error of the contact law (error_rms).",
                               &SolverSettings::tolerance),
@@ -350,10 +348,20 @@ Section<SolverSettings> solver_keys() {
               &SolverSettings::precision),
           choice<SolverSettings>("simd", {"auto", "portable", "avx2", "avx512"},
                                  "Instructions of the sweeps; `auto`: the widest that the processors of all "
-                                 "ranks have. AVX2 and AVX-512 give the same bits, the portable sweeps round "
-                                 "otherwise.",
+                                 "ranks have. All give the same bits; `portable` is slow where the processor "
+                                 "has no fused product.",
                                  &SolverSettings::simd),
       }};
+}
+
+/// "auto, boxes or fitted": the partitioners that cut boxes.
+std::string box_cutters() {
+  std::vector<std::string> names;
+  for (const auto& partitioner : partitioner_registry())
+    if (partitioner.make->takes_boxes) names.emplace_back(partitioner.name);
+  const std::string last = names.back();
+  names.pop_back();
+  return listed(names) + " or " + last;
 }
 
 Section<DecompositionSettings> decomposition_keys() {
@@ -368,23 +376,12 @@ Section<DecompositionSettings> decomposition_keys() {
                  "Number of subdomains, at least one per rank.", &D::subdomains)
               .blank_when_zero()
               .or_else("product of `boxes`, else one per rank"),
-          choice<D>(
-              "partitioner", {"auto", "boxes", "fitted", "rcb", "metis"},
-              "`boxes`: equal boxes; `fitted`: boxes of equal work; `rcb`: recursive bisection; `metis`: "
-              "a graph of cells; `auto`: boxes where they are balanced or given, else rcb.",
-              &D::partitioner),
+          choice<D>("partitioner", partitioner_registry(), &D::partitioner),
           key<D>("boxes", "", countable,
                  "Boxes along x, y and z; their product is `subdomains`, which need not be given.", &D::boxes)
               .blank_when_zero()
-              .only("partitioner = auto, boxes or fitted", in_boxes),
-          choice<D>(
-              "coupling", {"nscdd", "alternating", "schwarz"},
-              "`nscdd`: copies of a body share its mass and are glued; `alternating`: likewise, but in "
-              "turns: half "
-              "of the subdomains sweep their borders when they know what the others did, and it takes "
-              "as many sweeps as with one subdomain; `schwarz`: copies have the whole mass and exchange what "
-              "they gain.",
-              &D::coupling),
+              .only("partitioner = " + box_cutters(), in_boxes),
+          choice<D>("coupling", couplings(), &D::coupling),
           choice<D>("exchange", {"dcs", "ccs"},
                     "`dcs`: between the subdomains that share a body; `ccs`: through one rank.",
                     &D::exchange),

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "io/scene/detail/scene_key.hpp"
-#include "kernels/bodies/walls.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus::io::detail {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/bodies/walls.hpp"
+#include "kernels/shapes/walls.hpp"
 
 namespace talus::io::detail {
 

@@ -5,8 +5,10 @@
 /// branches. Per pair: 2 centres, velocities and radii of 56 bytes read, 40 bytes written, 4 divisions, a
 /// square root, about 40 flop.
 
-#include "kernels/simd/contact_view.hpp"
+#include "kernels/detection/detail/gap_kernels.hpp"
+#include "kernels/law/gap_law.hpp"
 #include "kernels/simd/lanes.hpp"
+#include "kernels/simd/transpose.hpp"
 
 namespace talus {
 namespace {
@@ -61,9 +63,6 @@ template <std::same_as<Octet> V>
   return {{c[0], c[1], c[2]}, {c[4], c[5], c[6]}, radius_i, radius_j};
 }
 
-template <class V>
-using BitsOf = decltype(V{} < V{});
-
 /// W pairs from `at` of `out` on; returns the lanes that came far.
 template <class V>
 [[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const std::size_t* i,
@@ -75,18 +74,12 @@ template <class V>
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
                       off ? pair.d.z / distance : V{} + 1.0};
   const V gap = distance - pair.radius_i - pair.radius_j, v_n = dot(n, pair.v);
-  BitsOf<V> none = (gap >= rule.alert) & (gap >= -rule.time_step * v_n);
-  V bias = (gap > 0 ? gap : rule.overlap_correction * gap) / rule.time_step;
-  if (rule.restitution > 0) {
-    const BitsOf<V> quick = absolute(v_n) > rule.slow;
-    none |= quick & (gap > 0);
-    bias = quick ? rule.restitution * v_n : bias;
-  }
+  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n);  // gravity moves both alike
   store(out.nx + at, n.x);
   store(out.ny + at, n.y);
   store(out.nz + at, n.z);
-  store(out.bias + at, bias);
-  const BitsOf<V> contact = ~none;
+  store(out.bias + at, found.bias);
+  const BitsOf<V> contact = ~found.absent;
   __builtin_memcpy(out.contact + at, &contact, sizeof(contact));
   const Space<V> way = (V{} + rule.time_step) * pair.v;
   const V small = pair.radius_j < pair.radius_i ? pair.radius_j : pair.radius_i;

@@ -4,7 +4,7 @@
 /// contacts may stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever
 /// W is.
 
-#include "kernels/detection/detail/gap_lanes.hpp"
+#include "kernels/law/contact_law.hpp"
 #include "kernels/sweeps/detail/advance_lanes.hpp"
 #include "kernels/sweeps/detail/sweep_lanes.hpp"
 
@@ -18,45 +18,20 @@ struct ErrorLanes {
   V active{};
 };
 
-/// Projection of z on the Coulomb cone about n.
-template <class V>
-[[gnu::always_inline]] inline Space<V> project_on_cone(const Space<V>& z, const Space<V>& n, double mu) {
-  const V z_n = fused_dot(z, n);
-  const Space<V> t = add_scaled(-z_n, n, z);
-  const V length = root(fused_dot(t, t));
-  const V r_n = fused(V{} + mu, length, z_n) * (1 / (1 + mu * mu));
-  const Space<V> edge = add_scaled(mu * r_n / length, t, r_n * n);
-  const auto apex = mu * length <= -z_n, inside = length <= mu * z_n;
-  const auto choose = [&](V on_edge, V own) { return apex ? V{} : inside ? own : on_edge; };
-  return {choose(edge.x, z.x), choose(edge.y, z.y), choose(edge.z, z.z)};
-}
-
 template <bool Friction, class V, class Only>
 [[gnu::always_inline]] inline void add_error(const Slice<double>& c, Only only, const Space<V>& n,
                                              const Space<V>& v, V w_nn, double mu, ErrorLanes<V>& sums) {
-  const V v_0 = fused_dot(v, n), v_n = v_0 + load<V>(c.bias, 0, only);
-  V e2, r_n, carried;
-  if constexpr (Friction) {
-    const Space<V> r = load_impulse<true, V>(c, 0, only, n);
-    const Space<V> v_t = add_scaled(-v_0, n, v);
-    const V v_t2 = fused_dot(v_t, v_t);
-    const Space<V> v_hat = add_scaled(fused(V{} + mu, root(v_t2), v_n), n, v_t);
-    const Space<V> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
-    e2 = fused_dot(miss, miss);
-    r_n = fused_dot(r, n);
-    sums.impulse2 += fused_dot(p, p);
-    carried = fused(v_n, v_n, v_t2);
-  } else {
-    r_n = load<V>(c.rn, 0, only);
-    const V p = w_nn * r_n, miss = p - positive_part(p - v_n);
-    e2 = miss * miss;
-    sums.impulse2 += p * p;
-    carried = v_n * v_n;
-  }
-  sums.velocity2 += (r_n > 0) | (v_n < 0) ? carried : V{};
-  sums.residual2 += e2;
-  sums.residual_max2 = sums.residual_max2 < e2 ? e2 : sums.residual_max2;
-  sums.active += r_n > 0 ? V{} + 1.0 : V{};
+  const V bias = load<V>(c.bias, 0, only);
+  LawError<V> error;
+  if constexpr (Friction)
+    error = error_of_law(load_impulse<true, V>(c, 0, only, n), n, v, bias, w_nn, mu);
+  else
+    error = error_of_law(load<V>(c.rn, 0, only), fused_dot(v, n) + bias, w_nn);
+  sums.impulse2 += error.impulse2;
+  sums.velocity2 += error.velocity2;
+  sums.residual2 += error.residual2;
+  sums.residual_max2 = sums.residual_max2 < error.residual2 ? error.residual2 : sums.residual_max2;
+  sums.active += error.r_n > 0 ? V{} + 1.0 : V{};
 }
 
 /// 1/M of the bodies whose copies these are, by which the error counts.
@@ -149,19 +124,11 @@ ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, co
 }
 
 template <bool Friction, int W>
-constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W>,
-                                          momentum_grains<Friction, W>,
-                                          sweep_wall<Friction, W>,
-                                          momentum_wall<Friction, W>,
-                                          single_grains<Friction, NarrowOctet>,
-                                          single_wall<Friction, NarrowOctet>,
-                                          accumulate_grains<Friction, W>,
-                                          accumulate_wall<Friction, W>,
-                                          error_grains<Friction, W>,
-                                          error_wall<Friction, W>,
-                                          advance_bodies<Lanes<W>, double>,
-                                          advance_bodies<NarrowOctet, float>,
-                                          find_gaps<W>};
+constexpr LaneKernels kernels_of_lanes = {
+    sweep_grains<Friction, W>,      momentum_grains<Friction, W>,         sweep_wall<Friction, W>,
+    momentum_wall<Friction, W>,     single_grains<Friction, NarrowOctet>, single_wall<Friction, NarrowOctet>,
+    accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,         error_grains<Friction, W>,
+    error_wall<Friction, W>,        advance_bodies<Lanes<W>, double>,     advance_bodies<NarrowOctet, float>};
 
 }  // namespace
 }  // namespace talus

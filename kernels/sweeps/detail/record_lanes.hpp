@@ -6,6 +6,7 @@
 
 #include "kernels/simd/contact_view.hpp"
 #include "kernels/simd/lanes.hpp"
+#include "kernels/simd/transpose.hpp"
 
 namespace talus {
 namespace {

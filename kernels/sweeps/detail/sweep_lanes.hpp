@@ -14,6 +14,7 @@
 /// flop, 1.5 shuffles of 8 lanes. In a group that is not full the free lanes read n = r = bias = 0 and meet a
 /// grain of their own of mass 1 at rest, so that nothing happens there.
 
+#include "kernels/law/contact_law.hpp"
 #include "kernels/sweeps/detail/record_lanes.hpp"
 
 namespace talus {
@@ -102,39 +103,19 @@ struct MomentumStart {
   }
 };
 
-/// 1/W_nn and 1/W_tt: as in kernels/sweeps/detail/scalar_sweeps.hpp.
-template <class V>
-struct Inverses {
-  V nn, tt;
-};
-template <class V>
-[[gnu::always_inline]] inline Inverses<V> invert(V w_nn, V w_tt) {
-  const V inverse = NumberOf<V>{1} / (w_nn * w_tt);
-  return {inverse * w_tt, inverse * w_nn};
-}
-
-/// The impulse that solves the law, less the one that the velocities know; stores the new one. Without
-/// friction only the first component is meant, along the normal.
+/// Solves the law of the contacts from `at` on: stores the new impulse and returns it less the one that the
+/// velocities know. Without friction only the component along the normal exists.
 template <bool Friction, class V, class Start, class Only>
-[[gnu::always_inline]] inline Space<V> solve_law(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
-                                                 std::size_t at, Only only, const Space<V>& n,
-                                                 const Space<V>& v, V w_nn, V w_tt, double mu,
-                                                 const Start& start) {
+[[gnu::always_inline]] inline Space<V> renew_impulse(const Slice<NumberOf<V>>& c,
+                                                     const Target<NumberOf<V>>& out, std::size_t at,
+                                                     Only only, const Space<V>& n, const Space<V>& v, V w_nn,
+                                                     V w_tt, double mu, const Start& start) {
   using Number = NumberOf<V>;
   const V omega = V{} + static_cast<Number>(start.omega);
-  const V bias = load<V>(c.bias, at, only), v_n = fused_dot(v, n);
+  const V bias = load<V>(c.bias, at, only);
   if constexpr (Friction) {
     const Space<V> s = load_impulse<true, V>(c, at, only, n), r = start.begin(s, at, only);
-    const Inverses<V> inverse = invert(w_nn, w_tt);
-    const V r_n = fused_dot(r, n);
-    const V r_n_new = positive_part(fused(-omega, (v_n + bias) * inverse.nn, r_n));
-    const V limit = static_cast<Number>(mu) * r_n_new;
-    const Space<V> t = add_scaled(-fused(-inverse.tt, v_n, r_n), n, add_scaled(-inverse.tt, v, r));
-    V t2 = fused_dot(t, t);
-    // In floats squares vanish early: a contact that carries nothing must not keep what is left of its t.
-    if constexpr (std::same_as<Number, float>) t2 = t2 + __FLT_MIN__;
-    const V scale = t2 > limit * limit ? limit / root(t2) : V{} + Number{1};
-    const Space<V> r_new = add_scaled(scale, t, r_n_new * n);
+    const Space<V> r_new = solve_law(r, n, v, bias, w_nn, w_tt, static_cast<Number>(mu), omega);
     store(out.x, at, r_new.x, only);
     store(out.y, at, r_new.y, only);
     store(out.z, at, r_new.z, only);
@@ -142,7 +123,7 @@ template <bool Friction, class V, class Start, class Only>
     return r_new - r;
   } else {
     const V s = load<V>(c.rn, at, only), r_n = start.begin(s, at, only);
-    const V r_n_new = positive_part(fused(-omega, (v_n + bias) / w_nn, r_n));
+    const V r_n_new = solve_normal(r_n, fused_dot(v, n) + bias, w_nn, omega);
     store(out.n, at, r_n_new, only);
     start.end(s, r_n_new, at, only);
     return (r_n_new - r_n) * n;
@@ -170,8 +151,8 @@ template <bool Friction, class V, int Blocks, class Start, class Grains, class O
     const Space<V> n = load_normal<V>(c, at, only);
     V w_tt{};
     if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
-    dr[k] = solve_law<Friction>(c, out, at, only, n, relative_velocity<Friction>(m[k], n), m[k].w_nn, w_tt,
-                                mu, start);
+    dr[k] = renew_impulse<Friction>(c, out, at, only, n, relative_velocity<Friction>(m[k], n), m[k].w_nn,
+                                    w_tt, mu, start);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)
@@ -317,8 +298,8 @@ template <bool Friction, class V, class Grains, class Start, class Only>
   const Space<V> n = load_normal<V>(c, 0, only);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
-  const Space<V> dr = solve_law<Friction>(c, out, 0, only, n, relative_velocity<Friction>(m, n),
-                                          m.w_nn + wall.inv_mass, w_tt, mu, start);
+  const Space<V> dr = renew_impulse<Friction>(c, out, 0, only, n, relative_velocity<Friction>(m, n),
+                                              m.w_nn + wall.inv_mass, w_tt, mu, start);
   scatter<Friction, false>(a, a, n, dr);
   wall.push(lanes, n, dr);
 }

@@ -14,7 +14,7 @@
 
 namespace talus::detail {
 
-using Channel = graph::Communicator::Channel;
+using graph::Channel;
 
 inline std::size_t at(std::int32_t k) {
   return static_cast<std::size_t>(k);
@@ -32,8 +32,7 @@ inline void start(Channel& channel, trace::Recorder* trace, std::uint32_t messag
   channel.start();
 }
 
-/// A message from and to another rank; buffers have one room more than payload, for the time stamp of a
-/// delay.
+/// A message from and to another rank.
 struct Link {
   std::vector<double> out, in;
   std::unique_ptr<Channel> sender, receiver;

@@ -9,8 +9,9 @@
 
 #include "partition/load_table.hpp"
 #include "partition/partitioner.hpp"
+#include "runtime/graph/pretend_ranks.hpp"
+#include "runtime/step/decomposition.hpp"
 #include "tests/unit/dense_sample.hpp"
-#include "tests/unit/pretend_ranks.hpp"
 
 namespace talus {
 namespace {
@@ -277,11 +278,12 @@ TEST(LoadTable, CountsWhatBruteForceCountsOnAnyNumberOfRanks) {
     EXPECT_EQ(whole.contacts[at(e)], std::count(d.subdomain.begin(), d.subdomain.end(), e));
   }
   std::vector<LoadTable> parts(3);
-  test::on_pretend_ranks(3, [&](std::size_t rank, const Reduction& reduction) {
+  graph::on_pretend_ranks(3, [&](const graph::Communicator& ranks) {
+    const auto rank = static_cast<std::size_t>(ranks.rank());
     const auto interfaces = build_interfaces(d.grains, d.bodies.id, std::span(here).subspan(4 * rank, 4));
     const std::size_t begin = contacts.size() * rank / 3, end = contacts.size() * (rank + 1) / 3;
-    parts[rank] =
-        measure_load(12, interfaces, d.grains, d.of_walls, contacts.subspan(begin, end - begin), reduction);
+    parts[rank] = measure_load(12, interfaces, d.grains, d.of_walls, contacts.subspan(begin, end - begin),
+                               reduction_over(ranks));
   });
   for (const LoadTable& part : parts) {
     EXPECT_EQ(part.contacts, whole.contacts);

@@ -7,8 +7,10 @@
 #include <set>
 
 #include "partition/partitioner.hpp"
+#include "partition/partitioners.hpp"
+#include "runtime/graph/pretend_ranks.hpp"
+#include "runtime/step/decomposition.hpp"
 #include "tests/unit/dense_sample.hpp"
-#include "tests/unit/pretend_ranks.hpp"
 
 namespace talus {
 namespace {
@@ -17,8 +19,12 @@ using test::Random;
 using test::uniform;
 using test::uniform_vector;
 
-constexpr std::array<PartitionKind, 5> kinds{PartitionKind::automatic, PartitionKind::boxes,
-                                             PartitionKind::fitted, PartitionKind::rcb, PartitionKind::metis};
+/// Every way there is: a new one has to pass what all pass.
+const std::vector<PartitionKind> kinds = [] {
+  std::vector<PartitionKind> all;
+  for (const auto& partitioner : partitioner_registry()) all.push_back(partitioner.kind);
+  return all;
+}();
 
 PartitionPoints random_points(std::size_t n, std::uint64_t seed, bool weights = false) {
   Random random(seed);
@@ -144,11 +150,13 @@ TEST(Partition, IsTheSameForAnyOrderOfPointsAndAnyNumberOfRanks) {
     const PartitionPoints points = random_points(4000, 5, weights);
     for (PartitionKind kind : kinds) {
       const auto expected = map_of(make_partition(points, options_of(kind, 13)));
-      for (std::size_t ranks : {1u, 2u, 3u, 7u}) {
+      for (int count : {1, 2, 3, 7}) {
+        const auto ranks = static_cast<std::size_t>(count);
         const auto parts = deal(points, ranks, ranks);
         std::vector<std::vector<std::int32_t>> maps(ranks);
-        test::on_pretend_ranks(ranks, [&](std::size_t rank, const Reduction& reduction) {
-          maps[rank] = map_of(make_partition(parts[rank], options_of(kind, 13), reduction));
+        graph::on_pretend_ranks(count, [&](const graph::Communicator& all) {
+          const auto rank = static_cast<std::size_t>(all.rank());
+          maps[rank] = map_of(make_partition(parts[rank], options_of(kind, 13), reduction_over(all)));
         });
         for (const auto& map : maps) EXPECT_EQ(map, expected) << name_of(kind) << " on " << ranks << " ranks";
       }

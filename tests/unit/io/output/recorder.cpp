@@ -33,7 +33,7 @@ std::set<std::string> every_sink() {
 TEST(Recorder, EveryFileOfEverySinkIsKnownToForce) {
   const ScratchDirectory scratch;
   Recorder recorder = opened(scratch.path(), every_sink());
-  recorder.record_step({.triaxial = triaxial_row(1, "shear"), .errors = std::vector<Iteration::Check>(1)});
+  recorder.record_step({.triaxial = triaxial_row(1, "shear"), .errors = std::vector<ErrorCheck>(1)});
   recorder.record_frame(three_grains());
   recorder.close();
   std::size_t files = 0;
@@ -83,7 +83,7 @@ TEST(Recorder, HandsOverAllLinesSoFarWhenAsked) {
     recorder.record_step({.step = {.step = k},
                           .walls = frame.walls,
                           .triaxial = triaxial_row(k, "shear"),
-                          .errors = std::vector<Iteration::Check>(2)});
+                          .errors = std::vector<ErrorCheck>(2)});
   }
   recorder.flush();
   EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 1u + 3u);

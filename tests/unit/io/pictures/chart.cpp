@@ -1,4 +1,4 @@
-// Curves as SVG and as a gnuplot script, and the page they stand in.
+// Curves as SVG, and the page they stand in.
 
 #include "io/pictures/chart.hpp"
 
@@ -15,18 +15,14 @@ namespace talus::io {
 namespace {
 
 Chart two_curves() {
-  return {
-      .name = "residual",
-      .title = "Residual < 1 & falling",
-      .subtitle = "",
-      .x_label = "time  [s]",
-      .y_label = "residual  [1]",
-      .table = "residual.csv",
-      .x_column = "seconds",
-      .y_column = "error_rms",
-      .series = {{"nlgs", {{0.01, 1e-1}, {0.1, 1e-2}, {1, 1e-3}}, 0, 0, {{"method", "nlgs"}}},
-                 {"nlgs, warm", {{0.01, 1e-2}, {0.1, 1e-3}}, 0, 1, {{"method", "nlgs"}, {"start", "warm"}}}},
-      .levels = {{1e-2, "tolerance"}}};
+  return {.name = "residual",
+          .title = "Residual < 1 & falling",
+          .subtitle = "",
+          .x_label = "time  [s]",
+          .y_label = "residual  [1]",
+          .series = {{"nlgs", {{0.01, 1e-1}, {0.1, 1e-2}, {1, 1e-3}}, 0, 0},
+                     {"nlgs, warm", {{0.01, 1e-2}, {0.1, 1e-3}}, 0, 1}},
+          .levels = {{1e-2, "tolerance"}}};
 }
 
 /// Points of the n-th polyline.
@@ -69,14 +65,13 @@ TEST(Chart, LeavesOutWhatALogarithmCannotShow) {
 TEST(Chart, OnePointAndNoneArePictures) {
   Chart chart = two_curves();
   chart.levels.clear();
-  chart.series = {{"one", {{0.3, 0.004}}, 0, 0, {}}};
+  chart.series = {{"one", {{0.3, 0.004}}, 0, 0}};
   const std::string one = draw_chart(chart);
   EXPECT_EQ(one.find("nan"), std::string::npos);
   EXPECT_EQ(one.find("inf"), std::string::npos);
   EXPECT_NE(one.find("<circle"), std::string::npos);
   chart.series.clear();
   EXPECT_NE(draw_chart(chart).find("No data"), std::string::npos);
-  EXPECT_EQ(gnuplot_script(std::array{chart}).find("plot '"), std::string::npos);
 }
 
 TEST(Chart, AStaircaseHoldsItsValueUpToTheNextPoint) {
@@ -87,19 +82,6 @@ TEST(Chart, AStaircaseHoldsItsValueUpToTheNextPoint) {
   EXPECT_EQ(points[1][1], points[0][1]);
   EXPECT_EQ(points[1][0], points[2][0]);
   EXPECT_EQ(points[5][1], points[4][1]) << "the last value holds up to the edge";
-}
-
-TEST(Chart, TheScriptPicksTheRowsOfEachCurveFromTheTable) {
-  Chart chart = two_curves();
-  chart.title = "it's";
-  const std::string script = gnuplot_script(std::array{chart});
-  EXPECT_NE(
-      script.find("'residual.csv' using (1 && strcol('method') eq 'nlgs' && strcol('start') eq 'warm' ? "
-                  "column('seconds') : NaN):(column('error_rms'))"),
-      std::string::npos)
-      << script;
-  EXPECT_NE(script.find("set title 'it''s'"), std::string::npos);
-  EXPECT_NE(script.find("set logscale y"), std::string::npos);
 }
 
 TEST(CsvTable, QuotesWhatItMustAndKeepsEveryDigit) {

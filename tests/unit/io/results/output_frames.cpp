@@ -9,8 +9,8 @@
 #include <set>
 
 #include "io/files/detail/with_unit.hpp"
-#include "io/pictures/detail/svg.hpp"
 #include "io/files/error.hpp"
+#include "io/pictures/detail/svg.hpp"
 #include "io/pictures/picture.hpp"
 #include "io/results/results.hpp"
 #include "io/results/vtk.hpp"

@@ -9,6 +9,7 @@
 #include "kernels/bodies/motion.hpp"
 #include "kernels/detection/narrow_phase.hpp"
 #include "kernels/detection/skin_escape.hpp"
+#include "kernels/law/gap_law.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace talus {
@@ -200,7 +201,7 @@ TEST(SkinEscape, MeetWhomTheyTouch) {
         const Vec3 d = bodies.x[i] - bodies.x[j];
         using Map = Eigen::Map<const Vec3>;
         const double v_n = d.normalized().dot(Map(bodies.velocity[i].u) - Map(bodies.velocity[j].u));
-        if (may_touch(d.norm() - bodies.radius[i] - bodies.radius[j], v_n, 0.02, 0.03))
+        if (!stays_apart(d.norm() - bodies.radius[i] - bodies.radius[j], v_n, 0.02, 0.03))
           expected.push_back(
               {std::min(static_cast<std::int64_t>(bodies.id[i]), static_cast<std::int64_t>(bodies.id[j])),
                std::max(static_cast<std::int64_t>(bodies.id[i]), static_cast<std::int64_t>(bodies.id[j]))});

@@ -182,8 +182,7 @@ double bias_of(const Approach& approach, bool at_wall) {
   allocate(sample.contacts, sample.candidates, sample.chunks, false);
   const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity,       sample.walls, h,
                        alert,           approach.restitution, Vec3(0, 0, -approach.gravity)};
-  narrow_chunk(in, sample.candidates, sample.chunks, 0, SweepKernels(InstructionSet::portable),
-               sample.contacts);
+  narrow_chunk(in, sample.candidates, sample.chunks, 0, InstructionSet::portable, sample.contacts);
   return sample.contacts.count[0] > 0 ? sample.contacts.bias[0] : std::nan("");
 }
 

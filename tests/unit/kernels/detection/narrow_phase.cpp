@@ -25,9 +25,9 @@ NarrowPhase narrow_phase(const Sample& sample, double alert = 0.05) {
           Vec3(0, 0, -9.81)};
 }
 
-void find(const NarrowPhase& in, const SweepKernels& kernels, Sample& sample) {
+void find(const NarrowPhase& in, InstructionSet set, Sample& sample) {
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-    narrow_chunk(in, sample.candidates, sample.chunks, c, kernels, sample.contacts);
+    narrow_chunk(in, sample.candidates, sample.chunks, c, set, sample.contacts);
 }
 
 /// All that a sweep sees of one chunk: exact bits, NaN and the sign of zero included.
@@ -57,12 +57,12 @@ void expect_same_contacts(const Sample& a, const Sample& b, std::size_t chunk) {
 
 void expect_scalar_contacts(const Sample& sample, const NarrowPhase& in) {
   Sample expected = sample;
-  find(in, SweepKernels(InstructionSet::portable), expected);
+  find(in, InstructionSet::portable, expected);
   for (const InstructionSet set : {InstructionSet::avx2, InstructionSet::avx512}) {
     if (set > best_instruction_set()) continue;
     SCOPED_TRACE(name_of(set));
     Sample found = sample;
-    find(in, SweepKernels(set), found);
+    find(in, set, found);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) expect_same_contacts(found, expected, c);
   }
 }
@@ -77,6 +77,7 @@ Sample fresh_sample(bool friction, int target, std::uint64_t seed) {
 
 // Chunks from one pair to many groups, and every length behind the last full vector.
 TEST(NarrowPhase, FindsTheSameBitsOnEveryInstructionSet) {
+  if (best_instruction_set() == InstructionSet::portable) GTEST_SKIP() << test::no_other_instruction_set;
   for (int target : {1, 5, 7, 16, 37, 100, 384})
     for (const bool friction : {false, true}) {
       SCOPED_TRACE(testing::Message() << "chunks of " << target);
@@ -90,6 +91,7 @@ TEST(NarrowPhase, FindsTheSameBitsOnEveryInstructionSet) {
 }
 
 TEST(NarrowPhase, FindsTheSameBitsOfPairsThatPassCoincideOrAreNoNumbers) {
+  if (best_instruction_set() == InstructionSet::portable) GTEST_SKIP() << test::no_other_instruction_set;
   Sample sample = fresh_sample(true, 50, 5);
   for (std::size_t s = 0; s < sample.bodies.size(); s += 7)
     for (double& u : sample.bodies.velocity[s].u) u *= 2000;
@@ -98,7 +100,7 @@ TEST(NarrowPhase, FindsTheSameBitsOfPairsThatPassCoincideOrAreNoNumbers) {
   sample.bodies.velocity[90].u[2] = std::numeric_limits<double>::infinity();
   const NarrowPhase in = narrow_phase(sample);
   expect_scalar_contacts(sample, in);
-  find(in, SweepKernels(InstructionSet::portable), sample);
+  find(in, InstructionSet::portable, sample);
   EXPECT_GT(std::accumulate(sample.contacts.passed.begin(), sample.contacts.passed.end(), 0), 0);
 }
 
@@ -130,8 +132,8 @@ std::size_t stayed(const Sample& sample, std::size_t chunk, const std::vector<st
 TEST(NarrowPhase, RepairsTheGroupsOfFewContactsThatCameOrWent) {
   for (const bool friction : {false, true}) {
     Sample sample = fresh_sample(friction, 300, 8);
-    const SweepKernels kernels(best_instruction_set());
-    find(narrow_phase(sample), kernels, sample);
+    const InstructionSet best = best_instruction_set();
+    find(narrow_phase(sample), best, sample);
     Sample other = sample;
     Random random(1);
     std::size_t kept = 0, repaired = 0, dealt = 0, groups = 0, fresh_groups = 0;
@@ -144,11 +146,11 @@ TEST(NarrowPhase, RepairsTheGroupsOfFewContactsThatCameOrWent) {
       other.bodies.x = sample.bodies.x;
       other.candidates.impulse = sample.candidates.impulse;
       const Contacts before = sample.contacts;
-      find(narrow_phase(sample), kernels, sample);
-      find(narrow_phase(other), SweepKernels(InstructionSet::portable), other);
+      find(narrow_phase(sample), best, sample);
+      find(narrow_phase(other), InstructionSet::portable, other);
       Sample fresh = sample;
       allocate(fresh.contacts, fresh.candidates, fresh.chunks, friction);
-      find(narrow_phase(fresh), kernels, fresh);
+      find(narrow_phase(fresh), best, fresh);
       for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
         EXPECT_EQ(contacts_of(sample, c), contacts_of(fresh, c));
         expect_same_contacts(sample, other, c);
@@ -180,13 +182,13 @@ TEST(NarrowPhase, RepairsGroupsOfOne) {
   sample.candidates.impulse.assign(3 * sample.candidates.size(), 0.0);
   sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
   test::find_contacts(sample, 0.001);
-  const SweepKernels kernels(best_instruction_set());
+  const InstructionSet best = best_instruction_set();
   for (const std::size_t away : {1u, 70u, 150u}) {
     sample.bodies.x[away] *= 1.1;
-    find(narrow_phase(sample, 0.001), kernels, sample);
+    find(narrow_phase(sample, 0.001), best, sample);
     EXPECT_EQ(test::checked_groups(sample, 0).size(), 149u);
     sample.bodies.x[away] /= 1.1;
-    find(narrow_phase(sample, 0.001), kernels, sample);
+    find(narrow_phase(sample, 0.001), best, sample);
     EXPECT_EQ(test::checked_groups(sample, 0).size(), 150u);
     EXPECT_EQ(contacts_of(sample, 0).size(), 150u);
   }
@@ -197,11 +199,11 @@ TEST(NarrowPhase, FindsContactsInAChunkThatHadNone) {
   Sample sample = fresh_sample(true, 300, 8);
   for (Velocity& v : sample.bodies.velocity) std::fill_n(v.u, 3, 0.0);
   const std::vector<Vec3> near = sample.bodies.x;
-  const SweepKernels kernels(best_instruction_set());
+  const InstructionSet best = best_instruction_set();
   std::vector<std::int32_t> counts;
   for (const double apart : {1.0, 2.0, 1.0}) {
     for (std::size_t s = 0; s < near.size(); ++s) sample.bodies.x[s] = apart * near[s];
-    find(narrow_phase(sample), kernels, sample);
+    find(narrow_phase(sample), best, sample);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) test::checked_groups(sample, c);
     counts.push_back(sample.contacts.count.front());
   }

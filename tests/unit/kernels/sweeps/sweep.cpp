@@ -19,6 +19,9 @@ using test::Sample;
 using test::uniform;
 using test::uniform_vector;
 
+/// What the formulas say: sweep_kernels.cpp holds every instruction set against it, bit by bit.
+const test::ReferenceSweeps reference;
+
 constexpr double eps = 2.3e-16;
 
 Vec3 u_of(const Velocity& v) {
@@ -33,7 +36,7 @@ template <bool Friction>
 void sweep_all(Sample& sample, double mu) {
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     if (sample.chunks.wall[c] < 0)
-      sweep_grains<Friction>(sample.contacts, sample.range(c), sample.bodies.velocity, mu);
+      reference.sweep_grains<Friction>(sample.contacts, sample.range(c), sample.bodies.velocity, mu);
 }
 
 void set_bias(Sample& sample, double bias) {
@@ -85,7 +88,7 @@ TEST(Sweep, SolvesOneContactExactlyInEachRegime) {
   for (int trial = 0; trial < 2000; ++trial) {
     OneContact one(random, true);
     const double mu = uniform(random, 0, 1.5);
-    sweep_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
+    reference.sweep_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
     const Vec3 r = contact_impulse(one.contacts, 0), v = one.relative_velocity();
     const double r_n = r.dot(one.n), v_n = v.dot(one.n) + one.bias;
     const Vec3 r_t = r - r_n * one.n, v_t = v - v.dot(one.n) * one.n;
@@ -117,7 +120,7 @@ TEST(Sweep, SolvesOneFrictionlessContactExactly) {
   for (int trial = 0; trial < 500; ++trial) {
     OneContact one(random, false);
     const Vec3 spin = w_of(one.velocity[0]);
-    sweep_grains<false>(one.contacts, {0, 1}, one.velocity, 0);
+    reference.sweep_grains<false>(one.contacts, {0, 1}, one.velocity, 0);
     const double v_n = one.n.dot(u_of(one.velocity[0]) - u_of(one.velocity[1])) + one.bias;
     const double error = 100 * eps * (1 + one.velocity[0].inv_mass + one.velocity[1].inv_mass);
     EXPECT_GE(v_n, -error);
@@ -136,7 +139,7 @@ TEST(Sweep, AgainstAWallOfFiniteMassSolvesOneContactAndMovesItAlongItsNormal) {
       OneContact one(random, true);
       WallCopy wall{{0.1 * one.n[0], 0.1 * one.n[1], 0.1 * one.n[2]}, wall_inv_mass};
       const Vec3 before(wall.velocity), impulse_before = contact_impulse(one.contacts, 0);
-      sweep_wall<true>(one.contacts, {0, 1}, one.velocity, 0.4, wall);
+      reference.sweep_wall<true>(one.contacts, {0, 1}, one.velocity, 0.4, wall);
       const Vec3 after(wall.velocity), r = contact_impulse(one.contacts, 0);
       const double v_n = one.n.dot(u_of(one.velocity[0]) - after) + one.bias;
       const double error = 100 * eps * (1 + one.velocity[0].inv_mass + wall_inv_mass);
@@ -156,12 +159,12 @@ TEST(Sweep, OverRelaxedGoesBeyondTheSolutionOfAContactAndSettlesThereWithTheNext
     OneContact over = plain;
     SweepSteps steps{{0}, {0}, {0}, {}};
     const double before = contact_impulse(over.contacts, 0).dot(over.n);
-    sweep_grains<true>(plain.contacts, {0, 1}, plain.velocity, 0.4);
-    sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4, SweepMomentum{0, 1.2, steps});
+    reference.sweep_grains<true>(plain.contacts, {0, 1}, plain.velocity, 0.4);
+    reference.sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4, SweepMomentum{0, 1.2, steps});
     const double exact = contact_impulse(plain.contacts, 0).dot(plain.n),
                  beyond = contact_impulse(over.contacts, 0).dot(over.n);
     EXPECT_NEAR(beyond - before, 1.2 * (exact - before), 1e-12 * (std::abs(exact) + std::abs(before)));
-    sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4);
+    reference.sweep_grains<true>(over.contacts, {0, 1}, over.velocity, 0.4);
     EXPECT_NEAR(contact_impulse(over.contacts, 0).dot(over.n), exact, 1e-12 * (std::abs(exact) + before));
   }
 }
@@ -267,8 +270,8 @@ TEST(Accumulate, GivesTheSweptVelocityAfreshFromTheImpulses) {
     std::vector<Velocity> afresh = sample.bodies.velocity;
     for (int k = 0; k < 50; ++k) friction ? sweep_all<true>(sample, 0.5) : sweep_all<false>(sample, 0);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-      friction ? accumulate_grains<true>(sample.contacts, sample.range(c), afresh)
-               : accumulate_grains<false>(sample.contacts, sample.range(c), afresh);
+      friction ? reference.accumulate_grains<true>(sample.contacts, sample.range(c), afresh)
+               : reference.accumulate_grains<false>(sample.contacts, sample.range(c), afresh);
     double impulse_speed = 0;  // the largest that one impulse gives to a grain
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
       for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k)
@@ -309,8 +312,8 @@ TEST(NaturalMap, MatchesASearchForTheNearestPointOfTheCone) {
     const OneContact one(random, friction);
     const double mu = friction ? uniform(random, 0, 1.5) : 0;
     const double w_nn = one.velocity[0].inv_mass + one.velocity[1].inv_mass;
-    const ErrorSums sums = friction ? error_grains<true>(one.contacts, {0, 1}, one.velocity, mu)
-                                    : error_grains<false>(one.contacts, {0, 1}, one.velocity, mu);
+    const ErrorSums sums = friction ? reference.error_grains<true>(one.contacts, {0, 1}, one.velocity, mu)
+                                    : reference.error_grains<false>(one.contacts, {0, 1}, one.velocity, mu);
     // Without friction the tangential part of v is no error; the normal line is the cone.
     Vec3 v = one.relative_velocity();
     if (!friction) v = one.n.dot(u_of(one.velocity[0]) - u_of(one.velocity[1])) * one.n;
@@ -327,8 +330,8 @@ TEST(NaturalMap, IsZeroAtTheExactSolution) {
   for (int trial = 0; trial < 500; ++trial) {
     OneContact one(random, true);
     const double mu = uniform(random, 0, 1.5);
-    sweep_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
-    const ErrorSums sums = error_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
+    reference.sweep_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
+    const ErrorSums sums = reference.error_grains<true>(one.contacts, {0, 1}, one.velocity, mu);
     EXPECT_LE(std::sqrt(sums.residual_max2),
               200 * eps * (1 + one.velocity[0].inv_mass + one.velocity[1].inv_mass));
   }
@@ -342,7 +345,7 @@ TEST(NaturalMap, IsZeroForAnOpenContactWithoutFrictionOrTangentialVelocity) {
   one.contacts.nz = {1};
   one.velocity[0] = {{0, 0, 3}, 1, {0, 0, 0}, 2.5};
   one.contacts.bias = {0};
-  EXPECT_EQ(error_wall<true>(one.contacts, {0, 1}, one.velocity, 0, {}, 0).residual_max2, 0);
+  EXPECT_EQ(reference.error_wall<true>(one.contacts, {0, 1}, one.velocity, 0, {}, 0).residual_max2, 0);
 }
 
 TEST(NaturalMap, FallsByOrdersOfMagnitudeAsAPackingIsSwept) {
@@ -350,7 +353,7 @@ TEST(NaturalMap, FallsByOrdersOfMagnitudeAsAPackingIsSwept) {
   const auto rms = [&] {
     ErrorSums sums;
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-      sums.add(error_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, 0.3));
+      sums.add(reference.error_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, 0.3));
     return std::sqrt(sums.residual2 / static_cast<double>(sums.contacts));
   };
   const double before = rms();
@@ -418,7 +421,8 @@ TEST(Gluing, OfASplitWallConvergesToTheUnsplitVelocity) {
     }
     for (int sweep = 0; sweep < 1000; ++sweep) {
       for (std::size_t c = 0; c < copies; ++c)
-        sweep_wall<true>(own, {grains * c / copies, grains * (c + 1) / copies}, velocity, 0.3, wall[c]);
+        reference.sweep_wall<true>(own, {grains * c / copies, grains * (c + 1) / copies}, velocity, 0.3,
+                                   wall[c]);
       glue_copies(wall, which);
     }
     EXPECT_NEAR(wall[0].velocity[2], expected, 1e-10) << copies << " copies";

@@ -105,12 +105,11 @@ void expect_same(const Outcome& a, const Outcome& b) {
 }
 
 template <bool Friction>
-void expect_scalar_bits(const Sample& sample, const Plan& plan) {
+void expect_reference_bits(const Sample& sample, const Plan& plan) {
   for (const InstructionSet set : test::sets_to_test()) {
     SCOPED_TRACE(name_of(set));
     expect_same(run<Friction>(SweepKernels(set), sample, plan),
-                test::with_scalar_kernels(
-                    set, [&](const auto& scalar) { return run<Friction>(scalar, sample, plan); }));
+                run<Friction>(test::ReferenceSweeps{}, sample, plan));
   }
 }
 
@@ -121,16 +120,16 @@ void start_from_random_impulses(Sample& sample, std::uint64_t seed) {
 }
 
 // Chunks from one contact to many groups; contacts that open, stick and slide; walls fixed and light.
-TEST(SweepKernels, GiveTheBitsOfTheScalarKernelOnEveryInstructionSet) {
+TEST(SweepKernels, GiveTheBitsOfThePlainReferenceOnEveryInstructionSet) {
   for (int target : {1, 5, 16, 37, 100, 384})
     for (double wall_inv_mass : {0.0, 1e-3}) {
       SCOPED_TRACE(testing::Message() << "chunks of " << target << ", 1/M of walls " << wall_inv_mass);
       Sample sample = test::dense_sample(6, 11, true, true, target);
       start_from_random_impulses(sample, 3);
-      expect_scalar_bits<true>(sample, {0.3, wall_inv_mass});
+      expect_reference_bits<true>(sample, {0.3, wall_inv_mass});
       Sample smooth = test::dense_sample(6, 12, false, true, target);
       start_from_random_impulses(smooth, 4);
-      expect_scalar_bits<false>(smooth, {0, wall_inv_mass});
+      expect_reference_bits<false>(smooth, {0, wall_inv_mass});
     }
 }
 
@@ -155,7 +154,7 @@ TEST(SweepKernels, SeeOpenStickingAndSlidingContactsInTheTestAbove) {
   EXPECT_GT(std::min({open, stick, slide}), 50) << open << " " << stick << " " << slide;
 }
 
-TEST(SweepKernels, GiveTheScalarBitsWithoutFrictionAtRubbingGrainsAndForGrainsThatNothingMoves) {
+TEST(SweepKernels, GiveTheReferenceBitsWithoutFrictionAtRubbingGrainsAndForGrainsThatNothingMoves) {
   Sample sample = test::dense_sample(5, 13, true, true, 64);
   Random random(2);
   for (Velocity& v : sample.bodies.velocity) {
@@ -170,18 +169,18 @@ TEST(SweepKernels, GiveTheScalarBitsWithoutFrictionAtRubbingGrainsAndForGrainsTh
       const bool fixed = second < 0 || sample.bodies.velocity[static_cast<std::size_t>(second)].inv_mass == 0;
       if (fixed && a.inv_mass == 0) a.inv_mass = 0.01;
     }
-  expect_scalar_bits<true>(sample, {0, 0});
-  expect_scalar_bits<true>(sample, {0.5, 0});
+  expect_reference_bits<true>(sample, {0, 0});
+  expect_reference_bits<true>(sample, {0.5, 0});
 }
 
-TEST(SweepKernels, GiveTheScalarErrorOfCopiesThatCarryAPartOfTheMass) {
+TEST(SweepKernels, GiveTheReferenceErrorOfCopiesThatCarryAPartOfTheMass) {
   for (const bool friction : {false, true}) {
     Sample sample = test::dense_sample(5, 14, friction, true, 64);
     start_from_random_impulses(sample, 6);
     Plan plan{0.3, 0.01};
     for (std::size_t s = 0; s < sample.bodies.size(); ++s)
       plan.multiplicity.push_back(static_cast<std::uint16_t>(1 + s % 4));
-    friction ? expect_scalar_bits<true>(sample, plan) : expect_scalar_bits<false>(sample, plan);
+    friction ? expect_reference_bits<true>(sample, plan) : expect_reference_bits<false>(sample, plan);
   }
 }
 
@@ -213,24 +212,6 @@ TEST(SweepKernels, KeepAnImpulseThatIsNoNumber) {
       for (std::size_t k = sample.range(0).begin; k < sample.range(0).end; ++k)
         ASSERT_TRUE(std::isnan(friction ? out.contacts.rx[k] : out.contacts.rn[k])) << k;
     }
-}
-
-// What the two roundings share is the formula.
-TEST(SweepKernels, FusedAndSeparateRoundingDifferByRounding) {
-  Sample sample = test::dense_sample(6, 11, true, true, 100);
-  start_from_random_impulses(sample, 3);
-  const Plan once{.mu = 0.3, .wall_inv_mass = 1e-3, .sweeps = 1};
-  const Outcome fused = run<true>(scalar::Sweeps<scalar::Fused>{}, sample, once),
-                separate = run<true>(scalar::Sweeps<scalar::Separate>{}, sample, once);
-  double largest = 0, difference = 0;
-  for (std::size_t k = 0; k < fused.contacts.rx.size(); ++k) {
-    largest = std::max(largest, std::abs(fused.contacts.rx[k]));
-    difference = std::max(difference, std::abs(fused.contacts.rx[k] - separate.contacts.rx[k]));
-  }
-  EXPECT_GT(difference, 0);
-  EXPECT_LT(difference, 1e-12 * largest);
-  for (std::size_t c = 0; c < fused.errors.size(); ++c)
-    EXPECT_NEAR(fused.errors[c].residual2, separate.errors[c].residual2, 1e-10 * fused.errors[c].impulse2);
 }
 
 TEST(InstructionSets, AreNamedAndRefusedWhereTheProcessorLacksThem) {

@@ -15,13 +15,13 @@
 namespace talus {
 namespace {
 
-constexpr std::array couplings{Coupling::nscdd, Coupling::alternating, Coupling::schwarz};
+constexpr std::array all_couplings{Coupling::nscdd, Coupling::alternating, Coupling::schwarz};
 constexpr std::array exchanges{ExchangeScheme::dcs, ExchangeScheme::ccs};
 constexpr std::array partitioners{PartitionKind::boxes, PartitionKind::fitted, PartitionKind::rcb,
                                   PartitionKind::metis};
 
 std::string label(const DecompositionSettings& settings) {
-  return std::string(name_of(settings.coupling)) +
+  return std::string(couplings().of(settings.coupling).name) +
          (settings.exchange == ExchangeScheme::dcs ? " dcs " : " ccs ") +
          std::string(name_of(settings.partitioner)) + " " + std::to_string(settings.subdomains);
 }
@@ -88,7 +88,7 @@ TEST_P(EveryCoupling, GivesTheAggregatesOfTheSequentialSolver) {
     ASSERT_TRUE(whole.converged);
     EXPECT_GT(whole.contacts_per_grain, 5);
     setup.decomposition.subdomains = GetParam();
-    for (const Coupling coupling : couplings)
+    for (const Coupling coupling : all_couplings)
       for (const ExchangeScheme exchange : exchanges)
         for (const PartitionKind partitioner : partitioners) {
           setup.decomposition.coupling = coupling;
@@ -207,7 +207,7 @@ TEST(Coupling, SendsWhatTheClosedFormulasSay) {
   for (const double friction : {0.0, 0.2})
     for (const bool pressed : {true, false})
       for (const int subdomains : {2, 8, 27, 96})
-        for (const Coupling coupling : couplings)
+        for (const Coupling coupling : all_couplings)
           for (const ExchangeScheme exchange : exchanges) {
             talus::Setup setup = pressed_lattice(6, friction, 1);
             if (!pressed) setup.stages[0].loads.clear();
@@ -254,7 +254,7 @@ TEST(Coupling, BeginsWithTheMotionThatTheSampleHas) {
 
 TEST(Coupling, KeepsTheMomentumOfTwoSpheresThatMeetAtABorder) {
   // One on each side of the cut and a third that leans on the second, so that the second stands in both.
-  for (const Coupling coupling : couplings)
+  for (const Coupling coupling : all_couplings)
     for (const ExchangeScheme exchange : exchanges)
       for (const bool damping : {true, false}) {
         talus::Setup setup;
@@ -322,7 +322,7 @@ TEST(Coupling, HoldsGrainsThatTouchNothingButWalls) {
   Bodies bodies;
   for (int k = 0; k < 25; ++k)
     add_sphere(bodies, BodyId{k}, Vec3(0.1 * (k % 5), 0.1 * (k / 5), 0.01), 0.01, 2600);
-  for (const Coupling coupling : couplings)
+  for (const Coupling coupling : all_couplings)
     for (const ExchangeScheme exchange : exchanges)
       for (const int subdomains : {1, 7, 40}) {
         setup.decomposition.subdomains = subdomains;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {

@@ -1,12 +1,14 @@
-/// The loops of all ranks, played to their end on made-up subdomains: nobody waits for ever.
+/// The loops of all ranks, as the program plans them, played to their end on made-up subdomains: nobody waits
+/// for ever.
 
-#include "runtime/graph/loop_colours.hpp"
+#include "runtime/graph/loop_plan.hpp"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -30,10 +32,9 @@ struct Machine {
   bool overlap = true;
 };
 
-/// What waits or is waited for. Chunks do neither.
+/// A node of the plan that waits or is waited for. Work does neither.
 struct Node {
-  enum Role { publish, collect, root, glue, take, tell } role;
-  std::uint32_t colour;
+  LoopRole role;
   std::size_t subdomain;  ///< of collect and root none
 };
 
@@ -81,45 +82,49 @@ class Play {
   }
 
  private:
+  LoopSpec spec_of(std::size_t rank, const std::vector<std::size_t>& mine) const {
+    LoopSpec spec;
+    using enum LoopWork::Side;
+    for (std::uint32_t k = 0; k < mine.size(); ++k) {
+      const char colour = machine_.subdomain_colour[mine[k]];
+      LoopGroup group{.colour = colour, .tells = true, .readers = {}};
+      for (const std::size_t other : machine_.neighbours[mine[k]])
+        if (const auto at = std::ranges::find(mine, other); at != mine.end())
+          group.readers.push_back(static_cast<std::uint32_t>(at - mine.begin()));
+      spec.groups.push_back(group);
+      std::uint32_t next = 0;
+      const auto add = [&](LoopWork::Side side, int count) {
+        for (int i = 0; i < count; ++i, ++next) spec.work.push_back({side, k, next, 1, next});
+      };
+      add(early, 2);
+      if (colour == 0) add(border, machine_.border[mine[k]]);
+      add(inside, machine_.inside[mine[k]]);
+      if (colour > 0) add(late, machine_.border[mine[k]]);
+    }
+    spec.offset.assign(spec.work.size() + 1, 0);
+    spec.in_colours = std::ranges::any_of(machine_.subdomain_colour, [](char colour) { return colour > 0; });
+    spec.overlap = machine_.overlap;
+    spec.collects = tree_.relays(static_cast<int>(rank));
+    spec.threads = machine_.threads;
+    spec.rank = static_cast<int>(rank);
+    return spec;
+  }
+
   void add_walks(std::size_t rank) {
     std::vector<std::size_t> mine;
     for (std::size_t e = 0; e < machine_.subdomain_colour.size(); ++e)
       if (machine_.rank_of[e] == rank) mine.push_back(e);
-    std::vector<ChunkOrder> chunks;
-    std::vector<char> subdomain_colour_of;
-    using enum ChunkOrder::Side;
-    for (std::uint32_t k = 0; k < mine.size(); ++k) {
-      const char subdomain_colour = machine_.subdomain_colour[mine[k]];
-      subdomain_colour_of.push_back(subdomain_colour);
-      std::uint32_t colour = 0;
-      const auto add = [&](ChunkOrder::Side side, int count) {
-        for (int i = 0; i < count; ++i) chunks.push_back({side, k, colour++});
-      };
-      add(early, 2);
-      if (subdomain_colour == 0) add(border, machine_.border[mine[k]]);
-      add(inside, machine_.inside[mine[k]]);
-      if (subdomain_colour > 0) add(late, machine_.border[mine[k]]);
+    const LoopPlan plan = plan_loop(spec_of(rank, mine), tree_);
+    std::vector<std::uint32_t> order(plan.nodes.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, {}, [&](std::uint32_t n) { return plan.colour[n]; });
+    std::vector<Walk> walks(static_cast<std::size_t>(machine_.threads), Walk{rank, {}});
+    for (const std::uint32_t n : order) {
+      const auto [role, group] = plan.nodes[n];
+      if (role == LoopRole::work) continue;
+      walks[plan.owner[n]].nodes.push_back({role, group == LoopPlan::none ? 0 : mine[group]});
     }
-    const bool in_colours = std::ranges::any_of(machine_.subdomain_colour,
-                                                [](char subdomain_colour) { return subdomain_colour > 0; });
-    const LoopColours colours =
-        loop_colours(chunks, subdomain_colour_of, std::vector<char>(mine.size(), 1), in_colours,
-                     machine_.overlap, machine_.threads, static_cast<int>(rank), tree_);
-    const auto threads = static_cast<std::size_t>(machine_.threads);
-    std::vector<Walk> walks(threads, Walk{rank, {}});
-    for (std::size_t k = 0; k < mine.size(); ++k) {
-      std::vector<Node>& own = walks[k * threads / mine.size()].nodes;
-      own.push_back({Node::publish, colours.publish[k], mine[k]});
-      own.push_back({Node::glue, colours.glue, mine[k]});
-      own.push_back({Node::tell, colours.tell[k], mine[k]});
-      if (subdomain_colour_of[k] > 0) own.push_back({Node::take, colours.take[k], mine[k]});
-    }
-    if (tree_.relays(static_cast<int>(rank))) walks[0].nodes.push_back({Node::collect, colours.tree.up, 0});
-    walks[0].nodes.push_back({Node::root, colours.tree.down, 0});
-    for (Walk& walk : walks) {
-      std::ranges::stable_sort(walk.nodes, {}, [](const Node& n) { return std::pair(n.colour, n.role); });
-      walks_.push_back(std::move(walk));
-    }
+    for (Walk& walk : walks) walks_.push_back(std::move(walk));
   }
 
   bool may_run(const Walk& walk, const Node& node) const {
@@ -129,32 +134,33 @@ class Play {
     };
     const bool top = static_cast<int>(walk.rank) == tree_.top();
     switch (node.role) {
-      case Node::take:
+      case LoopRole::take:
         return all_of([&](std::size_t e) {
           return machine_.subdomain_colour[e] < machine_.subdomain_colour[node.subdomain];
         });
-      case Node::glue:
+      case LoopRole::glue:
         return down_[walk.rank] != 0 && all_of([](std::size_t) { return true; });
-      case Node::root:
+      case LoopRole::root:
         if (!top)
           return tells_left_[walk.rank] == 0 && down_[static_cast<std::size_t>(tree_.parent[walk.rank])] != 0;
         [[fallthrough]];
-      case Node::collect:
+      case LoopRole::collect:
         return tells_left_[walk.rank] == 0 && std::ranges::all_of(tree_.children[walk.rank], [&](int child) {
                  return up_[static_cast<std::size_t>(child)] != 0;
                });
-      case Node::publish:
-      case Node::tell:
+      case LoopRole::work:
+      case LoopRole::publish:
+      case LoopRole::tell:
         break;
     }
     return true;
   }
 
   void run(std::size_t rank, const Node& node) {
-    if (node.role == Node::publish) published_[node.subdomain] = 1;
-    if (node.role == Node::collect) up_[rank] = 1;
-    if (node.role == Node::root) down_[rank] = 1;
-    if (node.role == Node::tell && --tells_left_[rank] == 0 && tree_.leaf(static_cast<int>(rank)))
+    if (node.role == LoopRole::publish) published_[node.subdomain] = 1;
+    if (node.role == LoopRole::collect) up_[rank] = 1;
+    if (node.role == LoopRole::root) down_[rank] = 1;
+    if (node.role == LoopRole::tell && --tells_left_[rank] == 0 && tree_.leaf(static_cast<int>(rank)))
       up_[rank] = 1;
   }
 

@@ -11,6 +11,7 @@
 #include <span>
 #include <utility>
 
+#include "runtime/graph/one_rank.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "tests/unit/dense_sample.hpp"
 
@@ -212,7 +213,7 @@ std::pair<int, int> looks_and_renewals(double heavy) {
     for (const trace::Record& record : block.records) looks += record.kind() == kind_of(TaskKind::whole);
   }});
   graph::Executor executor({.trace = &recorder});
-  const graph::Communicator ranks;
+  const graph::OneRank ranks;
   ranks.record_to(&recorder);
   Bodies bodies;
   for (int k = 0; k < height * edge * edge; ++k) {

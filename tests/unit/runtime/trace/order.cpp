@@ -39,7 +39,7 @@ class Orders : public testing::Test {
     for (int epoch = 0; epoch < 2; ++epoch) {
       for (std::uint32_t n = 0; n < 8; ++n)
         trace.tracks[n / 4].records.push_back(
-            {20 * epoch + 2 * (n % 4) + n / 4, 1, n, epoch, pack(1, test::sweep)});
+            {20 * epoch + static_cast<int>(2 * (n % 4) + n / 4), 1, n, epoch, pack(1, test::sweep)});
       if (epoch == 1 || two_gates)
         trace.tracks[0].records.push_back({20 * epoch + 10, 1, 0, epoch, pack(1, kind_check)});
     }

@@ -1,0 +1,57 @@
+#pragma once
+
+/// When a pair is a contact of a step, and with which bias, on one pair or on several at once: V is a double
+/// or a vector of doubles (kernels/simd/lanes.hpp). Everything here has internal linkage, as there.
+
+#include "kernels/simd/lanes.hpp"
+
+namespace talus {
+
+/// Numbers of the rule, the same for all pairs of a step.
+struct GapRule {
+  double time_step;           ///< h [s]
+  double alert;               ///< [m]
+  double restitution;         ///< e in [0, 1]
+  double overlap_correction;  ///< in [0, 1]
+  double slow;                ///< [m/s] no restitution up to here
+};
+
+namespace {
+
+/// What a comparison of V gives: a bool, or a mask of all bits of a lane.
+template <class V>
+using BitsOf = decltype(V{} < V{});
+
+/// Whether a pair stays apart in this step: no nearer than the alert distance, and not closed at the speed
+/// `v_n` [m/s] that it has at the end of the step without contacts.
+template <class V>
+[[gnu::always_inline]] inline BitsOf<V> stays_apart(V gap, V v_n, double time_step, double alert) {
+  return (gap >= alert) & (gap >= -time_step * v_n);
+}
+
+template <class V>
+struct GapResult {
+  V bias;            ///< b [m/s]: Signorini's condition holds for v_n + b
+  BitsOf<V> absent;  ///< where the pair constrains nothing in this step
+};
+
+/// Inelastic quasi-Signorini, b = max(g, 0)/h; an overlap is undone at the rate `overlap_correction`. With
+/// restitution, a pair faster than `slow` follows Moreau's impact law instead: b = e v_n once g <= 0, and no
+/// constraint before. `v_n` [m/s] is the normal velocity at the beginning of the step, `v_n_free` the one at
+/// its end without contacts.
+template <class V>
+[[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free) {
+  BitsOf<V> absent = stays_apart(gap, v_n_free, rule.time_step, rule.alert);
+  V bias = (gap > 0 ? gap : rule.overlap_correction * gap) / rule.time_step;
+  // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
+  // between both would gain energy.
+  if (rule.restitution > 0) {
+    const BitsOf<V> quick = absolute(v_n) > rule.slow;
+    absent |= quick & (gap > 0);
+    bias = quick ? rule.restitution * v_n : bias;
+  }
+  return {bias, absent};
+}
+
+}  // namespace
+}  // namespace talus

@@ -1,0 +1,55 @@
+#include "kernels/shapes/walls.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace talus {
+
+namespace {
+/// Distance to the opposite wall, or -1 when there is none.
+double opposite_distance(const std::vector<Wall>& walls, std::size_t index) {
+  const Wall& wall = walls[index];
+  for (std::size_t k = 0; k < walls.size(); ++k)
+    if (k != index && (walls[k].normal + wall.normal).norm() < 1e-12)
+      return (walls[k].point - wall.point).dot(wall.normal);
+  return -1;
+}
+}  // namespace
+
+double face_area(const std::vector<Wall>& walls, std::size_t index) {
+  const Wall& wall = walls[index];
+  if (wall.area > 0) return wall.area;
+  double area = 1;
+  int pairs = 0;
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    if (walls[k].surface() != nullptr || std::abs(walls[k].normal.dot(wall.normal)) > 1e-12) continue;
+    bool counted = false;  // the opposite wall came first
+    for (std::size_t earlier = 0; earlier < k; ++earlier)
+      counted |= (walls[earlier].normal + walls[k].normal).norm() < 1e-12;
+    const double distance = opposite_distance(walls, k);
+    if (counted || distance < 0) continue;
+    area *= distance;
+    ++pairs;
+  }
+  if (pairs != 2)
+    throw std::invalid_argument(
+        "wall '" + wall.name +
+        "': no two pairs of opposite walls at right angles to it bound its face; give its area [m^2]");
+  return area;
+}
+
+Vec3 box_lengths(const std::vector<Wall>& walls) {
+  Vec3 lengths = Vec3::Zero();
+  for (std::size_t k = 0; k < walls.size(); ++k)
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      if (walls[k].normal[axis] > 1 - 1e-12) lengths[axis] = std::max(0.0, opposite_distance(walls, k));
+  return lengths;
+}
+
+double box_volume(const std::vector<Wall>& walls) {
+  const bool planes = std::ranges::all_of(walls, [](const Wall& wall) { return wall.surface() == nullptr; });
+  return planes ? box_lengths(walls).prod() : 0;
+}
+
+}  // namespace talus

@@ -1,0 +1,10 @@
+/// Compiled for every processor. Where it has no fused product, `fused` calls the one of the C library.
+
+#include "kernels/sweeps/detail/error_lanes.hpp"
+
+namespace talus {
+
+constinit const LaneKernels lane_kernels_portable[2] = {kernels_of_lanes<false, 4>,
+                                                        kernels_of_lanes<true, 4>};
+
+}  // namespace talus

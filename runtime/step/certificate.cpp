@@ -1,0 +1,145 @@
+#include "runtime/step/certificate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "kernels/bodies/larger.hpp"
+#include "kernels/global/balance.hpp"
+
+namespace talus {
+
+void Certificate::begin(Scales scales) {
+  scales_ = std::move(scales);
+  result_ = {};
+  history_.clear();
+  wall_impulses_.clear();
+  velocity_check_ = {};
+}
+
+/// The error and the drift of the wall forces, and where they stand in the history.
+void Certificate::measure(const CheckSums& sums) {
+  const ErrorSums& error = sums.error;
+  const auto count = static_cast<double>(error.contacts);
+  // Forces that fade away leave velocities that rounding makes.
+  const double rounding = scales_.rounding_velocity;
+  residual2_ = error.residual2;
+  scale2_ = larger(larger(error.impulse2, error.velocity2), count * rounding * rounding);
+  result_.error_rms = scale2_ != 0 ? std::sqrt(error.residual2 / scale2_) : 0;
+  result_.error_max = scale2_ != 0 ? std::sqrt(error.residual_max2 * count / scale2_) : 0;
+  result_.jump = sums.jump.velocity2 > 0 ? std::sqrt(sums.jump.jump2 / sums.jump.velocity2) : 0;
+  result_.contacts = error.contacts;
+  result_.active = error.active;
+}
+
+Verdict Certificate::judge(const CheckSums& sums, const Check& check, WholeProblem& whole) {
+  result_.iterations = check.iterations;
+  measure(sums);
+  history_.add({check.iterations, result_.error_rms, check.seconds});
+  wall_impulses_.push_back(sums.wall_impulse);
+  result_.drift = drift();
+
+  // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
+  const bool judged = check.iterations > 0 || residual2_ == 0;
+  const bool small = judged && result_.error_rms <= settings_.tolerance;
+  const bool last = check.iterations >= settings_.max_iterations;
+  result_.unbalance = result_.drift;
+  // Only a step that may end pays for an answer about the whole problem.
+  const bool balance = (small || last) && balanced(whole);
+  result_.converged = small && balance;
+
+  if (history_.first_since_start()) first_residual2_ = std::max(residual2_, scale2_);
+  const double most = thresholds_.divergence * thresholds_.divergence * first_residual2_;
+  result_.diverged = check.plain && residual2_ > most;
+  if (result_.diverged) return Verdict::diverged;
+  const bool stagnant = !result_.converged &&
+                        history_.stagnant(settings_.tolerance, thresholds_.patience, thresholds_.stagnation);
+  result_.stagnated = stagnant && !check.other_ways;
+  if (result_.converged) return Verdict::solved;
+  // A NaN fails every comparison above.
+  if (std::isnan(result_.error_rms)) return Verdict::not_finite;
+  if (last) return Verdict::exhausted;
+  if (result_.stagnated) return Verdict::stagnated;
+  return stagnant ? Verdict::stuck : Verdict::go_on;
+}
+
+/// The largest impulse of a wall, got or pushed with [N s].
+double Certificate::wall_scale() const {
+  double scale = 0;
+  for (std::size_t w = 0; w < wall_impulses().size(); ++w)
+    scale = std::max({scale, wall_impulses()[w].norm(), scales_.wall_pushes[w]});
+  return scale;
+}
+
+/// Of the wall impulses between two checks, relative. The largest distance on the way: what swings may just
+/// pass where it came from.
+double Certificate::largest_change(std::size_t from, std::size_t to) const {
+  double largest = 0;
+  for (std::size_t k = from; k < to; ++k)
+    for (std::size_t w = 0; w < wall_impulses().size(); ++w)
+      largest = std::max(largest, (wall_impulses_[to][w] - wall_impulses_[k][w]).norm());
+  return largest / wall_scale();
+}
+
+double Certificate::drift() const {
+  if (wall_scale() == 0) return 0;
+  const std::size_t last = history_.size() - 1;
+  // Since ADMM: all that sweeps changed of what it had settled.
+  if (result_.stiff_calls > 0) return largest_change(history_.start(), last);
+  const std::size_t half = history_.last_in(2), quarter = history_.last_in(4);
+  if (half == quarter) return thresholds_.first_drift * largest_change(half, last);
+  // The checks do not stand at halves and quarters.
+  const double second_quarter = 0.25 * history_[last].iterations;
+  const int between = history_[half].iterations - history_[quarter].iterations;
+  return left_over(largest_change(half, last), largest_change(quarter, half) * second_quarter / between);
+}
+
+bool Certificate::checks_velocities(WholeProblem& whole) const {
+  if (result_.stiff_calls > 0) return true;
+  if (result_.contacts <= thresholds_.tiny) return result_.contacts > 0;
+  return whole.sweeps_needed() >= thresholds_.velocity_check_cost &&
+         whole.plain_sweeps_needed() >= stiff_for(result_.contacts);
+}
+
+bool Certificate::balanced(WholeProblem& whole) {
+  const double tolerance = settings_.balance_tolerance;
+  const int done = result_.iterations;
+  result_.unbalance = result_.drift;
+  if (!checks_velocities(whole)) {
+    if (result_.drift > 0 && result_.drift <= tolerance)
+      result_.unbalance = unbalance(result_.drift, done, whole.sweeps_needed());
+    return result_.unbalance <= tolerance;
+  }
+  const bool last = done >= settings_.max_iterations;
+  if (!last && result_.stiff_calls > 0 && done - started_at() < thresholds_.settling) {
+    result_.unbalance = std::numeric_limits<double>::infinity();
+    return false;
+  }
+  // From a residual of 0 nothing is inferred.
+  VelocityCheck& then = velocity_check_;
+  const double guess = then.error_rms > 0 ? then.error * result_.error_rms / then.error_rms : then.error;
+  const bool due = last || !(guess > tolerance) || done > thresholds_.velocity_check_growth * then.at;
+  if (then.at < 0 || (then.at != done && due))
+    then = {done, result_.error_rms, whole.velocity_error(thresholds_.velocity_resolution * tolerance)};
+  result_.unbalance = then.at == done ? then.error : guess;
+  return result_.unbalance <= tolerance;
+}
+
+void Certificate::solved_by_admm(const BodyAdmmResult& result) {
+  result_.stiff = result;
+  ++result_.stiff_calls;
+  history_.start_anew();
+  velocity_check_ = {};
+}
+
+void Certificate::forgive() {
+  first_residual2_ = std::max(first_residual2_, residual2_);
+}
+
+bool certified(const IterationResult& result, double momentum_defect, std::int64_t passed,
+               const SolverSettings& settings) {
+  return result.converged && momentum_defect <= settings.balance_tolerance && passed == 0;
+}
+
+}  // namespace talus

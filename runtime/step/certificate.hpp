@@ -1,0 +1,169 @@
+#pragma once
+
+/// The one place that says whether a step is solved. Two things are asked of it: that each contact satisfies
+/// the law, by the norm of the natural map's residuals (docs/decisions/0003-certificate.md), and that the
+/// forces carry what they must, which no contact can see alone (0012-stiff.md, 0014-velocity-error.md).
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/global/admm.hpp"
+#include "runtime/step/check_sums.hpp"
+#include "runtime/step/error_history.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus {
+
+/// How the iterations of a step ended.
+struct IterationResult {
+  int iterations = 0;  ///< sweeps
+  double error_rms = 0, error_max = 0;
+  double jump = 0;  ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
+  double drift =
+      0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
+  double unbalance = 0;  ///< estimate of the relative error of the forces: Certificate::balanced
+  BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
+  int stiff_calls = 0;
+  std::int64_t contacts = 0, active = 0;
+  bool converged = false;
+  bool diverged = false;   ///< the error grows without bound
+  bool stagnated = false;  ///< more sweeps would not have made the error smaller
+};
+
+/// Every number that a verdict depends on, besides the tolerances that the user sets (SolverSettings).
+/// Counts are of sweeps; ratios have no unit.
+struct CertificateThresholds {
+  /// Plain sweeps diverge when they make the residual of the step's first check so many times larger, > 1. A
+  /// plain sweep never does that; an exchange that adds up too much does.
+  double divergence = 1e3;
+  /// Stagnation is not spoken of before so many sweeps, >= 4.
+  int patience = 1000;
+  /// The best error of the second half of the sweeps, over that of the quarter before it, above which they
+  /// stagnate, in (0, 1]. Plain sweeps, the slowest, take a third off in as many.
+  double stagnation = 0.95;
+  /// At the first check nothing tells how the change of the wall forces goes on: it counts so many times, >=
+  /// 1. Where a few sweeps follow warm impulses in a pile, up to six times as much is still to come (`talus
+  /// study stability`, time-step-pile).
+  double first_drift = 4;
+  /// Velocities are checked in problems of at most so many contacts, >= 0, whatever they need.
+  std::int64_t tiny = 64;
+  /// In larger ones, where at least so many sweeps are needed, > 0: about what a velocity check costs.
+  double velocity_check_cost = 100;
+  /// And at least so many plain sweeps per contact, >= 0: that is stiff for a problem of its size.
+  double stiff_per_contact = 0.1;
+  /// Behind ADMM sweeps still mend much: no velocity check before so many, >= 0.
+  int settling = 50;
+  /// A velocity check tells nothing apart below this part of the tolerance on the balance, in (0, 1).
+  double velocity_resolution = 0.2;
+  /// It is repeated when the sweeps done have grown by this factor, > 1, if the residual has not fallen far
+  /// enough before to promise a balance within the tolerance.
+  double velocity_check_growth = 1.25;
+};
+
+/// Answers about the problem as a whole. Each costs about as much as ten to a hundred sweeps, and is asked
+/// for where a verdict depends on it only. Collective: all ranks ask in the same order.
+class WholeProblem {
+ public:
+  virtual ~WholeProblem() = default;
+  /// About the number of plain sweeps that the step's problem takes.
+  virtual double plain_sweeps_needed() = 0;
+  /// How many plain sweeps one of the present sweeps is worth.
+  virtual double speed() const = 0;
+  /// Relative error of the velocities that the impulses of the last check give (kernels/global/balance.hpp);
+  /// what is below `enough` is not told apart.
+  virtual double velocity_error(double enough) = 0;
+
+  double sweeps_needed() { return plain_sweeps_needed() / speed(); }
+};
+
+enum class Verdict {
+  go_on,
+  solved,      ///< converged
+  diverged,    ///< the error grows without bound
+  not_finite,  ///< sweeping on cannot mend a NaN; the step's end reports it
+  exhausted,   ///< max_iterations are done
+  stagnated,   ///< more sweeps would not make the error smaller
+  stuck,       ///< likewise, but the method has another way
+};
+
+/// The checks of a step and what they say:
+///
+///   certificate.begin(scales);
+///   per check:      verdict = certificate.judge(sums, check, whole)
+///   behind ADMM:    certificate.solved_by_admm(result)
+///   after the step: certified(certificate.result(), ...)
+class Certificate {
+ public:
+  /// Sizes of a step that residuals and changes are compared with.
+  struct Scales {
+    double rounding_velocity = 0;     ///< that rounding makes in gaps, over a step [m/s]
+    std::vector<double> wall_pushes;  ///< per wall: the impulse that it is pushed with along its normal [N s]
+  };
+  struct Check {
+    int iterations = 0;       ///< sweeps done
+    double seconds = 0;       ///< since the step's iterations began
+    bool plain = true;        ///< sweeps are plain Gauss-Seidel
+    bool other_ways = false;  ///< the method has another way when they stagnate
+  };
+
+  /// `settings` is kept as a reference.
+  explicit Certificate(const SolverSettings& settings, const CertificateThresholds& thresholds = {})
+      : settings_(settings), thresholds_(thresholds) {}
+
+  void begin(Scales scales);
+  Verdict judge(const CheckSums& sums, const Check& check, WholeProblem& whole);
+  /// Whether the forces that walls and heavy bodies get are right within balance_tolerance: by the drift of
+  /// the wall forces, which sweeps show; or by a velocity check, which decides by itself. Collective.
+  bool balanced(WholeProblem& whole);
+  /// This step's velocities are checked as a whole: where that costs less than the sweeps that it may save,
+  /// in problems that are stiff for their size; and in tiny ones. Collective.
+  bool checks_velocities(WholeProblem& whole) const;
+  /// More plain sweeps than a problem of so many contacts should take.
+  double stiff_for(std::int64_t contacts) const {
+    return thresholds_.stiff_per_contact * static_cast<double>(contacts);
+  }
+
+  /// The impulses of the last check were replaced by those of ADMM.
+  void solved_by_admm(const BodyAdmmResult& result);
+  /// Sweeps become plain: what those before have made worse is not held against them.
+  void forgive();
+  /// Stagnation counts from here.
+  void be_patient() { history_.be_patient(); }
+
+  const IterationResult& result() const { return result_; }
+  const ErrorHistory& history() const { return history_; }
+  /// Per wall, at the last check [N s].
+  const std::vector<Vec3>& wall_impulses() const { return wall_impulses_.back(); }
+  /// Sweeps done when those that count began: ADMM is a new start.
+  int started_at() const { return result_.stiff_calls == 0 ? 0 : history_[history_.start()].iterations; }
+
+ private:
+  void measure(const CheckSums& sums);
+  double drift() const;
+  double wall_scale() const;
+  double largest_change(std::size_t from, std::size_t to) const;
+
+  const SolverSettings& settings_;
+  CertificateThresholds thresholds_;
+  Scales scales_;
+  IterationResult result_;
+  ErrorHistory history_;
+  std::vector<std::vector<Vec3>> wall_impulses_;  ///< like the history: per wall [N s]
+  double residual2_ = 0;                          ///< at the last check [m^2/s^2]
+  double scale2_ = 0;                             ///< what it is compared with [m^2/s^2]
+  /// Of the first check of the step, or the first since ADMM, or since sweeps became plain [m^2/s^2].
+  double first_residual2_ = 0;
+  /// The last velocity check.
+  struct VelocityCheck {
+    int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
+    double error_rms = 0, error = 0;
+  };
+  VelocityCheck velocity_check_;
+};
+
+/// Whether a step whose iterations ended so is to be believed. `momentum_defect`: what the sample gained
+/// beside what walls and weight gave, relative; `passed`: pairs of bodies that went through one another.
+bool certified(const IterationResult& result, double momentum_defect, std::int64_t passed,
+               const SolverSettings& settings);
+
+}  // namespace talus

@@ -1,0 +1,35 @@
+#pragma once
+
+/// Sums over all contacts that are the same bits on any number of ranks: each subdomain adds up its chunks in
+/// their order and makes a row of numbers; rows travel, and every rank adds them in order of subdomain.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/step/gluing.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// What a check has measured, of all subdomains.
+struct CheckSums {
+  ErrorSums error;  ///< but for its wall_impulse
+  JumpSums jump;
+  std::vector<Vec3> wall_impulse;  ///< per wall, on the grains [N s]
+  double imbalance = 0;            ///< contacts of the fullest subdomain over those of the mean one, less 1
+};
+
+/// Doubles in the row that a subdomain sends per check.
+std::size_t check_row_width(std::size_t walls);
+/// The rows of the subdomains here. `sums`: per chunk; `jumps`: per subdomain here, or none.
+std::vector<double> check_rows(const StepState& state, std::span<const ErrorSums> sums,
+                               std::span<const JumpSums> jumps);
+/// From the rows of all subdomains, each once, in any order.
+CheckSums add_check_rows(std::span<const double> rows, std::size_t walls, std::int32_t subdomains);
+
+/// The same of a single number per chunk, such as what a sweep changed.
+std::vector<double> number_rows(const StepState& state, std::span<const double> numbers);
+double add_number_rows(std::span<const double> rows, std::int32_t subdomains);
+
+}  // namespace talus

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "kernels/sweeps/momentum.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
+#include "runtime/step/courses.hpp"
+#include "runtime/step/epoch_schedule.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// What an epoch does to one chunk: velocities afresh, errors, a sweep, or the certified impulses again.
+/// Chunks that share no body they write may be worked on at the same time.
+class ChunkWork {
+ public:
+  /// Keeps references.
+  ChunkWork(StepState& state, const StepParameters& parameters, const SweepKernels& kernels,
+            const EpochSchedule& schedule, const Courses& courses);
+
+  /// The chunks are new. `timed`: how long each is worked on is added up from now on.
+  void plan(bool timed) { busy_.assign(timed ? state_.chunks.size() : 0, 0.0); }
+  /// Before the first epoch of a step. `damped`: of what a sweep changes at the interface a part is kept
+  /// (damped Schwarz). `keep_impulses`: those of each check are stored with the candidates, as sweeps go on
+  /// before it is known how the check came out.
+  void begin(bool damped, bool keep_impulses);
+  /// At a gate: room for what the present course remembers.
+  void make_room();
+
+  void run(std::size_t c, int epoch);
+  /// At a gate, behind a sweep after which ADMM takes over: the impulses of the last check.
+  void restore();
+
+  /// Sweeps of this epoch are in single precision.
+  bool single(int epoch) const {
+    return schedule_.work(epoch) == EpochSchedule::Work::sweep && course(epoch).single;
+  }
+  /// Those of the epoch before, in this step, were.
+  bool single_before(int epoch) const { return schedule_.sweep(epoch) > 0 && course(epoch - 1).single; }
+  const Course& course(int epoch) const { return courses_.of(schedule_.sweep(epoch)); }
+
+  const std::vector<ErrorSums>& errors() const { return errors_; }  ///< per chunk, of the last measure
+  /// Per chunk, with conjugate gradients: what the last sweep changed, squared [J].
+  const std::vector<double>& changes() const { return changes_; }
+  /// Per subdomain here: time of its chunks since the plan [s]; zeros unless timed.
+  std::vector<double> busy() const;
+  const AccelerationHistory& acceleration() const { return acceleration_; }
+
+ private:
+  template <bool Friction>
+  void work(std::size_t c, int epoch);
+  template <bool Friction>
+  void accumulate(std::size_t c, int epoch);
+  template <bool Friction>
+  void measure(std::size_t c);
+  template <bool Friction>
+  void sweep(std::size_t c, int epoch);
+  void carry_on(std::size_t c, int epoch);
+  void change_precision(std::size_t c, int epoch);
+  void to_single(std::size_t c, int epoch, bool before);
+  void to_double(std::size_t c, int epoch, bool before);
+  ContactRange range_of(std::size_t c) const;
+  std::span<const Slot> owned(std::size_t c) const;
+  double friction_of(std::size_t c) const;
+  bool at_wall(std::size_t c) const { return state_.chunks.wall[c] >= 0; }
+
+  StepState& state_;
+  const StepParameters& parameters_;
+  const SweepKernels& kernels_;
+  const EpochSchedule& schedule_;
+  const Courses& courses_;
+  bool keep_impulses_ = false;
+  std::vector<ErrorSums> errors_;
+  std::vector<std::vector<double>> before_;  ///< damped: per chunk at the interface, impulses before a sweep
+  AccelerationHistory acceleration_;         ///< empty with plain sweeps
+  std::vector<double> changes_;
+  std::vector<double> busy_;  ///< per chunk [s]; empty unless timed
+};
+
+}  // namespace talus

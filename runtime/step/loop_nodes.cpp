@@ -1,0 +1,61 @@
+#include "runtime/step/loop_nodes.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Where nothing is told, chunks at glued walls are of the border.
+graph::LoopWork::Side side_of(ChunkSide side, bool tells) {
+  using enum graph::LoopWork::Side;
+  switch (side) {
+    case ChunkSide::wall:
+      return tells ? early : border;
+    case ChunkSide::border:
+      return border;
+    case ChunkSide::inside:
+      return inside;
+    case ChunkSide::late:
+      break;
+  }
+  return late;
+}
+
+}  // namespace
+
+std::uint32_t work_of_chunk(const StepState& state, std::size_t c) {
+  return 1 + static_cast<std::uint32_t>(state.contacts.count[c]);
+}
+
+std::uint32_t place_of_chunk(const Chunks& chunks, std::size_t c) {
+  return static_cast<std::uint32_t>(chunks.bodies[static_cast<std::size_t>(chunks.body_begin[c])]);
+}
+
+graph::LoopSpec loop_spec(const StepState& state, const Gluing& gluing, const DecompositionSettings& settings,
+                          const graph::Communicator& ranks, int threads) {
+  const Chunks& chunks = state.chunks;
+  graph::LoopSpec spec;
+  spec.in_colours = state.decomposition.in_colours();
+  spec.overlap = settings.overlap;
+  spec.collects = gluing.collects();
+  spec.only_first_thread_exchanges = ranks.ranks() > 1 && !ranks.any_thread();
+  spec.threads = threads;
+  spec.rank = ranks.rank();
+  for (std::size_t e = 0; e < state.decomposition.here.size(); ++e)
+    spec.groups.push_back({.colour = static_cast<char>(gluing.subdomain_colour(e)),
+                           .exchanges = gluing.needed(),
+                           .tells = gluing.tells(e),
+                           .readers = gluing.readers_here(e)});
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    const auto e = static_cast<std::uint32_t>(chunks.subdomain[c]);
+    spec.work.push_back({.side = side_of(chunks.side[c], gluing.tells(e)),
+                         .group = e,
+                         .colour = static_cast<std::uint32_t>(chunks.colour[c]),
+                         .weight = work_of_chunk(state, c),
+                         .place = place_of_chunk(chunks, c)});
+  }
+  spec.offset.assign(chunks.conflict_begin.begin(), chunks.conflict_begin.end());
+  spec.neighbour.assign(chunks.conflicts.begin(), chunks.conflicts.end());
+  return spec;
+}
+
+}  // namespace talus

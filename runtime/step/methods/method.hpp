@@ -1,0 +1,81 @@
+#pragma once
+
+/// What makes of sweeps a solver. A method says how sweeps go on and when ADMM takes over; that a step is
+/// solved is for the certificate to say. One file per method beside this one; methods/registry.cpp lists
+/// them.
+
+#include <memory>
+#include <optional>
+
+#include "kernels/registry.hpp"
+#include "runtime/step/methods/sweep_plan.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus {
+
+/// What a method knows of its problem before it begins. Constant during a step.
+struct MethodContext {
+  const SolverSettings& settings;
+  bool friction = false;
+  /// Damped Schwarz is no descent: what is carried on from it need not go down.
+  bool schwarz = false;
+};
+
+/// What a check of a step tells its method about the problem as a whole. Answers beyond the counts may cost
+/// as much as a hundred sweeps, are collective, and are asked for in the same order by all ranks.
+class MethodView {
+ public:
+  virtual ~MethodView() = default;
+  virtual int sweeps_since_start() const = 0;  ///< of the step, or since ADMM
+  virtual int admm_calls() const = 0;          ///< in this step
+  virtual double sweeps_needed() = 0;          ///< of the present ones, about
+  virtual bool checks_velocities() = 0;        ///< Certificate::checks_velocities
+  virtual bool balanced() = 0;                 ///< Certificate::balanced
+};
+
+/// Calls of a step, all at gates of the loop:
+///
+///   begin()                 before the first sweep
+///   after_check(), calls_admm()   behind each check that has not ended the step, in this order
+///   after_admm()            where that was called: before the next sweep
+///   after_stagnation()      behind a check that found stagnation, instead of after_check()
+///
+/// Methods keep nothing between calls: what is in force comes in as the plan.
+class Method {
+ public:
+  virtual ~Method() = default;
+
+  virtual SweepPlan begin() const = 0;
+  /// `growth`: of the error since the check before. A plan begins anew with the next sweep; none: go on.
+  virtual std::optional<SweepPlan> after_check(const SweepPlan& now, double growth) const;
+  /// Another way, where the method has one.
+  virtual std::optional<SweepPlan> after_stagnation(const SweepPlan& now) const;
+  virtual SweepPlan after_admm(const SweepPlan& now) const { return now; }
+  virtual bool calls_admm(MethodView& view) const;
+};
+
+inline std::optional<SweepPlan> Method::after_check(const SweepPlan&, double) const {
+  return std::nullopt;
+}
+inline std::optional<SweepPlan> Method::after_stagnation(const SweepPlan&) const {
+  return std::nullopt;
+}
+inline bool Method::calls_admm(MethodView&) const {
+  return false;
+}
+
+/// When sweeps hand over to ADMM.
+struct AdmmCalls {
+  /// Sweeps that have their chance before the first call, >= 0; four times as many before each further one.
+  int chance = 50;
+  /// Calls in a step, at most, >= 1. Whatever ADMM leaves undone it is asked for again.
+  int most = 3;
+};
+/// Sweeps have had their chance since the last call, and there is one left.
+bool admm_due(const AdmmCalls& calls, const MethodView& view);
+
+using MethodMaker = std::unique_ptr<Method> (*)(const MethodContext&);
+/// All methods: solver.method in scenes, --method in studies.
+const Registry<SolverMethod, MethodMaker>& methods();
+
+}  // namespace talus

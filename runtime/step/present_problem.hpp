@@ -1,0 +1,42 @@
+#pragma once
+
+#include "runtime/step/admm.hpp"
+#include "runtime/step/certificate.hpp"
+#include "runtime/step/courses.hpp"
+#include "runtime/step/stiffness_memory.hpp"
+
+namespace talus {
+
+/// The problem of the present step, as the certificate asks about it.
+class PresentProblem final : public WholeProblem {
+ public:
+  /// Keeps references.
+  PresentProblem(const StepState& state, const Admm& admm, const Courses& courses,
+                 const Certificate& certificate)
+      : state_(state), admm_(admm), courses_(courses), certificate_(certificate) {}
+
+  /// Collective, where candidates were found anew.
+  void plan(const graph::Communicator& ranks);
+  /// Of each step.
+  void begin() { stiffness_.begin_step(); }
+
+  double plain_sweeps_needed() override;
+  double speed() const override { return speed_of(courses_.now().plan); }
+  double velocity_error(double enough) override { return admm_.velocity_error(enough); }
+
+  bool grains_alike() const { return stiffness_.grains_alike(); }
+  double candidates() const { return candidates_; }  ///< of all ranks
+  /// Of the lightest grain of all ranks [1/kg].
+  double largest_inv_mass() const { return largest_inv_mass_; }
+
+ private:
+  const StepState& state_;
+  const Admm& admm_;
+  const Courses& courses_;
+  const Certificate& certificate_;
+  StiffnessMemory stiffness_;
+  double candidates_ = 0;
+  double largest_inv_mass_ = 0;
+};
+
+}  // namespace talus

@@ -1,0 +1,385 @@
+#include "runtime/step/solver_loop.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "kernels/sweeps/fetch_lines.hpp"
+#include "runtime/graph/clock.hpp"
+#include "runtime/step/check_spacing.hpp"
+#include "runtime/step/check_sums.hpp"
+#include "runtime/step/loop_nodes.hpp"
+#include "runtime/step/task_kinds.hpp"
+#include "runtime/trace/recorder.hpp"
+
+namespace talus {
+
+using Work = EpochSchedule::Work;
+
+namespace {
+
+/// When sweeps begin in single precision (docs/decisions/0015-single-precision.md).
+struct SinglePrecisionUse {
+  /// error_rms, > 0: floats alone stall near 1e-6.
+  double least_error = 1e-5;
+  /// Of all ranks: smaller problems have no time to gain.
+  double least_candidates = 1000;
+};
+constexpr SinglePrecisionUse single_use;
+
+TaskKind kind_of_work(Work work) {
+  switch (work) {
+    case Work::accumulate:
+      return TaskKind::accumulate;
+    case Work::measure:
+      return TaskKind::measure;
+    case Work::restore:
+      return TaskKind::restore;
+    case Work::sweep:
+      break;
+  }
+  return TaskKind::sweep;
+}
+
+/// Of what is no work of a chunk.
+TaskKind kind_of_role(graph::LoopRole role) {
+  switch (role) {
+    case graph::LoopRole::publish:
+      return TaskKind::publish;
+    case graph::LoopRole::glue:
+      return TaskKind::glue;
+    case graph::LoopRole::take:
+      return TaskKind::take;
+    case graph::LoopRole::tell:
+      return TaskKind::tell;
+    case graph::LoopRole::work:
+    case graph::LoopRole::collect:
+    case graph::LoopRole::root:
+      break;
+  }
+  return TaskKind::root;
+}
+
+/// A step as its method sees it.
+class StepView final : public MethodView {
+ public:
+  StepView(Certificate& certificate, WholeProblem& problem) : certificate_(certificate), problem_(problem) {}
+  int sweeps_since_start() const override {
+    return certificate_.result().iterations - certificate_.started_at();
+  }
+  int admm_calls() const override { return certificate_.result().stiff_calls; }
+  double sweeps_needed() override { return problem_.sweeps_needed(); }
+  bool checks_velocities() override { return certificate_.checks_velocities(problem_); }
+  bool balanced() override { return certificate_.balanced(problem_); }
+
+ private:
+  Certificate& certificate_;
+  WholeProblem& problem_;
+};
+
+}  // namespace
+
+std::size_t memory_used(const StepState& state) {
+  return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) +
+         memory_used(state.contacts) + memory_used(state.decomposition) +
+         (state.free.u.capacity() + state.free.w.capacity()) * sizeof(std::array<double, 3>) +
+         state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
+         memory_used(state.single) + state.copies.capacity() * sizeof(WallCopy);
+}
+
+InstructionSet settled(InstructionSet set, const graph::Communicator& ranks) {
+  if (set != InstructionSet::automatic || ranks.ranks() == 1) return set;
+  double weakest[1] = {-static_cast<double>(best_instruction_set())};
+  ranks.max(weakest);
+  return static_cast<InstructionSet>(static_cast<int>(-weakest[0]));
+}
+
+SolverLoop::SolverLoop(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+                       const DecompositionSettings& decomposition, const graph::Communicator& ranks)
+    : state_(state),
+      parameters_(parameters),
+      settings_(settings),
+      decomposition_(decomposition),
+      ranks_(ranks),
+      kernels_(settled(settings.simd, ranks)),
+      gluing_(state, decomposition, ranks),
+      admm_(state, parameters, decomposition, gluing_, ranks),
+      work_(state, parameters, kernels_, schedule_, courses_),
+      certificate_(settings),
+      problem_(state, admm_, courses_, certificate_) {}
+
+void SolverLoop::plan() {
+  gluing_.plan(parameters_.rotates);
+  problem_.plan(ranks_);
+  const double lightest = problem_.largest_inv_mass();
+  state_.single.contacts.unit = lightest > 0 ? unit_of_mass(lightest) : 1;
+  work_.plan(decomposition_.balance == BalanceBy::time);
+}
+
+void SolverLoop::plan_tree() {
+  std::uint64_t contacts = 0;
+  for (std::size_t c = 0; c < state_.chunks.size(); ++c)
+    contacts += 1 + static_cast<std::uint64_t>(state_.contacts.count[c]);
+  gluing_.plan_tree(contacts);
+}
+
+const graph::LoopPlan& SolverLoop::plan_nodes(int threads) {
+  plan_ = graph::plan_loop(loop_spec(state_, gluing_, decomposition_, ranks_, threads), gluing_.tree());
+  return plan_;
+}
+
+/// Each chunk at a wall that has contacts holds a copy of it. Collective.
+void SolverLoop::split_walls() {
+  const Chunks& chunks = state_.chunks;
+  for (WallState& wall : state_.wall_states) {
+    wall.copies.clear();
+    wall.impulse.setZero();
+  }
+  state_.copies.assign(chunks.size(), {});
+  for (std::size_t c = 0; c < chunks.size(); ++c)
+    if (chunks.wall[c] >= 0 && state_.contacts.count[c] > 0)
+      state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
+          static_cast<std::int32_t>(c));
+  gluing_.begin();
+  gluing_.forget_jumps();
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    const WallState& wall = state_.wall_states[w];
+    const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
+    for (std::int32_t c : wall.copies) state_.copies[static_cast<std::size_t>(c)].inv_mass = split;
+  }
+}
+
+bool SolverLoop::schwarz() const {
+  return decomposition_.coupling == Coupling::schwarz && state_.decomposition.several();
+}
+
+void SolverLoop::begin() {
+  split_walls();
+  work_.begin(schwarz() && decomposition_.damping, ranks_.ranks() > 1);
+  began_ = graph::seconds_now();
+  Certificate::Scales scales;
+  scales.rounding_velocity =
+      std::numeric_limits<double>::epsilon() * parameters_.alert / parameters_.time_step;
+  for (const WallState& wall : state_.wall_states)
+    scales.wall_pushes.push_back(parameters_.time_step * wall.applied);
+  certificate_.begin(std::move(scales));
+  problem_.begin();
+  pending_.reset();
+  schedule_ = {};
+  method_ = methods().of(settings_.method).make({settings_, parameters_.friction, schwarz()});
+  begin_course(method_->begin(), 0);
+}
+
+void SolverLoop::begin_course(const SweepPlan& plan, int from) {
+  courses_.begin(plan, from, single_will_do(plan.kind));
+  work_.make_room();
+}
+
+/// Whether sweeps in single precision make the error of this problem smaller as those in double do. Not where
+/// it is small already, or bodies are so heavy that single sweeps would not move them.
+bool SolverLoop::single_will_do(SweepKind kind) const {
+  const ErrorHistory& history = certificate_.history();
+  return kind == SweepKind::momentum && settings_.precision == Precision::mixed && !schwarz() &&
+         problem_.grains_alike() && problem_.candidates() >= single_use.least_candidates &&
+         (history.empty() || history.last().error_rms > single_use.least_error);
+}
+
+Gluing::Mode SolverLoop::gluing_mode(int epoch) const {
+  const Work work = schedule_.work(epoch);
+  if (work == Work::accumulate || work == Work::restore) return Gluing::Mode::fresh;
+  if (schedule_.closes_segment(epoch)) return Gluing::Mode::measured;
+  return schedule_.sweeps_of_segment(epoch) % decomposition_.sweeps_per_exchange == 0 ? Gluing::Mode::iterate
+                                                                                      : Gluing::Mode::local;
+}
+
+void SolverLoop::node(std::uint32_t node, int epoch) {
+  const auto [role, e] = plan_.nodes[node];
+  if (role == graph::LoopRole::work) {
+    work_.run(node, epoch);
+    // Long messages advance only while somebody calls MPI.
+    if (ranks_.ranks() > 1 && node % 4 == 0 && ranks_.any_thread()) ranks_.progress();
+    return;
+  }
+  if (schedule_.work(epoch) == Work::measure) return;
+  const Gluing::Mode mode = gluing_mode(epoch);
+  const bool single = work_.single(epoch);
+  switch (role) {
+    case graph::LoopRole::work:
+      return;
+    case graph::LoopRole::publish:
+      return gluing_.publish(e, mode, single);
+    case graph::LoopRole::collect:
+      return gluing_.collect(mode);
+    case graph::LoopRole::root:
+      return gluing_.root(mode);
+    case graph::LoopRole::glue:
+      return gluing_.glue(e, mode, single);
+    case graph::LoopRole::take:
+      return take(e, epoch);
+    case graph::LoopRole::tell:
+      return gluing_.tell(e, mode);
+  }
+}
+
+/// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
+/// look for it with the first of them.
+void SolverLoop::take(std::size_t e, int epoch) {
+  const bool now = work_.single(epoch);
+  if (now && !work_.single_before(epoch))
+    narrow_bodies(gluing_.taken(e), state_.bodies.velocity, state_.single);
+  gluing_.take(e, now);
+}
+
+std::optional<trace::Kind> SolverLoop::kind(std::uint32_t node, int epoch) const {
+  const Work now = schedule_.work(epoch);
+  const graph::LoopRole role = plan_.nodes[node].role;
+  if (role == graph::LoopRole::work) return kind_of(kind_of_work(now));
+  if (now == Work::measure || gluing_mode(epoch) == Gluing::Mode::local) return std::nullopt;
+  return kind_of(kind_of_role(role));
+}
+
+std::optional<std::size_t> SolverLoop::subdomain_of(std::uint32_t node) const {
+  const std::uint32_t group = plan_.nodes[node].group;
+  return group == graph::LoopPlan::none ? std::nullopt : std::optional<std::size_t>(group);
+}
+
+void SolverLoop::fetch(std::size_t subdomain) const {
+  const auto fetch = [](std::size_t begin, std::size_t end, const auto&... columns) {
+    // A column that this scene has not got is empty.
+    (fetch_lines(std::span(std::as_const(columns))
+                     .subspan(std::min(begin, columns.size()), columns.size() < end ? 0 : end - begin)),
+     ...);
+  };
+  const AccelerationHistory& acceleration = work_.acceleration();
+  const Contacts& contacts = state_.contacts;
+  const SingleContacts& single = state_.single.contacts;
+  const Decomposition& all = state_.decomposition;
+  const std::size_t first = all.several() ? all.slot_begin[subdomain] : 0,
+                    last = all.several() ? all.slot_begin[subdomain + 1] : state_.bodies.size();
+  // What single sweeps want comes last, and is nearest then.
+  fetch(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, acceleration.last_v,
+        acceleration.step_v);
+  for (const bool in_single : {false, true})
+    for (std::size_t c = 0; c < state_.chunks.size(); ++c) {
+      if (static_cast<std::size_t>(state_.chunks.subdomain[c]) != subdomain) continue;
+      const auto begin = static_cast<std::size_t>(state_.chunks.begin[c]);
+      const std::size_t end = begin + static_cast<std::size_t>(contacts.count[c]);
+      if (in_single)
+        fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
+              single.rn, acceleration.steps.x, acceleration.steps.y, acceleration.steps.z,
+              acceleration.steps.n, contacts.first_record, contacts.second_record, contacts.group);
+      else
+        fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
+              contacts.rz, contacts.rn);
+    }
+  fetch(first, last, state_.single.velocity, state_.single.last_v);
+  gluing_.fetch(subdomain);
+}
+
+bool SolverLoop::decide(int epoch) {
+  if (schedule_.restores_at(epoch)) return false;
+  return schedule_.work(epoch) == Work::measure ? measured(epoch) : swept(epoch);
+}
+
+/// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
+bool SolverLoop::measured(int epoch) {
+  const bool waits = ranks_.ranks() == 1 || settles(epoch);
+  schedule_.measured();
+  measured_ = graph::seconds_now();
+  trace::Span span(ranks_.trace(), kind_of(TaskKind::sums), 0, trace::Span::in_check);
+  std::vector<double> rows = check_rows(state_, work_.errors(), gluing_.jumps());
+  span.end();
+  std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
+  for (std::int32_t rank : state_.decomposition.rank_of)
+    lengths[static_cast<std::size_t>(rank)] += check_row_width(state_.walls.size());
+  pending_ = ranks_.start_gather(std::move(rows), lengths);
+  if (waits) {
+    if (!judge()) return false;
+    if (ask_admm())
+      call_admm(epoch);
+    else
+      schedule_.sweep_on(epoch, sweeps_ahead());
+    return true;
+  }
+  // One for sure; how many more follows when it is known how this check came out.
+  schedule_.sweep_on(epoch, std::min(least_sweeps, settings_.max_iterations - schedule_.checked()));
+  schedule_.read_sums_after_next(epoch);
+  return true;
+}
+
+/// Behind a sweep: what was set out before it is read.
+bool SolverLoop::swept(int epoch) {
+  if (conjugate(epoch)) turn_conjugate();
+  if (!schedule_.reads_sums_at(epoch)) return true;
+  schedule_.sums_read();
+  if (!judge())
+    schedule_.restore_after(epoch);
+  else if (ask_admm())
+    call_admm(epoch);
+  else
+    schedule_.stretch(sweeps_ahead());
+  return true;
+}
+
+void SolverLoop::turn_conjugate() {
+  const std::vector<double> own = number_rows(state_, work_.changes());
+  const std::vector<double> everywhere = ranks_.gather_records(std::span<const double>(own));
+  courses_.turn(add_number_rows(everywhere, state_.decomposition.partition.subdomains));
+}
+
+int SolverLoop::sweeps_ahead() const {
+  return sweeps_until_check(certificate_.history(), courses_.now(), certificate_.started_at(), settings_,
+                            decomposition_.sweeps_per_exchange);
+}
+
+/// Judges the sums of the last measure. False: the step ends with them.
+bool SolverLoop::judge() {
+  const CheckSums sums =
+      add_check_rows(pending_->wait(), state_.walls.size(), state_.decomposition.partition.subdomains);
+  imbalance_ = sums.imbalance;
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].impulse = sums.wall_impulse[w];
+  const SweepPlan now = courses_.now().plan;
+  const std::optional<SweepPlan> other = method_->after_stagnation(now);
+  const Verdict verdict = certificate_.judge(sums,
+                                             {.iterations = schedule_.checked(),
+                                              .seconds = measured_ - began_,
+                                              .plain = now.kind == SweepKind::plain,
+                                              .other_ways = other.has_value()},
+                                             problem_);
+  if (verdict != Verdict::go_on && verdict != Verdict::stuck) return false;
+  std::optional<SweepPlan> next;
+  const ErrorHistory& history = certificate_.history();
+  if (verdict == Verdict::stuck) {
+    certificate_.be_patient();
+    next = other;
+  } else if (const ErrorCheck* before = history.before_last(courses_.now().begun, settings_.check_every)) {
+    next = method_->after_check(now, history.last().error_rms / before->error_rms);
+  }
+  if (next) {
+    begin_course(*next, schedule_.checked() + 1);
+    if (next->kind == SweepKind::plain) certificate_.forgive();
+  }
+  if (courses_.now().single && !single_will_do(courses_.now().plan.kind)) {
+    courses_.go_on_in_double(schedule_.checked() + 1);
+    work_.make_room();
+  }
+  return true;
+}
+
+bool SolverLoop::ask_admm() {
+  StepView view(certificate_, problem_);
+  return method_->calls_admm(view);
+}
+
+/// With several ranks behind the sweep that hid the sums: what it did is dropped.
+void SolverLoop::call_admm(int epoch) {
+  if (ranks_.ranks() > 1) work_.restore();
+  gluing_.forget_jumps();
+  certificate_.solved_by_admm(admm_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
+  // What the last sweeps changed says nothing of where ADMM has gone.
+  begin_course(method_->after_admm(courses_.now().plan), schedule_.checked());
+  schedule_.again_from(epoch);
+}
+
+}  // namespace talus

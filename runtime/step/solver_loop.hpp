@@ -1,0 +1,127 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "kernels/sweeps/sweep_kernels.hpp"
+#include "runtime/graph/loop_plan.hpp"
+#include "runtime/step/admm.hpp"
+#include "runtime/step/certificate.hpp"
+#include "runtime/step/chunk_work.hpp"
+#include "runtime/step/courses.hpp"
+#include "runtime/step/epoch_schedule.hpp"
+#include "runtime/step/gluing.hpp"
+#include "runtime/step/methods/method.hpp"
+#include "runtime/step/present_problem.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// What `automatic` means on these ranks: the strongest set that all of them run, since they shall round
+/// alike. Any other set as it is. Collective.
+InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
+
+/// The iterations of a step as a program on the chunk graph (runtime/graph/epoch_loop.hpp): every epoch, each
+/// chunk does one thing, in the order of its colour. It puts the parts together that decide:
+///
+///   EpochSchedule   which epoch does what            ChunkWork     what that is for a chunk
+///   Certificate     whether the step is solved       Method        how sweeps go on, and when ADMM helps
+///
+/// At a gate one thread adds the chunks' sums in order, by subdomain, and asks certificate and method. With
+/// several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read at a
+/// gate behind that sweep, so that results are the bits of one rank, where nothing has to be waited for.
+/// Where ADMM is called, it is by the gate's threads of all ranks, on the impulses that were certified.
+///
+/// The nodes are those of a graph::LoopPlan whose work is the chunks and whose groups are the subdomains
+/// here; where nothing is glued (gluing.hpp) there are chunks only. The order in a subdomain is chunks at
+/// glued walls, tell, those at the border, publish, those inside, which hide the messages; in a later
+/// subdomain colour the inside comes before take, the border and publish.
+class SolverLoop {
+ public:
+  /// References are kept. `state.contacts` holds the narrow phase's contacts.
+  SolverLoop(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
+             const DecompositionSettings& decomposition, const graph::Communicator& ranks);
+
+  // The program.
+  void node(std::uint32_t node, int epoch);
+  bool gate(int epoch) const {
+    return schedule_.measures_at(epoch) || schedule_.reads_sums_at(epoch) || schedule_.restores_at(epoch) ||
+           conjugate(epoch);
+  }
+  bool decide(int epoch);
+  /// The decision behind this epoch waits for the sums of all ranks, however many there are.
+  bool settles(int epoch) const {
+    return schedule_.measures_at(epoch) && schedule_.planned() >= settings_.max_iterations;
+  }
+  /// Of threads that wait for decide(): ADMM's subdomains are shared out.
+  void assist() { admm_.assist(); }
+  /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
+  std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
+
+  /// Subdomain here that the node works on; none: the root.
+  std::optional<std::size_t> subdomain_of(std::uint32_t node) const;
+  /// Brings all that the loop reads and writes of a subdomain here into the cache of the core that calls.
+  void fetch(std::size_t subdomain) const;
+
+  /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
+  void begin();
+
+  /// Collective, after the candidates were distributed.
+  void plan();
+  /// Collective, behind plan() and the first narrow phase, before begin().
+  void plan_tree();
+  /// Behind plan_tree(): the nodes, on so many threads.
+  const graph::LoopPlan& plan_nodes(int threads);
+
+  const Gluing& gluing() const { return gluing_; }
+  const SweepKernels& kernels() const { return kernels_; }
+  const IterationResult& result() const { return certificate_.result(); }
+  /// The checks of the step.
+  const std::vector<ErrorCheck>& history() const { return certificate_.history().all(); }
+  /// Contacts of the fullest subdomain over the mean one, less 1, at the last check.
+  double imbalance() const { return imbalance_; }
+  /// Per subdomain here, with BalanceBy::time: time of its chunks since the plan [s].
+  std::vector<double> busy() const { return work_.busy(); }
+
+ private:
+  bool conjugate(int epoch) const {
+    return schedule_.work(epoch) == EpochSchedule::Work::sweep &&
+           work_.course(epoch).plan.kind == SweepKind::conjugate;
+  }
+  bool schwarz() const;
+  Gluing::Mode gluing_mode(int epoch) const;
+  void split_walls();
+  void take(std::size_t e, int epoch);
+  bool measured(int epoch);
+  bool swept(int epoch);
+  bool judge();
+  bool ask_admm();
+  void call_admm(int epoch);
+  void turn_conjugate();
+  void begin_course(const SweepPlan& plan, int from);
+  bool single_will_do(SweepKind kind) const;
+  int sweeps_ahead() const;
+
+  StepState& state_;
+  const StepParameters& parameters_;
+  const SolverSettings& settings_;
+  const DecompositionSettings& decomposition_;
+  const graph::Communicator& ranks_;
+  SweepKernels kernels_;
+  Gluing gluing_;
+  Admm admm_;
+  EpochSchedule schedule_;  ///< written at gates only, when every thread waits; so are courses_
+  Courses courses_;
+  ChunkWork work_;
+  Certificate certificate_;
+  PresentProblem problem_;
+  graph::LoopPlan plan_;
+  std::unique_ptr<Method> method_;  ///< of the step
+  std::unique_ptr<graph::PendingGather> pending_;
+  double imbalance_ = 0;
+  double began_ = 0, measured_ = 0;  ///< clock at begin() and at the last check [s], for the history only
+};
+
+}  // namespace talus

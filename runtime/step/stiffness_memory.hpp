@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace talus {
+
+/// When the stiffness that an earlier step has found goes for this one, too.
+struct StiffnessReuse {
+  /// Grains are alike when the heaviest has less than so many times the mass of the lightest, > 1: none would
+  /// change everything where it lands.
+  double alike = 1000;
+  /// Renewals of the candidates after which all have moved on and nothing is known, >= 0.
+  int most_renewals = 10;
+  /// The problem was far from stiff: so many times its sweeps are less than makes it stiff, >= 1.
+  double margin = 2;
+  /// The number of contacts has changed by at most one in so many, >= 1.
+  std::int64_t same_contacts = 20;
+};
+
+/// How many plain sweeps the problem takes. To find out takes as long as ten sweeps, and two messages for
+/// each layer of grains, so the answer is kept for later steps as long as it holds.
+class StiffnessMemory {
+ public:
+  /// What the answer depends on.
+  struct Problem {
+    std::int64_t contacts = 0;
+    std::vector<double> carrying;  ///< per wall 1/M [1/kg] where it carries, else -1
+  };
+
+  explicit StiffnessMemory(const StiffnessReuse& reuse = {}) : reuse_(reuse) {}
+
+  /// Candidates were found anew. `spread`: the heaviest grain over the lightest.
+  void renew(double spread);
+  /// A new step: its problem is not known yet.
+  void begin_step() { now_ = unknown; }
+  /// Asked first in a step, it takes the last answer if that holds for `problem`, else that of `estimate`;
+  /// later in the step it repeats it. `stiff`: sweeps from which the problem is stiff. The same on all ranks
+  /// when what is passed is.
+  double sweeps_needed(const Problem& problem, double stiff, const std::function<double()>& estimate);
+  bool grains_alike() const { return spread_ < reuse_.alike; }
+
+ private:
+  static constexpr double unknown = -1;
+  bool holds(const Problem& problem, double stiff) const;
+
+  StiffnessReuse reuse_;
+  double now_ = unknown;   ///< of this step
+  double then_ = unknown;  ///< the last estimate
+  Problem problem_;        ///< for which that was made
+  int renewals_ = 0;       ///< of the candidates since
+  double spread_ = 1;
+};
+
+}  // namespace talus

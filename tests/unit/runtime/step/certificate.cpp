@@ -1,0 +1,266 @@
+// What the certificate says of a step, and that each of its thresholds has a part in it.
+
+#include "runtime/step/certificate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace talus {
+namespace {
+
+/// A problem with known answers. Those of velocity checks are given in turn, the last one again and again.
+class KnownProblem : public WholeProblem {
+ public:
+  KnownProblem(double plain_sweeps, std::vector<double> velocity_errors)
+      : plain_sweeps_(plain_sweeps), velocity_errors_(std::move(velocity_errors)) {}
+  double plain_sweeps_needed() override { return plain_sweeps_; }
+  double speed() const override { return 1; }
+  double velocity_error(double enough) override {
+    const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
+    return std::max(enough, velocity_errors_[which]);
+  }
+  std::size_t asked() const { return asked_; }
+
+ private:
+  double plain_sweeps_;
+  std::vector<double> velocity_errors_;
+  std::size_t asked_ = 0;
+};
+
+/// What a check finds: the relative error, and the impulse of the one wall [N s].
+struct Found {
+  int iterations;
+  double error;
+  double wall = 1;
+};
+
+struct Situation {
+  std::string what;
+  std::vector<Found> checks;
+  Verdict verdict;  ///< at the last check
+  std::int64_t contacts = 1000;
+  double plain_sweeps = 10;
+  std::vector<double> velocity_errors = {0};
+  bool plain = true, other_ways = false;
+  int admm_behind = -1;  ///< check behind which ADMM is called
+};
+
+CheckSums sums_of(const Found& found, std::int64_t contacts) {
+  CheckSums sums;
+  sums.error.impulse2 = 1;
+  sums.error.residual2 = found.error * found.error;
+  sums.error.contacts = contacts;
+  sums.wall_impulse = {Vec3(found.wall, 0, 0)};
+  return sums;
+}
+
+struct Outcome {
+  Verdict verdict = Verdict::go_on;
+  IterationResult result;
+  std::size_t velocity_checks = 0;
+};
+
+/// Tolerances 1e-3 on the error and 0.05 on the balance; at most 10,000 sweeps.
+Outcome judged(const Situation& given, const CertificateThresholds& thresholds = {}) {
+  SolverSettings settings;
+  settings.max_iterations = 10000;
+  Certificate certificate(settings, thresholds);
+  certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
+  KnownProblem problem(given.plain_sweeps, given.velocity_errors);
+  Outcome outcome;
+  for (std::size_t k = 0; k < given.checks.size(); ++k) {
+    outcome.verdict = certificate.judge(sums_of(given.checks[k], given.contacts),
+                                        {.iterations = given.checks[k].iterations,
+                                         .seconds = 0,
+                                         .plain = given.plain,
+                                         .other_ways = given.other_ways},
+                                        problem);
+    if (static_cast<int>(k) == given.admm_behind) certificate.solved_by_admm({});
+  }
+  outcome.result = certificate.result();
+  outcome.velocity_checks = problem.asked();
+  return outcome;
+}
+
+std::vector<Found> steady(int from, int to, int every, const std::function<double(int)>& error) {
+  std::vector<Found> checks;
+  for (int at = from; at <= to; at += every) checks.push_back({at, error(at)});
+  return checks;
+}
+std::vector<Found> steady(double error, int to = 1000) {
+  return steady(0, to, 100, [error](int) { return error; });
+}
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(Certificate, SaysWhatASituationIs) {
+  using enum Verdict;
+  const Situation table[] = {
+      {.what = "small error, walls at rest", .checks = {{0, 1}, {10, 1e-4}}, .verdict = solved},
+      {.what = "too large an error", .checks = {{0, 1}, {10, 2e-3}}, .verdict = go_on},
+      {.what = "before the first sweep nothing is known", .checks = {{0, 1e-4}}, .verdict = go_on},
+      {.what = "but an exact answer is taken", .checks = {{0, 0}}, .verdict = solved},
+      {.what = "wall forces still change", .checks = {{0, 1, 1}, {10, 1e-4, 2}}, .verdict = go_on},
+      {.what = "the last sweep is done", .checks = {{0, 1}, {10000, 2e-3}}, .verdict = exhausted},
+      {.what = "solved by the last sweep", .checks = {{0, 1}, {10000, 1e-4}}, .verdict = solved},
+      {.what = "no number", .checks = {{0, 1}, {10, nan}}, .verdict = not_finite},
+      {.what = "no number at the end", .checks = {{0, 1}, {10000, nan}}, .verdict = not_finite},
+      {.what = "an error without bound", .checks = {{0, 1}, {10, 2e3}}, .verdict = diverged},
+      {.what = "which momentum may make", .checks = {{0, 1}, {10, 2e3}}, .verdict = go_on, .plain = false},
+      {.what = "an error that stays", .checks = steady(0.1), .verdict = stagnated},
+      {.what = "where the method has another way",
+       .checks = steady(0.1),
+       .verdict = stuck,
+       .other_ways = true},
+      {.what = "velocities far from the answer",
+       .checks = {{0, 1}, {10, 1e-4}},
+       .verdict = go_on,
+       .plain_sweeps = 1e4,
+       .velocity_errors = {0.5}},
+      {.what = "velocities near it, whatever walls do",
+       .checks = {{0, 1, 1}, {10, 1e-4, 2}},
+       .verdict = solved,
+       .plain_sweeps = 1e4}};
+  for (const Situation& situation : table) {
+    const Outcome outcome = judged(situation);
+    EXPECT_EQ(outcome.verdict, situation.verdict) << situation.what;
+    EXPECT_EQ(outcome.result.converged, situation.verdict == solved) << situation.what;
+    EXPECT_EQ(outcome.result.diverged, situation.verdict == diverged) << situation.what;
+    EXPECT_EQ(outcome.result.stagnated, situation.verdict == stagnated) << situation.what;
+  }
+}
+
+TEST(Certificate, EveryThresholdDecidesASituation) {
+  using enum Verdict;
+  struct Case {
+    Situation situation;
+    std::function<void(CertificateThresholds&)> change;
+    Verdict otherwise;
+  };
+  using T = CertificateThresholds;
+  const Situation stiff{.what = "",
+                        .checks = {{0, 1}, {10, 1e-4}},
+                        .verdict = go_on,
+                        .plain_sweeps = 500,
+                        .velocity_errors = {1}};
+  const auto named = [](std::string what, Situation situation) {
+    situation.what = std::move(what);
+    return situation;
+  };
+  const auto falling = [](int at) { return at < 500 ? 0.1 : 0.08; };
+  const Case table[] = {
+      {{.what = "divergence", .checks = {{0, 1}, {10, 2e3}}, .verdict = diverged},
+       [](T& t) { t.divergence = 1e4; },
+       go_on},
+      {{.what = "patience", .checks = steady(0.1), .verdict = stagnated},
+       [](T& t) { t.patience = 2000; },
+       go_on},
+      {{.what = "stagnation", .checks = steady(0, 1000, 100, falling), .verdict = go_on},
+       [](T& t) { t.stagnation = 0.5; },
+       stagnated},
+      {{.what = "first drift", .checks = {{0, 1, 1}, {2, 1e-4, 1.02}}, .verdict = go_on, .plain_sweeps = 1},
+       [](T& t) { t.first_drift = 1; },
+       solved},
+      {{.what = "tiny",
+        .checks = {{0, 1}, {10, 1e-4}},
+        .verdict = go_on,
+        .contacts = 64,
+        .velocity_errors = {1}},
+       [](T& t) { t.tiny = 63; },
+       solved},
+      {named("cost of a velocity check", stiff), [](T& t) { t.velocity_check_cost = 501; }, solved},
+      {named("stiffness for a size", stiff), [](T& t) { t.stiff_per_contact = 0.501; }, solved},
+      {{.what = "settling",
+        .checks = {{0, 1}, {10, 1e-2}, {10, 1e-2}, {59, 1e-4}},
+        .verdict = go_on,
+        .admm_behind = 1},
+       [](T& t) { t.settling = 49; },
+       solved},
+      {{.what = "resolution of a velocity check",
+        .checks = {{0, 1}, {10, 1e-4}},
+        .verdict = solved,
+        .plain_sweeps = 1e4},
+       [](T& t) { t.velocity_resolution = 1.1; },
+       go_on},
+      {{.what = "growth between velocity checks",
+        .checks = {{0, 1}, {100, 1e-4}, {125, 1e-4}},
+        .verdict = go_on,
+        .plain_sweeps = 1e4,
+        .velocity_errors = {1, 0}},
+       [](T& t) { t.velocity_check_growth = 1.2; },
+       solved}};
+  for (const Case& row : table) {
+    EXPECT_EQ(judged(row.situation).verdict, row.situation.verdict) << row.situation.what;
+    CertificateThresholds changed;
+    row.change(changed);
+    EXPECT_EQ(judged(row.situation, changed).verdict, row.otherwise) << row.situation.what << ", changed";
+  }
+}
+
+TEST(Certificate, VelocitiesAreCheckedOnlyWhereTheStepMayEnd) {
+  Situation given{
+      .what = "", .checks = {{0, 1}, {10, 0.1}, {20, 0.01}}, .verdict = Verdict::go_on, .plain_sweeps = 1e4};
+  EXPECT_EQ(judged(given).velocity_checks, 0u);
+  given.checks.push_back({30, 1e-4});
+  EXPECT_EQ(judged(given).velocity_checks, 1u);
+}
+
+TEST(Certificate, AResidualThatHasFallenFarPromisesABalanceThatIsChecked) {
+  // At 100 sweeps velocities are 0.2 off; a residual a tenth of that then lets expect 0.02, within 0.05.
+  const Situation given{.what = "",
+                        .checks = {{0, 1}, {100, 1e-4}, {110, 1e-5}},
+                        .verdict = Verdict::solved,
+                        .plain_sweeps = 1e4,
+                        .velocity_errors = {0.2, 0.01}};
+  const Outcome outcome = judged(given);
+  EXPECT_EQ(outcome.velocity_checks, 2u);
+  EXPECT_EQ(outcome.verdict, Verdict::solved);
+}
+
+TEST(Certificate, ForgivesPlainSweepsWhatOtherSweepsMadeWorse) {
+  SolverSettings settings;
+  KnownProblem problem(10, {0});
+  for (const bool forgiven : {false, true}) {
+    Certificate certificate(settings);
+    certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
+    certificate.judge(sums_of({0, 1}, 1000), {.iterations = 0, .plain = false}, problem);
+    certificate.judge(sums_of({10, 2e3}, 1000), {.iterations = 10, .plain = false}, problem);
+    if (forgiven) certificate.forgive();
+    EXPECT_EQ(certificate.judge(sums_of({20, 2e3}, 1000), {.iterations = 20}, problem),
+              forgiven ? Verdict::go_on : Verdict::diverged);
+  }
+}
+
+TEST(Certificate, RoundingOfVelocitiesIsNoError) {
+  SolverSettings settings;
+  KnownProblem problem(10, {0});
+  Certificate certificate(settings);
+  certificate.begin({.rounding_velocity = 1e-12, .wall_pushes = {0}});
+  CheckSums sums = sums_of({0, 1e-16, 0}, 100);
+  sums.error.impulse2 = 0;
+  certificate.judge(sums, {.iterations = 0}, problem);
+  EXPECT_LT(certificate.result().error_rms, 1e-4);
+  EXPECT_GT(certificate.result().error_rms, 0);
+}
+
+TEST(Certificate, AStepIsCertifiedOnlyWithItsMomentumAndWithoutBodiesThatPassed) {
+  const SolverSettings settings;
+  IterationResult result;
+  result.converged = true;
+  const double tolerance = settings.balance_tolerance;
+  EXPECT_TRUE(certified(result, tolerance, 0, settings));
+  EXPECT_FALSE(certified(result, 1.01 * tolerance, 0, settings));
+  EXPECT_FALSE(certified(result, nan, 0, settings));
+  EXPECT_FALSE(certified(result, 0, 1, settings));
+  result.converged = false;
+  EXPECT_FALSE(certified(result, 0, 0, settings));
+}
+
+}  // namespace
+}  // namespace talus
