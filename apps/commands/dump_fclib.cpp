@@ -35,8 +35,7 @@ std::function<void()> fclib_dump(const Simulation& simulation, const std::filesy
                                     .chunks = state.chunks,
                                     .walls = state.walls,
                                     .wall_free = wall_free,
-                                    .mu_grains = parameters.law.mu_grains,
-                                    .mu_walls = parameters.law.mu_walls});
+                                    .laws = parameters.laws});
   io::FclibInfo info{
       .title =
           fmt::format("Talus {}, stage {}, step {}", io::version(), simulation.stage().name, report.step),

@@ -33,9 +33,9 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
   line("rotation in the sweeps", turning,
        turning               ? "tangential impulses subdomain_colour the grains"
        : parameters.friction ? "rotation = false"
-                             : "nothing subdomain_colours grains without friction");
+                             : "nothing turns grains without friction");
   line("free angular velocities", !state.free.w.empty(),
-       state.free.w.empty() ? "no grain subdomain_colours" : "24 bytes per grain");
+       state.free.w.empty() ? "no grain turns" : "24 bytes per grain");
   line("orientations", !state.bodies.orientation.empty(),
        state.bodies.orientation.empty() ? "spheres need none; not asked for"
                                         : "asked for: 32 bytes per grain");
@@ -45,7 +45,8 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
               : "no momentum, few candidates, or precision = \"double\"");
   line("gravity", parameters.gravity.norm() > 0,
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
-  line("restitution", parameters.law.restitution > 0, fmt::format("e = {:g}", parameters.law.restitution));
+  const double restitution = parameters.laws.largest(&PairLaw::restitution);
+  line("restitution", restitution > 0, fmt::format("e = {:g}", restitution));
   line("moving walls", driven + pressed > 0,
        fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
   line("gluing of wall copies", pressed > 0,

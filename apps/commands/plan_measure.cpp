@@ -91,11 +91,11 @@ class Forms {
 
   Setup friction(bool in) const {
     Setup setup = base_;
-    ContactLaw& law = setup.stages.front().law;
+    PairTable& laws = setup.stages.front().laws;
     if (!in)
-      law.mu_grains = law.mu_walls = 0;
-    else if (law.mu_grains == 0 && law.mu_walls == 0)
-      law.mu_grains = friction_put_in;
+      laws.set_all(&PairLaw::friction, 0);
+    else if (laws.largest(&PairLaw::friction) == 0)
+      laws.between(material_of_grains, material_of_grains).friction = friction_put_in;
     return setup;
   }
   Setup rotation(bool in) const {
@@ -121,10 +121,7 @@ class Forms {
     return setup;
   }
 
-  bool has_friction() const {
-    const ContactLaw& law = base_.stages.front().law;
-    return law.mu_grains > 0 || law.mu_walls > 0;
-  }
+  bool has_friction() const { return base_.stages.front().laws.largest(&PairLaw::friction) > 0; }
   bool has_rotation() const { return has_friction() && base_.rotation; }
   bool has_pushed_walls() const {
     return std::ranges::any_of(base_.walls, [](const Wall& wall) { return wall.load.pushed(); });

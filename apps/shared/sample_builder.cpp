@@ -27,7 +27,7 @@ std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<
 Sample make_sample(const io::Scene& scene) {
   const io::SampleSpec& spec = scene.sample;
   if (spec.kind == io::SampleSpec::Kind::bodies)
-    return io::read_bodies(spec.file, scene.density, scene.setup.rotation);
+    return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
 
   Sample sample;
   sample.density = scene.density;
@@ -52,7 +52,7 @@ void check(const io::Scene& scene, const Sample& sample) {
       refuse(fmt::format(
           "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg; mass and 1/mass must be "
           "positive and finite",
-          sample.radius[k], sample.density, m));
+          sample.radius[k], sample.density_of(k), m));
     if (!sample.velocity.empty() &&
         !std::ranges::all_of(sample.velocity[k], [](double v) { return std::isfinite(v); }))
       refuse("radius times angular velocity is not finite");
@@ -85,8 +85,19 @@ struct Overlaps {
 
 }  // namespace
 
+void put_materials(const io::Scene& scene, Sample& sample) {
+  if (scene.materials.empty()) return;
+  for (const io::MaterialSpec& material : scene.materials)
+    sample.material_density.push_back(material.density);
+  if (!sample.material.empty()) return;
+  const auto named = std::ranges::find(scene.materials, scene.sample.material, &io::MaterialSpec::name);
+  const auto of_all = named == scene.materials.end() ? 0 : named - scene.materials.begin();
+  sample.material.assign(sample.size(), static_cast<Material>(of_all));
+}
+
 Sample build_sample(const io::Scene& scene) {
   Sample sample = make_sample(scene);
+  put_materials(scene, sample);
   check(scene, sample);
   return sample;
 }

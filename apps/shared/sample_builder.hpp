@@ -12,6 +12,10 @@ namespace talus {
 /// is finite, std::invalid_argument when grains do not fit their base.
 Sample build_sample(const io::Scene& scene);
 
+/// Where materials have names: gives the grains that have none that of the scene's sample, and all their
+/// densities.
+void put_materials(const io::Scene& scene, Sample& sample);
+
 /// How many grains overlap others or walls (placed, io::place_walls) by more than a tenth of the smaller
 /// radius, the worst of them, and what to do; "" when none does.
 std::string describe_overlaps(const io::Scene& scene, const Sample& sample);

@@ -42,6 +42,9 @@ Sample grains_of(const Frame& frame, const io::Scene& scene) {
   sample.rotates = scene.setup.rotation;
   sample.x = frame.x;
   sample.radius = frame.radius;
+  for (const std::int64_t material : frame.material)
+    sample.material.push_back(static_cast<Material>(material));
+  put_materials(scene, sample);
   for (std::size_t k = 0; k < frame.x.size(); ++k) {
     sample.id.push_back(BodyId{frame.id[k]});
     const Vec3 spin = frame.omega.empty() ? Vec3(Vec3::Zero()) : Vec3(frame.radius[k] * frame.omega[k]);

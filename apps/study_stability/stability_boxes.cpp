@@ -84,7 +84,7 @@ Problem pressed_cube(double pressure, int subdomains) {
   constexpr int n = 4;
   const double edge = 2 * radius * n, force = pressure * edge * edge;
   Problem made = problem(natural_dt, {0, 0, -earth}, 0.35);
-  stage(made).law.mu_walls = 0;
+  stage(made).laws.between(material_of_grains, material_of_walls).friction = 0;
   made.setup.decomposition.subdomains = subdomains;
   fill_with_lattice(made, n);
   add_box(made, Vec3::Constant(edge));

@@ -163,7 +163,7 @@ Problem on_floor(double slope, double mu, const Vec3& u, const Vec3& w, int step
 /// approach, the next one stops.
 Problem impact(double ratio, double e) {
   Problem made = problem(natural_dt, Vec3::Zero(), 0.35);
-  stage(made).law.restitution = e;
+  stage(made).laws.set_all(&PairLaw::restitution, e);
   const double m = sphere_mass(radius);
   push(add_grain(made, {-0.999 * radius, 0, 0}, radius, m), {1, 0, 0});
   add_grain(made, {0.999 * radius, 0, 0}, radius, ratio * m);
@@ -237,7 +237,7 @@ Problem crowd(double correction) {
 /// Elastic grains fly about in a box: their energy stays.
 Problem gas() {
   Problem made = problem(natural_dt, Vec3::Zero(), 0);
-  stage(made).law.restitution = 1;
+  stage(made).laws.set_all(&PairLaw::restitution, 1);
   constexpr int n = 5;
   add_box(made, Vec3::Constant(4 * radius * n));
   const std::vector<double> speeds =

@@ -129,8 +129,8 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
   Simulation simulation(problem.setup, problem.bodies, executor);
   const Truth& truth = problem.truth;
   const double tolerance = problem.setup.solver.tolerance;
-  const bool energy_bounded =
-      simulation.stage().law.restitution == 0 && problem.setup.solver.overlap_correction == 0;
+  const bool energy_bounded = simulation.stage().laws.largest(&PairLaw::restitution) == 0 &&
+                              problem.setup.solver.overlap_correction == 0;
   EnergyLedger energy(simulation);
   const Frame at_start = simulation.frame(false);
   Frame before = at_start;

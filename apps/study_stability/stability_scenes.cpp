@@ -32,7 +32,7 @@ Problem problem(double time_step, const Vec3& gravity, double mu) {
   only.name = "all";
   only.time_step = time_step;
   only.gravity = gravity;
-  only.law.mu_grains = only.law.mu_walls = mu;
+  only.laws.set_all(&PairLaw::friction, mu);
   only.end.steps = std::numeric_limits<std::int64_t>::max();
   made.setup.stages.push_back(std::move(only));
   return made;

@@ -121,9 +121,9 @@ void add_nonsense(std::vector<Scene>& table) {
   add("nonsense-speed", "a velocity is infinite", [](Problem& p) { p.bodies.velocity[0].u[1] = infinity; });
   add("nonsense-gravity", "gravity is not a number", [](Problem& p) { stage(p).gravity[2] = nan; });
   add("nonsense-friction", "a friction coefficient is not a number",
-      [](Problem& p) { stage(p).law.mu_walls = nan; });
+      [](Problem& p) { stage(p).laws.between(material_of_grains, material_of_walls).friction = nan; });
   add("nonsense-friction-infinite", "a friction coefficient is infinite",
-      [](Problem& p) { stage(p).law.mu_walls = infinity; });
+      [](Problem& p) { stage(p).laws.between(material_of_grains, material_of_walls).friction = infinity; });
   add("nonsense-time-step", "the time step is 0", [](Problem& p) { stage(p).time_step = 0; });
   add("nonsense-time-step-infinite", "the time step is infinite",
       [](Problem& p) { stage(p).time_step = infinity; });

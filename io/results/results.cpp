@@ -148,13 +148,19 @@ class ArrayWriter {
   Rows rows_;
 };
 
-void write_bodies(const ArrayWriter& write, const Frame& part, bool omega, bool orientation) {
+/// Arrays that a frame may have, on any rank.
+struct OptionalArrays {
+  bool omega, orientation, material;
+};
+
+void write_bodies(const ArrayWriter& write, const Frame& part, const OptionalArrays& has) {
   write("id", "1", part.id);
   write("x", "m", part.x);
   write("radius", "m", part.radius);
   write("u", "m/s", part.u);
-  if (omega) write("omega", "rad/s", part.omega);
-  if (orientation) write("orientation", "1", part.orientation);
+  if (has.omega) write("omega", "rad/s", part.omega);
+  if (has.orientation) write("orientation", "1", part.orientation);
+  if (has.material) write("material", "1", part.material);
 }
 
 void write_contacts(const ArrayWriter& write, const Frame& part) {
@@ -196,6 +202,7 @@ void validate(const Frame& frame) {
   demand_same_length(frame.u.size(), bodies, "u");
   if (!frame.omega.empty()) demand_same_length(frame.omega.size(), bodies, "omega");
   if (!frame.orientation.empty()) demand_same_length(frame.orientation.size(), bodies, "orientation");
+  if (!frame.material.empty()) demand_same_length(frame.material.size(), bodies, "material");
   const std::size_t contacts = frame.contact_bodies.size();
   demand_same_length(frame.contact_point.size(), contacts, "contact_point");
   demand_same_length(frame.contact_normal.size(), contacts, "contact_normal");
@@ -237,6 +244,9 @@ ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vecto
   ranks.max(there);
 }
 
+/// Numbers that a rank tells of its part of a frame.
+constexpr std::size_t row_counts = 5;
+
 void ResultsWriter::append(const Frame& part) {
   validate(part);
   demand_same_length(part.walls.size(), wall_names_.size(), "walls");
@@ -247,9 +257,9 @@ void ResultsWriter::append(const Frame& part) {
     }
   }
   // Rows of each rank, and whether they have the optional arrays: a rank may have no body.
-  const std::int64_t own[4] = {static_cast<std::int64_t>(part.id.size()),
-                               static_cast<std::int64_t>(part.contact_bodies.size()), !part.omega.empty(),
-                               !part.orientation.empty()};
+  const std::int64_t own[row_counts] = {
+      static_cast<std::int64_t>(part.id.size()), static_cast<std::int64_t>(part.contact_bodies.size()),
+      !part.omega.empty(), !part.orientation.empty(), !part.material.empty()};
   const std::vector<std::int64_t> rows = ranks_.gather_records(std::span<const std::int64_t>(own));
   append_here(part, rows);
   ++frames_;
@@ -259,15 +269,15 @@ void ResultsWriter::append_here(const Frame& part, std::span<const std::int64_t>
   const Sharing sharing{ranks_, way_};
   const auto rows_of = [&](std::size_t column) {
     Rows result{0, 0};
-    for (std::size_t r = 0; 4 * r < rows.size(); ++r) {
+    for (std::size_t r = 0; row_counts * r < rows.size(); ++r) {
       if (r == static_cast<std::size_t>(ranks_.rank())) result.begin = result.all;
-      result.all += static_cast<std::size_t>(rows[4 * r + column]);
+      result.all += static_cast<std::size_t>(rows[row_counts * r + column]);
     }
     return result;
   };
   const auto write_frame = [&](const auto& group) {
-    const bool omega = rows_of(2).all > 0, orientation = rows_of(3).all > 0;
-    write_bodies(ArrayWriter(sharing, group("bodies"), rows_of(0)), part, omega, orientation);
+    const OptionalArrays has{rows_of(2).all > 0, rows_of(3).all > 0, rows_of(4).all > 0};
+    write_bodies(ArrayWriter(sharing, group("bodies"), rows_of(0)), part, has);
     write_contacts(ArrayWriter(sharing, group("contacts"), rows_of(1)), part);
     write_walls(sharing, group("walls"), part);
   };

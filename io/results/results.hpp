@@ -5,7 +5,7 @@
 ///   /walls/name                  names, in the order of the setup
 ///   /frames/000000               attributes step, time, stage
 ///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3]; where computed omega [n,3] and
-///                                orientation [n,4]
+///                                orientation [n,4]; where materials have names, material [n]
 ///   /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force [m,3]
 ///   /frames/000000/walls         position [w], velocity [w], force [w,3]
 ///
@@ -26,8 +26,8 @@
 
 namespace talus::io {
 
-/// Throws std::invalid_argument naming the array whose length does not fit the others; `omega` and
-/// `orientation` may be empty.
+/// Throws std::invalid_argument naming the array whose length does not fit the others; `omega`,
+/// `orientation` and `material` may be empty.
 void validate(const Frame& frame);
 
 /// How several ranks write one file.

@@ -76,6 +76,8 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   if (H5Lexists(h, "bodies/orientation", H5P_DEFAULT) > 0) {
     frame.orientation = read_doubles<std::array<double, 4>>(h, name, "bodies/orientation");
   }
+  if (H5Lexists(h, "bodies/material", H5P_DEFAULT) > 0)
+    frame.material = read_integers<std::int64_t>(h, name, "bodies/material");
   frame.contact_bodies = read_integers<std::array<std::int64_t, 2>>(h, name, "contacts/bodies");
   frame.contact_point = read_doubles<Vec3>(h, name, "contacts/point");
   frame.contact_normal = read_doubles<Vec3>(h, name, "contacts/normal");

@@ -241,6 +241,7 @@ void write_grains_vtp(const Frame& part, const graph::Communicator& ranks, const
   file.floats("velocity", 3, floats(part.u));
   if (file.any(!part.omega.empty())) file.floats("omega", 3, floats(part.omega));
   if (file.any(!part.orientation.empty())) file.floats("orientation", 4, floats(part.orientation));
+  if (file.any(!part.material.empty())) file.integers("material", part.material);
   for (const GrainField& field : fields)
     file.array("Int32", field.name, 1, std::vector<std::int32_t>(field.values.begin(), field.values.end()));
   file.text("</PointData>\n");

@@ -1,5 +1,6 @@
 #include "io/scene/bodies_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -26,8 +27,10 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Fields of a line, at most one more than there are columns: enough to see that there are too many.
-std::size_t split(std::string_view line, std::array<std::string_view, columns.size() + 1>& fields) {
+/// Fields of a line, at most one more than there can be: enough to see that there are too many.
+using Fields = std::array<std::string_view, columns.size() + 2>;
+
+std::size_t split(std::string_view line, Fields& fields) {
   std::size_t count = 0;
   while (count < fields.size()) {
     const std::size_t comma = line.find(',');
@@ -63,29 +66,46 @@ Number number(std::string_view field, std::string_view column, const Place& plac
   return value;
 }
 
-/// Number of columns that the header announces.
-std::size_t read_header(std::string_view line, const Place& place) {
-  std::array<std::string_view, columns.size() + 1> fields;
-  const std::size_t count = split(line, fields);
+/// Columns that the header announces.
+struct Header {
+  std::size_t numbers = 0;
+  bool material = false;  ///< as the last one
+  std::size_t count() const { return numbers + (material ? 1 : 0); }
+};
+
+Header read_header(std::string_view line, const Place& place) {
+  Fields fields;
+  std::size_t count = split(line, fields);
+  const bool material = count > 0 && count <= columns.size() + 1 && fields[count - 1] == "material";
+  if (material) --count;
   bool known = count == 5 || count == 8 || count == 11;
   for (std::size_t k = 0; known && k < count; ++k) known = fields[k] == columns[k];
   if (!known)
-    place.fail("",
-               fmt::format("the first line must be id,x,y,z,radius[,vx,vy,vz[,wx,wy,wz]], got '{}'", line));
-  return count;
+    place.fail(
+        "", fmt::format("the first line must be id,x,y,z,radius[,vx,vy,vz[,wx,wy,wz]][,material], got '{}'",
+                        line));
+  return {count, material};
+}
+
+Material material_named(std::string_view name, std::span<const MaterialSpec> materials, const Place& place) {
+  const auto found = std::ranges::find(materials, name, &MaterialSpec::name);
+  if (found == materials.end())
+    place.fail("material", fmt::format("no [[material]] of the scene is named '{}'", name));
+  return static_cast<Material>(found - materials.begin());
 }
 
 }  // namespace
 
-Sample read_bodies(const std::string& path, double density, bool rotates) {
+Sample read_bodies(const std::string& path, double density, bool rotates,
+                   std::span<const MaterialSpec> materials) {
   std::ifstream in(path);
   if (!in) throw SceneError(path, 0, "", "cannot open the file of bodies");
   Sample sample;
   sample.density = density;
   sample.rotates = rotates;
   std::unordered_map<std::int64_t, int> line_of_id;
-  std::array<std::string_view, columns.size() + 1> fields;
-  std::size_t count = 0;
+  Fields fields;
+  Header header;
   Place place{path, 0};
   for (std::string text; std::getline(in, text);) {
     ++place.line;
@@ -94,13 +114,15 @@ Sample read_bodies(const std::string& path, double density, bool rotates) {
     if (place.line == 1 && text.starts_with(mark)) text.erase(0, mark.size());
     const std::string_view line = trimmed(text);
     if (line.empty() || line.front() == '#') continue;
-    if (count == 0) {
-      count = read_header(line, place);
+    if (header.numbers == 0) {
+      header = read_header(line, place);
       continue;
     }
-    if (const std::size_t found = split(line, fields); found != count)
-      place.fail("", fmt::format("{} fields expected as in the header, got {}{}", count,
-                                 found > count ? "more than " : "", found > count ? count : found));
+    const std::size_t count = header.numbers;
+    if (const std::size_t found = split(line, fields); found != header.count())
+      place.fail("",
+                 fmt::format("{} fields expected as in the header, got {}{}", header.count(),
+                             found > header.count() ? "more than " : "", std::min(found, header.count())));
     const auto id = number<std::int64_t>(fields[0], columns[0], place);
     if (id < 0) place.fail("id", fmt::format("must be >= 0, got {}", id));
     if (const auto [first, inserted] = line_of_id.emplace(id, place.line); !inserted)
@@ -112,6 +134,7 @@ Sample read_bodies(const std::string& path, double density, bool rotates) {
     sample.id.push_back(BodyId{id});
     sample.x.emplace_back(value[1], value[2], value[3]);
     sample.radius.push_back(radius);
+    if (header.material) sample.material.push_back(material_named(fields[count], materials, place));
     if (count > 5)  // columns that the header lacks are 0
       sample.velocity.push_back(
           {value[5], value[6], value[7], radius * value[8], radius * value[9], radius * value[10]});

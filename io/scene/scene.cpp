@@ -9,6 +9,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "io/scene/detail/material_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
 #include "io/scene/detail/shape_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
@@ -31,11 +32,12 @@ class SceneReader {
   }
 
   Scene read() && {
-    read_table(root_, "", keys_.top,
-               {"material", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
-               scene_);
+    read_table(
+        root_, "", keys_.top,
+        {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
+        scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
-    read_table(table_at(root_, "material"), "material", keys_.material, {}, scene_);
+    read_materials(root_, scene_);
     read_sample();
     read_walls();
     read_stages();
@@ -62,40 +64,13 @@ class SceneReader {
     if (!node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
     return *node->as_table();
   }
-  static bool required_keys(const std::string& name) { return name == "material" || name == "sample"; }
-
-  /// Names of walls and stages stand in columns of CSV files, in paths and in overrides.
-  static bool may_be_in_name(char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) || c == '+' || c == '-' || c == '_';
-  }
-
-  static void check_name(const toml::table& table, const std::string& path, const std::string& name) {
-    if (name.empty() || !std::all_of(name.begin(), name.end(), may_be_in_name))
-      fail_at(*table.get("name"), joined(path, "name"),
-              fmt::format("must be made of letters, digits, +, - and _, got '{}'", name));
-  }
-
-  /// The elements of an array of tables; none when it is left out.
-  static std::vector<const toml::table*> tables_at(const toml::table& parent, const std::string& name,
-                                                   const std::string& path) {
-    const toml::node* node = parent.get(name);
-    if (!node) return {};
-    const toml::array* array = node->as_array();
-    if (!array)
-      fail_at(*node, path,
-              fmt::format("must be an array of tables: write [[{}]]", name == "load" ? "stage.load" : name));
-    std::vector<const toml::table*> tables;
-    for (const toml::node& element : *array) {
-      if (!element.is_table()) fail_at(element, path, "must hold tables only");
-      tables.push_back(element.as_table());
-    }
-    return tables;
-  }
+  static bool required_keys(const std::string& name) { return name == "sample"; }
 
   void read_sample() {
     SampleSpec& sample = scene_.sample;
     const toml::table& table = table_at(root_, "sample");
     read_table(table, "sample", keys_.sample, {}, sample);
+    read_material(table, "sample", scene_, material_of_grains);
     const bool on_base = sample.count > 0 && sample.base[0] > 0;
     const bool by_cells = sample.cells[0] > 0;
     if (sample.kind == SampleSpec::Kind::deposition && !on_base)
@@ -128,6 +103,8 @@ class SceneReader {
 
   void read_walls() {
     std::vector<Wall>& walls = scene_.setup.walls;
+    if (!scene_.materials.empty())
+      for (Wall& wall : walls) wall.material = 0;
     std::vector<const toml::table*> place(walls.size(), nullptr);  // of the walls of the box: none yet
     for (const toml::table* table : tables_at(root_, "wall", "wall")) {
       const std::string path = fmt::format("wall[{}]", count_++);
@@ -165,6 +142,7 @@ class SceneReader {
       fail_at(*table.get("point"), path + ".point", "give position or point, not both");
     refuse_load(table, path, table["shape"].value_or(std::string("plane")));
     read_table(table, path, keys_.wall, {}, wall);
+    wall.material = read_material(table, path, scene_, material_of_walls);
     check_name(table, path, wall.name);
     if (wall.shape.name != "plane") {
       read_shape(table, path, wall);
@@ -225,7 +203,11 @@ class SceneReader {
       const std::size_t index = scene_.setup.stages.size();
       const std::string path = fmt::format("stage[{}]", index);
       Stage stage = scene_.common;
-      read_table(*table, path, keys_.stage, {"end", "load"}, stage);
+      if (!scene_.materials.empty() && table->get("wall_friction"))
+        fail_at(*table->get("wall_friction"), path + ".wall_friction",
+                "walls have materials of their own here: give friction in a [[stage.pair]]");
+      read_table(*table, path, keys_.stage, {"end", "load", "pair"}, stage);
+      read_stage_pairs(*table, path, scene_, stage);
       check_name(*table, path, stage.name);
       for (const Stage& earlier : scene_.setup.stages)
         if (earlier.name == stage.name)

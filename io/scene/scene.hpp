@@ -1,7 +1,7 @@
 #pragma once
 
 /// Scene files: what a simulation is made of, as a user writes it (docs/scenes.md). One table of keys,
-/// io/scene/detail/scene_keys.cpp, is behind reading, checking, writing and the reference page.
+/// io/scene/detail/scene_keys.hpp, is behind reading, checking, writing and the reference page.
 
 #include <array>
 #include <cstdint>
@@ -33,7 +33,8 @@ struct SampleSpec {
   std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given by `count` and `base`
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
   SizeDistribution radii;
-  std::string file;  ///< absolute path
+  std::string file;      ///< absolute path
+  std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names
 
   /// Grains of a deposition or a lattice.
   std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
@@ -51,12 +52,34 @@ struct OutputSpec {
   std::set<std::string> sinks = default_sinks();
 };
 
+/// A [[material]].
+struct MaterialSpec {
+  std::string name;
+  double density = 0;  ///< [kg/m^3]
+};
+
+/// A [[pair]]: what is said of the contacts between two materials.
+struct PairSpec {
+  std::string material, with;  ///< names
+  std::optional<double> friction = {};
+  std::optional<double> restitution = {};
+};
+
+/// A number of a PairLaw, and where a PairSpec has it.
+struct PairNumber {
+  std::optional<double> PairSpec::*given;
+  double PairLaw::*held;
+};
+inline constexpr std::array pair_numbers = {PairNumber{&PairSpec::friction, &PairLaw::friction},
+                                            PairNumber{&PairSpec::restitution, &PairLaw::restitution}};
+
 /// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said
 /// there.
 struct Scene {
   std::string name;
   std::string description;
-  double density = 0;  ///< [kg/m^3]
+  double density = 0;                   ///< [kg/m^3] of the only material; 0 where materials have names
+  std::vector<MaterialSpec> materials;  ///< by name; empty with [material]
   SampleSpec sample;
   Stage common;  ///< time_step, gravity and law of the stages that give none themselves; its other fields are
                  ///< not used

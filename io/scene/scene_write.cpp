@@ -1,3 +1,6 @@
+#include <set>
+
+#include "io/scene/detail/material_keys.hpp"
 #include "io/scene/detail/scene_keys.hpp"
 #include "io/scene/detail/scene_text.hpp"
 #include "io/scene/scene.hpp"
@@ -10,14 +13,23 @@ using namespace detail;
 
 /// The section of one part, every key that applies and holds something on a line of its own, with its unit.
 template <class Part>
-void write_section(std::string& out, const Section<Part>& section, const Part& part) {
+void write_section(std::string& out, const Section<Part>& section, const Part& part,
+                   const std::set<std::string>& left_out = {}) {
   if (!section.header.empty()) out += "\n" + section.header + "\n";
   for (const Key<Part>& key : section.keys) {
-    if (key.applies && !key.applies(part)) continue;
+    if ((key.applies && !key.applies(part)) || left_out.contains(key.name)) continue;
     const std::string text = text_of(key, part);
     if (text.empty()) continue;
     out += fmt::format("{} = {}{}\n", key.name, text, key.unit.empty() ? "" : "  # " + key.unit);
   }
+}
+
+void write_materials(std::string& out, const Scene& scene) {
+  const SceneKeys& keys = scene_keys();
+  if (scene.materials.empty()) return write_section(out, keys.material, scene);
+  for (const MaterialSpec& material : scene.materials) write_section(out, keys.named_material, material);
+  for (const PairSpec& pair : pairs_of(scene.common.laws, scene.materials))
+    write_section(out, keys.pair, pair);
 }
 
 }  // namespace
@@ -26,17 +38,26 @@ std::string resolved_scene(const Scene& scene) {
   const SceneKeys& keys = scene_keys();
   std::string out;
   write_section(out, keys.top, scene);
-  write_section(out, keys.material, scene);
+  write_materials(out, scene);
   write_section(out, keys.sample, scene.sample);
   write_section(out, keys.detection, scene.setup.detection);
   write_section(out, keys.solver, scene.setup.solver);
   write_section(out, keys.decomposition, scene.setup.decomposition);
   write_section(out, keys.output, scene.output);
-  for (const Wall& wall : scene.setup.walls) write_section(out, keys.wall, wall);
+  const bool named = !scene.materials.empty();
+  for (const Wall& wall : scene.setup.walls) {
+    write_section(out, keys.wall, wall);
+    if (named) out += fmt::format("material = \"{}\"\n", scene.materials[wall.material].name);
+  }
+  std::set<std::string> left_out;
+  if (named)
+    for (const Key<Stage>& key : stage_law_keys()) left_out.insert(key.name);
   for (const Stage& stage : scene.setup.stages) {
-    write_section(out, keys.stage, stage);
+    write_section(out, keys.stage, stage, left_out);
     write_section(out, keys.stage_end, stage.end);
     for (const NamedLoad& load : stage.loads) write_section(out, keys.stage_load, load);
+    for (const PairSpec& pair : pairs_of(stage.laws, scene.materials))
+      write_section(out, keys.stage_pair, pair);
   }
   return out;
 }

@@ -64,6 +64,7 @@ void reorder(Bodies& bodies, std::span<const Slot> order) {
   permute(bodies.radius, order);
   permute(bodies.velocity, order);
   permute(bodies.orientation, order);
+  permute(bodies.material, order);
 }
 
 std::vector<Slot> morton_order(const Bodies& bodies) {
@@ -94,7 +95,8 @@ std::vector<Slot> morton_order(const Bodies& bodies) {
 void validate(const Bodies& bodies) {
   const std::size_t n = bodies.size();
   if (bodies.x.size() != n || bodies.radius.size() != n || bodies.velocity.size() != n ||
-      (!bodies.orientation.empty() && bodies.orientation.size() != n))
+      (!bodies.orientation.empty() && bodies.orientation.size() != n) ||
+      (!bodies.material.empty() && bodies.material.size() != n))
     throw std::invalid_argument("the arrays of the bodies differ in length");
   for (std::size_t k = 0; k < n; ++k) {
     const Velocity& v = bodies.velocity[k];

@@ -26,13 +26,14 @@ using SingleVelocity = VelocityOf<float>;  ///< mobilities in other units: singl
 static_assert(sizeof(Velocity) == 64 && sizeof(SingleVelocity) == 32);
 
 /// The spheres of this process, one entry per slot. All arrays have the same length, except `orientation`,
-/// which is empty unless the scene asks for orientations.
+/// which is empty unless the scene asks for orientations, and `material`, unless it names materials.
 struct Bodies {
   std::vector<BodyId> id;
   std::vector<Vec3> x;                             ///< centre [m]
   std::vector<double> radius;                      ///< [m]
   std::vector<Velocity> velocity;                  ///< V, end of the last step or iterate of this one
   std::vector<std::array<double, 4>> orientation;  ///< unit quaternion (w, x, y, z) or empty
+  std::vector<Material> material;                  ///< empty: all are material_of_grains
 
   std::size_t size() const { return id.size(); }
   double mass(std::size_t slot) const {
@@ -43,8 +44,8 @@ struct Bodies {
 /// Mass of a solid sphere [kg].
 double sphere_mass(double radius, double density);
 
-/// Appends a solid sphere at rest. radius > 0 [m], density > 0 [kg/m^3]; with `rotates` false its spin
-/// mobility is 0.
+/// Appends a solid sphere at rest; its material, where bodies have one, is left to the caller. radius > 0
+/// [m], density > 0 [kg/m^3]; with `rotates` false its spin mobility is 0.
 void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, double density,
                 bool rotates = true);
 

@@ -23,4 +23,11 @@ using Slot = std::int32_t;
 /// whole body.
 using Multiplicities = std::span<const std::uint16_t>;
 
+/// Number of a material in its scene.
+using Material = std::uint8_t;
+inline constexpr std::size_t most_materials = 255;
+
+/// The materials of a scene that names none: its grains, and its walls.
+inline constexpr Material material_of_grains = 0, material_of_walls = 1;
+
 }  // namespace talus

@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "kernels/detection/materials.hpp"
+
 namespace talus {
 namespace {
 
@@ -72,7 +74,7 @@ StepProblem assemble_step(const StepView& step) {
         of_wall[static_cast<std::size_t>(wall)].push_back({contact, -axes, Mat3::Zero()});
       }
       q.insert(q.end(), {v[0], v[1], v[2]});
-      mu.push_back(wall < 0 ? step.mu_grains : step.mu_walls);
+      mu.push_back(friction_of(step.laws, step.chunks, chunk, c, k));
       const Vec3 r =
           c.rn.empty() ? Vec3(axes.transpose() * Vec3(c.rx[k], c.ry[k], c.rz[k])) : Vec3(c.rn[k], 0, 0);
       result.r.insert(result.r.end(), {r[0], r[1], r[2]});

@@ -6,6 +6,7 @@
 #include "kernels/bodies/motion.hpp"
 #include "kernels/delassus/delassus.hpp"
 #include "kernels/detection/contacts.hpp"
+#include "kernels/law/pair_table.hpp"
 #include "kernels/shapes/walls.hpp"
 
 namespace talus {
@@ -18,7 +19,7 @@ struct StepView {
   const Chunks& chunks;              ///< which of the contacts' rooms are filled, and which are at walls
   std::span<const Wall> walls;       ///< mass and normal of pushed walls
   std::span<const Vec3> wall_free;   ///< per wall: velocity without contacts [m/s]
-  double mu_grains, mu_walls;
+  const PairTable& laws;
 };
 
 struct StepProblem {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels/detection/wall_pairs.hpp"
+#include "kernels/law/pair_table.hpp"
 
 namespace talus {
 
@@ -26,6 +27,8 @@ void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
       chunks.wall.push_back(group.wall);
       chunks.subdomain.push_back(group.subdomain);
       chunks.side.push_back(group.side);
+      chunks.law.push_back(static_cast<std::int32_t>(
+          PairTable::number(material_of_grains, group.wall < 0 ? material_of_grains : material_of_walls)));
     }
   }
   chunks.begin.push_back(groups.empty() ? 0 : groups.back().end);
@@ -309,9 +312,9 @@ std::size_t memory_used(const Candidates& candidates) {
 
 std::size_t memory_used(const Chunks& chunks) {
   return (chunks.begin.capacity() + chunks.wall.capacity() + chunks.subdomain.capacity() +
-          chunks.colour.capacity() + chunks.body_begin.capacity() + chunks.bodies.capacity() +
-          chunks.owned_begin.capacity() + chunks.owned.capacity() + chunks.untouched.capacity() +
-          chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
+          chunks.law.capacity() + chunks.colour.capacity() + chunks.body_begin.capacity() +
+          chunks.bodies.capacity() + chunks.owned_begin.capacity() + chunks.owned.capacity() +
+          chunks.untouched.capacity() + chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
              4 +
          (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.side.capacity();
 }

@@ -58,6 +58,9 @@ inline constexpr int longest_chunk = 1000;
 /// So that 32 bits tell where the record of a body begins (record_of).
 inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
+/// The candidates of a chunk are of several pairs of materials.
+inline constexpr std::int32_t mixed_laws = -1;
+
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
 /// neither grains and walls nor two walls. Those of a side have colours above those of the sides before it.
 /// Two chunks conflict when they share a grain, and then differ in colour: the sweep's result depends on
@@ -68,7 +71,9 @@ struct Chunks {
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
   std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
   std::vector<ChunkSide> side;          ///< per chunk: that of its group
-  std::vector<std::int32_t> colour;     ///< per chunk
+  std::vector<std::int32_t> law;     ///< per chunk: number of the law of all its candidates (PairTable), or
+                                     ///< mixed_laws (note_laws)
+  std::vector<std::int32_t> colour;  ///< per chunk
   int colours = 0;
   std::vector<std::int32_t> body_begin;  ///< chunks + 1 offsets into `bodies`
   std::vector<Slot> bodies;              ///< the grains that a chunk touches, in order of first use
@@ -88,7 +93,8 @@ struct Chunks {
 
 /// Cuts the groups into chunks, colours them greedily in order, and lists who resets which body: nobody those
 /// that are `taken` (per body, or empty), whose velocities come from elsewhere before a chunk writes them.
-/// Throws std::runtime_error when there are more than most_bodies_of_a_process.
+/// Laws are those of a scene that names no materials, until note_laws. Throws std::runtime_error when there
+/// are more than most_bodies_of_a_process.
 Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies,
                   std::span<const char> taken = {});
 

@@ -23,6 +23,8 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
     values->resize(friction ? n : 0);
     if (!friction) values->shrink_to_fit();
   }
+  const bool mixed = std::ranges::find(chunks.law, mixed_laws) != chunks.law.end();
+  contacts.mu.resize(friction && mixed ? n : 0);
   contacts.rn.resize(friction ? 0 : n);
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
@@ -107,7 +109,7 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
 std::size_t memory_used(const Contacts& contacts) {
   std::size_t bytes = 0;
   for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
-                             &contacts.ry, &contacts.rz, &contacts.rn})
+                             &contacts.ry, &contacts.rz, &contacts.rn, &contacts.mu})
     bytes += values->capacity() * sizeof(double);
   return bytes +
          (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +

@@ -24,10 +24,11 @@ inline std::uint32_t record_of(Slot slot) {
 /// group, so that a group can be swept at once. Behind them, between grains, stand the candidates that are
 /// no contacts, so that the next step finds all of them where they were (kernels/detection/narrow_phase.hpp).
 struct Contacts {
-  std::vector<double> nx, ny, nz;   ///< normal, unit, from the second body (or the wall) to the first
-  std::vector<double> bias;         ///< b [m/s]: Signorini holds for v_n + b
-  std::vector<double> rx, ry, rz;   ///< impulse on the first body [N s]; empty without friction
-  std::vector<double> rn;           ///< normal impulse [N s]; empty with friction
+  std::vector<double> nx, ny, nz;  ///< normal, unit, from the second body (or the wall) to the first
+  std::vector<double> bias;        ///< b [m/s]: Signorini holds for v_n + b
+  std::vector<double> rx, ry, rz;  ///< impulse on the first body [N s]; empty without friction
+  std::vector<double> rn;          ///< normal impulse [N s]; empty with friction
+  std::vector<double> mu;  ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Slot> first, second;  ///< second is -1 - feature at a wall: -1 at a plane
   /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.
   std::vector<std::uint32_t> first_record, second_record;
@@ -45,6 +46,7 @@ struct SingleContacts {
   std::vector<float> bias;        ///< b [m/s]
   std::vector<float> rx, ry, rz;  ///< impulse on the first body over `unit` [m/s]; empty without friction
   std::vector<float> rn;          ///< normal impulse over `unit` [m/s]; empty with friction
+  std::vector<float> mu;          ///< as in Contacts
 };
 
 /// Room for the contacts of `chunks`, of which there are none yet: the candidates stand in their order, with

@@ -4,6 +4,7 @@
 
 #include "kernels/detection/detail/contact_groups.hpp"
 #include "kernels/detection/detail/gap_kernels.hpp"
+#include "kernels/detection/materials.hpp"
 #include "kernels/law/gap_law.hpp"
 #include "kernels/simd/contact_view.hpp"
 
@@ -60,14 +61,45 @@ FindGaps kernel_of(InstructionSet set) {
   return set == InstructionSet::avx2 ? gap_kernels_avx2 : gap_kernels_avx512;
 }
 
-void narrow_grains(const NarrowPhase& in, const GapRule& rule, const Chunks& chunks, std::size_t chunk,
-                   InstructionSet set, Contacts& contacts) {
+MaterialView materials_of(const NarrowPhase& in) {
+  return {in.material, in.walls};
+}
+
+/// What the narrow phase of one chunk goes by.
+struct ChunkPhase {
+  const NarrowPhase& in;
+  GapRule rule;
+  const Candidates& candidates;
+  const Chunks& chunks;
+  std::size_t chunk;
+};
+
+/// Restitution of each pair of a chunk that mixes laws, in the places of `contacts`; of others empty.
+std::vector<double> own_restitution(const ChunkPhase& phase, const Slot* first, const Slot* second) {
+  std::vector<double> own;
+  const Chunks& chunks = phase.chunks;
+  if (chunks.law[phase.chunk] != mixed_laws) return own;
+  const MaterialView materials = materials_of(phase.in);
+  for (std::size_t k = 0; k < index(chunks.begin[phase.chunk + 1] - chunks.begin[phase.chunk]); ++k)
+    own.push_back(phase.in.laws.laws()[materials.law(GrainPair{first[k], second[k]})].restitution);
+  return own;
+}
+
+void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contacts) {
+  const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
   Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
-  const PairView pairs{
-      in.x.data()->data(), in.radius.data(), in.velocity.data()->u, first, second, count, in.domain};
+  const std::vector<double> restitution = own_restitution(phase, first, second);
+  const PairView pairs{in.x.data()->data(),
+                       in.radius.data(),
+                       in.velocity.data()->u,
+                       first,
+                       second,
+                       count,
+                       restitution.empty() ? nullptr : restitution.data(),
+                       in.domain};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
   const bool far = kernel_of(set)(pairs, rule, target);
@@ -86,21 +118,27 @@ void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Cont
     *size++ = static_cast<std::uint8_t>(std::min(group_size, end - k));
 }
 
+/// Restitution of a grain at a wall.
+double restitution_at(const ChunkPhase& phase, const WallPair& pair) {
+  return phase.in.laws.laws()[materials_of(phase.in).law(pair)].restitution;
+}
+
 /// At a plane.
-void narrow_wall(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
-                 const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
+  const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
   const Wall& wall = in.walls[index(chunks.wall[chunk])];
   const double fall = wall.normal.dot(in.time_step * in.gravity - wall.gain);
   std::int32_t through = 0;
   std::size_t at = begin;
   for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
-    const Slot body = candidates.wall_pairs[k - grains].body;
+    const WallPair& pair = candidates.wall_pairs[k - grains];
+    const Slot body = pair.body;
     const std::size_t i = index(body);
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
-    const GapResult<double> found = solve_gap(rule, gap, v_n, v_n + fall);
+    const GapResult<double> found = solve_gap(rule, gap, v_n, v_n + fall, restitution_at(phase, pair));
     if (found.absent) continue;
     contacts.bias[at] = found.bias;
     contacts.nx[at] = wall.normal[0];
@@ -127,15 +165,16 @@ bool passed_surface(const Surface& surface, const Vec3& x, const Vec3& way, doub
 }
 
 /// At a surface: a chunk has each grain once, with one of the features that it may touch.
-void narrow_surface(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
-                    const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
+  const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
   const Surface& surface = *in.walls[index(chunks.wall[chunk])].surface();
   std::int32_t through = 0;
   std::size_t at = begin;
   std::vector<SurfacePoint> points;
   for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
-    const auto [wall, body, feature] = candidates.wall_pairs[k - grains];
+    const WallPair& pair = candidates.wall_pairs[k - grains];
+    const auto [wall, body, feature] = pair;
     const std::size_t i = index(body);
     const Vec3 v = Eigen::Map<const Vec3>(in.velocity[i].u), free = v + in.time_step * in.gravity;
     points.clear();
@@ -143,8 +182,8 @@ void narrow_surface(const NarrowPhase& in, const GapRule& rule, const Candidates
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
     through += passed_surface(surface, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
-    const GapResult<double> found =
-        solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v), point->normal.dot(free));
+    const GapResult<double> found = solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v),
+                                              point->normal.dot(free), restitution_at(phase, pair));
     if (found.absent) continue;
     contacts.bias[at] = found.bias;
     contacts.nx[at] = point->normal[0];
@@ -163,14 +202,21 @@ void narrow_surface(const NarrowPhase& in, const GapRule& rule, const Candidates
 
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, InstructionSet set, Contacts& contacts) {
-  const GapRule rule{in.time_step, in.alert, in.restitution, in.overlap_correction,
-                     2 * in.time_step * in.gravity.norm()};
+  const std::int32_t law = chunks.law[chunk];
+  const double restitution = law == mixed_laws ? 0 : in.laws.laws()[index(law)].restitution;
+  const ChunkPhase phase{
+      in,
+      {in.time_step, in.alert, restitution, in.overlap_correction, 2 * in.time_step * in.gravity.norm()},
+      candidates,
+      chunks,
+      chunk};
   if (chunks.wall[chunk] < 0)
-    narrow_grains(in, rule, chunks, chunk, set, contacts);
+    narrow_grains(phase, set, contacts);
   else if (in.walls[index(chunks.wall[chunk])].surface() == nullptr)
-    narrow_wall(in, rule, candidates, chunks, chunk, contacts);
+    narrow_wall(phase, contacts);
   else
-    narrow_surface(in, rule, candidates, chunks, chunk, contacts);
+    narrow_surface(phase, contacts);
+  set_friction(candidates, chunks, chunk, materials_of(in), in.laws, contacts);
   restore_impulses(candidates, chunks, chunk, contacts);
 }
 

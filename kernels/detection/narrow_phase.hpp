@@ -4,6 +4,7 @@
 
 #include "kernels/detection/contacts.hpp"
 #include "kernels/detection/domain.hpp"
+#include "kernels/law/pair_table.hpp"
 #include "kernels/simd/instruction_set.hpp"
 
 namespace talus {
@@ -17,9 +18,10 @@ struct NarrowPhase {
   std::span<const Wall> walls;         ///< points at the middle of the step
   double time_step;                    ///< h [s]
   double alert;                        ///< [m]
-  double restitution;                  ///< e in [0, 1]
-  Vec3 gravity;                        ///< [m/s^2]
-  double overlap_correction = 0;       ///< in [0, 1]
+  PairTable laws;
+  Vec3 gravity;                             ///< [m/s^2]
+  double overlap_correction = 0;            ///< in [0, 1]
+  std::span<const Material> material = {};  ///< of the bodies; empty: material_of_grains
   [[no_unique_address]] Domain domain = {};
 };
 

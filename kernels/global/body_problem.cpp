@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
 
 namespace talus {
@@ -120,7 +121,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     ContactEquation contact;
     contact.normal = contact_normal(contacts, k);
     contact.offset = contacts.bias[k] * contact.normal;
-    contact.mu = contacts.rn.empty() ? (w < 0 ? source.mu_grains : source.mu_walls) : 0;
+    contact.mu = friction_of(source.laws, source.chunks, c, contacts, k);
     contact.first = pair[0];
     contact.second = pair[1];
     if (w >= 0) {

@@ -17,6 +17,7 @@
 #include "kernels/bodies/motion.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/contacts.hpp"
+#include "kernels/law/pair_table.hpp"
 
 namespace talus {
 
@@ -95,8 +96,7 @@ struct BodyProblemSource {
   std::span<const WallMotion> walls;
   const Chunks& chunks;
   const Contacts& contacts;
-  double mu_grains = 0;
-  double mu_walls = 0;
+  const PairTable& laws;
   Multiplicities parts;  ///< of the slots: copies carry M/parts
 };
 

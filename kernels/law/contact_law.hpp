@@ -32,14 +32,24 @@ template <class V>
   return positive_part(fused(-omega, closing / w_nn, r_n));
 }
 
-/// Signorini-Coulomb: the impulse [N s] after r, at a relative velocity v [m/s] of the first body that r is
-/// part of:
-///   r_n <- max(0, r_n - omega (v_n + b)/W_nn),   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt).
-/// n points to the first body. Over-relaxation is for the normal part only: friction gains nothing by it.
+/// A contact as its law sees it. n points to the first body.
 template <class V>
-[[gnu::always_inline]] inline Space<V> solve_law(const Space<V>& r, const Space<V>& n, const Space<V>& v,
-                                                 V bias, V w_nn, V w_tt, NumberOf<V> mu, V omega) {
+struct Approach {
+  Space<V> n;    ///< unit
+  Space<V> v;    ///< relative velocity of the first body [m/s]
+  V bias;        ///< b [m/s]
+  V w_nn, w_tt;  ///< diagonal of W_aa [1/kg]; w_tt with friction only
+};
+
+/// Signorini-Coulomb: the impulse [N s] after r, which v is a part of:
+///   r_n <- max(0, r_n - omega (v_n + b)/W_nn),   r_t <- P_{|.| <= mu r_n}(r_t - v_t/W_tt).
+/// `mu` is a number, or one per lane. Over-relaxation is for the normal part only: friction gains nothing by
+/// it.
+template <class V, class Mu>
+[[gnu::always_inline]] inline Space<V> solve_law(const Space<V>& r, const Approach<V>& contact, Mu mu,
+                                                 V omega) {
   using Number = NumberOf<V>;
+  const auto& [n, v, bias, w_nn, w_tt] = contact;
   const V v_n = fused_dot(v, n);
   const Inverses<V> inverse = invert(w_nn, w_tt);
   const V r_n = fused_dot(r, n);
@@ -54,9 +64,9 @@ template <class V>
   return add_scaled(scale, t, r_n_new * n);
 }
 
-/// Projection of z on the Coulomb cone about n.
-template <class V>
-[[gnu::always_inline]] inline Space<V> project_on_cone(const Space<V>& z, const Space<V>& n, double mu) {
+/// Projection of z on the Coulomb cone about n. `mu` is a number, or one per lane.
+template <class V, class Mu>
+[[gnu::always_inline]] inline Space<V> project_on_cone(const Space<V>& z, const Space<V>& n, Mu mu) {
   const V z_n = fused_dot(z, n);
   const Space<V> t = add_scaled(-z_n, n, z);
   const V length = root(fused_dot(t, t));
@@ -78,9 +88,9 @@ struct LawError {
 };
 
 /// Natural map of the De Saxce form, r - P_Kmu(r - rho (v + (b + mu |v_t|) n)) with rho = 1/W_nn.
-template <class V>
-[[gnu::always_inline]] inline LawError<V> error_of_law(const Space<V>& r, const Space<V>& n,
-                                                       const Space<V>& v, V bias, V w_nn, double mu) {
+template <class V, class Mu>
+[[gnu::always_inline]] inline LawError<V> error_of_law(const Space<V>& r, const Approach<V>& contact, Mu mu) {
+  const auto& [n, v, bias, w_nn, w_tt] = contact;
   const V v_0 = fused_dot(v, n), v_n = v_0 + bias;
   const Space<V> v_t = add_scaled(-v_0, n, v);
   const V v_t2 = fused_dot(v_t, v_t);

@@ -11,7 +11,7 @@ namespace talus {
 struct GapRule {
   double time_step;           ///< h [s]
   double alert;               ///< [m]
-  double restitution;         ///< e in [0, 1]
+  double restitution;         ///< e in [0, 1], where pairs have none of their own
   double overlap_correction;  ///< in [0, 1]
   double slow;                ///< [m/s] no restitution up to here
 };
@@ -38,17 +38,22 @@ struct GapResult {
 /// Inelastic quasi-Signorini, b = max(g, 0)/h; an overlap is undone at the rate `overlap_correction`. With
 /// restitution, a pair faster than `slow` follows Moreau's impact law instead: b = e v_n once g <= 0, and no
 /// constraint before. `v_n` [m/s] is the normal velocity at the beginning of the step, `v_n_free` the one at
-/// its end without contacts.
-template <class V>
-[[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free) {
+/// its end without contacts. `restitution` is a number, or one per lane.
+template <class V, class E>
+[[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free,
+                                                     E restitution) {
   BitsOf<V> absent = stays_apart(gap, v_n_free, rule.time_step, rule.alert);
   V bias = (gap > 0 ? gap : rule.overlap_correction * gap) / rule.time_step;
   // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
   // between both would gain energy.
-  if (rule.restitution > 0) {
-    const BitsOf<V> quick = absolute(v_n) > rule.slow;
+  const auto impact = [&](BitsOf<V> quick) {
     absent |= quick & (gap > 0);
-    bias = quick ? rule.restitution * v_n : bias;
+    bias = quick ? restitution * v_n : bias;
+  };
+  if constexpr (std::same_as<E, double>) {
+    if (restitution > 0) impact(absolute(v_n) > rule.slow);
+  } else {
+    impact((restitution > 0) & (absolute(v_n) > rule.slow));
   }
   return {bias, absent};
 }

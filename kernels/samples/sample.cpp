@@ -33,12 +33,13 @@ constexpr std::uint32_t jitter_draw = 1;
 }  // namespace
 
 double mass(const Sample& sample, std::size_t k) {
-  return sphere_mass(sample.radius[k], sample.density);
+  return sphere_mass(sample.radius[k], sample.density_of(k));
 }
 
 void append(const Sample& sample, Bodies& bodies) {
   for (std::size_t k = 0; k < sample.size(); ++k) {
-    add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density, sample.rotates);
+    add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density_of(k), sample.rotates);
+    if (!sample.material.empty()) bodies.material.push_back(sample.material[k]);
     if (sample.velocity.empty()) continue;
     const auto first = sample.velocity[k].begin();
     std::copy_n(first, 3, bodies.velocity.back().u);

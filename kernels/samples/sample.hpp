@@ -25,10 +25,15 @@ struct Sample {
   std::vector<Vec3> x;                          ///< centre [m]
   std::vector<double> radius;                   ///< [m]
   std::vector<std::array<double, 6>> velocity;  ///< u and R omega [m/s]; empty: at rest
-  double density = 0;                           ///< [kg/m^3]
+  double density = 0;                           ///< [kg/m^3], of all grains where `material` is empty
+  std::vector<Material> material;               ///< of each grain; empty: material_of_grains
+  std::vector<double> material_density;         ///< per material [kg/m^3]; read where `material` is not empty
   bool rotates = true;                          ///< false: spin mobility and R omega are 0
 
   std::size_t size() const { return x.size(); }
+  double density_of(std::size_t k) const {
+    return material.empty() ? density : material_density[material[k]];
+  }
   BodyId id_of(std::size_t k) const { return id.empty() ? BodyId{static_cast<std::int64_t>(k)} : id[k]; }
 };
 

@@ -40,6 +40,7 @@ struct Wall {
   Vec3 velocity = Vec3::Zero();  ///< [m/s] now
   Vec3 gain = Vec3::Zero();      ///< what the load adds to it within the step, without contacts [m/s]
   WallShape shape = {};          ///< a plane unless it says otherwise
+  Material material = material_of_walls;
   /// Null for a plane.
   const Surface* surface() const { return shape.surface.get(); }
   /// 1/M [1/kg] of a pushed wall; 0 for one that is fixed or driven, whatever mass its load names.

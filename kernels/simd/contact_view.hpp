@@ -16,6 +16,7 @@ struct ContactViewOf {
   const Number *nx, *ny, *nz, *bias;
   const Number *rx, *ry, *rz;           ///< with friction
   const Number* rn;                     ///< without
+  const Number* mu;                     ///< where each contact has friction of its own
   const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
@@ -48,28 +49,37 @@ struct ErrorTotals {
   std::int64_t active;
 };
 
-/// `bodies` are records of 8 doubles: u(3), 1/m, w(3), R^2/I. At a wall `wall` is its velocity (3) and
-/// `wall_inv_mass` that of the chunk's copy, or of the whole wall for the error. `parts` may be
-/// null.
+/// A wall, or a chunk's copy of it.
+struct WallView {
+  double* velocity;  ///< 3 [m/s]
+  double inv_mass;   ///< [1/kg]
+};
+
+/// Of which copies a wall's error is asked, and in how many parts the bodies stand.
+struct WholeView {
+  const double* wall;          ///< its velocity, 3 [m/s]
+  double wall_inv_mass;        ///< that of the whole wall [1/kg]
+  const std::uint16_t* parts;  ///< per body, or null
+};
+
+/// `bodies` are records of 8 numbers: u(3), 1/m, w(3), R^2/I. `mu` is the friction of all contacts of the
+/// chunk; kernels for chunks whose contacts have friction of their own do not read it.
 struct LaneKernels {
   void (*sweep_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu);
   void (*momentum_grains)(const ContactView&, const ImpulseView&, double* bodies, double mu,
                           const MomentumView&);
-  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
-                     double wall_inv_mass);
-  void (*momentum_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, double* wall,
-                        double wall_inv_mass, const MomentumView&);
-  /// Momentum in single precision, bodies as records of 8 floats.
+  void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, const WallView&);
+  void (*momentum_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, const WallView&,
+                        const MomentumView&);
+  /// Momentum in single precision.
   void (*single_grains)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
                         const MomentumView&);
   void (*single_wall)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
-                      double* wall, double wall_inv_mass, const MomentumView&);
+                      const WallView&, const MomentumView&);
   void (*accumulate_grains)(const ContactView&, double* bodies);
-  void (*accumulate_wall)(const ContactView&, double* bodies, double* wall, double wall_inv_mass);
-  ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu,
-                              const std::uint16_t* parts);
-  ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const double* wall,
-                            double wall_inv_mass, const std::uint16_t* parts);
+  void (*accumulate_wall)(const ContactView&, double* bodies, const WallView&);
+  ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu, const WholeView&);
+  ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const WholeView&);
   /// Momentum of whole records at `slots`.
   void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
                          double beta);
@@ -79,8 +89,9 @@ struct LaneKernels {
 
 /// Constants, and no functions: whoever called one to see what there is would run instructions that the
 /// processor may not have.
-extern const LaneKernels lane_kernels_portable[2];  ///< without friction, and with
-extern const LaneKernels lane_kernels_avx2[2];      ///< without friction, and with
-extern const LaneKernels lane_kernels_avx512;       ///< with friction
+/// Without friction, with one coefficient in a chunk, and with one per contact.
+extern const LaneKernels lane_kernels_portable[3];
+extern const LaneKernels lane_kernels_avx2[3];
+extern const LaneKernels lane_kernels_avx512[2];  ///< those with friction
 
 }  // namespace talus

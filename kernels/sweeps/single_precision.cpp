@@ -14,6 +14,7 @@ void allocate(SingleState& single, const Contacts& contacts, std::size_t bodies)
   for (std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias}) part->resize(contacts.nx.size());
   for (std::vector<float>* part : {&c.rx, &c.ry, &c.rz}) part->resize(contacts.rx.size());
   c.rn.resize(contacts.rn.size());
+  c.mu.resize(contacts.mu.size());
   single.velocity.resize(bodies);
   single.last_v.resize(bodies);
 }
@@ -33,6 +34,7 @@ void narrow_geometry(const Contacts& contacts, ContactRange range, SingleContact
   round_numbers(contacts.ny, range, 1, single.ny);
   round_numbers(contacts.nz, range, 1, single.nz);
   round_numbers(contacts.bias, range, 1, single.bias);
+  round_numbers(contacts.mu, range, 1, single.mu);
 }
 
 void narrow_impulses(const Contacts& contacts, ContactRange range, SingleContacts& single) {
@@ -88,7 +90,7 @@ void widen_steps(double unit, ContactRange range, SweepSteps& steps) {
 std::size_t memory_used(const SingleState& single) {
   const SingleContacts& c = single.contacts;
   std::size_t numbers = 0;
-  for (const std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn})
+  for (const std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn, &c.mu})
     numbers += part->capacity();
   return numbers * sizeof(float) +
          sizeof(SingleVelocity) * (single.velocity.capacity() + single.last_v.capacity());

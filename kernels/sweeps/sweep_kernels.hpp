@@ -11,6 +11,19 @@
 namespace talus {
 
 struct LaneKernels;
+struct SingleState;
+
+/// Friction of the contacts of a chunk: one coefficient, or of each contact its own (Contacts::mu).
+struct ChunkFriction {
+  double mu = 0;  ///< Coulomb's coefficient >= 0; void where `own`
+  bool own = false;
+  ChunkFriction(double coefficient) : mu(coefficient) {}
+  static ChunkFriction of_each_contact() {
+    ChunkFriction friction(0);
+    friction.own = true;
+    return friction;
+  }
+};
 
 /// The kernels of one instruction set. Which one it is changes no bit of what they compute. A range is that
 /// of a whole chunk, and `contacts.group` holds its groups (narrow_chunk); `Friction` false: only r_n exists
@@ -30,31 +43,31 @@ class SweepKernels {
   /// Per contact: reads 2 body records (128 bytes) and 56 bytes of contact, writes 128 + 24; about 108 flop,
   /// 2 divisions and a square root. Momentum reads and writes 12 bytes more.
   template <bool Friction>
-  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu) const;
+  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                    ChunkFriction friction) const;
   template <bool Friction>
-  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                    const SweepMomentum& momentum) const;
+  void sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                    ChunkFriction friction, const SweepMomentum& momentum) const;
 
   /// The same between grains and a wall: W_nn = 1/m_i + 1/m_copy, W_tt = 1/m_i + R_i^2/I_i. A copy of finite
   /// mass is split once more, contact k of the range against part k mod 8, and glued at the end: 8 contacts
   /// that do not wait for one another.
   template <bool Friction>
-  void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  WallCopy& wall) const;
+  void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                  ChunkFriction friction, WallCopy& wall) const;
   template <bool Friction>
-  void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity, double mu,
-                  WallCopy& wall, const SweepMomentum& momentum) const;
+  void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                  ChunkFriction friction, WallCopy& wall, const SweepMomentum& momentum) const;
 
   /// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
   /// (single_precision.hpp); of `contacts` groups and bodies are read. The steps are in the units of
   /// `single`.
   template <bool Friction>
-  void sweep_grains(const Contacts& contacts, SingleContacts& single, ContactRange range,
-                    std::span<SingleVelocity> velocity, double mu, const SweepMomentum& momentum) const;
+  void sweep_grains(const Contacts& contacts, SingleState& single, ContactRange range, ChunkFriction friction,
+                    const SweepMomentum& momentum) const;
   template <bool Friction>
-  void sweep_wall(const Contacts& contacts, SingleContacts& single, ContactRange range,
-                  std::span<SingleVelocity> velocity, double mu, WallCopy& wall,
-                  const SweepMomentum& momentum) const;
+  void sweep_wall(const Contacts& contacts, SingleState& single, ContactRange range, ChunkFriction friction,
+                  WallCopy& wall, const SweepMomentum& momentum) const;
 
   /// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
   /// r.
@@ -65,14 +78,14 @@ class SweepKernels {
                        WallCopy& wall) const;
 
   /// Natural map of the De Saxce form, e = |r - P_Kmu(r - rho v^)| / rho with v^ = v + (b + mu |v_t|) n and
-  /// rho = 1/W_nn [m/s] (docs/theory.md). W_nn at a wall counts its whole mass: pass `wall_inv_mass` = 1/M.
+  /// rho = 1/W_nn [m/s] (docs/theory.md). W_nn at a wall counts its whole mass: `wall` has the velocity of
+  /// the chunk's copy, and 1/M.
   template <bool Friction>
   ErrorSums error_grains(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                         double mu, Multiplicities parts = {}) const;
+                         ChunkFriction friction, Multiplicities parts = {}) const;
   template <bool Friction>
   ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                       double mu, const WallCopy& wall, double wall_inv_mass,
-                       Multiplicities parts = {}) const;
+                       ChunkFriction friction, const WallCopy& wall, Multiplicities parts = {}) const;
 
   /// Momentum of bodies: s goes on to s + beta (s - last), and `last` becomes s. Of whole records at `slots`,
   /// whose masses, equal in both, stay to the bit.
@@ -82,8 +95,13 @@ class SweepKernels {
                std::span<SingleVelocity> last, double beta) const;
 
  private:
+  template <bool Friction>
+  const LaneKernels& lanes(ChunkFriction friction) const {
+    return *lanes_[Friction ? (friction.own ? 2 : 1) : 0];
+  }
+
   InstructionSet set_;
-  const LaneKernels* lanes_[2];  ///< without and with friction
+  const LaneKernels* lanes_[3];  ///< without friction, with one coefficient, with one per contact
 };
 
 }  // namespace talus

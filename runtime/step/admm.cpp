@@ -131,8 +131,8 @@ std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
         {state_.walls[w].normal, state_.wall_states[w].free_velocity, state_.walls[w].inv_mass()});
   const Decomposition& all = state_.decomposition;
   const BodyProblemSource source{
-      state_.bodies.x, state_.bodies.radius,      state_.bodies.velocity,   state_.free, walls, state_.chunks,
-      state_.contacts, parameters_.law.mu_grains, parameters_.law.mu_walls, all.parts};
+      state_.bodies.x, state_.bodies.radius, state_.bodies.velocity, state_.free, walls,
+      state_.chunks,   state_.contacts,      parameters_.laws,       all.parts};
   std::vector<Gathered> parts;
   if (!all.several()) {
     parts.push_back(gather(source));

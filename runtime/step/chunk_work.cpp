@@ -44,8 +44,10 @@ std::span<const Slot> ChunkWork::owned(std::size_t c) const {
   return std::span(state_.chunks.owned).subspan(from, to - from);
 }
 
-double ChunkWork::friction_of(std::size_t c) const {
-  return at_wall(c) ? parameters_.law.mu_walls : parameters_.law.mu_grains;
+ChunkFriction ChunkWork::friction_of(std::size_t c) const {
+  const std::int32_t law = state_.chunks.law[c];
+  if (law == mixed_laws) return ChunkFriction::of_each_contact();
+  return parameters_.laws.laws()[static_cast<std::size_t>(law)].friction;
 }
 
 void ChunkWork::run(std::size_t c, int epoch) {
@@ -115,11 +117,13 @@ void ChunkWork::measure(std::size_t c) {
   std::span<const Velocity> velocity = state_.bodies.velocity;
   const Multiplicities parts =
       chunks.side[c] != ChunkSide::inside ? Multiplicities(state_.decomposition.parts) : Multiplicities();
-  errors_[c] = at_wall(c)
-                   ? kernels_.error_wall<Friction>(
-                         contacts, range_of(c), velocity, friction_of(c), state_.copies[c],
-                         state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass(), parts)
-                   : kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
+  if (at_wall(c)) {
+    WallCopy whole = state_.copies[c];
+    whole.inv_mass = state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass();
+    errors_[c] = kernels_.error_wall<Friction>(contacts, range_of(c), velocity, friction_of(c), whole, parts);
+  } else {
+    errors_[c] = kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
+  }
   if (keep_impulses_) store_impulses(contacts, chunks, c, state_.candidates);
 }
 
@@ -131,7 +135,7 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
   const ContactRange range = range_of(c);
   const Course& course = this->course(epoch);
   const bool wall = at_wall(c), damped = !before_.empty() && state_.chunks.side[c] != ChunkSide::inside;
-  const double mu = friction_of(c);
+  const ChunkFriction friction = friction_of(c);
   change_precision(c, epoch);
   if (course.plan.kind != SweepKind::plain) carry_on(c, epoch);
   if (damped) copy_impulses<Friction>(contacts, range, before_[c]);
@@ -140,17 +144,17 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
     const SweepMomentum momentum{courses_.beta(sweep), courses_.omega(sweep), acceleration_.steps};
     SingleState& single = state_.single;
     if (course.single && wall)
-      kernels_.sweep_wall<Friction>(contacts, single.contacts, range, single.velocity, mu, copy, momentum);
+      kernels_.sweep_wall<Friction>(contacts, single, range, friction, copy, momentum);
     else if (course.single)
-      kernels_.sweep_grains<Friction>(contacts, single.contacts, range, single.velocity, mu, momentum);
+      kernels_.sweep_grains<Friction>(contacts, single, range, friction, momentum);
     else if (wall)
-      kernels_.sweep_wall<Friction>(contacts, range, velocity, mu, copy, momentum);
+      kernels_.sweep_wall<Friction>(contacts, range, velocity, friction, copy, momentum);
     else
-      kernels_.sweep_grains<Friction>(contacts, range, velocity, mu, momentum);
+      kernels_.sweep_grains<Friction>(contacts, range, velocity, friction, momentum);
   } else if (wall) {
-    kernels_.sweep_wall<Friction>(contacts, range, velocity, mu, copy);
+    kernels_.sweep_wall<Friction>(contacts, range, velocity, friction, copy);
   } else {
-    kernels_.sweep_grains<Friction>(contacts, range, velocity, mu);
+    kernels_.sweep_grains<Friction>(contacts, range, velocity, friction);
   }
   if (damped)
     relax<Friction>(contacts, range, before_[c], state_.decomposition.multiplicity, velocity,

@@ -62,7 +62,7 @@ class ChunkWork {
   void to_double(std::size_t c, int epoch, bool before);
   ContactRange range_of(std::size_t c) const;
   std::span<const Slot> owned(std::size_t c) const;
-  double friction_of(std::size_t c) const;
+  ChunkFriction friction_of(std::size_t c) const;
   bool at_wall(std::size_t c) const { return state_.chunks.wall[c] >= 0; }
 
   StepState& state_;

@@ -19,8 +19,9 @@ constexpr std::size_t piece = 8192;
 /// A grain on its way.
 struct GrainRecord {
   std::int64_t id;
-  double x[3], radius;
+  double x[3], radius, density;
   double velocity[6];
+  std::int64_t material;
 };
 
 GrainRecord record_of(const Sample& sample, std::size_t k) {
@@ -28,15 +29,24 @@ GrainRecord record_of(const Sample& sample, std::size_t k) {
   record.id = static_cast<std::int64_t>(sample.id_of(k));
   std::copy_n(sample.x[k].data(), 3, record.x);
   record.radius = sample.radius[k];
+  record.density = sample.density_of(k);
+  if (!sample.material.empty()) record.material = sample.material[k];
   if (!sample.velocity.empty()) std::copy_n(sample.velocity[k].begin(), 6, record.velocity);
   return record;
 }
 
-void add(const GrainRecord& record, double density, bool rotates, Bodies& bodies) {
-  add_sphere(bodies, BodyId{record.id}, {record.x[0], record.x[1], record.x[2]}, record.radius, density,
-             rotates);
+/// What is said of a sample once.
+struct SampleKind {
+  std::int64_t grains;
+  bool rotates, materials;
+};
+
+void add(const GrainRecord& record, const SampleKind& kind, Bodies& bodies) {
+  add_sphere(bodies, BodyId{record.id}, {record.x[0], record.x[1], record.x[2]}, record.radius,
+             record.density, kind.rotates);
+  if (kind.materials) bodies.material.push_back(static_cast<Material>(record.material));
   std::copy_n(record.velocity, 3, bodies.velocity.back().u);
-  if (rotates) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
+  if (kind.rotates) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
 }
 
 /// Rank of each grain: that of the subdomain its centre is in.
@@ -86,13 +96,8 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
     append(sample, bodies);
     return bodies;
   }
-  struct Common {
-    std::int64_t grains;
-    double density;
-    bool rotates;
-  };
-  const Common own{static_cast<std::int64_t>(sample.size()), sample.density, sample.rotates};
-  const Common all = ranks.gather_records(std::span<const Common>(&own, 1)).front();
+  const SampleKind own{static_cast<std::int64_t>(sample.size()), sample.rotates, !sample.material.empty()};
+  const SampleKind all = ranks.gather_records(std::span<const SampleKind>(&own, 1)).front();
   const std::vector<std::int32_t> rank = receivers(sample, settings, ranks);
   std::vector<std::int64_t> count(static_cast<std::size_t>(ranks.ranks()), 0);
   for (std::int32_t to : rank) ++count[static_cast<std::size_t>(to)];
@@ -103,16 +108,16 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
     for (std::size_t k = begin; k < std::min(begin + piece, sample.size()); ++k)
       to[static_cast<std::size_t>(rank[k])].push_back(record_of(sample, k));
     for (const auto& part : ranks.exchange_records(std::move(to)))
-      for (const GrainRecord& record : part) add(record, all.density, all.rotates, bodies);
+      for (const GrainRecord& record : part) add(record, all, bodies);
   }
   return bodies;
 }
 
 SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks) {
   const auto volume_of = [](double radius) { return sphere_mass(radius, 1); };
-  // The largest of each is wanted first; of the smallest radius the negative. `orientation` is a flag.
-  std::array<double, 4> most{0, -std::numeric_limits<double>::infinity(), 0,
-                             own.orientation.empty() ? 0.0 : 1.0};
+  // The largest of each is wanted first; of the smallest radius the negative. The last two are flags.
+  std::array<double, 5> most{0, -std::numeric_limits<double>::infinity(), 0,
+                             own.orientation.empty() ? 0.0 : 1.0, own.material.empty() ? 0.0 : 1.0};
   for (std::size_t k = 0; k < own.size(); ++k) {
     most[0] = std::max(most[0], own.radius[k]);
     most[1] = std::max(most[1], -own.radius[k]);
@@ -134,6 +139,7 @@ SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks) {
   size.volume = volume.over(ranks);
   size.total_mass = mass.over(ranks);
   size.orientation = most[3] > 0;
+  size.materials = most[4] > 0;
   return size;
 }
 

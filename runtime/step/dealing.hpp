@@ -24,7 +24,8 @@ struct SampleSize {
   double mean_diameter = 0;  ///< [m]
   double total_mass = 0;     ///< [kg]
   double volume = 0;         ///< of the solid [m^3]
-  bool orientation = false;
+  bool orientation = false;  ///< bodies have orientations
+  bool materials = false;    ///< bodies have materials
 };
 
 /// Collective; the same bits however the bodies are dealt to the ranks, and in whatever order they stand.

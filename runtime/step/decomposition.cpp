@@ -24,6 +24,7 @@ struct BodyRecord {
   double u[3], w[3];
   double inv_mass, spin_mobility;
   double orientation[4];
+  std::int64_t material;
 };
 
 std::size_t at(std::int32_t k) {
@@ -43,6 +44,7 @@ BodyRecord record_of(const Decomposition& decomposition, const Bodies& bodies, s
   record.inv_mass = v.inv_mass;
   record.spin_mobility = v.spin_mobility;
   if (!bodies.orientation.empty()) std::copy_n(bodies.orientation[s].data(), 4, record.orientation);
+  if (!bodies.material.empty()) record.material = bodies.material[s];
   return record;
 }
 
@@ -286,6 +288,11 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
     take(
         around.bodies.orientation, [&](std::size_t s) { return bodies.orientation[s]; }, orientation_of);
   release(bodies.orientation);
+  if (decomposition.materials)
+    take(
+        around.bodies.material, [&](std::size_t s) { return bodies.material[s]; },
+        [](const BodyRecord& record) { return static_cast<Material>(record.material); });
+  release(bodies.material);
   take(
       around.reach, [&](std::size_t s) { return reach[s]; },
       [](const BodyRecord& record) { return record.reach; });

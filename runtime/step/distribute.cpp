@@ -276,6 +276,7 @@ Bodies make_copies(Decomposition& decomposition, Bodies& around) {
   copy(around.radius, copies.radius);
   copy(around.velocity, copies.velocity);
   if (decomposition.orientation) copy(around.orientation, copies.orientation);
+  if (decomposition.materials) copy(around.material, copies.material);
   decomposition.whole.clear();
   decomposition.whole.reserve(copies.size());
   for (std::size_t s = 0; s < copies.size(); ++s) {

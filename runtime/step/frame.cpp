@@ -17,6 +17,7 @@ struct BodyRow {
   std::int64_t id;
   double x[3], radius, u[3], omega[3];
   double orientation[4];
+  std::int64_t material;
 };
 struct ContactRow {
   std::int64_t bodies[2];
@@ -41,6 +42,7 @@ BodyRow body_row(const Bodies& bodies, std::size_t s) {
   std::copy_n(bodies.velocity[s].u, 3, row.u);
   for (std::size_t k = 0; k < 3; ++k) row.omega[k] = bodies.velocity[s].w[k] / bodies.radius[s];
   if (!bodies.orientation.empty()) std::copy_n(bodies.orientation[s].data(), 4, row.orientation);
+  if (!bodies.material.empty()) row.material = bodies.material[s];
   return row;
 }
 
@@ -161,6 +163,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
         if (orientation)
           frame.orientation.push_back(
               {row.orientation[0], row.orientation[1], row.orientation[2], row.orientation[3]});
+        if (state.decomposition.materials) frame.material.push_back(row.material);
       });
   release(counted);
   const std::vector<Slot> by_id = ascending(std::span<const std::int64_t>(frame.id));
@@ -170,6 +173,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   permute(frame.u, by_id);
   permute(frame.omega, by_id);
   permute(frame.orientation, by_id);
+  permute(frame.material, by_id);
   if (!contacts) return;
   const std::vector<Active> active = active_contacts(state);
   deal_rows(

@@ -66,11 +66,12 @@ struct Frame {
   double time = 0;
   std::string stage;
   std::vector<std::int64_t> id;
-  std::vector<Vec3> x;                                      ///< [m]
-  std::vector<double> radius;                               ///< [m]
-  std::vector<Vec3> u;                                      ///< [m/s]
-  std::vector<Vec3> omega;                                  ///< [rad/s]; empty without rotation
-  std::vector<std::array<double, 4>> orientation;           ///< empty unless asked for
+  std::vector<Vec3> x;                             ///< [m]
+  std::vector<double> radius;                      ///< [m]
+  std::vector<Vec3> u;                             ///< [m/s]
+  std::vector<Vec3> omega;                         ///< [rad/s]; empty without rotation
+  std::vector<std::array<double, 4>> orientation;  ///< empty unless asked for
+  std::vector<std::int64_t> material;              ///< number in the scene; empty where it names none
   std::vector<std::array<std::int64_t, 2>> contact_bodies;  ///< ids; second is -(1 + wall index) at a wall
   std::vector<Vec3> contact_point;                          ///< [m]
   std::vector<Vec3> contact_normal;                         ///< unit, from the second body to the first

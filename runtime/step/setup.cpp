@@ -38,6 +38,19 @@ const Registry<Coupling>& couplings() {
   return registry;
 }
 
+namespace {
+
+void validate_laws(const Stage& stage) {
+  for (const PairLaw& law : stage.laws.laws()) {
+    require(law.friction >= 0 && std::isfinite(law.friction),
+            fmt::format("stage '{}': friction must be finite and >= 0, got {}", stage.name, law.friction));
+    require(law.restitution >= 0 && law.restitution <= 1,
+            fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, law.restitution));
+  }
+}
+
+}  // namespace
+
 void validate(const Setup& setup) {
   for (const Wall& wall : setup.walls) {
     require(wall.surface() != nullptr || std::abs(wall.normal.norm() - 1) < 1e-9,
@@ -52,12 +65,7 @@ void validate(const Setup& setup) {
         stage.time_step > 0 && std::isfinite(stage.time_step),
         fmt::format("stage '{}': time_step must be finite and > 0 s, got {}", stage.name, stage.time_step));
     require(stage.gravity.allFinite(), fmt::format("stage '{}': gravity must be finite [m/s^2]", stage.name));
-    for (double mu : {stage.law.mu_grains, stage.law.mu_walls})
-      require(mu >= 0 && std::isfinite(mu),
-              fmt::format("stage '{}': friction must be finite and >= 0, got {}", stage.name, mu));
-    require(
-        stage.law.restitution >= 0 && stage.law.restitution <= 1,
-        fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, stage.law.restitution));
+    validate_laws(stage);
     require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
     require(

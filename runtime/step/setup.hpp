@@ -11,19 +11,13 @@
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/law/pair_table.hpp"
 #include "kernels/registry.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
 
 namespace talus {
-
-/// Contact law parameters in force during a stage.
-struct ContactLaw {
-  double mu_grains = 0;    ///< Coulomb friction between grains, >= 0
-  double mu_walls = 0;     ///< Coulomb friction between grains and walls, >= 0
-  double restitution = 0;  ///< Newton restitution in [0, 1]
-};
 
 /// Steps of `time_step` in a time, both in s: the nearest number of them, and of half a step none. The sum of
 /// many steps is not their product.
@@ -45,9 +39,9 @@ struct StageEnd {
 /// One stage: a time interval with its own loads.
 struct Stage {
   std::string name;
-  double time_step = 0;         ///< h [s] > 0
-  Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
-  ContactLaw law;
+  double time_step = 0;                                 ///< h [s] > 0
+  Vec3 gravity = Vec3::Zero();                          ///< [m/s^2]
+  PairTable laws;                                       ///< of the setup's materials
   std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
   StageEnd end;
 };

@@ -43,6 +43,7 @@ struct Simulation::Implementation {
         size(measure_sample(state.bodies, ranks_)),
         graph(state, parameters, setup.solver, setup.decomposition, size.bodies, executor, ranks_) {
     state.decomposition.orientation = size.orientation;
+    state.decomposition.materials = size.materials;
     const double unit = size.bodies > 0 ? size.smallest : 1;
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
@@ -101,8 +102,8 @@ struct Simulation::Implementation {
     const double last_time_step = parameters.time_step;
     parameters.time_step = stage.time_step;
     parameters.gravity = stage.gravity;
-    parameters.law = stage.law;
-    parameters.friction = stage.law.mu_grains > 0 || stage.law.mu_walls > 0;
+    parameters.laws = stage.laws;
+    parameters.friction = stage.laws.largest(&PairLaw::friction) > 0;
     parameters.rotates = parameters.friction && setup.rotation;
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
     if (state.candidates_valid && !state.decomposition.several()) {

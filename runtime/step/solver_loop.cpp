@@ -267,11 +267,11 @@ void SolverLoop::fetch(std::size_t subdomain) const {
       const std::size_t end = begin + static_cast<std::size_t>(contacts.count[c]);
       if (in_single)
         fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
-              single.rn, acceleration.steps.x, acceleration.steps.y, acceleration.steps.z,
+              single.rn, single.mu, acceleration.steps.x, acceleration.steps.y, acceleration.steps.z,
               acceleration.steps.n, contacts.first_record, contacts.second_record, contacts.group);
       else
         fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
-              contacts.rz, contacts.rn);
+              contacts.rz, contacts.rn, contacts.mu);
     }
   fetch(first, last, state_.single.velocity, state_.single.last_v);
   gluing_.fetch(subdomain);

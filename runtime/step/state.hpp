@@ -20,7 +20,7 @@ namespace talus {
 struct StepParameters {
   double time_step = 0;  ///< h [s]
   Vec3 gravity = Vec3::Zero();
-  ContactLaw law;
+  PairTable laws;
   bool friction =
       false;             ///< any friction coefficient > 0: impulses have three components and grains may turn
   bool rotates = false;  ///< friction, and grains that rotate

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernels/bodies/release.hpp"
+#include "kernels/detection/materials.hpp"
 #include "kernels/detection/narrow_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "runtime/graph/clock.hpp"
@@ -170,6 +171,7 @@ void StepGraph::make_chunks() {
     groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(all, all));
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
+  note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
   const double planning = graph::seconds_now();
   loop_.plan();
@@ -207,15 +209,10 @@ void StepGraph::narrow_share(std::uint32_t share) {
                   static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.end],
               0.0);
   }
-  const NarrowPhase in{bodies.x,
-                       bodies.radius,
-                       bodies.velocity,
-                       state_.walls,
-                       parameters_.time_step,
-                       parameters_.alert,
-                       parameters_.law.restitution,
-                       parameters_.gravity,
-                       settings_.overlap_correction};
+  const NarrowPhase in{bodies.x,         bodies.radius,         bodies.velocity,
+                       state_.walls,     parameters_.time_step, parameters_.alert,
+                       parameters_.laws, parameters_.gravity,   settings_.overlap_correction,
+                       bodies.material};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c)
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);

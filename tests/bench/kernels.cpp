@@ -69,7 +69,7 @@ Sample make_sample(const bench::Packing& packing, std::size_t grains, bool frict
   const auto all = static_cast<std::int64_t>(candidates.size());
   sample.chunks = cut_chunks(candidates, bodies.size(), chunk_target(all, all));
   allocate(sample.contacts, candidates, sample.chunks, friction);
-  const NarrowPhase in{bodies.x, bodies.radius, bodies.velocity, {}, 0.01, 0.02, 0, Vec3::Zero()};
+  const NarrowPhase in{bodies.x, bodies.radius, bodies.velocity, {}, 0.01, 0.02, {}, Vec3::Zero()};
   const SweepKernels kernels(best_instruction_set());
   for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
     narrow_chunk(in, candidates, sample.chunks, c, kernels.set(), sample.contacts);
@@ -260,8 +260,7 @@ void report(const bench::Packing& packing, std::size_t grains, int repeats) {
     narrow_geometry(contacts, {0, contacts.nx.size()}, single.contacts);
     row("  the same, single", time_of(sample.count, repeats, [&] {
           over_chunks([&](ContactRange range) {
-            kernels.sweep_grains<Friction>(contacts, single.contacts, range, single.velocity, mu,
-                                           {0.5, 1.2, steps});
+            kernels.sweep_grains<Friction>(contacts, single, range, mu, {0.5, 1.2, steps});
           });
         }));
     row("  natural map", time_of(sample.count, repeats, [&] {
@@ -270,7 +269,7 @@ void report(const bench::Packing& packing, std::size_t grains, int repeats) {
     row("  V afresh from r", time_of(sample.count, repeats, [&] {
           over_chunks([&](ContactRange range) { kernels.accumulate_grains<Friction>(contacts, range, own); });
         }));
-    const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, {}, 0.01, 0.02, 0,
+    const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, {}, 0.01, 0.02, {},
                          Vec3::Zero()};
     for (const bool anew : {false, true})
       row(anew ? "  narrow phase, all groups anew" : "  narrow phase, groups kept",

@@ -28,7 +28,7 @@ inline Setup packed_scene(const Packing& packing, bool pile, double tolerance, d
   Stage stage;
   stage.name = pile ? "pile" : "triaxial";
   stage.time_step = 1e-3;
-  stage.law = {mu, pile ? mu : 0.0, 0};
+  stage.laws = laws_of_one_material(mu, pile ? mu : 0.0, 0);
   stage.end.steps = 1;
   if (pile) stage.gravity = Vec3(0, 0, -9.81);
   WallLoad load;

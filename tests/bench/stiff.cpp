@@ -50,7 +50,7 @@ struct Scene {
     sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
     allocate(sample.contacts, sample.candidates, sample.chunks, true);
     const NarrowPhase in{
-        sample.bodies.x,     sample.bodies.radius, sample.bodies.velocity, sample.walls, time_step, alert, 0,
+        sample.bodies.x,     sample.bodies.radius, sample.bodies.velocity, sample.walls, time_step, alert, {},
         Vec3(0, 0, -gravity)};
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
       narrow_chunk(in, sample.candidates, sample.chunks, c, best_instruction_set(), sample.contacts);
@@ -101,6 +101,12 @@ struct Scene {
       glue();
     }
   }
+  /// The copy of a chunk, with the mass of its whole wall.
+  WallCopy of_whole(std::size_t chunk, std::size_t wall) const {
+    WallCopy copy = copies[chunk];
+    copy.inv_mass = walls[wall].inv_mass;
+    return copy;
+  }
   double residual() const {
     ErrorSums sums;
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
@@ -108,7 +114,7 @@ struct Scene {
       sums.add(w < 0
                    ? kernels.error_grains<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu)
                    : kernels.error_wall<true>(sample.contacts, sample.range(c), sample.bodies.velocity, mu,
-                                              copies[c], walls[static_cast<std::size_t>(w)].inv_mass));
+                                              of_whole(c, static_cast<std::size_t>(w))));
     }
     return std::sqrt(sums.residual2 / std::max(sums.impulse2, sums.velocity2));
   }
@@ -222,7 +228,7 @@ Setup plate_setup(const Packing& packing, double friction) {
   stage.name = "plate";
   stage.time_step = 0.005;
   stage.gravity = Vec3(0, 0, -gravity);
-  stage.law = {friction, friction, 0};
+  stage.laws = laws_of_one_material(friction, friction, 0);
   stage.end.steps = 1;
   setup.stages = {stage};
   setup.detection.alert = 0.02;
@@ -290,7 +296,7 @@ void run_column(int grains, double top, int subdomains, const SolverSettings& so
   stage.name = "column";
   stage.time_step = scene.time_step;
   stage.gravity = Vec3(0, 0, -gravity);
-  stage.law = {mu, mu, 0};
+  stage.laws = laws_of_one_material(mu, mu, 0);
   stage.end.steps = 1;
   setup.stages = {stage};
   setup.solver = solver;

@@ -51,7 +51,7 @@ Setup pile(double edge, int sweeps, bool friction) {
   stage.name = "pile";
   stage.time_step = 0.005;
   stage.gravity = Vec3(0, 0, -9.81);
-  if (friction) stage.law = {0.35, 0.35, 0};
+  if (friction) stage.laws = laws_of_one_material(0.35, 0.35, 0);
   stage.end.steps = 1000000;
   setup.stages = {stage};
   setup.detection.alert = 0.02;
@@ -129,7 +129,7 @@ void time_kernels(const StepState& state, Times& times, int repeats) {
     const double cut =
         cpu_time([&] { cut_chunks(state.candidates, state.bodies.size(), chunk_target(all, all)); });
     const NarrowPhase in{
-        state.bodies.x,   state.bodies.radius, state.bodies.velocity, state.walls, 0.005, 0.02, 0,
+        state.bodies.x,   state.bodies.radius, state.bodies.velocity, state.walls, 0.005, 0.02, {},
         Vec3(0, 0, -9.81)};
     Contacts found = contacts;
     const auto narrow = [&] {

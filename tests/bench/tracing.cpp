@@ -36,7 +36,9 @@ int main(int argc, char** argv) {
   Sample sample = build_sample(scene);
   io::place_walls(scene, sample);
   scene.setup.decomposition.subdomains = number(4, 8);
-  if (argc > 5) scene.setup.stages.front().law.mu_grains = std::atof(argv[5]);
+  if (argc > 5)
+    scene.setup.stages.front().laws.between(material_of_grains, material_of_grains).friction =
+        std::atof(argv[5]);
 
   const std::filesystem::path directory = std::filesystem::temp_directory_path() / "talus_bench_tracing";
   std::filesystem::create_directories(directory);

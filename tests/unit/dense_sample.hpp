@@ -81,7 +81,7 @@ inline talus::Setup pressed_setup(std::vector<Wall> box, double friction, std::i
   Stage stage;
   stage.name = "press";
   stage.time_step = 1e-3;
-  stage.law = {friction, friction, 0};
+  stage.laws = laws_of_one_material(friction, friction, 0);
   stage.end.steps = steps;
   WallLoad load;
   load.drive = WallDrive::pressure;
@@ -140,7 +140,7 @@ struct Sample {
 inline void find_contacts(Sample& sample, double alert, InstructionSet set = InstructionSet::automatic) {
   allocate(sample.contacts, sample.candidates, sample.chunks, sample.candidates.components == 3);
   const NarrowPhase in{
-      sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, 0,
+      sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, {},
       Vec3::Zero()};
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     narrow_chunk(in, sample.candidates, sample.chunks, c, set, sample.contacts);

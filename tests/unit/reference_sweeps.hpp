@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "kernels/sweeps/single_precision.hpp"
 #include "tests/unit/reference_contact.hpp"
 
 namespace talus::test {
@@ -20,11 +21,16 @@ void for_each(const Contacts& contacts, const auto& arrays, ContactRange range,
   }
 }
 
+/// Friction of a contact.
+double coefficient(ChunkFriction mu, const auto& arrays, std::size_t k) {
+  return mu.own ? static_cast<double>(arrays.mu[k]) : mu.mu;
+}
+
 /// Of grains, or at the wall whose parts are given; sums in 8 lanes, contact k in lane k mod 8, then in
 /// order.
 template <bool Friction>
 ErrorSums error_of(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
-                   double mu, Multiplicities parts, WallParts<double>* wall) {
+                   ChunkFriction mu, Multiplicities parts, WallParts<double>* wall) {
   std::vector<Velocity> copy(velocity.begin(), velocity.end());
   const auto whole = [&](Slot slot) {
     const auto s = std::size_t(slot);
@@ -36,7 +42,7 @@ ErrorSums error_of(const Contacts& contacts, ContactRange range, std::span<const
     const double w_nn = whole(contacts.first[k]) + (wall ? wall->inv_mass : whole(contacts.second[k]));
     const V3<double> r = impulse_of<Friction>(contacts, k), v = c.velocity();
     if constexpr (Friction)
-      add_error<true>(sums, c.n, r, v, contacts.bias[k], w_nn, mu);
+      add_error<true>(sums, c.n, r, v, contacts.bias[k], w_nn, coefficient(mu, contacts, k));
     else
       add_error(sums, contacts.rn[k], v.dot(c.n) + contacts.bias[k], w_nn);
     if (wall) (V3<double>(sums.wall_impulse) + r).store(sums.wall_impulse);
@@ -48,13 +54,14 @@ ErrorSums error_of(const Contacts& contacts, ContactRange range, std::span<const
 
 template <bool Friction, class N>
 void sweep(const Contacts& contacts, auto& arrays, ContactRange range, std::span<VelocityOf<N>> velocity,
-           double mu, const SweepMomentum* momentum, WallParts<N>* wall = nullptr) {
-  for_each<Friction>(contacts, arrays, range, velocity, wall,
-                     [&](const auto& c, std::size_t k) { solve<Friction>(c, arrays, k, mu, momentum); });
+           ChunkFriction mu, const SweepMomentum* momentum, WallParts<N>* wall = nullptr) {
+  for_each<Friction>(contacts, arrays, range, velocity, wall, [&](const auto& c, std::size_t k) {
+    solve<Friction>(c, arrays, k, coefficient(mu, arrays, k), momentum);
+  });
 }
 template <bool Friction, class N>
 void sweep(const Contacts& contacts, auto& arrays, ContactRange range, std::span<VelocityOf<N>> velocity,
-           double mu, const SweepMomentum* momentum, WallCopy& wall, double unit = 1) {
+           ChunkFriction mu, const SweepMomentum* momentum, WallCopy& wall, double unit = 1) {
   WallParts<N> parts(wall, range, unit);
   sweep<Friction>(contacts, arrays, range, velocity, mu, momentum, &parts);
   parts.glue(wall);
@@ -64,31 +71,32 @@ void sweep(const Contacts& contacts, auto& arrays, ContactRange range, std::span
 struct ReferenceSweeps {
   using Range = ContactRange;
   template <bool F>
-  void sweep_grains(Contacts& c, Range r, std::span<Velocity> v, double mu) const {
+  void sweep_grains(Contacts& c, Range r, std::span<Velocity> v, ChunkFriction mu) const {
     sweep<F>(c, c, r, v, mu, nullptr);
   }
   template <bool F>
-  void sweep_grains(Contacts& c, Range r, std::span<Velocity> v, double mu, const SweepMomentum& m) const {
+  void sweep_grains(Contacts& c, Range r, std::span<Velocity> v, ChunkFriction mu,
+                    const SweepMomentum& m) const {
     sweep<F>(c, c, r, v, mu, &m);
   }
   template <bool F>
-  void sweep_grains(const Contacts& c, SingleContacts& single, Range r, std::span<SingleVelocity> v,
-                    double mu, const SweepMomentum& m) const {
-    sweep<F>(c, single, r, v, mu, &m);
+  void sweep_grains(const Contacts& c, SingleState& single, Range r, ChunkFriction mu,
+                    const SweepMomentum& m) const {
+    sweep<F>(c, single.contacts, r, std::span(single.velocity), mu, &m);
   }
   template <bool F>
-  void sweep_wall(Contacts& c, Range r, std::span<Velocity> v, double mu, WallCopy& wall) const {
+  void sweep_wall(Contacts& c, Range r, std::span<Velocity> v, ChunkFriction mu, WallCopy& wall) const {
     sweep<F>(c, c, r, v, mu, nullptr, wall);
   }
   template <bool F>
-  void sweep_wall(Contacts& c, Range r, std::span<Velocity> v, double mu, WallCopy& wall,
+  void sweep_wall(Contacts& c, Range r, std::span<Velocity> v, ChunkFriction mu, WallCopy& wall,
                   const SweepMomentum& m) const {
     sweep<F>(c, c, r, v, mu, &m, wall);
   }
   template <bool F>
-  void sweep_wall(const Contacts& c, SingleContacts& single, Range r, std::span<SingleVelocity> v, double mu,
-                  WallCopy& wall, const SweepMomentum& m) const {
-    sweep<F>(c, single, r, v, mu, &m, wall, single.unit);
+  void sweep_wall(const Contacts& c, SingleState& single, Range r, ChunkFriction mu, WallCopy& wall,
+                  const SweepMomentum& m) const {
+    sweep<F>(c, single.contacts, r, std::span(single.velocity), mu, &m, wall, single.contacts.unit);
   }
   template <bool F>
   void accumulate_grains(const Contacts& c, Range r, std::span<Velocity> v) const {
@@ -103,15 +111,15 @@ struct ReferenceSweeps {
     parts.glue(wall);
   }
   template <bool F>
-  ErrorSums error_grains(const Contacts& c, Range r, std::span<const Velocity> v, double mu,
+  ErrorSums error_grains(const Contacts& c, Range r, std::span<const Velocity> v, ChunkFriction mu,
                          Multiplicities parts = {}) const {
     return error_of<F>(c, r, v, mu, parts, nullptr);
   }
   template <bool F>
-  ErrorSums error_wall(const Contacts& c, Range r, std::span<const Velocity> v, double mu,
-                       const WallCopy& wall, double wall_inv_mass, Multiplicities parts = {}) const {
+  ErrorSums error_wall(const Contacts& c, Range r, std::span<const Velocity> v, ChunkFriction mu,
+                       const WallCopy& wall, Multiplicities parts = {}) const {
     WallParts<double> whole(wall, r, 1);
-    whole.inv_mass = wall_inv_mass;
+    whole.inv_mass = wall.inv_mass;
     return error_of<F>(c, r, v, mu, parts, &whole);
   }
 };

@@ -19,7 +19,7 @@ double uniform(std::mt19937_64& random, double from, double to) {
 /// 343 spheres of two sizes in a box, with random velocities of about 1 m/s and spins.
 Scene gas(double e, double mu, const Vec3& gravity) {
   Scene scene(h);
-  scene.stage().law.restitution = e;
+  scene.stage().laws.set_all(&PairLaw::restitution, e);
   scene.friction(mu);
   scene.stage().gravity = gravity;
   // Frictional clusters do not always admit more (Renouf and Alart 2004; docs/theory.md, "Error"), and forces

@@ -16,7 +16,7 @@ Scene oblique(double v_t, double v_n, double mu, double e) {
   Scene scene(1e-3);
   scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
   scene.friction(mu);
-  scene.stage().law.restitution = e;
+  scene.stage().laws.set_all(&PairLaw::restitution, e);
   scene.sphere({0, 0, 0.1 + 0.0137 * v_n}, 0.1, 0.7, {v_t, 0, -v_n});
   return scene;
 }
@@ -47,7 +47,7 @@ struct Bounces {
 Bounces bounce(double height, double e, double time_step, double until) {
   Scene scene(time_step);
   scene.slope(0);
-  scene.stage().law.restitution = e;
+  scene.stage().laws.set_all(&PairLaw::restitution, e);
   scene.sphere({0, 0, 0.1 + height}, 0.1, 1.0);
   Experiment run(std::move(scene));
   Bounces out;
@@ -105,7 +105,7 @@ TEST(BouncingBall, StopsAfterTheSumOfItsFlights) {
 TEST(BouncingBall, ElasticBallKeepsItsEnergy) {
   Scene scene(1e-3);
   scene.slope(0);
-  scene.stage().law.restitution = 1;
+  scene.stage().laws.set_all(&PairLaw::restitution, 1);
   scene.sphere({0, 0, 0.1 + 0.5}, 0.1, 1.0);
   Experiment run(std::move(scene));
   const double before = run.mechanical_energy();
@@ -121,7 +121,7 @@ Scene two_spheres(double e, double mu, double head_start) {
   const Vec3 n = Vec3(0.8, 0.5, -0.3).normalized(), u_0(-1.1, 0.2, 0.4), u_1(0.9, -0.3, 0.1);
   Scene scene(h);
   scene.friction(mu);
-  scene.stage().law.restitution = e;
+  scene.stage().laws.set_all(&PairLaw::restitution, e);
   const Vec3 x_1(0.3, -0.2, 0.05), x_0 = x_1 + (r_0 + r_1) * n;
   scene.sphere(x_0 - head_start * h * u_0, r_0, 0.5, u_0).w[2] = 0.7;
   scene.sphere(x_1 - head_start * h * u_1, r_1, 1.3, u_1).w[0] = -0.4;
@@ -182,7 +182,7 @@ TEST(TwoSpheres, NormalImpactFollowsNewtonsLaw) {
   const double m_0 = 0.5, m_1 = 2.0, u_0 = 1.5, u_1 = -0.5;
   for (double e : {0.0, 0.4, 1.0}) {
     Scene scene(1e-3);
-    scene.stage().law.restitution = e;
+    scene.stage().laws.set_all(&PairLaw::restitution, e);
     scene.sphere({0, 0, 0}, 0.1, m_0, {u_0, 0, 0});
     scene.sphere({0.23, 0, 0}, 0.1, m_1, {u_1, 0, 0});
     Experiment run(std::move(scene));
@@ -199,7 +199,7 @@ TEST(ThreeSpheres, PushingASeparatingNeighbourGivesNoEnergy) {
   // 17/12 of 1/2 m v^2 at e = 1, where it began with 5/4.
   for (double e : {0.5, 0.9, 1.0}) {
     Scene scene(1e-3);
-    scene.stage().law.restitution = e;
+    scene.stage().laws.set_all(&PairLaw::restitution, e);
     scene.sphere({-0.2, 0, 0}, 0.1, 1.0, {1, 0, 0});
     scene.sphere({0, 0, 0}, 0.1, 1.0);
     scene.sphere({0.2 - 4e-4, 0, 0}, 0.1, 1.0, {0.5, 0, 0});

@@ -73,7 +73,7 @@ TEST(Order, OfAnImpactsTimeIsOne) {
     const double height = 0.3 + 0.0031 * start, e = 0.7, lands = std::sqrt(2 * height / g_earth);
     Scene scene(h);
     scene.slope(0);
-    scene.stage().law.restitution = e;
+    scene.stage().laws.set_all(&PairLaw::restitution, e);
     scene.sphere({0, 0, 0.1 + height}, 0.1, 1.0);
     Experiment run(std::move(scene));
     const double until = lands * 1.4;
@@ -113,7 +113,7 @@ Scene corner(double length, double mass, double time, double restitution) {
   Wall& lid = scene.wall("lid", Vec3(0, 0, 1.0) * length, -Vec3::UnitZ());
   lid.load = {.drive = WallDrive::force, .force = 3 * mass * acceleration, .mass = 2 * mass};
   scene.stage().gravity = Vec3(0.5, 0.1, -9.81) * acceleration;
-  scene.stage().law.restitution = restitution;
+  scene.stage().laws.set_all(&PairLaw::restitution, restitution);
   scene.friction(0.3);
   for (int k = 0; k < 12; ++k) {
     const Vec3 centre(-0.2 + 0.19 * (k % 3), 0.02 * (k % 2), 0.11 + 0.19 * (k / 3));

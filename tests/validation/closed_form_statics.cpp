@@ -53,7 +53,7 @@ TEST(Tower, EachContactCarriesWhatStandsOnIt) {
 Scene pressed_column(int count, double pressure, double area, double wall_mass, double e) {
   Scene scene(h);
   scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
-  scene.stage().law.restitution = e;
+  scene.stage().laws.set_all(&PairLaw::restitution, e);
   scene.friction(0.3);
   stack(scene, count);
   Wall& lid = scene.wall("lid", {0, 0, 2 * radius * count + 0.001}, -Vec3::UnitZ());
@@ -205,7 +205,7 @@ TEST(Wedge, SphereDrivenIntoItByAWallStops) {
   const double top = radius / std::sin(0.3) + radius;
   Wall& lid = scene.wall("lid", {0, 0, top}, -Vec3::UnitZ());
   lid.load = {.drive = WallDrive::force, .force = 500, .mass = 2.0};
-  scene.stage().law.mu_walls = 0;
+  scene.stage().laws.between(material_of_grains, material_of_walls).friction = 0;
   Experiment run(std::move(scene));
   run.steps(100);
   const double force = (500 + mass * g_earth) / (2 * std::sin(0.3));

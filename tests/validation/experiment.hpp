@@ -38,7 +38,7 @@ struct Scene {
     setup.solver.check_every = 2;
   }
   Stage& stage() { return setup.stages.front(); }
-  void friction(double mu) { stage().law.mu_grains = stage().law.mu_walls = mu; }
+  void friction(double mu) { stage().laws.set_all(&PairLaw::friction, mu); }
 
   Wall& wall(std::string name, const Vec3& point, const Vec3& normal) {
     Wall wall;

@@ -1,5 +1,7 @@
 #include "io/scene/detail/scene_read.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <system_error>
 
@@ -97,6 +99,34 @@ void refuse_unknown(const toml::table& table, const std::string& path,
         meant.empty() && !elsewhere.empty() ? "; it belongs in " + listed(elsewhere) : hint(name, known);
     fail_at(node, joined(path, name), "unknown key" + help);
   }
+}
+
+std::vector<const toml::table*> tables_at(const toml::table& parent, const std::string& name,
+                                          const std::string& path) {
+  const toml::node* node = parent.get(name);
+  if (!node) return {};
+  const toml::array* array = node->as_array();
+  if (!array) {
+    const bool of_stage = path.starts_with("stage[");
+    fail_at(*node, path,
+            fmt::format("must be an array of tables: write [[{}{}]]", of_stage ? "stage." : "", name));
+  }
+  std::vector<const toml::table*> tables;
+  for (const toml::node& element : *array) {
+    if (!element.is_table()) fail_at(element, path, "must hold tables only");
+    tables.push_back(element.as_table());
+  }
+  return tables;
+}
+
+bool may_be_in_name(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) || c == '+' || c == '-' || c == '_';
+}
+
+void check_name(const toml::table& table, const std::string& path, const std::string& name) {
+  if (name.empty() || !std::all_of(name.begin(), name.end(), may_be_in_name))
+    fail_at(*table.get("name"), joined(path, "name"),
+            fmt::format("must be made of letters, digits, +, - and _, got '{}'", name));
 }
 
 }  // namespace talus::io::detail

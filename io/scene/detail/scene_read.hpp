@@ -18,6 +18,17 @@ Value read_value(const toml::node& node, const std::string& path, const Value& k
 /// Fails when `table` has a key that is not in `known`, with what was probably meant.
 void refuse_unknown(const toml::table& table, const std::string& path, const std::vector<std::string>& known);
 
+/// The elements of an array of tables `name` of `parent`; none when it is left out. `path` is that of the
+/// array.
+std::vector<const toml::table*> tables_at(const toml::table& parent, const std::string& name,
+                                          const std::string& path);
+
+/// Names of walls, stages and materials stand in columns of CSV files, in paths and in overrides.
+bool may_be_in_name(char c);
+
+/// Fails when a table's own `name` has other characters.
+void check_name(const toml::table& table, const std::string& path, const std::string& name);
+
 inline std::string joined(const std::string& path, const std::string& name) {
   return path.empty() ? name : path + "." + name;
 }

@@ -15,11 +15,12 @@ struct GapRule;
 
 /// Pairs of grains whose gaps are asked for.
 struct PairView {
-  const double* x;                     ///< 3 per body: its centre [m]
-  const double* radius;                ///< 1 per body [m]
-  const double* velocity;              ///< 8 per body: its record
-  const std::int32_t *first, *second;  ///< per pair: slots of its bodies
-  std::size_t count;                   ///< of pairs
+  const double* x;                      ///< 3 per body: its centre [m]
+  const double* radius;                 ///< 1 per body [m]
+  const double* velocity;               ///< 8 per body: its record
+  const std::int32_t *first, *second;   ///< per pair: slots of its bodies
+  std::size_t count;                    ///< of pairs
+  const double* restitution = nullptr;  ///< per pair; null: all have that of the rule
   [[no_unique_address]] WalledSpace domain = {};
 };
 

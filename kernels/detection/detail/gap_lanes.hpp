@@ -63,18 +63,38 @@ template <std::same_as<Octet> V>
   return {{c[0], c[1], c[2]}, {c[4], c[5], c[6]}, radius_i, radius_j};
 }
 
+/// Restitution of all pairs, or of each its own.
+struct OneRestitution {
+  double value;
+  template <class V, class Only>
+  [[gnu::always_inline]] double of(std::size_t, Only) const {
+    return value;
+  }
+};
+struct OwnRestitution {
+  const double* value;
+  template <class V, class Only>
+  [[gnu::always_inline]] V of(std::size_t k, Only only) const {
+    return load<V>(value + k, 0, only);
+  }
+};
+
+/// The bodies of the pairs in the lanes.
+struct LaneSlots {
+  const std::size_t *i, *j;
+};
+
 /// W pairs from `at` of `out` on; returns the lanes that came far.
-template <class V>
-[[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const std::size_t* i,
-                                                  const std::size_t* j, const GapRule& rule,
-                                                  const GapTarget& out, std::size_t at) {
-  const Pairing<V> pair = meet(pairs, i, j, V{});
+template <class V, class E>
+[[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, LaneSlots slots, const GapRule& rule,
+                                                  E restitution, const GapTarget& out, std::size_t at) {
+  const Pairing<V> pair = meet(pairs, slots.i, slots.j, V{});
   const V distance = root(dot(pair.d, pair.d));
   const BitsOf<V> off = distance > 0;
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
                       off ? pair.d.z / distance : V{} + 1.0};
   const V gap = distance - pair.radius_i - pair.radius_j, v_n = dot(n, pair.v);
-  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n);  // gravity moves both alike
+  const GapResult<V> found = solve_gap(rule, gap, v_n, v_n, restitution);  // gravity moves both alike
   store(out.nx + at, n.x);
   store(out.ny + at, n.y);
   store(out.nz + at, n.z);
@@ -86,8 +106,9 @@ template <class V>
   return ~(dot(way, way) < 0.25 * small * small);
 }
 
-template <int W>
-bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& target) {
+template <int W, class E>
+[[gnu::always_inline]] inline bool find_gaps_with(const PairView& view, const GapRule& rule, E restitution,
+                                                  const GapTarget& target) {
   using V = Lanes<W>;
   const PairView pairs = view;  // local ones, so that no store can change them
   const GapTarget out = target;
@@ -114,13 +135,14 @@ bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& targe
         ask(pairs.second[next]);
       }
     }
-    far |= gap_block<V>(pairs, i, j, rule, out, k);
+    far |= gap_block<V>(pairs, {i, j}, rule, restitution.template of<V>(k, AllLanes{}), out, k);
   }
   if (const std::size_t rest = pairs.count - k; rest > 0) {  // the last pair fills the lanes behind it
     for (std::size_t l = 0; l < W; ++l) slots(k + (l < rest ? l : rest - 1), l);
     double nx[W], ny[W], nz[W], bias[W];
     std::int64_t contact[W];
-    far |= gap_block<V>(pairs, i, j, rule, {nx, ny, nz, bias, contact}, 0);
+    far |= gap_block<V>(pairs, {i, j}, rule, restitution.template of<V>(k, FirstLanes{rest}),
+                        {nx, ny, nz, bias, contact}, 0);
     for (std::size_t l = 0; l < rest; ++l) {
       out.nx[k + l] = nx[l];
       out.ny[k + l] = ny[l];
@@ -132,6 +154,12 @@ bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& targe
   bool any = false;
   for (int l = 0; l < W; ++l) any |= far[l] != 0;
   return any;
+}
+
+template <int W>
+bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& target) {
+  if (view.restitution) return find_gaps_with<W>(view, rule, OwnRestitution{view.restitution}, target);
+  return find_gaps_with<W>(view, rule, OneRestitution{rule.restitution}, target);
 }
 
 }  // namespace

@@ -18,15 +18,8 @@ struct ErrorLanes {
   V active{};
 };
 
-template <bool Friction, class V, class Only>
-[[gnu::always_inline]] inline void add_error(const Slice<double>& c, Only only, const Space<V>& n,
-                                             const Space<V>& v, V w_nn, double mu, ErrorLanes<V>& sums) {
-  const V bias = load<V>(c.bias, 0, only);
-  LawError<V> error;
-  if constexpr (Friction)
-    error = error_of_law(load_impulse<true, V>(c, 0, only, n), n, v, bias, w_nn, mu);
-  else
-    error = error_of_law(load<V>(c.rn, 0, only), fused_dot(v, n) + bias, w_nn);
+template <class V>
+[[gnu::always_inline]] inline void add_error(const LawError<V>& error, ErrorLanes<V>& sums) {
   sums.impulse2 += error.impulse2;
   sums.velocity2 += error.velocity2;
   sums.residual2 += error.residual2;
@@ -34,12 +27,29 @@ template <bool Friction, class V, class Only>
   sums.active += error.r_n > 0 ? V{} + 1.0 : V{};
 }
 
+/// With what the error of a chunk is measured.
+template <class Mu>
+struct ErrorRule {
+  Mu friction;
+  const WholeView& whole;
+};
+
+/// As many lanes as are meant.
+template <int W>
+[[gnu::always_inline]] inline FirstLanes lanes_of(AllLanes) {
+  return {W};
+}
+template <int W>
+[[gnu::always_inline]] inline FirstLanes lanes_of(FirstLanes lanes) {
+  return lanes;
+}
+
 /// 1/M of the bodies whose copies these are, by which the error counts.
 template <class V, class Grains>
-[[gnu::always_inline]] inline V whole(const Grains& a, const std::uint32_t* begin, std::size_t count,
+[[gnu::always_inline]] inline V whole(const Grains& a, const std::uint32_t* begin, FirstLanes lanes,
                                       const std::uint16_t* parts) {
   V inv_mass = V{} + 1.0;
-  for (std::size_t l = 0; l < count; ++l) inv_mass[l] = a[l][3] / parts[begin[l] / record];
+  for (std::size_t l = 0; l < lanes.count; ++l) inv_mass[l] = a[l][3] / parts[begin[l] / record];
   return inv_mass;
 }
 
@@ -64,34 +74,39 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
   return total;
 }
 
-/// Adds up the error of `count` <= W contacts from k on, whose bodies are a, b.
-template <bool Friction, bool AtWall, int W, class Only, class Grains>
-[[gnu::always_inline]] inline void error_block(const ContactView& c, std::size_t k, std::size_t count,
-                                               Only only, const Grains& a, const Grains& b, double mu,
-                                               const double* wall, double wall_inv_mass,
-                                               const std::uint16_t* parts, ErrorLanes<Lanes<W>>& sums) {
+/// Adds up the error of up to W contacts, whose bodies are a, b.
+template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grains>
+[[gnu::always_inline]] inline void error_block(const Slice<double>& c, Only only, const Grains& a,
+                                               const Grains& b, const Rule& rule,
+                                               ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
-  const Slice<double> own = slice(c, k);
-  const Space<V> n = load_normal<V>(own, 0, only);
+  const WholeView& of = rule.whole;
+  const Space<V> n = load_normal<V>(c, 0, only);
   Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
-  if (parts) {
-    m.w_nn = whole<V>(a, c.first + k, count, parts);
-    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second + k, count, parts);
+  if (of.parts) {
+    m.w_nn = whole<V>(a, c.first, lanes_of<W>(only), of.parts);
+    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second, lanes_of<W>(only), of.parts);
   }
   if constexpr (AtWall) {
-    m.du = m.du - Space<V>{V{} + wall[0], V{} + wall[1], V{} + wall[2]};
-    m.w_nn = m.w_nn + wall_inv_mass;
-    sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(own, 0, only, n);
+    m.du = m.du - Space<V>{V{} + of.wall[0], V{} + of.wall[1], V{} + of.wall[2]};
+    m.w_nn = m.w_nn + of.wall_inv_mass;
+    sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(c, 0, only, n);
   }
-  add_error<Friction>(own, only, n, relative_velocity<Friction>(m, n), m.w_nn, mu, sums);
+  const Approach<V> contact = approach_of<Friction>(c, 0, only, m);
+  if constexpr (Friction)
+    add_error(
+        error_of_law(load_impulse<true, V>(c, 0, only, n), contact, rule.friction.template of<V>(c, 0, only)),
+        sums);
+  else
+    add_error(error_of_law(load<V>(c.rn, 0, only), fused_dot(contact.v, n) + contact.bias, contact.w_nn),
+              sums);
 }
 
-/// `wall` is null between grains.
-template <bool Friction, bool AtWall, int W>
+template <bool Friction, bool AtWall, int W, class Mu>
 [[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
-                                                   const double* wall, double wall_inv_mass,
-                                                   const std::uint16_t* parts) {
+                                                   const WholeView& whole) {
   const ContactView c = view;
+  const ErrorRule<Mu> rule{Mu{mu}, whole};
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
   // At a wall nothing is read of b.
@@ -100,35 +115,41 @@ template <bool Friction, bool AtWall, int W>
   };
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
     if (!AtWall && (k - c.begin) % group_size == 0) prefetch_group(c, k, bodies);
-    error_block<Friction, AtWall, W>(c, k, W, AllLanes{}, first_of(c, k, bodies), second(k), mu, wall,
-                                     wall_inv_mass, parts, sums[lanes]);
+    error_block<Friction, AtWall, W>(slice(c, k), AllLanes{}, first_of(c, k, bodies), second(k), rule,
+                                     sums[lanes]);
   }
   if (const std::size_t rest = c.end - k; rest > 0) {
     // A lane without a contact sees no motion, and so no error.
-    SpareGrains<Lanes<W>> spare(wall);
+    SpareGrains<Lanes<W>> spare(AtWall ? whole.wall : nullptr);
     const FewRecords<const double, W> a(first_of(c, k, bodies), rest, spare), b(second(k), rest, spare);
-    error_block<Friction, AtWall, W>(c, k, rest, FirstLanes{rest}, a, b, mu, wall, wall_inv_mass, parts,
-                                     sums[lanes]);
+    error_block<Friction, AtWall, W>(slice(c, k), FirstLanes{rest}, a, b, rule, sums[lanes]);
   }
   return add_lanes<W>(sums);
 }
 
-template <bool Friction, int W>
-ErrorTotals error_grains(const ContactView& c, const double* bodies, double mu, const std::uint16_t* parts) {
-  return error_of<Friction, false, W>(c, bodies, mu, nullptr, 0, parts);
+template <bool Friction, int W, class Mu>
+ErrorTotals error_grains(const ContactView& c, const double* bodies, double mu, const WholeView& whole) {
+  return error_of<Friction, false, W, Mu>(c, bodies, mu, whole);
 }
-template <bool Friction, int W>
-ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, const double* wall,
-                       double wall_inv_mass, const std::uint16_t* parts) {
-  return error_of<Friction, true, W>(c, bodies, mu, wall, wall_inv_mass, parts);
+template <bool Friction, int W, class Mu>
+ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, const WholeView& whole) {
+  return error_of<Friction, true, W, Mu>(c, bodies, mu, whole);
 }
 
-template <bool Friction, int W>
-constexpr LaneKernels kernels_of_lanes = {
-    sweep_grains<Friction, W>,      momentum_grains<Friction, W>,         sweep_wall<Friction, W>,
-    momentum_wall<Friction, W>,     single_grains<Friction, NarrowOctet>, single_wall<Friction, NarrowOctet>,
-    accumulate_grains<Friction, W>, accumulate_wall<Friction, W>,         error_grains<Friction, W>,
-    error_wall<Friction, W>,        advance_bodies<Lanes<W>, double>,     advance_bodies<NarrowOctet, float>};
+/// `Mu` is OneFriction or OwnFriction.
+template <bool Friction, int W, class Mu>
+constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W, Mu>,
+                                          momentum_grains<Friction, W, Mu>,
+                                          sweep_wall<Friction, W, Mu>,
+                                          momentum_wall<Friction, W, Mu>,
+                                          single_grains<Friction, NarrowOctet, Mu>,
+                                          single_wall<Friction, NarrowOctet, Mu>,
+                                          accumulate_grains<Friction, W>,
+                                          accumulate_wall<Friction, W>,
+                                          error_grains<Friction, W, Mu>,
+                                          error_wall<Friction, W, Mu>,
+                                          advance_bodies<Lanes<W>, double>,
+                                          advance_bodies<NarrowOctet, float>};
 
 }  // namespace
 }  // namespace talus

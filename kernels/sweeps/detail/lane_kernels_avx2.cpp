@@ -4,6 +4,8 @@
 
 namespace talus {
 
-constinit const LaneKernels lane_kernels_avx2[2] = {kernels_of_lanes<false, 4>, kernels_of_lanes<true, 4>};
+constinit const LaneKernels lane_kernels_avx2[3] = {kernels_of_lanes<false, 4, OneFriction>,
+                                                    kernels_of_lanes<true, 4, OneFriction>,
+                                                    kernels_of_lanes<true, 4, OwnFriction>};
 
 }  // namespace talus

@@ -5,6 +5,7 @@
 
 namespace talus {
 
-constinit const LaneKernels lane_kernels_avx512 = kernels_of_lanes<true, 8>;
+constinit const LaneKernels lane_kernels_avx512[2] = {kernels_of_lanes<true, 8, OneFriction>,
+                                                      kernels_of_lanes<true, 8, OwnFriction>};
 
 }  // namespace talus

@@ -4,7 +4,8 @@
 
 namespace talus {
 
-constinit const LaneKernels lane_kernels_portable[2] = {kernels_of_lanes<false, 4>,
-                                                        kernels_of_lanes<true, 4>};
+constinit const LaneKernels lane_kernels_portable[3] = {kernels_of_lanes<false, 4, OneFriction>,
+                                                        kernels_of_lanes<true, 4, OneFriction>,
+                                                        kernels_of_lanes<true, 4, OwnFriction>};
 
 }  // namespace talus

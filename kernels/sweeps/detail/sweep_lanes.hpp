@@ -25,7 +25,8 @@ constexpr std::size_t wall_lanes = 8;  ///< copies of a wall inside a chunk
 /// Contacts that a kernel works on at once: W x blocks of them, from `k` on.
 template <class Number>
 struct Slice {
-  const Number *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn;
+  const Number *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn, *mu;
+  const std::uint32_t *first, *second;
 };
 
 /// Where their impulses are written.
@@ -36,7 +37,8 @@ struct Target {
 
 template <class Number>
 [[gnu::always_inline]] inline Slice<Number> slice(const ContactViewOf<Number>& c, std::size_t k) {
-  return {c.nx + k, c.ny + k, c.nz + k, c.bias + k, c.rx + k, c.ry + k, c.rz + k, c.rn + k};
+  return {c.nx + k, c.ny + k, c.nz + k, c.bias + k,  c.rx + k,    c.ry + k,
+          c.rz + k, c.rn + k, c.mu + k, c.first + k, c.second + k};
 }
 
 template <class Number>
@@ -58,6 +60,22 @@ template <bool Friction, class V>
   if constexpr (Friction) return less_cross(m.du, m.w, n);
   return m.du;
 }
+
+/// Friction of the contacts in the lanes: of all the same, or of each its own.
+struct OneFriction {
+  double mu;
+  template <class V, class Only>
+  [[gnu::always_inline]] NumberOf<V> of(const Slice<NumberOf<V>>&, std::size_t, Only) const {
+    return static_cast<NumberOf<V>>(mu);
+  }
+};
+struct OwnFriction {
+  [[gnu::always_inline]] explicit OwnFriction(double) {}
+  template <class V, class Only>
+  [[gnu::always_inline]] V of(const Slice<NumberOf<V>>& c, std::size_t at, Only only) const {
+    return load<V>(c.mu, at, only);
+  }
+};
 
 /// A plain sweep begins where the last one ended.
 struct PlainStart {
@@ -103,43 +121,59 @@ struct MomentumStart {
   }
 };
 
-/// Solves the law of the contacts from `at` on: stores the new impulse and returns it less the one that the
-/// velocities know. Without friction only the component along the normal exists.
-template <bool Friction, class V, class Start, class Only>
-[[gnu::always_inline]] inline Space<V> renew_impulse(const Slice<NumberOf<V>>& c,
-                                                     const Target<NumberOf<V>>& out, std::size_t at,
-                                                     Only only, const Space<V>& n, const Space<V>& v, V w_nn,
-                                                     V w_tt, double mu, const Start& start) {
-  using Number = NumberOf<V>;
-  const V omega = V{} + static_cast<Number>(start.omega);
-  const V bias = load<V>(c.bias, at, only);
-  if constexpr (Friction) {
-    const Space<V> s = load_impulse<true, V>(c, at, only, n), r = start.begin(s, at, only);
-    const Space<V> r_new = solve_law(r, n, v, bias, w_nn, w_tt, static_cast<Number>(mu), omega);
-    store(out.x, at, r_new.x, only);
-    store(out.y, at, r_new.y, only);
-    store(out.z, at, r_new.z, only);
-    start.end(s, r_new, at, only);
-    return r_new - r;
-  } else {
-    const V s = load<V>(c.rn, at, only), r_n = start.begin(s, at, only);
-    const V r_n_new = solve_normal(r_n, fused_dot(v, n) + bias, w_nn, omega);
-    store(out.n, at, r_n_new, only);
-    start.end(s, r_n_new, at, only);
-    return (r_n_new - r_n) * n;
-  }
-}
-
 template <class V, class Only>
 [[gnu::always_inline]] inline Space<V> load_normal(const Slice<NumberOf<V>>& c, std::size_t at, Only only) {
   return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
 }
 
+/// How the contacts of a chunk are swept: their friction, and where they start.
+template <class Mu, class Start>
+struct SweepRule {
+  Mu friction;
+  Start start;
+  [[gnu::always_inline]] SweepRule from(std::size_t k) const { return {friction, start.from(k)}; }
+};
+
+/// Contacts in lanes as their law sees them, from what their bodies do.
+template <bool Friction, class V, class Only>
+[[gnu::always_inline]] inline Approach<V> approach_of(const Slice<NumberOf<V>>& c, std::size_t at, Only only,
+                                                      const Meeting<V>& m) {
+  const Space<V> n = load_normal<V>(c, at, only);
+  V w_tt{};
+  if constexpr (Friction) w_tt = m.w_nn + m.spin;
+  return {n, relative_velocity<Friction>(m, n), load<V>(c.bias, at, only), m.w_nn, w_tt};
+}
+
+/// Solves the law of the contacts from `at` on: stores the new impulse and returns it less the one that the
+/// velocities know. Without friction only the component along the normal exists.
+template <bool Friction, class V, class Rule, class Only>
+[[gnu::always_inline]] inline Space<V> renew_impulse(const Slice<NumberOf<V>>& c,
+                                                     const Target<NumberOf<V>>& out, std::size_t at,
+                                                     Only only, const Approach<V>& contact,
+                                                     const Rule& rule) {
+  const V omega = V{} + static_cast<NumberOf<V>>(rule.start.omega);
+  if constexpr (Friction) {
+    const Space<V> s = load_impulse<true, V>(c, at, only, contact.n), r = rule.start.begin(s, at, only);
+    const Space<V> r_new = solve_law(r, contact, rule.friction.template of<V>(c, at, only), omega);
+    store(out.x, at, r_new.x, only);
+    store(out.y, at, r_new.y, only);
+    store(out.z, at, r_new.z, only);
+    rule.start.end(s, r_new, at, only);
+    return r_new - r;
+  } else {
+    const V s = load<V>(c.rn, at, only), r_n = rule.start.begin(s, at, only);
+    const V r_n_new = solve_normal(r_n, fused_dot(contact.v, contact.n) + contact.bias, contact.w_nn, omega);
+    store(out.n, at, r_n_new, only);
+    rule.start.end(s, r_n_new, at, only);
+    return (r_n_new - r_n) * contact.n;
+  }
+}
+
 /// Blocks x W contacts in three phases.
-template <bool Friction, class V, int Blocks, class Start, class Grains, class Only>
+template <bool Friction, class V, int Blocks, class Rule, class Grains, class Only>
 [[gnu::always_inline]] inline void sweep_block(const Slice<NumberOf<V>>& c, const Target<NumberOf<V>>& out,
-                                               const Grains& a, const Grains& b, double mu,
-                                               const Start& start, Only only) {
+                                               const Grains& a, const Grains& b, const Rule& rule,
+                                               Only only) {
   constexpr int W = width_of<V>;
   Meeting<V> m[Blocks];
   Space<V> dr[Blocks];
@@ -148,11 +182,7 @@ template <bool Friction, class V, int Blocks, class Start, class Grains, class O
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k) {
     const auto at = static_cast<std::size_t>(W * k);
-    const Space<V> n = load_normal<V>(c, at, only);
-    V w_tt{};
-    if constexpr (Friction) w_tt = m[k].w_nn + m[k].spin;
-    dr[k] = renew_impulse<Friction>(c, out, at, only, n, relative_velocity<Friction>(m[k], n), m[k].w_nn,
-                                    w_tt, mu, start);
+    dr[k] = renew_impulse<Friction>(c, out, at, only, approach_of<Friction>(c, at, only, m[k]), rule);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)
@@ -167,25 +197,31 @@ constexpr std::size_t minimum(std::size_t a, std::size_t b) {
   return a < b ? a : b;
 }
 
+/// Contacts [begin, begin + count) of a chunk.
+struct ContactRun {
+  std::size_t begin, count;
+};
+
 /// The last contacts of a group, fewer than fill its blocks.
-template <bool Friction, class V, int Blocks, class Start, class Number>
+template <bool Friction, class V, int Blocks, class Rule, class Number>
 [[gnu::always_inline]] inline void sweep_rest(const ContactViewOf<Number>& c, const ImpulseViewOf<Number>& r,
-                                              std::size_t k, std::size_t count, Number* bodies,
-                                              SpareGrains<V>& spare, double mu, const Start& start) {
+                                              ContactRun run, Number* bodies, SpareGrains<V>& spare,
+                                              const Rule& rule) {
   constexpr std::size_t room = width_of<V> * Blocks;
+  const auto [k, count] = run;
   const FewRecords<Number, room> a(first_of(c, k, bodies), count, spare),
       b(second_of(c, k, bodies), count, spare);
-  sweep_block<Friction, V, Blocks>(slice(c, k), target(r, k), a, b, mu, start.from(k), FirstLanes{count});
+  sweep_block<Friction, V, Blocks>(slice(c, k), target(r, k), a, b, rule.from(k), FirstLanes{count});
 }
 
-template <bool Friction, class V, class Start, class Number>
-[[gnu::always_inline]] inline void sweep_grains_from(const ContactViewOf<Number>& view,
-                                                     const ImpulseViewOf<Number>& impulses, Number* bodies,
-                                                     double mu, const Start& start) {
+template <bool Friction, class V, class Rule, class Number>
+[[gnu::always_inline]] inline void sweep_grains_by(const Rule& rule_of_chunk,
+                                                   const ContactViewOf<Number>& view,
+                                                   const ImpulseViewOf<Number>& impulses, Number* bodies) {
   constexpr std::size_t W = width_of<V>, at_once = W * blocks_at_once;
   const ContactViewOf<Number> c = view;  // local ones, so that no store can change them
   const ImpulseViewOf<Number> r = impulses;
-  const Start all = start;
+  const Rule rule = rule_of_chunk;
   SpareGrains<V> spare;
   const std::uint8_t* group = c.group;
   for (std::size_t k = c.begin; k < c.end; ++group) {
@@ -193,34 +229,39 @@ template <bool Friction, class V, class Start, class Number>
     prefetch_group(c, k, bodies);
     for (; k + at_once <= end; k += at_once)
       sweep_block<Friction, V, blocks_at_once>(slice(c, k), target(r, k), first_of(c, k, bodies),
-                                               second_of(c, k, bodies), mu, all.from(k), AllLanes{});
+                                               second_of(c, k, bodies), rule.from(k), AllLanes{});
     if (k + W < end)
-      sweep_rest<Friction, V, blocks_at_once>(c, r, k, end - k, bodies, spare, mu, all);
+      sweep_rest<Friction, V, blocks_at_once>(c, r, {k, end - k}, bodies, spare, rule);
     else if (k < end)
-      sweep_rest<Friction, V, 1>(c, r, k, end - k, bodies, spare, mu, all);
+      sweep_rest<Friction, V, 1>(c, r, {k, end - k}, bodies, spare, rule);
     k = end;
   }
 }
 
-[[gnu::always_inline]] inline MomentumStart start_of(const MomentumView& m) {
-  return {m.x, m.y, m.z, m.n, m.beta, m.omega};
+template <class Mu>
+[[gnu::always_inline]] inline SweepRule<Mu, PlainStart> plain_rule(double mu) {
+  return {Mu{mu}, {}};
+}
+template <class Mu>
+[[gnu::always_inline]] inline SweepRule<Mu, MomentumStart> momentum_rule(double mu, const MomentumView& m) {
+  return {Mu{mu}, {m.x, m.y, m.z, m.n, m.beta, m.omega}};
 }
 
-template <bool Friction, int W>
+template <bool Friction, int W, class Mu>
 void sweep_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu) {
-  sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, PlainStart{});
+  sweep_grains_by<Friction, Lanes<W>>(plain_rule<Mu>(mu), c, r, bodies);
 }
 
-template <bool Friction, int W>
+template <bool Friction, int W, class Mu>
 void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
                      const MomentumView& momentum) {
-  sweep_grains_from<Friction, Lanes<W>>(c, r, bodies, mu, start_of(momentum));
+  sweep_grains_by<Friction, Lanes<W>>(momentum_rule<Mu>(mu, momentum), c, r, bodies);
 }
 
-template <bool Friction, class V>
+template <bool Friction, class V, class Mu>
 void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
                    const MomentumView& momentum) {
-  sweep_grains_from<Friction, V>(c, r, bodies, mu, start_of(momentum));
+  sweep_grains_by<Friction, V>(momentum_rule<Mu>(mu, momentum), c, r, bodies);
 }
 
 /// V += M^-1 H r for W contacts.
@@ -261,15 +302,15 @@ struct SplitWall {
   Number inv_mass;
   std::size_t lanes;
 
-  SplitWall(const double* wall, double wall_inv_mass, std::size_t contacts) : lanes(minimum(contacts, 8)) {
-    const auto all = [&](int d) { return V{} + static_cast<Number>(wall[d]); };
+  SplitWall(const WallView& wall, std::size_t contacts) : lanes(minimum(contacts, 8)) {
+    const auto all = [&](int d) { return V{} + static_cast<Number>(wall.velocity[d]); };
     velocity = {all(0), all(1), all(2)};
-    inv_mass = static_cast<Number>(wall_inv_mass * static_cast<double>(lanes));
+    inv_mass = static_cast<Number>(wall.inv_mass * static_cast<double>(lanes));
   }
   void push(std::size_t part, const Space<V>& n, const Space<V>& dr) {
     gained[part] = add_scaled(-inv_mass * fused_dot(n, dr), n, gained[part]);
   }
-  void glue(double* wall) const {
+  void glue(const WallView& wall) const {
     if (inv_mass == 0 || lanes == 0) return;
     Number x[wall_lanes], y[wall_lanes], z[wall_lanes];
     for (std::size_t k = 0; k < wall_lanes / W; ++k) {
@@ -283,73 +324,75 @@ struct SplitWall {
       sum[1] += y[l];
       sum[2] += z[l];
     }
-    for (int d = 0; d < 3; ++d) wall[d] += 1 / static_cast<double>(lanes) * sum[d];
+    for (int d = 0; d < 3; ++d) wall.velocity[d] += 1 / static_cast<double>(lanes) * sum[d];
   }
 };
 
+/// The copies of a wall that a block of contacts meets.
+template <class V>
+struct WallPart {
+  SplitWall<V>& wall;
+  std::size_t part;
+};
+
 /// A block of W grains against as many copies of a wall.
-template <bool Friction, class V, class Grains, class Start, class Only>
+template <bool Friction, class V, class Grains, class Rule, class Only>
 [[gnu::always_inline]] inline void sweep_wall_block(const Slice<NumberOf<V>>& c,
                                                     const Target<NumberOf<V>>& out, const Grains& a,
-                                                    double mu, const Start& start, Only only,
-                                                    std::size_t lanes, SplitWall<V>& wall) {
+                                                    const Rule& rule, Only only, WallPart<V> at) {
   Meeting<V> m = gather<Friction, false>(a, a, V{});
-  m.du = m.du - (wall.velocity + wall.gained[lanes]);
-  const Space<V> n = load_normal<V>(c, 0, only);
-  V w_tt{};
-  if constexpr (Friction) w_tt = m.w_nn + m.spin;
-  const Space<V> dr = renew_impulse<Friction>(c, out, 0, only, n, relative_velocity<Friction>(m, n),
-                                              m.w_nn + wall.inv_mass, w_tt, mu, start);
-  scatter<Friction, false>(a, a, n, dr);
-  wall.push(lanes, n, dr);
+  m.du = m.du - (at.wall.velocity + at.wall.gained[at.part]);
+  Approach<V> contact = approach_of<Friction>(c, 0, only, m);
+  contact.w_nn = contact.w_nn + at.wall.inv_mass;
+  const Space<V> dr = renew_impulse<Friction>(c, out, 0, only, contact, rule);
+  scatter<Friction, false>(a, a, contact.n, dr);
+  at.wall.push(at.part, contact.n, dr);
 }
 
-template <bool Friction, class V, class Start, class Number>
-[[gnu::always_inline]] inline void sweep_wall_from(const ContactViewOf<Number>& view,
-                                                   const ImpulseViewOf<Number>& impulses, Number* bodies,
-                                                   double mu, double* wall, double wall_inv_mass,
-                                                   const Start& start) {
+template <bool Friction, class V, class Rule, class Number>
+[[gnu::always_inline]] inline void sweep_wall_by(const Rule& rule_of_chunk, const ContactViewOf<Number>& view,
+                                                 const ImpulseViewOf<Number>& impulses, Number* bodies,
+                                                 const WallView& wall) {
   constexpr std::size_t W = width_of<V>;
   const ContactViewOf<Number> c = view;
   const ImpulseViewOf<Number> r = impulses;
-  const Start all = start;
-  SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
-  std::size_t k = c.begin, lanes = 0;
-  for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W))
-    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), first_of(c, k, bodies), mu, all.from(k),
-                                  AllLanes{}, lanes, split);
+  const Rule rule = rule_of_chunk;
+  SplitWall<V> split(wall, c.end - c.begin);
+  std::size_t k = c.begin, part = 0;
+  for (; k + W <= c.end; k += W, part = (part + 1) % (wall_lanes / W))
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), first_of(c, k, bodies), rule.from(k), AllLanes{},
+                                  {split, part});
   if (k < c.end) {
     SpareGrains<V> spare;
     const FewRecords<Number, W> a(first_of(c, k, bodies), c.end - k, spare);
-    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, mu, all.from(k), FirstLanes{c.end - k}, lanes,
-                                  split);
+    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, rule.from(k), FirstLanes{c.end - k},
+                                  {split, part});
   }
   split.glue(wall);
 }
 
-template <bool Friction, int W>
-void sweep_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
-                double wall_inv_mass) {
-  sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, PlainStart{});
+template <bool Friction, int W, class Mu>
+void sweep_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, const WallView& wall) {
+  sweep_wall_by<Friction, Lanes<W>>(plain_rule<Mu>(mu), c, r, bodies, wall);
 }
 
-template <bool Friction, int W>
-void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, double* wall,
-                   double wall_inv_mass, const MomentumView& momentum) {
-  sweep_wall_from<Friction, Lanes<W>>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+template <bool Friction, int W, class Mu>
+void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
+                   const WallView& wall, const MomentumView& momentum) {
+  sweep_wall_by<Friction, Lanes<W>>(momentum_rule<Mu>(mu, momentum), c, r, bodies, wall);
 }
 
-template <bool Friction, class V>
+template <bool Friction, class V, class Mu>
 void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
-                 double* wall, double wall_inv_mass, const MomentumView& momentum) {
-  sweep_wall_from<Friction, V>(c, r, bodies, mu, wall, wall_inv_mass, start_of(momentum));
+                 const WallView& wall, const MomentumView& momentum) {
+  sweep_wall_by<Friction, V>(momentum_rule<Mu>(mu, momentum), c, r, bodies, wall);
 }
 
 template <bool Friction, int W>
-void accumulate_wall(const ContactView& view, double* bodies, double* wall, double wall_inv_mass) {
+void accumulate_wall(const ContactView& view, double* bodies, const WallView& wall) {
   using V = Lanes<W>;
   const ContactView c = view;
-  SplitWall<V> split(wall, wall_inv_mass, c.end - c.begin);
+  SplitWall<V> split(wall, c.end - c.begin);
   const auto add = [&](const Slice<double>& own, const auto& a, std::size_t lanes, auto only) {
     const Space<V> n = load_normal<V>(own, 0, only);
     accumulate_block<Friction, false, W>(own, a, a, only);

@@ -110,14 +110,14 @@ TEST(Scene, StagesInheritStepGravityAndLawFromTheScene) {
   const Stage& first = scene.setup.stages[0];
   const Stage& second = scene.setup.stages[1];
   EXPECT_EQ(first.time_step, 1e-3);
-  EXPECT_EQ(first.law.mu_grains, 0.35);
-  EXPECT_EQ(first.law.mu_walls, 0.1);
-  EXPECT_EQ(first.law.restitution, 0.5);
+  EXPECT_EQ(first.laws.between(material_of_grains, material_of_grains).friction, 0.35);
+  EXPECT_EQ(first.laws.between(material_of_grains, material_of_walls).friction, 0.1);
+  EXPECT_EQ(first.laws.between(material_of_grains, material_of_grains).restitution, 0.5);
   EXPECT_EQ(first.gravity, Vec3(0, 0, -9.81));
   EXPECT_EQ(second.name, "stage-2");
   EXPECT_EQ(second.time_step, 2e-3);
-  EXPECT_EQ(second.law.mu_grains, 0);
-  EXPECT_EQ(second.law.mu_walls, 0.1);
+  EXPECT_EQ(second.laws.between(material_of_grains, material_of_grains).friction, 0);
+  EXPECT_EQ(second.laws.between(material_of_grains, material_of_walls).friction, 0.1);
   EXPECT_EQ(second.gravity, Vec3::Zero());
 }
 
@@ -289,7 +289,7 @@ TEST(Overrides, ReachKeysElementsAndListEntries) {
                                    "name=moon", "wall.x+.drive=velocity", "wall.x+.velocity=[-1, 0, 0]"});
   EXPECT_EQ(scene.setup.solver.tolerance, 1e-5);
   EXPECT_EQ(scene.setup.stages[0].time_step, 1e-4);
-  EXPECT_EQ(scene.setup.stages[0].law.mu_grains, 0.2);
+  EXPECT_EQ(scene.setup.stages[0].laws.between(material_of_grains, material_of_grains).friction, 0.2);
   EXPECT_FALSE(scene.setup.stages[0].end.steps);
   EXPECT_EQ(scene.setup.stages[0].end.time, 2);
   EXPECT_EQ(scene.setup.walls[5].load.pressure, 2e4);
@@ -303,8 +303,8 @@ TEST(Overrides, NameAStageWithoutANameAsTheRunDoes) {
                                     "name = \"press\"", "");
   const Scene scene = parse_scene(text, file, {"stage.stage-2.friction=0.5"});
   EXPECT_EQ(scene.setup.stages[1].name, "stage-2");
-  EXPECT_EQ(scene.setup.stages[1].law.mu_grains, 0.5);
-  EXPECT_EQ(scene.setup.stages[0].law.mu_grains, 0);
+  EXPECT_EQ(scene.setup.stages[1].laws.between(material_of_grains, material_of_grains).friction, 0.5);
+  EXPECT_EQ(scene.setup.stages[0].laws.between(material_of_grains, material_of_grains).friction, 0);
   EXPECT_NE(std::string(error_of(text, {"stage.shear.friction=1"}).what()).find("0 'stage-1', 1 'stage-2'"),
             std::string::npos);
   const std::string wall = replaced(scene_with(), "name = \"z+\"", "side = \"z+\"");
@@ -440,7 +440,8 @@ TEST(ResolvedScene, ReadsBackToTheSameScene) {
     }
     ASSERT_EQ(again.setup.stages.size(), scene.setup.stages.size());
     EXPECT_EQ(again.setup.stages.back().time_step, scene.setup.stages.back().time_step);
-    EXPECT_EQ(again.setup.stages.back().law.mu_grains, scene.setup.stages.back().law.mu_grains);
+    EXPECT_EQ(again.setup.stages.back().laws.between(material_of_grains, material_of_grains).friction,
+              scene.setup.stages.back().laws.between(material_of_grains, material_of_grains).friction);
     EXPECT_EQ(again.sample.count, scene.sample.count);
     EXPECT_EQ(again.sample.file, scene.sample.file);
   }

@@ -180,8 +180,14 @@ double bias_of(const Approach& approach, bool at_wall) {
   sample.candidates.impulse.assign(1, 0.0);
   sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 10);
   allocate(sample.contacts, sample.candidates, sample.chunks, false);
-  const NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity,       sample.walls, h,
-                       alert,           approach.restitution, Vec3(0, 0, -approach.gravity)};
+  const NarrowPhase in{sample.bodies.x,
+                       sample.bodies.radius,
+                       sample.bodies.velocity,
+                       sample.walls,
+                       h,
+                       alert,
+                       PairTable(2, {0, approach.restitution}),
+                       Vec3(0, 0, -approach.gravity)};
   narrow_chunk(in, sample.candidates, sample.chunks, 0, InstructionSet::portable, sample.contacts);
   return sample.contacts.count[0] > 0 ? sample.contacts.bias[0] : std::nan("");
 }

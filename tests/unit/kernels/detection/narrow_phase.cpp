@@ -21,7 +21,7 @@ using test::Sample;
 using test::uniform;
 
 NarrowPhase narrow_phase(const Sample& sample, double alert = 0.05) {
-  return {sample.bodies.x,  sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, 0,
+  return {sample.bodies.x,  sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, {},
           Vec3(0, 0, -9.81)};
 }
 
@@ -85,7 +85,7 @@ TEST(NarrowPhase, FindsTheSameBitsOnEveryInstructionSet) {
       NarrowPhase in = narrow_phase(sample);
       expect_scalar_contacts(sample, in);
       in.overlap_correction = 0.3;
-      in.restitution = 0.6;
+      in.laws.set_all(&PairLaw::restitution, 0.6);
       expect_scalar_contacts(sample, in);
     }
 }

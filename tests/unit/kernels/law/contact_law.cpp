@@ -57,8 +57,9 @@ TEST(ContactLaw, MeasuresTheNaturalMapThatBlocksAreJudgedBy) {
     const Frame frame(random);
     const Vec3 r = uniform_vector(random, -1, 1), v = uniform_vector(random, -1, 1);
     const double mu = uniform(random, 0, 1), bias = uniform(random, -0.3, 0.3), w_nn = 2;
-    const LawError<double> error = error_of_law(space_of(frame.axes.transpose() * r), frame.normal(),
-                                                space_of(frame.axes.transpose() * v), bias, w_nn, mu);
+    const LawError<double> error =
+        error_of_law<double>(space_of(frame.axes.transpose() * r),
+                             {frame.normal(), space_of(frame.axes.transpose() * v), bias, w_nn, 0}, mu);
     const Vec3 expected = w_nn * natural_map(r, v + bias * Vec3::UnitX(), mu, 1 / w_nn);
     EXPECT_NEAR(error.residual2, expected.squaredNorm(), 500 * epsilon);
   }
@@ -72,9 +73,9 @@ TEST(ContactLaw, SolvesWhatTheBlockSolverSolvesWhereTangentsWeighLikeTheNormal) 
     const Frame frame(random);
     const Vec3 v = uniform_vector(random, -1, 1);
     const double mu = uniform(random, 0.1, 1), bias = uniform(random, -0.3, 0.3), w = 2;
-    const Vec3 r =
-        frame.axes * vector_of(solve_law<double>({0, 0, 0}, frame.normal(),
-                                                 space_of(frame.axes.transpose() * v), bias, w, w, mu, 1));
+    const Vec3 r = frame.axes *
+                   vector_of(solve_law<double>(
+                       {0, 0, 0}, {frame.normal(), space_of(frame.axes.transpose() * v), bias, w, w}, mu, 1));
     const LocalSolution exact =
         solve_local(local_block(w * Mat3::Identity(), mu), v + bias * Vec3::UnitX(), Vec3::Zero());
     EXPECT_LT((r - exact.r).norm(), 100 * epsilon) << k;
@@ -96,17 +97,21 @@ TEST(ContactLaw, GivesEveryLaneTheBitsOfADouble) {
       return Space<double>{in[l][c], in[l][c + 1], in[l][c + 2]};
     };
     const auto rows = [&](std::size_t c) { return Space<Quad>{row(c), row(c + 1), row(c + 2)}; };
-    const Space<Quad> lanes =
-        solve_law(rows(0), rows(3), rows(6), row(9), absolute(row(10)), absolute(row(11)), 0.4, Quad{} + 1.2);
-    const LawError<Quad> errors = error_of_law(rows(0), rows(3), rows(6), row(9), absolute(row(10)), 0.4);
+    const Approach<Quad> contacts{rows(3), rows(6), row(9), absolute(row(10)), absolute(row(11))};
+    const Space<Quad> lanes = solve_law<Quad>(rows(0), contacts, 0.4, Quad{} + 1.2),
+                      own = solve_law<Quad>(rows(0), contacts, Quad{} + 0.4, Quad{} + 1.2);
+    const LawError<Quad> errors = error_of_law<Quad>(rows(0), contacts, 0.4),
+                         own_errors = error_of_law<Quad>(rows(0), contacts, Quad{} + 0.4);
     for (std::size_t l = 0; l < 4; ++l) {
-      const Space<double> one = solve_law<double>(column(l, 0), column(l, 3), column(l, 6), in[l][9],
-                                                  absolute(in[l][10]), absolute(in[l][11]), 0.4, 1.2);
+      const Approach<double> contact{column(l, 3), column(l, 6), in[l][9], absolute(in[l][10]),
+                                     absolute(in[l][11])};
+      const Space<double> one = solve_law<double>(column(l, 0), contact, 0.4, 1.2);
       EXPECT_EQ(lanes.x[l], one.x);
       EXPECT_EQ(lanes.y[l], one.y);
       EXPECT_EQ(lanes.z[l], one.z);
-      const LawError<double> error =
-          error_of_law(column(l, 0), column(l, 3), column(l, 6), in[l][9], absolute(in[l][10]), 0.4);
+      EXPECT_EQ(own.x[l], one.x) << "with a coefficient of its own";
+      EXPECT_EQ(own_errors.residual2[l], errors.residual2[l]);
+      const LawError<double> error = error_of_law<double>(column(l, 0), contact, 0.4);
       EXPECT_EQ(errors.residual2[l], error.residual2);
       EXPECT_EQ(errors.velocity2[l], error.velocity2);
     }
@@ -116,7 +121,7 @@ TEST(ContactLaw, GivesEveryLaneTheBitsOfADouble) {
 TEST(GapLaw, LeavesOutPairsThatStayApartAndFollowsTheImpactLawOfFastOnes) {
   const GapRule rule{
       .time_step = 0.01, .alert = 0.1, .restitution = 0.5, .overlap_correction = 0.2, .slow = 1};
-  const auto solve = [&](double gap, double v_n) { return solve_gap(rule, gap, v_n, v_n); };
+  const auto solve = [&](double gap, double v_n) { return solve_gap(rule, gap, v_n, v_n, rule.restitution); };
   EXPECT_TRUE(solve(0.2, -10).absent) << "far, and too slow to close within the step";
   EXPECT_FALSE(solve(0.05, -0.5).absent);
   EXPECT_EQ(solve(0.05, -0.5).bias, 5) << "g/h";

@@ -145,7 +145,7 @@ Solved solve(SolverMethod method, double friction, double tolerance, int subdoma
   Stage stage;
   stage.name = "impact";
   stage.time_step = 1e-3;
-  stage.law = {friction, friction, 0};
+  stage.laws = laws_of_one_material(friction, friction, 0);
   stage.end.steps = 1;
   setup.stages = {stage};
   setup.solver.method = method;

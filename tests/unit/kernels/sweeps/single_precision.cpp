@@ -63,11 +63,11 @@ Swept sweep(const test::Sample& sample, const Kernels& kernels, double mu, doubl
     carry_velocities(of_bodies, beta, slots, out.single.velocity, out.single.last_v);
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
       if (sample.chunks.wall[c] < 0)
-        kernels.template sweep_grains<Friction>(out.contacts, out.single.contacts, sample.range(c),
-                                                out.single.velocity, mu, {beta, 1.2, out.steps});
+        kernels.template sweep_grains<Friction>(out.contacts, out.single, sample.range(c), mu,
+                                                {beta, 1.2, out.steps});
       else
-        kernels.template sweep_wall<Friction>(out.contacts, out.single.contacts, sample.range(c),
-                                              out.single.velocity, mu, out.walls[c], {beta, 1.2, out.steps});
+        kernels.template sweep_wall<Friction>(out.contacts, out.single, sample.range(c), mu, out.walls[c],
+                                              {beta, 1.2, out.steps});
   }
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     widen_impulses(out.single.contacts, sample.range(c), out.contacts);

@@ -345,7 +345,7 @@ TEST(NaturalMap, IsZeroForAnOpenContactWithoutFrictionOrTangentialVelocity) {
   one.contacts.nz = {1};
   one.velocity[0] = {{0, 0, 3}, 1, {0, 0, 0}, 2.5};
   one.contacts.bias = {0};
-  EXPECT_EQ(reference.error_wall<true>(one.contacts, {0, 1}, one.velocity, 0, {}, 0).residual_max2, 0);
+  EXPECT_EQ(reference.error_wall<true>(one.contacts, {0, 1}, one.velocity, 0, WallCopy{}).residual_max2, 0);
 }
 
 TEST(NaturalMap, FallsByOrdersOfMagnitudeAsAPackingIsSwept) {

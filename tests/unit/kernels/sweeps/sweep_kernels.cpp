@@ -43,9 +43,11 @@ struct Outcome {
 
 struct Plan {
   double mu = 0.3;
+  bool own_mu = false;  ///< of each contact, as set_own_friction gives it
   double wall_inv_mass = 0;
   std::vector<std::uint16_t> multiplicity = {};
   int sweeps = 5;
+  ChunkFriction friction() const { return own_mu ? ChunkFriction::of_each_contact() : mu; }
 };
 
 template <bool Friction, class Kernels>
@@ -61,12 +63,12 @@ Outcome run(const Kernels& kernels, const Sample& sample, const Plan& plan) {
     out.walls[c] = {{0.1, -0.2, 0.05}, plan.wall_inv_mass};
   const auto measure = [&] {
     for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-      out.errors.push_back(sample.chunks.wall[c] < 0
-                               ? kernels.template error_grains<Friction>(out.contacts, sample.range(c),
-                                                                         out.velocity, plan.mu, multiplicity)
-                               : kernels.template error_wall<Friction>(out.contacts, sample.range(c),
-                                                                       out.velocity, plan.mu, out.walls[c],
-                                                                       plan.wall_inv_mass, multiplicity));
+      out.errors.push_back(
+          sample.chunks.wall[c] < 0
+              ? kernels.template error_grains<Friction>(out.contacts, sample.range(c), out.velocity,
+                                                        plan.friction(), multiplicity)
+              : kernels.template error_wall<Friction>(out.contacts, sample.range(c), out.velocity,
+                                                      plan.friction(), out.walls[c], multiplicity));
   };
   measure();
   for (int s = 0; s < plan.sweeps; ++s)
@@ -74,15 +76,15 @@ Outcome run(const Kernels& kernels, const Sample& sample, const Plan& plan) {
       // Plain and with momentum by turns.
       const SweepMomentum momentum{0.9, 1.2, steps};
       if (sample.chunks.wall[c] < 0 && s % 2 == 0)
-        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu);
+        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.friction());
       else if (sample.chunks.wall[c] < 0)
-        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
+        kernels.template sweep_grains<Friction>(out.contacts, sample.range(c), out.velocity, plan.friction(),
                                                 momentum);
       else if (s % 2 == 0)
-        kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
+        kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.friction(),
                                               out.walls[c]);
       else
-        kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.mu,
+        kernels.template sweep_wall<Friction>(out.contacts, sample.range(c), out.velocity, plan.friction(),
                                               out.walls[c], momentum);
     }
   measure();
@@ -126,17 +128,43 @@ TEST(SweepKernels, GiveTheBitsOfThePlainReferenceOnEveryInstructionSet) {
       SCOPED_TRACE(testing::Message() << "chunks of " << target << ", 1/M of walls " << wall_inv_mass);
       Sample sample = test::dense_sample(6, 11, true, true, target);
       start_from_random_impulses(sample, 3);
-      expect_reference_bits<true>(sample, {0.3, wall_inv_mass});
+      expect_reference_bits<true>(sample, {.mu = 0.3, .wall_inv_mass = wall_inv_mass});
       Sample smooth = test::dense_sample(6, 12, false, true, target);
       start_from_random_impulses(smooth, 4);
-      expect_reference_bits<false>(smooth, {0, wall_inv_mass});
+      expect_reference_bits<false>(smooth, {.mu = 0, .wall_inv_mass = wall_inv_mass});
     }
+}
+
+TEST(SweepKernels, GiveTheReferenceBitsOfContactsThatHaveFrictionOfTheirOwn) {
+  for (int target : {1, 16, 37, 384}) {
+    SCOPED_TRACE(testing::Message() << "chunks of " << target);
+    Sample sample = test::dense_sample(6, 21, true, true, target);
+    start_from_random_impulses(sample, 8);
+    Random random(9);
+    for (std::size_t k = 0; k < sample.contacts.nx.size(); ++k)
+      sample.contacts.mu.push_back(k % 3 == 0 ? 0 : uniform(random, 0, 1));
+    expect_reference_bits<true>(sample, {.mu = std::nan(""), .own_mu = true, .wall_inv_mass = 1e-3});
+  }
+}
+
+// The same coefficient everywhere, told once or told by every contact.
+TEST(SweepKernels, GiveTheBitsOfOneCoefficientWhereEveryContactHasTheSame) {
+  for (const InstructionSet set : test::sets_to_test()) {
+    SCOPED_TRACE(name_of(set));
+    Sample sample = test::dense_sample(6, 22, true, true, 100);
+    start_from_random_impulses(sample, 10);
+    const Outcome one = run<true>(SweepKernels(set), sample, {.mu = 0.3, .wall_inv_mass = 1e-3});
+    sample.contacts.mu.assign(sample.contacts.nx.size(), 0.3);
+    const Outcome own =
+        run<true>(SweepKernels(set), sample, {.mu = 0, .own_mu = true, .wall_inv_mass = 1e-3});
+    expect_same(one, own);
+  }
 }
 
 TEST(SweepKernels, SeeOpenStickingAndSlidingContactsInTheTestAbove) {
   Sample sample = test::dense_sample(6, 11, true, true, 100);
   start_from_random_impulses(sample, 3);
-  const Outcome out = run<true>(SweepKernels(best_instruction_set()), sample, {0.3, 0});
+  const Outcome out = run<true>(SweepKernels(best_instruction_set()), sample, {.mu = 0.3});
   int open = 0, stick = 0, slide = 0;
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k) {
@@ -169,15 +197,15 @@ TEST(SweepKernels, GiveTheReferenceBitsWithoutFrictionAtRubbingGrainsAndForGrain
       const bool fixed = second < 0 || sample.bodies.velocity[static_cast<std::size_t>(second)].inv_mass == 0;
       if (fixed && a.inv_mass == 0) a.inv_mass = 0.01;
     }
-  expect_reference_bits<true>(sample, {0, 0});
-  expect_reference_bits<true>(sample, {0.5, 0});
+  expect_reference_bits<true>(sample, {.mu = 0});
+  expect_reference_bits<true>(sample, {.mu = 0.5});
 }
 
 TEST(SweepKernels, GiveTheReferenceErrorOfCopiesThatCarryAPartOfTheMass) {
   for (const bool friction : {false, true}) {
     Sample sample = test::dense_sample(5, 14, friction, true, 64);
     start_from_random_impulses(sample, 6);
-    Plan plan{0.3, 0.01};
+    Plan plan{.mu = 0.3, .wall_inv_mass = 0.01};
     for (std::size_t s = 0; s < sample.bodies.size(); ++s)
       plan.multiplicity.push_back(static_cast<std::uint16_t>(1 + s % 4));
     friction ? expect_reference_bits<true>(sample, plan) : expect_reference_bits<false>(sample, plan);
@@ -192,7 +220,7 @@ TEST(SweepKernels, LetNotANumberSpreadToTheErrorAndNeverSwallowIt) {
       sample.bodies.velocity[20].u[1] = std::numeric_limits<double>::quiet_NaN();
       const SweepKernels kernels(set);
       const Outcome out =
-          friction ? run<true>(kernels, sample, {0.3, 0}) : run<false>(kernels, sample, {0, 0});
+          friction ? run<true>(kernels, sample, {.mu = 0.3}) : run<false>(kernels, sample, {.mu = 0});
       EXPECT_TRUE(std::isnan(out.errors.front().residual2));
       EXPECT_TRUE(std::isnan(out.errors.back().residual2));
       EXPECT_TRUE(std::isnan(out.velocity[20].u[1]));

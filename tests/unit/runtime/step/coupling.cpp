@@ -261,7 +261,7 @@ TEST(Coupling, KeepsTheMomentumOfTwoSpheresThatMeetAtABorder) {
         Stage stage;
         stage.name = "meet";
         stage.time_step = 1e-3;
-        stage.law = {0.3, 0, 0.5};
+        stage.laws = laws_of_one_material(0.3, 0, 0.5);
         stage.end.steps = 6;
         setup.stages = {stage};
         setup.solver.max_iterations = 3;
@@ -309,7 +309,7 @@ TEST(Coupling, HoldsGrainsThatTouchNothingButWalls) {
   Stage stage;
   stage.name = "press";
   stage.time_step = 1e-3;
-  stage.law = {0, 0, 0};
+  stage.laws = laws_of_one_material(0, 0, 0);
   stage.end.steps = 5;
   WallLoad load;
   load.drive = WallDrive::force;

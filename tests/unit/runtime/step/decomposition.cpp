@@ -155,7 +155,7 @@ TEST(Decomposition, ConservesMomentumAcrossABorder) {
       Stage stage;
       stage.name = "collide";
       stage.time_step = 1e-3;
-      stage.law = {0.4, 0, 0};
+      stage.laws = laws_of_one_material(0.4, 0, 0);
       stage.end.steps = 8;
       setup.stages = {stage};
       setup.solver.max_iterations = 7;  // a solution that is not finished conserves it too
@@ -196,7 +196,8 @@ TEST(Decomposition, LetsBodiesMigrateAndKeepsTheirContactsMemory) {
   };
   const auto run_late = [](double drift, bool warm_start) {
     talus::Setup setup = pressed_box(0.3, 250);
-    setup.stages[0].law.mu_walls = 0;  // the pushed ones do not come along
+    setup.stages[0].laws.between(material_of_grains, material_of_walls).friction =
+        0;  // the pushed ones do not come along
     choose(setup, variants[0], 8);
     setup.decomposition.repartition_every = 1000000;
     setup.decomposition.max_imbalance = 100;
@@ -249,7 +250,7 @@ TEST(Decomposition, SendsWhatTheFormulaSays) {
   Stage stage;
   stage.name = "rest";
   stage.time_step = 1e-3;
-  stage.law = {0.3, 0, 0};
+  stage.laws = laws_of_one_material(0.3, 0, 0);
   stage.end.steps = 1;
   setup.stages = {stage};
   setup.decomposition.subdomains = 4;
@@ -297,7 +298,7 @@ TEST(Decomposition, BearsSubdomainsWithLittleOrNothingInThem) {
     stage.name = "fall";
     stage.time_step = 1e-3;
     stage.gravity = Vec3(0, 0, -9.81);
-    stage.law = {0.3, 0.3, 0};
+    stage.laws = laws_of_one_material(0.3, 0.3, 0);
     stage.end.steps = 60;
     setup.stages = {stage};
     setup.decomposition.subdomains = subdomains;
@@ -394,7 +395,7 @@ TEST(Decomposition, CarriesOrientationsAndStagesAlong) {
   talus::Setup setup = pressed_box(0, 10);
   Stage shear = setup.stages[0];
   shear.name = "shear";
-  shear.law = {0.4, 0.2, 0};
+  shear.laws = laws_of_one_material(0.4, 0.2, 0);
   shear.time_step = 5e-4;
   setup.stages.push_back(shear);
   setup.orientation = true;

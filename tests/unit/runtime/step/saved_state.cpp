@@ -20,7 +20,7 @@ talus::Setup pressed_box() {
   Stage press, hold;
   press.name = "press";
   press.time_step = hold.time_step = 1e-3;
-  press.law = hold.law = {0.35, 0.2, 0};
+  press.laws = hold.laws = laws_of_one_material(0.35, 0.2, 0);
   press.end.steps = 4;
   hold.name = "hold";
   hold.gravity = Vec3(0, 0, -9.81);

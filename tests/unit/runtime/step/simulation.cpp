@@ -68,9 +68,9 @@ Setup press_and_shear() {
   setup.walls = box(8 * 2.1 * radius, 8 * 2.1 * radius, 9 * 2.1 * radius);
   Stage squeeze = stage("squeeze", 25), hold = stage("hold", 10), shear = stage("shear", 10);
   for (const char* name : {"x+", "y+", "z+"}) squeeze.loads.push_back({name, pressed(2e4)});
-  hold.law = {0.35, 0.2, 0};
+  hold.laws = laws_of_one_material(0.35, 0.2, 0);
   hold.gravity = Vec3(0, 0, -9.81);
-  shear.law = {0.35, 0, 0};
+  shear.laws = laws_of_one_material(0.35, 0, 0);
   WallLoad down;
   down.drive = WallDrive::velocity;
   down.velocity = Vec3(0, 0, -0.3);
@@ -249,7 +249,7 @@ TEST(Simulation, OfAPerfectlyElasticBallKeepsItsEnergy) {
   talus::Setup setup = falling(20000);
   setup.walls.resize(1);
   setup.walls[0].name = "floor";
-  setup.stages[0].law.restitution = 1;
+  setup.stages[0].laws.set_all(&PairLaw::restitution, 1);
   Bodies bodies;
   add_sphere(bodies, BodyId{0}, Vec3(0, 0, 1 + radius), radius, density);
   const double mass = bodies.mass(0);
@@ -345,7 +345,7 @@ TEST(Certificate, MarksAStepInWhichAGrainThatWasStruckPassesAnother) {
     talus::Setup setup = falling(4);
     setup.stages[0].gravity = Vec3::Zero();
     setup.stages[0].time_step = 1;
-    setup.stages[0].law.restitution = 1;
+    setup.stages[0].laws.set_all(&PairLaw::restitution, 1);
     Bodies bodies;
     for (const double x : {a, 0.0, c})
       add_sphere(bodies, BodyId{static_cast<int>(bodies.size())}, Vec3(x, 0, 0), 1, 1);
@@ -389,7 +389,7 @@ TEST(Simulation, WithoutFrictionHasNoTangentialArrays) {
     graph::Executor executor({});
     talus::Setup setup = falling(2);
     setup.walls = box(0.09, 0.09, 0.09);
-    setup.stages[0].law.mu_grains = mu;
+    setup.stages[0].laws.between(material_of_grains, material_of_grains).friction = mu;
     Simulation simulation(setup, loose_sample(4, 4, 4, 1), executor);
     simulation.step();
     const StepState& state = simulation.state();

@@ -1,0 +1,64 @@
+#pragma once
+
+/// Which contact law holds between two materials.
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/types.hpp"
+
+namespace talus {
+
+/// The law of the contacts between two materials.
+struct PairLaw {
+  double friction = 0;     ///< Coulomb's mu >= 0
+  double restitution = 0;  ///< Newton's e in [0, 1], of the normal velocity
+  bool operator==(const PairLaw&) const = default;
+};
+
+/// The laws of all pairs of materials, in an order in which more materials do not move those that there are:
+/// (0, 0), (0, 1), (1, 1), (0, 2), ...
+class PairTable {
+ public:
+  /// Of a scene that names no materials, without friction and restitution.
+  PairTable() : PairTable(2) {}
+  /// The same law for all pairs. `materials` >= 1.
+  explicit PairTable(std::size_t materials, const PairLaw& law = {})
+      : laws_(materials * (materials + 1) / 2, law) {}
+
+  /// Place of a pair in laws(), whichever material comes first.
+  static std::size_t number(Material a, Material b) {
+    const std::size_t low = std::min(a, b), high = std::max(a, b);
+    return high * (high + 1) / 2 + low;
+  }
+  PairLaw& between(Material a, Material b) { return laws_[number(a, b)]; }
+  const PairLaw& between(Material a, Material b) const { return laws_[number(a, b)]; }
+  std::span<PairLaw> laws() { return laws_; }
+  std::span<const PairLaw> laws() const { return laws_; }
+
+  /// Gives every pair the same value, e.g. of friction.
+  void set_all(double PairLaw::*number, double value) {
+    for (PairLaw& law : laws_) law.*number = value;
+  }
+  /// The largest value of any pair; of a NaN nothing is seen.
+  double largest(double PairLaw::*number) const {
+    double most = 0;
+    for (const PairLaw& law : laws_) most = std::max(most, law.*number);
+    return most;
+  }
+  bool operator==(const PairTable&) const = default;
+
+ private:
+  std::vector<PairLaw> laws_;
+};
+
+/// The laws of a scene that names no materials.
+inline PairTable laws_of_one_material(double friction, double wall_friction, double restitution) {
+  PairTable table(2, {friction, restitution});
+  table.between(material_of_grains, material_of_walls).friction = wall_friction;
+  return table;
+}
+
+}  // namespace talus
