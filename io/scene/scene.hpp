@@ -1,7 +1,7 @@
 #pragma once
 
 /// Scene files: what a simulation is made of, as a user writes it (docs/scenes.md). One table of keys,
-/// io/scene/detail/scene_keys.cpp, is behind reading, checking, writing and the reference page.
+/// io/scene/detail/scene_keys.hpp, is behind reading, checking, writing and the reference page.
 
 #include <array>
 #include <cstdint>

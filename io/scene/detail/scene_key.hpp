@@ -1,6 +1,6 @@
 #pragma once
 
-/// What the table of keys (scene_keys.cpp) is written in: a key of a scene file, bound to a member of the
+/// What the table of keys (scene_keys.hpp) is written in: a key of a scene file, bound to a member of the
 /// struct it fills.
 
 #include <algorithm>
@@ -96,6 +96,14 @@ struct Key : KeyText {
     applies = std::move(test);
     return std::move(*this);
   }
+};
+
+/// A table of the scene, or the elements of an array of tables.
+template <class Part>
+struct Section {
+  std::string header;   ///< as TOML writes it: "[solver]", "[[stage]]"; "" for the keys at the top
+  std::string meaning;  ///< for the reference
+  std::vector<Key<Part>> keys;
 };
 
 /// Conversion between a member of type T and a Value.

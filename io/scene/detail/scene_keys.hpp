@@ -1,24 +1,10 @@
 #pragma once
 
-#include <string>
-#include <utility>
-#include <vector>
-
+#include "io/scene/detail/loading_keys.hpp"
 #include "io/scene/detail/scene_key.hpp"
 #include "io/scene/scene.hpp"
 
 namespace talus::io::detail {
-
-/// A load as a stage names it: wall and what moves it.
-using NamedLoad = std::pair<std::string, WallLoad>;
-
-/// A table of the scene, or the elements of an array of tables.
-template <class Part>
-struct Section {
-  std::string header;   ///< as TOML writes it: "[solver]", "[[stage]]"; "" for the keys at the top
-  std::string meaning;  ///< for the reference
-  std::vector<Key<Part>> keys;
-};
 
 /// The table of keys: the one place where a key is named, bound, limited and explained.
 struct SceneKeys {
@@ -42,12 +28,8 @@ void for_each_section(Keys&& keys, F&& f) {
   f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output);
 }
 
+/// Top, material, sample and output from scene_keys.cpp, walls and stages from loading_keys.cpp, detection,
+/// solver and decomposition from solver_keys.cpp.
 const SceneKeys& scene_keys();
-
-/// The six sides of a box, in the order of its walls: x-, x+, y-, y+, z-, z+.
-const std::vector<std::string>& sides();
-
-/// The axis (0, 1, 2) that the wall is perpendicular to, or -1 for an oblique wall.
-int axis_of(const Wall& wall);
 
 }  // namespace talus::io::detail

@@ -1,0 +1,185 @@
+#include "io/scene/detail/loading_keys.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "io/scene/detail/shape_keys.hpp"
+
+namespace talus::io::detail {
+
+namespace {
+
+/// Unit normal, into the grains, of the wall at a side of a box.
+Vec3 normal_of_side(std::size_t side) {
+  const auto axis = static_cast<Eigen::Index>(side / 2);
+  return side % 2 == 0 ? Vec3(Vec3::Unit(axis)) : Vec3(-Vec3::Unit(axis));
+}
+
+std::size_t side_index(const std::string& text) {
+  return static_cast<std::size_t>(std::find(sides().begin(), sides().end(), text) - sides().begin());
+}
+
+std::vector<Key<WallLoad>> load_keys() {
+  const auto driven_by = [](WallDrive drive) {
+    return [drive](const WallLoad& load) { return load.drive == drive; };
+  };
+  return {
+      choice<WallLoad>("drive", {"fixed", "velocity", "pressure", "force"},
+                       "What moves the wall. Walls driven by pressure or force are free along their normal.",
+                       &WallLoad::drive),
+      key<WallLoad>("velocity", "m/s", any, "Velocity, whatever it costs.", &WallLoad::velocity)
+          .only("drive = velocity", driven_by(WallDrive::velocity))
+          .need(),
+      key<WallLoad>("pressure", "Pa", not_negative,
+                    "Pushes into the grains with pressure × area of the wall's face.", &WallLoad::pressure)
+          .only("drive = pressure", driven_by(WallDrive::pressure))
+          .need(),
+      key<WallLoad>("force", "N", not_negative, "Pushes into the grains.", &WallLoad::force)
+          .only("drive = force", driven_by(WallDrive::force))
+          .need(),
+      key<WallLoad>("mass", "kg", positive, "Inertia of the wall.", &WallLoad::mass)
+          .or_auto(0, "a tenth of the mass of the grains")
+          .only("drive = pressure or force", [](const WallLoad& load) { return load.pushed(); }),
+  };
+}
+
+}  // namespace
+
+Section<Wall> wall_keys() {
+  std::vector<Key<Wall>> shapes = shape_keys();
+  auto name = bound<std::string, Wall>(
+      "name", "", any, "Name, unique among the walls.",
+      [](Wall& wall, const std::string& text) {
+        wall.name = text;
+        if (const std::size_t at = side_index(text); at < sides().size()) wall.normal = normal_of_side(at);
+      },
+      [](const Wall& wall) -> Value { return wall.name; });
+  auto side = bound<std::string, Wall>(
+      "side", "", any, "Side of the sample at which the wall stands, facing it.",
+      [](Wall& wall, const std::string& text) { wall.normal = normal_of_side(side_index(text)); },
+      [](const Wall& wall) -> Value {
+        const int axis = axis_of(wall);
+        if (axis < 0) return {};
+        return sides()[static_cast<std::size_t>(2 * axis + (wall.normal[axis] > 0 ? 0 : 1))];
+      });
+  side.choices = sides();
+  auto normal = bound<Vec3, Wall>(
+      "normal", "", any, "Direction into the grains, of any length, instead of `side`.",
+      [](Wall& wall, const Vec3& direction) {
+        const double length = direction.norm();
+        wall.normal = length == 0 || std::abs(length - 1) < 1e-12 ? direction : Vec3(direction / length);
+      },
+      [](const Wall& wall) { return axis_of(wall) < 0 ? Held<Vec3>::out(wall.normal) : Value{}; });
+  auto position = bound<double, Wall>(
+      "position", "m", any, "Coordinate of the wall's face along its axis.",
+      [](Wall& wall, double coordinate) {
+        if (const int axis = axis_of(wall); axis >= 0) wall.point[axis] = coordinate;
+      },
+      [](const Wall& wall) {
+        const int axis = axis_of(wall);
+        return axis < 0 ? Value{} : Value{wall.point[axis]};
+      });
+  auto point = bound<Vec3, Wall>(
+      "point", "m", any, "A point of the wall's face, instead of `position`; an oblique wall needs it.",
+      [](Wall& wall, const Vec3& place) { wall.point = place; },
+      [](const Wall& wall) { return axis_of(wall) < 0 ? Held<Vec3>::out(wall.point) : Value{}; });
+  std::vector<Key<Wall>> keys = {
+      std::move(side).or_else("the name, if it is one of these; else `normal` is given"),
+      std::move(normal).or_else("from `side`"),
+      std::move(position)
+          .or_auto(std::nan(""), "at the side of `sample.base`, else at the outermost grain")
+          .only("side or a normal along an axis", [](const Wall& wall) { return axis_of(wall) >= 0; }),
+      std::move(point).or_else("from `position`"),
+      key<Wall>("area", "m²", positive, "Area that a pressure acts on.", &Wall::area)
+          .or_auto(0, "the wall's face in the box of walls, as it is at each step")};
+  for (auto& load_key : within(load_keys(), &Wall::load)) keys.push_back(std::move(load_key));
+  keys.push_back(key<Wall>("initial_velocity", "m/s", any, "Velocity at the beginning, along the normal.",
+                           &Wall::velocity)
+                     .only("drive = pressure or force", [](const Wall& wall) { return wall.load.pushed(); }));
+  keep_for_planes(keys);
+  std::vector<Key<Wall>> all = {std::move(name).need()};
+  for (std::vector<Key<Wall>>* some : {&shapes, &keys})
+    for (Key<Wall>& one : *some) all.push_back(std::move(one));
+  return {"[[wall]]", "A wall. Its load holds from the beginning, until a stage changes it.", std::move(all)};
+}
+
+Wall wall_at_side(std::size_t side) {
+  Wall wall;
+  wall.name = sides()[side];
+  wall.normal = normal_of_side(side);
+  wall.point = Vec3::Zero();
+  wall.point[static_cast<Eigen::Index>(side / 2)] = std::nan("");
+  return wall;
+}
+
+Section<Stage> stage_keys() {
+  return {"[[stage]]",
+          "Stages run one after the other. What a stage does not give is that of the scene; loads of walls "
+          "stay as the stage "
+          "before left them.",
+          {
+              key<Stage>("name", "", any, "Name, unique among the stages.", &Stage::name)
+                  .or_else("stage-1, stage-2, ..."),
+              key<Stage>("time_step", "s", positive, "Time step h.", &Stage::time_step)
+                  .or_else("that of the scene"),
+              key<Stage>("gravity", "m/s²", any, "Gravity.", &Stage::gravity).or_else("that of the scene"),
+              key<Stage>(
+                  "friction", "", not_negative, "Coulomb friction between grains.",
+                  [](auto& s) -> auto& { return s.law.mu_grains; })
+                  .or_else("that of the material"),
+              key<Stage>(
+                  "wall_friction", "", not_negative, "Coulomb friction between grains and walls.",
+                  [](auto& s) -> auto& { return s.law.mu_walls; })
+                  .or_else("that of the material"),
+              key<Stage>(
+                  "restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
+                  [](auto& s) -> auto& { return s.law.restitution; })
+                  .or_else("that of the material"),
+          }};
+}
+
+Section<StageEnd> stage_end_keys() {
+  return {
+      "[stage.end]",
+      "When the stage ends: at the first of the conditions given. At least one is given.",
+      {
+          key<StageEnd>("steps", "", at_least_one, "Number of steps.", &StageEnd::steps),
+          key<StageEnd>("time", "s", positive, "Time of the stage.", &StageEnd::time),
+          key<StageEnd>(
+              "strain", "", positive,
+              "Magnitude of the logarithmic strain along `strain_axis` since the beginning of the stage.",
+              &StageEnd::strain),
+          choice<StageEnd>("strain_axis", {"x", "y", "z"},
+                           "Axis of `strain`; two walls must bound the sample along it.",
+                           &StageEnd::strain_axis)
+              .only("strain is given", [](const StageEnd& end) { return end.strain.has_value(); }),
+          key<StageEnd>(
+              "equilibrium", "", positive,
+              "Bound on the net force over the applied force of every pushed wall, and on the kinetic energy "
+              "over p·V, or over m·g·d under gravity.",
+              &StageEnd::equilibrium),
+      }};
+}
+
+Section<NamedLoad> stage_load_keys() {
+  std::vector<Key<NamedLoad>> keys = {
+      key<NamedLoad>("wall", "", any, "Name of the wall.", &NamedLoad::first).need()};
+  for (auto& load_key : within(load_keys(), &NamedLoad::second)) keys.push_back(std::move(load_key));
+  return {"[[stage.load]]",
+          "A load that changes when the stage begins; the whole load of the wall is given anew.",
+          std::move(keys)};
+}
+
+const std::vector<std::string>& sides() {
+  static const std::vector<std::string> names = {"x-", "x+", "y-", "y+", "z-", "z+"};
+  return names;
+}
+
+int axis_of(const Wall& wall) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (std::abs(wall.normal[axis]) == 1) return axis;
+  return -1;
+}
+
+}  // namespace talus::io::detail
