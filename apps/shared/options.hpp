@@ -1,10 +1,12 @@
 #pragma once
 
-/// Checks of options. CLI11's own say the largest of all doubles when they refuse.
+/// Checks of options, and the options that several commands have. CLI11's own checks say the largest of all
+/// doubles when they refuse.
 
 #include <CLI/CLI.hpp>
 
 #include <string>
+#include <vector>
 
 namespace talus {
 
@@ -28,6 +30,18 @@ inline CLI::Validator not_negative() {
 /// Beyond 4096 a typing error is likelier than a machine.
 inline CLI::Validator thread_count() {
   return CLI::Range(1, 4096);
+}
+
+/// --threads; what is left as it is stands for one per core.
+inline void add_threads(CLI::App& app, int& threads) {
+  app.add_option("--threads", threads, "threads [one per core]")->type_name("N")->check(thread_count());
+}
+
+/// --set, once for each "a.b=c".
+inline void add_overrides(CLI::App& app, std::vector<std::string>& overrides) {
+  app.add_option("--set", overrides, "override a key of the scene, may be repeated")
+      ->type_name("a.b=c")
+      ->allow_extra_args(false);
 }
 
 }  // namespace talus

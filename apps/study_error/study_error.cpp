@@ -200,61 +200,56 @@ void refuse_idle_options(const CLI::App& app, const StudyErrorOptions& options) 
 
 }  // namespace
 
-CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options) {
-  CLI::App* app = study.add_subcommand(
-      "error", "error against run time: of one step, of whole runs, or a performance profile of FCLIB files");
-  app->add_option("subject", options.subject, "scene file, or folder of FCLIB files")
+void add_study_error_options(CLI::App& app, StudyErrorOptions& options) {
+  app.add_option("subject", options.subject, "scene file, or folder of FCLIB files")
       ->type_name("PATH")
       ->required();
-  app->add_option("--out", options.out, "directory of the study [out/error-NAME]")->type_name("DIR");
-  app->add_flag("--force", options.force, "replace an earlier study in the directory");
-  app->add_option("--methods", options.methods, "names of solver.method [all]")
+  app.add_option("--out", options.out, "directory of the study [out/error-NAME]")->type_name("DIR");
+  app.add_flag("--force", options.force, "replace an earlier study in the directory");
+  app.add_option("--methods", options.methods, "names of solver.method [all]")
       ->type_name("A,B")
       ->delimiter(',');
-  app->add_option("--tolerances", options.tolerances,
-                  "on the residual [0.01,0.001,0.0001; of FCLIB files 1e-4,1e-8]")
+  app.add_option("--tolerances", options.tolerances,
+                 "on the residual [0.01,0.001,0.0001; of FCLIB files 1e-4,1e-8]")
       ->type_name("T,..")
       ->delimiter(',')
       ->check(above_zero());
-  app->add_option("--time-steps", options.time_steps, "whole runs: multiples of the scene's time steps [1]")
+  app.add_option("--time-steps", options.time_steps, "whole runs: multiples of the scene's time steps [1]")
       ->type_name("F,..")
       ->delimiter(',')
       ->check(above_zero());
-  app->add_option("--subdomains", options.subdomains, "numbers of subdomains [1]")
+  app.add_option("--subdomains", options.subdomains, "numbers of subdomains [1]")
       ->type_name("N,..")
       ->delimiter(',')
       ->check(CLI::Range(1, most_subdomains));
-  app->add_option("--threads", options.threads, "numbers of threads [one per core]")
+  app.add_option("--threads", options.threads, "numbers of threads [one per core]")
       ->type_name("N,..")
       ->delimiter(',')
       ->check(thread_count());
-  app->add_option("--seeds", options.seeds, "seeds of the sample [the scene's]")
+  app.add_option("--seeds", options.seeds, "seeds of the sample [the scene's]")
       ->type_name("S,..")
       ->delimiter(',');
-  app->add_option("--only", options.only, "step: no whole runs; run: no single step")
+  app.add_option("--only", options.only, "step: no whole runs; run: no single step")
       ->type_name("PART")
       ->check(CLI::IsMember({"step", "run"}));
-  app->add_option("--at-step", options.at_step, "steps before the one that is solved in every way")
+  app.add_option("--at-step", options.at_step, "steps before the one that is solved in every way")
       ->type_name("N")
       ->capture_default_str()
       ->check(not_negative());
-  app->add_option("--steps", options.steps, "length of a whole run, in time steps of the first stage")
+  app.add_option("--steps", options.steps, "length of a whole run, in time steps of the first stage")
       ->type_name("N")
       ->capture_default_str()
       ->check(above_zero());
-  app->add_option("--max-sweeps", options.max_sweeps, "of a solve of the one step")
+  app.add_option("--max-sweeps", options.max_sweeps, "of a solve of the one step")
       ->type_name("N")
       ->capture_default_str()
       ->check(above_zero());
-  app->add_option("--max-seconds", options.max_seconds, "of a solve of the one step, or of an FCLIB problem")
+  app.add_option("--max-seconds", options.max_seconds, "of a solve of the one step, or of an FCLIB problem")
       ->type_name("S")
       ->capture_default_str()
       ->check(above_zero());
-  app->add_option("--set", options.overrides, "override a key of the scene, may be repeated")
-      ->type_name("a.b=c")
-      ->allow_extra_args(false);
-  app->callback([app, &options] { refuse_idle_options(*app, options); });
-  return app;
+  add_overrides(app, options.overrides);
+  app.callback([&app, &options] { refuse_idle_options(app, options); });
 }
 
 int study_error_command(const StudyErrorOptions& options) {

@@ -27,9 +27,9 @@ struct StudyErrorOptions {
   double max_seconds = 60;             ///< of a solve
 };
 
-/// Adds `error` to the command `study`; `options` must outlive the parsing, which refuses options that would
-/// do nothing for the subject or with --only.
-CLI::App* add_study_error(CLI::App& study, StudyErrorOptions& options);
+/// Adds the options of `talus study error` to `app`. `options` must outlive the parsing, which refuses
+/// options that would do nothing for the subject or with --only.
+void add_study_error_options(CLI::App& app, StudyErrorOptions& options);
 
 /// Measures and writes the study (docs/formats.md). Progress and errors go to stderr. Returns an ExitCode:
 /// exit_failure when the step, or whole runs, could be solved in no way, exit_tolerance_missed when a

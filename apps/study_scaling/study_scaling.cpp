@@ -458,23 +458,21 @@ int run_study(const StudyScalingOptions& options) {
 
 }  // namespace
 
-CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
-  CLI::App* app = study.add_subcommand(
-      "scaling", "strong and weak scaling: runs on this machine, predictions for larger ones");
-  app->add_option("scene", options.scene, "scene file")->type_name("FILE")->required();
-  app->add_option("--out", options.out, "directory of the study [out/scaling-NAME]")->type_name("DIR");
-  app->add_flag("--force", options.force, "replace an earlier study in the directory");
-  app->add_flag("--reuse", options.reuse,
-                "the same, but play the traces again that it has recorded of the same scene and steps; real "
-                "runs are made anew (--repeat 0: none)");
-  app->add_option("--steps", options.steps, "steps that count, first and last")
+void add_study_scaling_options(CLI::App& app, StudyScalingOptions& options) {
+  app.add_option("scene", options.scene, "scene file")->type_name("FILE")->required();
+  app.add_option("--out", options.out, "directory of the study [out/scaling-NAME]")->type_name("DIR");
+  app.add_flag("--force", options.force, "replace an earlier study in the directory");
+  app.add_flag("--reuse", options.reuse,
+               "the same, but play the traces again that it has recorded of the same scene and steps; real "
+               "runs are made anew (--repeat 0: none)");
+  app.add_option("--steps", options.steps, "steps that count, first and last")
       ->type_name("FIRST:LAST")
       ->capture_default_str();
-  app->add_option("--from", options.from, "results.h5 whose last frame is the sample [as the scene says]")
+  app.add_option("--from", options.from, "results.h5 whose last frame is the sample [as the scene says]")
       ->type_name("FILE");
-  app->add_option("--stage", options.stage, "stage to begin with [the first]")->type_name("NAME");
+  app.add_option("--stage", options.stage, "stage to begin with [the first]")->type_name("NAME");
   const auto numbers = [&](const char* name, std::vector<int>& values, const char* text) {
-    app->add_option(name, values, text)
+    app.add_option(name, values, text)
         ->type_name("N,..")
         ->delimiter(',')
         ->check(CLI::Range(1, most_subdomains));
@@ -482,54 +480,50 @@ CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options) {
   numbers("--subdomains", options.subdomains, "numbers of subdomains, one a core [1,2,4,8,16]");
   numbers("--weak", options.weak,
           "the same with as many grains a core; the most have the scene's sample [as --subdomains]");
-  app->add_flag("--no-weak", options.no_weak, "no weak scaling");
+  app.add_flag("--no-weak", options.no_weak, "no weak scaling");
   numbers("--hybrid", options.hybrid, "numbers of cores to divide into ranks and threads [the most]");
-  app->add_option("--variant", options.variants,
-                  "predict with these overrides too, several between spaces; may be repeated")
+  app.add_option("--variant", options.variants,
+                 "predict with these overrides too, several between spaces; may be repeated")
       ->type_name("\"a.b=c ...\"")
       ->allow_extra_args(false);
-  app->add_option("--network", options.networks, "of predictions: today, 2012 or node [today]")
+  app.add_option("--network", options.networks, "of predictions: today, 2012 or node [today]")
       ->type_name("NAME,..")
       ->delimiter(',');
-  app->add_option("--latency", options.latency, "of a message between nodes [s]: makes a network `given`")
+  app.add_option("--latency", options.latency, "of a message between nodes [s]: makes a network `given`")
       ->check(not_negative());
-  app->add_option("--bandwidth", options.bandwidth, "of a node's link, each way [B/s], likewise")
+  app.add_option("--bandwidth", options.bandwidth, "of a node's link, each way [B/s], likewise")
       ->check(above_zero());
-  app->add_option("--overhead", options.overhead, "of a core per message sent or taken [s], likewise")
+  app.add_option("--overhead", options.overhead, "of a core per message sent or taken [s], likewise")
       ->check(not_negative());
-  app->add_option("--ranks-per-node", options.ranks_per_node, "likewise")->check(above_zero());
-  app->add_option("--repeat", options.repeat, "real runs of each machine; 0: only predict")
+  app.add_option("--ranks-per-node", options.ranks_per_node, "likewise")->check(above_zero());
+  app.add_option("--repeat", options.repeat, "real runs of each machine; 0: only predict")
       ->type_name("N")
       ->capture_default_str()
       ->check(not_negative());
-  app->add_option("--record", options.record, "traces of each number of subdomains")
+  app.add_option("--record", options.record, "traces of each number of subdomains")
       ->type_name("N")
       ->capture_default_str()
       ->check(above_zero());
-  app->add_flag("--own-caches", options.own_caches,
-                "record subdomains as on cores of their own, each of whose caches holds no other");
-  app->add_flag("--typical", options.typical,
-                "tasks that took over three times their median take the median: for noisy recordings");
-  app->add_option(
+  app.add_flag("--own-caches", options.own_caches,
+               "record subdomains as on cores of their own, each of whose caches holds no other");
+  app.add_flag("--typical", options.typical,
+               "tasks that took over three times their median take the median: for noisy recordings");
+  app.add_option(
          "--quantile", options.quantile,
          "tasks take this quantile of their times in the step: for recordings on a busy machine [off]")
       ->type_name("Q")
       ->check(CLI::Range(0.0, 1.0));
-  app->add_option("--cores", options.cores, "cores for real runs [all]")->type_name("N")->check(above_zero());
-  app->add_option("--mpirun", options.mpirun, "words before -n RANKS [mpirun --bind-to core ...]")
+  app.add_option("--cores", options.cores, "cores for real runs [all]")->type_name("N")->check(above_zero());
+  app.add_option("--mpirun", options.mpirun, "words before -n RANKS [mpirun --bind-to core ...]")
       ->type_name("TEXT");
-  app->add_option("--smpi", options.smpi,
-                  "talus of preset smpi: predict by running it on simulated ranks too")
+  app.add_option("--smpi", options.smpi, "talus of preset smpi: predict by running it on simulated ranks too")
       ->type_name("PROGRAM");
-  app->add_option("--smpirun", options.smpirun, "SimGrid's launcher")
+  app.add_option("--smpirun", options.smpirun, "SimGrid's launcher")
       ->type_name("PROGRAM")
       ->capture_default_str();
-  app->add_option("--beside", options.beside, "other speedups for the pictures: name,cores,speedup")
+  app.add_option("--beside", options.beside, "other speedups for the pictures: name,cores,speedup")
       ->type_name("CSV");
-  app->add_option("--set", options.overrides, "override a key of the scene, may be repeated")
-      ->type_name("a.b=c")
-      ->allow_extra_args(false);
-  return app;
+  add_overrides(app, options.overrides);
 }
 
 int study_scaling_command(const StudyScalingOptions& options) {

@@ -39,8 +39,8 @@ struct StudyScalingOptions {
   std::string smpirun = "smpirun";
 };
 
-/// Adds `scaling` to the command `study`; `options` must outlive the parsing.
-CLI::App* add_study_scaling(CLI::App& study, StudyScalingOptions& options);
+/// Adds the options of `talus study scaling` to `app`. `options` must outlive the parsing.
+void add_study_scaling_options(CLI::App& app, StudyScalingOptions& options);
 
 /// Measures, predicts and writes the study (docs/formats.md). Progress and errors go to stderr, the commands
 /// to stdout. Returns an ExitCode; exit_tolerance_missed when steps that count missed their tolerance and the

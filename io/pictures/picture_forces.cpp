@@ -118,11 +118,15 @@ std::string_view line_colour(double normal, double mean) {
   return normal < mean ? "#e8a27c" : normal < 2 * mean ? "#d3652f" : "#8f2d0c";
 }
 
-void draw_force(Svg& svg, double x1, double y1, double x2, double y2, double normal, const ForceSlab& slab,
-                const View& view) {
+/// A straight line between two points of the picture [px].
+struct Segment {
+  double x1, y1, x2, y2;
+};
+
+void draw_force(Svg& svg, const Segment& at, double normal, const ForceSlab& slab, const View& view) {
   const double w = line_width(normal, slab, view);
   if (w < 0.05) return;
-  svg.line(x1, y1, x2, y2, {line_colour(normal, slab.mean_force), w});
+  svg.line(at.x1, at.y1, at.x2, at.y2, {line_colour(normal, slab.mean_force), w});
 }
 
 void draw_legend(Svg& svg, const ForceSlab& slab, const View& view, double top) {
@@ -133,7 +137,7 @@ void draw_legend(Svg& svg, const ForceSlab& slab, const View& view, double top) 
   double x = margin_left + bar + 60;
   if (!(slab.mean_force > 0)) return;
   for (const double multiple : {0.5, 1.0, 2.0, 4.0}) {
-    draw_force(svg, x, top + 18, x + 36, top + 18, multiple * slab.mean_force, slab, view);
+    draw_force(svg, {x, top + 18, x + 36, top + 18}, multiple * slab.mean_force, slab, view);
     svg.text(x, top + 38, (multiple == 1 ? "mean " : "") + detail::with_unit(multiple * slab.mean_force, "N"),
              {12, style::ink});
     x += 92;
@@ -165,7 +169,7 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
   svg.end_group();
   svg.begin_group(R"(stroke-linecap="round")");
   for (const Force& force : slab.forces) {
-    draw_force(svg, view.x(force.from.x), view.y(force.from.z), view.x(force.to.x), view.y(force.to.z),
+    draw_force(svg, {view.x(force.from.x), view.y(force.from.z), view.x(force.to.x), view.y(force.to.z)},
                force.normal, slab, view);
   }
   svg.end_group();

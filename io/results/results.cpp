@@ -87,18 +87,19 @@ Hdf5Object create_array(Place place, const char* name, const char* units, hid_t 
   return dataset;
 }
 
-/// Writes rows [begin, begin + rows) of a dataset.
+/// Writes rows of a dataset from `begin` on: whole ones, of so many `columns`, one after the other.
 template <class T>
-void write_rows(hid_t dataset, Place place, const char* name, const T* values, std::size_t begin,
-                std::size_t rows, std::size_t columns) {
-  if (rows == 0) return;
+void write_rows(hid_t dataset, Place place, const char* name, std::span<const T> values, std::size_t begin,
+                std::size_t columns) {
+  if (values.empty()) return;
   const std::string action = fmt::format("writing '{}'", name);
   const int dimensions = columns == 1 ? 1 : 2;
-  const hsize_t start[2] = {begin, 0}, count[2] = {rows, columns};
+  const hsize_t start[2] = {begin, 0}, count[2] = {values.size() / columns, columns};
   const Hdf5Object there = hold(H5Dget_space(dataset), H5Sclose, place.file, action);
   const Hdf5Object here = hold(H5Screate_simple(dimensions, count, nullptr), H5Sclose, place.file, action);
   demand(H5Sselect_hyperslab(there.id(), H5S_SELECT_SET, start, nullptr, count, nullptr), place.file, action);
-  demand(H5Dwrite(dataset, element_types(values).memory, here.id(), there.id(), H5P_DEFAULT, values),
+  demand(H5Dwrite(dataset, element_types(values.data()).memory, here.id(), there.id(), H5P_DEFAULT,
+                  values.data()),
          place.file, action);
 }
 
@@ -116,8 +117,9 @@ class ArrayWriter {
     if (sharing_.writes())
       dataset.emplace(create_array(place_, name, units, element_types(values).file, rows_.all, columns));
     if (!sharing_.several() || sharing_.together()) {
-      in_step(sharing_, place_.file,
-              [&] { write_rows(dataset->id(), place_, name, values, rows_.begin, rows, columns); });
+      in_step(sharing_, place_.file, [&] {
+        write_rows(dataset->id(), place_, name, std::span(values, rows * columns), rows_.begin, columns);
+      });
       return;
     }
     std::size_t begin = 0;  // a piece may end within a row: the rest waits
@@ -125,7 +127,8 @@ class ArrayWriter {
     sharing_.ranks.records_to_first(std::span(values, rows * columns), [&](std::span<const T> numbers) {
       rest.insert(rest.end(), numbers.begin(), numbers.end());
       const std::size_t whole = rest.size() / columns;
-      write_rows(dataset->id(), place_, name, rest.data(), begin, whole, columns);
+      write_rows(dataset->id(), place_, name, std::span<const T>(rest.data(), whole * columns), begin,
+                 columns);
       begin += whole;
       rest.erase(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(whole * columns));
     });

@@ -56,17 +56,17 @@ void write_attribute(Place place, const char* name, const std::string& value) {
   write_attribute(place, name, type.id(), type.id(), &text);
 }
 
-void write_array(Place place, const char* name, const char* units, ElementTypes types, const void* values,
-                 std::size_t rows, std::size_t columns) {
+void write_array(Place place, const char* name, const char* units, const NumberTable& table) {
   const std::string action = fmt::format("writing '{}'", name);
-  const hsize_t extent[2] = {rows, columns};
+  const hsize_t extent[2] = {table.rows, table.columns};
   const Hdf5Object space =
-      hold(H5Screate_simple(columns == 1 ? 1 : 2, extent, nullptr), H5Sclose, place.file, action);
+      hold(H5Screate_simple(table.columns == 1 ? 1 : 2, extent, nullptr), H5Sclose, place.file, action);
   const Hdf5Object dataset =
-      hold(H5Dcreate2(place.group, name, types.file, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+      hold(H5Dcreate2(place.group, name, table.types.file, space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
            H5Dclose, place.file, action);
-  if (rows > 0)
-    demand(H5Dwrite(dataset.id(), types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values), place.file, action);
+  if (table.rows > 0)
+    demand(H5Dwrite(dataset.id(), table.types.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, table.values),
+           place.file, action);
   write_attribute({dataset.id(), place.file}, "units", std::string(units));
 }
 

@@ -50,18 +50,24 @@ inline ElementTypes element_types(const std::uint8_t*) {
   return {H5T_STD_U8LE, H5T_NATIVE_UINT8};
 }
 
-/// Writes rows x columns elements; one column makes a one-dimensional dataset.
-void write_array(Place place, const char* name, const char* units, ElementTypes types, const void* values,
-                 std::size_t rows, std::size_t columns);
+/// rows x columns numbers of one type, row after row.
+struct NumberTable {
+  ElementTypes types;
+  const void* values;
+  std::size_t rows, columns;
+};
+
+/// Writes a dataset with the attribute `units`; one column makes a one-dimensional dataset.
+void write_array(Place place, const char* name, const char* units, const NumberTable& table);
 template <class T>
 void write_array(Place place, const char* name, const char* units, const std::vector<T>& values) {
-  write_array(place, name, units, element_types(values.data()), values.data(), values.size(), 1);
+  write_array(place, name, units, NumberTable{element_types(values.data()), values.data(), values.size(), 1});
 }
 template <class T, std::size_t N>
 void write_array(Place place, const char* name, const char* units,
                  const std::vector<std::array<T, N>>& values) {
-  write_array(place, name, units, element_types(static_cast<const T*>(nullptr)), values.data(), values.size(),
-              N);
+  write_array(place, name, units,
+              NumberTable{element_types(static_cast<const T*>(nullptr)), values.data(), values.size(), N});
 }
 
 void write_names(Place place, const char* name, const std::vector<std::string>& values);

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "apps/commands/command.hpp"
+
+namespace talus {
+
+/// The table of commands, in the order of `talus --help`.
+std::vector<Command> commands();
+
+/// The commands of the table, each from a file in entries/.
+Command run_entry();
+Command plan_entry();
+Command partition_entry();
+Command solve_entry();
+Command trace_show_entry();
+Command trace_export_entry();
+Command replay_entry();
+Command study_error_entry();
+Command study_scaling_entry();
+Command study_stability_entry();
+Command scene_reference_entry();
+
+}  // namespace talus

@@ -1,0 +1,45 @@
+#include "apps/commands/recorder_feed.hpp"
+
+#include <utility>
+
+namespace talus {
+
+RecorderFeed::RecorderFeed(graph::Executor& executor, io::Recorder& recorder,
+                           const graph::Communicator& ranks, StepList error_steps)
+    : executor_(executor), recorder_(recorder), ranks_(ranks), error_steps_(std::move(error_steps)) {}
+
+void RecorderFeed::row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+  if (ranks_.rank() != 0) return;
+  rows_.push_back({simulation.report(), simulation.walls(), triaxial, {}});
+  if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
+  if (rows_.size() >= 64 || graph::seconds_now() - flushed_ > 0.5) flush();
+}
+
+void RecorderFeed::frame(Frame&& frame) {
+  flush();
+  if (ranks_.ranks() > 1) {
+    executor_.drain();
+    recorder_.record_frame(std::move(frame));
+    return;
+  }
+  executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
+    recorder_.record_frame(std::move(moved));
+  });
+}
+
+void RecorderFeed::later(const char* name, std::function<void()> work) {
+  flush();
+  executor_.submit_background(name, std::move(work));
+}
+
+void RecorderFeed::flush() {
+  flushed_ = graph::seconds_now();
+  if (rows_.empty()) return;
+  executor_.submit_background("output of steps", [this, rows = std::move(rows_)] {
+    for (const io::StepRecord& row : rows) recorder_.record_step(row);
+    recorder_.flush();
+  });
+  rows_.clear();
+}
+
+}  // namespace talus

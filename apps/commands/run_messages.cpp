@@ -1,0 +1,121 @@
+#include "apps/commands/run_messages.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "apps/shared/exit_codes.hpp"
+#include "kernels/bodies/larger.hpp"
+
+namespace talus {
+
+void Tally::add(const Simulation& simulation) {
+  const StepReport& report = simulation.report();
+  exposed += simulation.exposed();
+  iterating += simulation.sums().times.iteration;
+  iterations += report.iterations;
+  if (!report.converged) ++unconverged;
+  passed += report.passed;
+  if (simulation.iterations().stagnated) {
+    ++stagnated;
+    floor = std::max(floor, report.error_rms);
+  }
+  worst_error = larger(worst_error, report.error_rms);
+  worst_balance = larger(worst_balance, report.balance);
+  worst_penetration = larger(worst_penetration, report.penetration_max);
+}
+
+void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
+  summary.steps = last.step;
+  summary.time = last.time;
+  summary.iterations = iterations;
+  summary.unconverged_steps = unconverged;
+  summary.converged_steps = last.step - unconverged;
+  summary.worst_error_rms = worst_error;
+  summary.worst_balance = worst_balance;
+  summary.worst_penetration = worst_penetration;
+}
+
+std::string counted(std::size_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+std::string contents(const io::Scene& scene, std::size_t grains) {
+  return fmt::format("{}, {}, {}", counted(grains, "grain"), counted(scene.setup.walls.size(), "wall"),
+                     counted(scene.setup.stages.size(), "stage"));
+}
+
+void print_start(const io::Scene& scene, std::size_t grains, int threads, const graph::Communicator& ranks) {
+  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, grains));
+  const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
+  const int cores = omp_get_num_procs();
+  fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n",
+             count(ranks.ranks(), "rank"), count(threads, "thread"), count(cores, "core"),
+             ranks.thread_level());
+  if (scene.setup.decomposition.subdomains > 1 || ranks.ranks() > 1)
+    fmt::print(stderr, "talus: {} by {}, {}, {}\n",
+               count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
+               name_of(scene.setup.decomposition.partitioner),
+               couplings().of(scene.setup.decomposition.coupling).name,
+               scene.setup.decomposition.exchange == ExchangeScheme::dcs ? "DCS" : "CCS");
+  // Ranks that are bound have cores of their own; unbound ones share those of the machine.
+  const bool bound = cores < io::collect_provenance().cores_online;
+  if (threads * (bound ? 1 : ranks.ranks_on_node()) > cores)
+    fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
+}
+
+void print_stage_end(const Simulation& simulation) {
+  const StageEnd& end = simulation.stage().end;
+  fmt::print(stderr, "talus: stage '{}' ended after {}: {} reached{}\n", simulation.stage().name,
+             counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"), simulation.end_reached(),
+             end.equilibrium
+                 ? fmt::format(", unrest {:.2g} (asked {:.2g})", simulation.unrest(), *end.equilibrium)
+                 : "");
+}
+
+void print_notes(const Simulation& simulation, const Tally& tally) {
+  const MessageCount& messages = simulation.messages();
+  if (messages.messages > 0)
+    fmt::print(stderr,
+               "talus: an exchange: {} messages of {} bytes between subdomains, {} of {} between ranks; "
+               "waiting for them took {:.1f} % of the iterations on rank 0\n",
+               messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
+               tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
+  if (tally.passed > 0)
+    fmt::print(stderr,
+               "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
+               "these steps count as unconverged. Reduce time_step\n",
+               tally.passed);
+  if (tally.stagnated > 0)
+    fmt::print(stderr,
+               "talus: warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
+               "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
+               "time_step, or try another solver.method\n",
+               tally.stagnated, tally.floor);
+}
+
+void print_end(const io::Summary& summary, const SolverSettings& solver, const std::string& directory) {
+  if (!summary.message.empty())
+    fmt::print(stderr, "talus: {}{}\n",
+               summary.exit_code != exit_failure ? ""
+               : summary.status == "stopped"     ? "stopped: "
+                                                 : "error: ",
+               summary.message);
+  const std::string digest = summary.digest ? fmt::format(", digest {:016x}", *summary.digest) : "";
+  fmt::print(stderr, "talus: {}, {:.6g} s simulated in {:.1f} s, {} sweeps{}\n",
+             counted(static_cast<std::size_t>(summary.steps), "step"), summary.time, summary.wall_s,
+             summary.iterations, digest);
+  if (summary.unconverged_steps > 0)
+    fmt::print(
+        stderr,
+        "talus: {} of {} steps missed the tolerance: worst error {:.2e} (allowed {:.2g}), worst balance "
+        "{:.2e} (allowed {:.2g}); `converged` in steps.csv says which. Raise solver.max_iterations, "
+        "reduce time_step, or accept them with allow_unconverged = true\n",
+        summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
+        summary.worst_balance, solver.balance_tolerance);
+  fmt::print(stderr, "talus: results in {}\n", directory);
+}
+
+}  // namespace talus

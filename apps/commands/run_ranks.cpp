@@ -1,0 +1,49 @@
+#include "apps/commands/run_ranks.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <set>
+#include <span>
+#include <sstream>
+#include <vector>
+
+namespace talus {
+
+void share_walls(Setup& setup, const graph::Communicator& ranks) {
+  std::vector<double*> values;
+  for (Wall& wall : setup.walls) {
+    for (Eigen::Index k = 0; k < 3; ++k) values.push_back(&wall.point[k]);
+    values.push_back(&wall.load.mass);
+  }
+  for (Stage& stage : setup.stages)
+    for (auto& [name, load] : stage.loads) values.push_back(&load.mass);
+  std::vector<double> own;
+  if (ranks.rank() == 0)
+    for (const double* value : values) own.push_back(*value);
+  const std::vector<double> shared = ranks.gather_records(std::span<const double>(own));
+  for (std::size_t k = 0; k < values.size(); ++k) *values[k] = shared[k];
+}
+
+bool any_refused(const std::string& why, const graph::Communicator& ranks) {
+  const std::string own = why.empty() ? "" : fmt::format("{} {}", ranks.rank(), why) + '\0';
+  const std::vector<char> all = ranks.gather_records(std::span<const char>(own));
+  std::istringstream refusals(ranks.rank() == 0 ? std::string(all.begin(), all.end()) : "");
+  std::set<std::string> said;
+  for (std::string refusal; std::getline(refusals, refusal, '\0');) {
+    const std::size_t space = refusal.find(' ');
+    const std::string rank = refusal.substr(0, space), sentence = refusal.substr(space + 1);
+    if (!said.insert(sentence).second) continue;
+    fmt::print(stderr, "talus: error: {}{}\n", rank == "0" ? "" : "rank " + rank + ": ", sentence);
+    if (rank == "0") break;
+  }
+  return !all.empty();
+}
+
+void end_all(int code, const graph::Communicator& ranks) {
+  std::fflush(nullptr);
+  ranks.meet(ranks.rank() == 0 ? 1 : 20);
+  ranks.abort(code);
+}
+
+}  // namespace talus

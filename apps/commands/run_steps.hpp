@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "apps/commands/run.hpp"
+#include "io/results/run_json.hpp"
+#include "io/scene/scene.hpp"
+#include "kernels/samples/sample.hpp"
+#include "runtime/graph/communicator.hpp"
+#include "runtime/trace/order.hpp"
+#include "runtime/trace/task_times.hpp"
+
+namespace talus {
+
+/// Of earlier runs, that this one goes by; null: not asked for.
+struct Recordings {
+  std::unique_ptr<trace::Order> order;
+  std::unique_ptr<trace::TaskTimes> times;
+};
+
+/// A run whose options and scene have been checked on all ranks, and whose directory is prepared.
+struct PreparedRun {
+  const RunOptions& options;
+  const io::Scene& scene;
+  const Recordings& recordings;
+  const graph::Communicator& ranks;
+  std::string directory;      ///< of the results
+  io::Provenance provenance;  ///< with the number of threads
+};
+
+/// From now on SIGINT and SIGTERM end a run after the step it is in, with all its files whole.
+void stop_on_signals();
+
+/// Collective. Runs from the first file of the results to the last; rank 0 has the sample. What breaks the run
+/// off is in the summary. Throws what the constructor of io::Recorder throws.
+io::Summary simulate(const PreparedRun& run, Sample sample);
+
+}  // namespace talus
