@@ -122,12 +122,18 @@ class Gluing {
   struct Side;
   struct Subdomain;
   struct Root;
+  struct RootTraffic;
   void plan_sides(std::size_t e);
   void plan_copies(std::size_t e);
   std::span<const CopySource> copies_of(std::size_t e, std::size_t s) const;
   int subdomain_colour_of(std::size_t e, const CopySource& copy) const;
   int latest_colour(std::size_t e, std::size_t s, int before) const;
   void count_messages();
+  RootTraffic gather_traffic() const;
+  std::vector<std::int64_t> items_below(const RootTraffic& traffic, int top) const;
+  void plan_parts(const RootTraffic& traffic);
+  void open_links(const RootTraffic& traffic);
+  void find_contributions(const RootTraffic& traffic);
   template <class Which>
   void await_messages(std::size_t e, const Which& which);
   template <class Which>

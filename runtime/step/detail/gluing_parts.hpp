@@ -53,8 +53,11 @@ struct Pair {
   std::int32_t place;
 };
 
+/// Subdomain colours are below the first of these; the second stands for all of them.
+inline constexpr int behind_all = 1000, any_colour = behind_all + 1;
+
 inline constexpr int root_tag = graph::Communicator::first_tag;
-/// The largest is subdomains^2 + centre_tag.
+/// The largest is subdomains^2 + root_tag.
 inline int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
   return root_tag + 1 + from * subdomains + to;
 }
