@@ -231,10 +231,10 @@ void index_by_id(Surroundings& around, std::span<const BodyId> id_of_slot) {
 }  // namespace
 
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
-                                  const graph::Communicator& ranks, Bodies& bodies,
-                                  std::span<const double> reach, const Candidates& candidates,
-                                  bool partition_anew) {
-  if (partition_anew) cut_space(decomposition, settings, ranks, bodies, candidates);
+                                  const graph::Communicator& ranks, const RankSample& sample,
+                                  std::span<const double> reach, bool partition_anew) {
+  Bodies& bodies = sample.bodies;
+  if (partition_anew) cut_space(decomposition, settings, ranks, bodies, sample.candidates);
   Gathered gathered = exchange_surroundings(decomposition, ranks, bodies, reach);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
   /// `source`: into the own slots, then into what came.

@@ -83,23 +83,33 @@ struct Surroundings {
   Slot find(std::int64_t id) const;                  ///< -1 when it is not among them
 };
 
+/// Bodies and candidates of a rank, which are replaced when the sample is dealt out anew.
+struct RankSample {
+  Bodies& bodies;
+  Candidates& candidates;
+};
+
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of
 /// the largest reaches of this rank's regions, so that each candidate whose midpoint is here, and each other
-/// candidate of its bodies, is found here without further messages. `reach` [m]: of the slots of `bodies`.
-/// The state of the bodies goes over to the surroundings: of `bodies`, ids and centres stay for `distribute`.
+/// candidate of its bodies, is found here without further messages. `reach` [m]: of the slots of the sample.
+/// The state of the bodies goes over to the surroundings: ids and centres stay in the sample for
+/// `distribute`.
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
-                                  const graph::Communicator& ranks, Bodies& bodies,
-                                  std::span<const double> reach, const Candidates& candidates,
-                                  bool partition_anew);
+                                  const graph::Communicator& ranks, const RankSample& sample,
+                                  std::span<const double> reach, bool partition_anew);
 
-/// Collective. From the candidates `found` among the surroundings (no impulses) to the copies, candidates
-/// with the impulses of `candidates`, and groups of this rank. `bodies` and `candidates` are replaced; the
-/// bodies of the surroundings are gone afterwards, their reaches stay. `glued[wall]`: the wall has a finite
-/// mass.
+/// Candidates found among the surroundings.
+struct FoundCandidates {
+  Candidates candidates;        ///< between places in the surroundings; without impulses
+  std::span<const char> glued;  ///< per wall: it has a finite mass
+};
+
+/// Collective. From the candidates found to the copies, candidates with the impulses of those in `sample`,
+/// and groups of this rank. The sample is replaced; the bodies of the surroundings are gone afterwards, their
+/// reaches stay.
 std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
                                        const graph::Communicator& ranks, Surroundings& around,
-                                       Candidates found, std::span<const char> glued, Bodies& bodies,
-                                       Candidates& candidates);
+                                       FoundCandidates among, const RankSample& sample);
 
 std::size_t memory_used(const Decomposition& decomposition);
 
