@@ -14,6 +14,7 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "kernels/registry.hpp"
 #include "partition/frame.hpp"
 #include "partition/reduction.hpp"
 
@@ -21,18 +22,11 @@ namespace talus {
 
 /// A way of cutting space, known by its name in the registry (partition/partitioners.hpp). The constants are
 /// those that code asks for.
-class PartitionKind {
+class PartitionKind : public NamedKind<PartitionKind> {
  public:
+  using NamedKind::NamedKind;
   static const PartitionKind automatic;  ///< "auto"
   static const PartitionKind boxes, fitted, rcb, metis;
-
-  /// `name` is that of a line of the registry, and lives as long as the program.
-  constexpr explicit PartitionKind(std::string_view name) : name_(name) {}
-  constexpr std::string_view name() const { return name_; }
-  friend constexpr bool operator==(PartitionKind, PartitionKind) = default;
-
- private:
-  std::string_view name_;
 };
 inline constexpr PartitionKind PartitionKind::automatic("auto");
 inline constexpr PartitionKind PartitionKind::boxes("boxes");

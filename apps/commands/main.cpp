@@ -26,7 +26,6 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <map>
 #include <utility>
 
 namespace {
@@ -35,12 +34,6 @@ void add_threads(CLI::App& app, int& threads) {
   app.add_option("--threads", threads, "threads [one per core]")
       ->type_name("N")
       ->check(talus::thread_count());
-}
-
-std::map<std::string, talus::SolverMethod> methods_by_name() {
-  std::map<std::string, talus::SolverMethod> known;
-  for (const auto& method : talus::methods()) known.emplace(method.name, method.kind);
-  return known;
 }
 
 /// The commands of `app` as far as they were recognised, "talus study error", and the last of them.
@@ -288,9 +281,13 @@ int main(int argc, char** argv) {
   stability_app->add_option("--only", stability.only, "scenes with this in their name, may be repeated [all]")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  stability_app->add_option("--method", stability.settings.method, "solver.method of every scene")
-      ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")))
-      ->transform(CLI::CheckedTransformer(methods_by_name()));
+  stability_app
+      ->add_option_function<std::string>(
+          "--method",
+          [&](const std::string& name) { stability.settings.method = methods().named(name).kind; },
+          "solver.method of every scene")
+      ->check(CLI::IsMember(methods().names()))
+      ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")));
   stability_app
       ->add_option("--tolerance", stability.settings.tolerance,
                    "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
