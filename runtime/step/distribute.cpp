@@ -58,8 +58,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     const std::int32_t rank =
         ranks.ranks() == 1
             ? 0
-            : decomposition
-                  .rank_of[at(decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x)))];
+            : decomposition.rank_of[decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x))];
     if (rank == ranks.rank()) {
       if (wall)
         old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)], at_wall.feature});
@@ -103,23 +102,23 @@ struct OwnCandidates {
 };
 
 OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& found,
-                       std::span<const std::int32_t> subdomain, const BodySubdomains& standings,
+                       std::span<const SubdomainId> subdomain, const BodySubdomains& standings,
                        std::span<const char> glued) {
   const std::size_t grains = found.grain_pairs.size(), here = decomposition.here.size();
-  std::vector<std::int32_t> local_of(at(decomposition.partition.subdomains), -1);
-  for (std::size_t e = 0; e < here; ++e) local_of[at(decomposition.here[e])] = static_cast<std::int32_t>(e);
+  Per<SubdomainId, SubdomainPlace> place_of(at(decomposition.partition.subdomains));
+  for (const SubdomainPlace e : decomposition.here.indices()) place_of[decomposition.here[e]] = e;
   const auto shared = [&](Slot body) { return standings.multiplicity(at(body)) > 1; };
   std::vector<std::int32_t> group(found.size(), -1);
   OwnCandidates own;
   own.begin.assign(2 * here * (glued.size() + 1) + 1, 0);
   for (std::size_t k = 0; k < found.size(); ++k) {
-    const std::int32_t local = local_of[at(subdomain[k])];
-    if (local < 0) continue;
+    const SubdomainPlace local = place_of[subdomain[k]];
+    if (local.none()) continue;
     const std::int32_t wall = k < grains ? -1 : found.wall_pairs[k - grains].wall;
     const bool boundary = k < grains
                               ? shared(found.grain_pairs[k].first) || shared(found.grain_pairs[k].second)
                               : glued[at(wall)] != 0 || shared(found.wall_pairs[k - grains].body);
-    group[k] = ((wall + 1) * static_cast<std::int32_t>(here) + local) * 2 + (boundary ? 0 : 1);
+    group[k] = ((wall + 1) * static_cast<std::int32_t>(here) + local.value()) * 2 + (boundary ? 0 : 1);
     ++own.begin[at(group[k]) + 1];
   }
   std::partial_sum(own.begin.begin(), own.begin.end(), own.begin.begin());
@@ -134,15 +133,15 @@ OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& fou
 /// The subdomain colours, none where there is a hub. Collective.
 void settle_colours(Decomposition& decomposition, const graph::Communicator& ranks,
                     const BodySubdomains& standings, std::int32_t hubs) {
-  const auto is_here = [&](std::int32_t e) { return decomposition.rank_of[at(e)] == ranks.rank(); };
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> shared;
+  const auto is_here = [&](SubdomainId e) { return decomposition.rank_of[e] == ranks.rank(); };
+  std::map<std::pair<SubdomainId, SubdomainId>, std::int32_t> shared;
   double hub[1] = {0};
   for (std::size_t b = 0; b < standings.bodies(); ++b) {
     const auto stands = standings.of(b);
-    for (const std::int32_t e : stands) {
+    for (const SubdomainId e : stands) {
       if (stands.size() == 1 || !is_here(e)) continue;
       if (standings.multiplicity(b) >= hubs) hub[0] = 1;
-      for (const std::int32_t other : stands)
+      for (const SubdomainId other : stands)
         if (other != e && hub[0] == 0) ++shared[{e, other}];
     }
   }
@@ -159,7 +158,7 @@ void settle_colours(Decomposition& decomposition, const graph::Communicator& ran
 /// others did to its grains. Collective: impulses of what goes to another rank follow.
 void move_wall_contacts(const Decomposition& decomposition, const graph::Communicator& ranks,
                         const BodySubdomains& standings, const Surroundings& around, FoundCandidates& among,
-                        std::vector<std::int32_t>& subdomain) {
+                        std::vector<SubdomainId>& subdomain) {
   Candidates& found = among.candidates;
   const std::size_t grains = found.grain_pairs.size();
   const auto components = static_cast<std::size_t>(found.components);
@@ -168,12 +167,12 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     const WallPair& pair = found.wall_pairs[k - grains];
     if (among.glued[at(pair.wall)] == 0) continue;
     const auto stands = standings.of(at(pair.body));
-    const std::int32_t first = *std::ranges::min_element(
-        stands, {}, [&](std::int32_t e) { return decomposition.subdomain_colour_of(e); });
-    const std::int32_t before = subdomain[k];
+    const SubdomainId first = *std::ranges::min_element(
+        stands, {}, [&](SubdomainId e) { return decomposition.subdomain_colour_of(e); });
+    const SubdomainId before = subdomain[k];
     if (decomposition.subdomain_colour_of(first) == decomposition.subdomain_colour_of(before)) continue;
     subdomain[k] = first;
-    const std::int32_t from = decomposition.rank_of[at(before)], rank = decomposition.rank_of[at(first)];
+    const std::int32_t from = decomposition.rank_of[before], rank = decomposition.rank_of[first];
     if (from != ranks.rank() || rank == from) continue;
     ImpulseRecord record{};
     record.first = static_cast<std::int64_t>(around.bodies.id[at(pair.body)]);
@@ -195,9 +194,9 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
 
 /// What the groups of candidates depend on beside the candidates.
 struct GroupRules {
-  std::span<const std::int64_t> load;  ///< candidates per subdomain of all
-  std::int64_t all;                    ///< their sum
-  std::span<const char> glued;         ///< per wall: of finite mass
+  const Per<SubdomainId, std::int64_t>& load;  ///< candidates
+  std::int64_t all;                            ///< their sum
+  std::span<const char> glued;                 ///< per wall: of finite mass
 };
 
 /// The groups of this rank, and in `cut` their candidates between the slots of the copies, with impulses.
@@ -215,7 +214,7 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
     const auto begin = static_cast<std::int32_t>(own.begin[group]);
     const auto end = static_cast<std::int32_t>(own.begin[group + 1]);
     if (begin == end) continue;
-    const std::size_t local = group / 2 % decomposition.here.size();
+    const SubdomainPlace local(group / 2 % decomposition.here.size());
     const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
     const ChunkSide side = group % 2 == 1                            ? ChunkSide::inside
                            : wall >= 0 && given.glued[at(wall)] != 0 ? ChunkSide::wall
@@ -223,17 +222,17 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
                                ? ChunkSide::late
                                : ChunkSide::border;
     // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
-    const int target = chunk_target(given.all, given.load[at(decomposition.here[local])]);
-    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
+    const int target = chunk_target(given.all, given.load[decomposition.here[local]]);
+    groups.push_back({begin, end, wall, local.value(), side, target});
     const std::size_t first_at_wall = cut.wall_pairs.size();
     const auto push_at_wall = [&](const WallPair& pair, std::int32_t place) {
       cut.wall_pairs.push_back({wall, slot[at(pair.body)], pair.feature});
       const std::size_t last = cut.wall_pairs.size() - 1;
       if (last == first_at_wall || !begins_layer(cut.wall_pairs, last)) return;
       groups.back().end = place;
-      groups.push_back({place, end, wall, static_cast<std::int32_t>(local), side, target});
+      groups.push_back({place, end, wall, local.value(), side, target});
     };
-    auto next = static_cast<Slot>(decomposition.slot_begin[local]);
+    auto next = static_cast<Slot>(decomposition.slots_of(local).begin);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
     for (std::int32_t place = begin; place < end; ++place) {
       const std::size_t k = at(own.candidate[at(place)]);
@@ -260,12 +259,12 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   sample.candidates = {};
   release(sample.bodies.x);
 
-  std::vector<std::int64_t> load(at(partition.subdomains), 0);
+  Per<SubdomainId, std::int64_t> load(at(partition.subdomains), 0);
   OwnCandidates own;
   const std::vector<std::size_t> slot_begin_before = decomposition.slot_begin;
   const bool first = decomposition.interfaces.empty();
   {
-    std::vector<std::int32_t> subdomain(found.size()), home;
+    std::vector<SubdomainId> subdomain(found.size()), home;
     for (std::size_t k = 0; k < found.size(); ++k)
       subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x));
     for (const Vec3& x : around.bodies.x) home.push_back(partition.subdomain_of(x));
@@ -281,10 +280,13 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
         standings = stand();
       }
     }
-    decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
+    std::vector<SubdomainInterface> interfaces =
+        build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
+    decomposition.interfaces.assign(std::move_iterator(interfaces.begin()),
+                                    std::move_iterator(interfaces.end()));
     detail::list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);
     own = sort_own(decomposition, found, subdomain, standings, among.glued);
-    for (std::int32_t k : own.candidate) ++load[at(subdomain[at(k)])];
+    for (std::int32_t k : own.candidate) ++load[subdomain[at(k)]];
   }
   ranks.sum(load);
   const std::int64_t all = std::accumulate(load.begin(), load.end(), std::int64_t{0});

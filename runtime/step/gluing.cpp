@@ -36,24 +36,24 @@ void Gluing::begin() {
   if (!walls_.empty()) ranks_.sum(copies);
   for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].copies_everywhere = copies[w];
   for (std::size_t g = 0; g < walls_.size(); ++g)
-    for (std::int32_t c : state_.wall_states[at(walls_[g])].copies)
-      subdomains_[at(state_.chunks.subdomain[at(c)])].wall_copies[g].push_back(c);
+    for (const ChunkId c : state_.wall_states[at(walls_[g])].copies)
+      subdomains_[SubdomainPlace(state_.chunks.subdomain[c.at()])].wall_copies[g].push_back(c);
 }
 
 /// Of interfaces[e].shared[s]; none of a hub.
-std::span<const CopySource> Gluing::copies_of(std::size_t e, std::size_t s) const {
+std::span<const CopySource> Gluing::copies_of(SubdomainPlace e, std::size_t s) const {
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   return std::span(interface.copies)
       .subspan(at(interface.copies_begin[s]), at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
 }
 
-int Gluing::subdomain_colour_of(std::size_t e, const CopySource& copy) const {
+int Gluing::subdomain_colour_of(SubdomainPlace e, const CopySource& copy) const {
   return copy.neighbour < 0 ? subdomains_[e].subdomain_colour
                             : subdomains_[e].sides[at(copy.neighbour)].subdomain_colour;
 }
 
 /// The latest subdomain colour below `before` that a copy of interfaces[e].shared[s] has; -1: none.
-int Gluing::latest_colour(std::size_t e, std::size_t s, int before) const {
+int Gluing::latest_colour(SubdomainPlace e, std::size_t s, int before) const {
   int latest = -1;
   for (const CopySource& copy : copies_of(e, s))
     if (const int subdomain_colour = subdomain_colour_of(e, copy); subdomain_colour < before)
@@ -77,7 +77,7 @@ void Gluing::with_bodies(bool single, const Work& work) {
 }
 
 template <std::size_t Width, class Record>
-void Gluing::publish_bodies(std::size_t e, std::span<const Record> velocity) {
+void Gluing::publish_bodies(SubdomainPlace e, std::span<const Record> velocity) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
     if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
@@ -91,7 +91,7 @@ void Gluing::publish_bodies(std::size_t e, std::span<const Record> velocity) {
   }
 }
 
-void Gluing::publish(std::size_t e, Mode mode, bool single) {
+void Gluing::publish(SubdomainPlace e, Mode mode, bool single) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
@@ -102,14 +102,14 @@ void Gluing::publish(std::size_t e, Mode mode, bool single) {
   if (!mine.tells || mode == Mode::sum) tell(e, mode);
 }
 
-void Gluing::tell(std::size_t e, Mode mode) {
+void Gluing::tell(SubdomainPlace e, Mode mode) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);
-    for (std::int32_t c : mine.wall_copies[g])
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[at(c)].velocity[k];
+    for (const ChunkId c : mine.wall_copies[g])
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[c.at()].velocity[k];
   }
   if (!root_->up || !root_->links.empty()) return;
   // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
@@ -118,18 +118,18 @@ void Gluing::tell(std::size_t e, Mode mode) {
   send_up();
 }
 
-void Gluing::glue(std::size_t e, Mode mode, bool single) {
+void Gluing::glue(SubdomainPlace e, Mode mode, bool single) {
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     const auto& copies = mine.wall_copies[g];
     if (copies.empty()) continue;
     if (mode == Mode::local) {
-      glue_copies(state_.copies, copies);
+      glue_copies(state_.copies, numbers(std::span<const ChunkId>(copies)));
       continue;
     }
     const double part = 1 / static_cast<double>(state_.wall_states[at(walls_[g])].copies_everywhere);
-    for (std::int32_t c : copies)
-      for (std::size_t k = 0; k < 3; ++k) state_.copies[at(c)].velocity[k] = part * root_->sums[3 * g + k];
+    for (const ChunkId c : copies)
+      for (std::size_t k = 0; k < 3; ++k) state_.copies[c.at()].velocity[k] = part * root_->sums[3 * g + k];
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
   const auto of_glue = [&](const Side& side) {
@@ -142,7 +142,7 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
   ask_for_messages(e, of_glue);
 }
 
-void Gluing::take(std::size_t e, bool single) {
+void Gluing::take(SubdomainPlace e, bool single) {
   const auto of_take = [mine = subdomain_colour(e)](const Side& side) {
     return side.subdomain_colour < mine;
   };
@@ -154,7 +154,7 @@ void Gluing::take(std::size_t e, bool single) {
 }
 
 template <class Which>
-void Gluing::await_messages(std::size_t e, const Which& which) {
+void Gluing::await_messages(SubdomainPlace e, const Which& which) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides)
     if (side.link.receiver && which(side))
@@ -162,7 +162,7 @@ void Gluing::await_messages(std::size_t e, const Which& which) {
 }
 
 template <class Which>
-void Gluing::ask_for_messages(std::size_t e, const Which& which) {
+void Gluing::ask_for_messages(SubdomainPlace e, const Which& which) {
   for (Side& side : subdomains_[e].sides)
     if (side.link.receiver && which(side)) side.link.receiver->start();
 }
@@ -170,7 +170,7 @@ void Gluing::ask_for_messages(std::size_t e, const Which& which) {
 /// The copies of interface.shared[s] that are of the latest subdomain colour below `before`, or all with
 /// `any_colour`: their sum in order of subdomain, how many they are, and whether the own one is among them.
 template <std::size_t Width, class Record>
-auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const {
+auto Gluing::add_copies(SubdomainPlace e, std::size_t s, int before, std::span<const Record> velocity) const {
   using Own = Numbers<Width, Record>;
   using Number = typename Own::value_type;
   const Subdomain& mine = subdomains_[e];
@@ -189,13 +189,13 @@ auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<cons
       added.own = true;
       continue;
     }
-    const std::byte* const from = mine.sides[at(copy.neighbour)].source + at(copy.place) * sizeof(Own);
+    const std::byte* const from = mine.sides[at(copy.neighbour)].source + copy.place.at() * sizeof(Own);
     for (std::size_t k = 0; k < Width; ++k) added.sum[k] += number_at<Number>(from, k);
   }
   return added;
 }
 
-void Gluing::fetch(std::size_t e) const {
+void Gluing::fetch(SubdomainPlace e) const {
   if (!needed_) return;
   const auto fetch = [](const auto&... lists) { (fetch_lines(std::span(std::as_const(lists))), ...); };
   const Subdomain& mine = subdomains_[e];
@@ -208,7 +208,7 @@ void Gluing::fetch(std::size_t e) const {
 }
 
 template <std::size_t Width, class Record>
-void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
+void Gluing::take_bodies(SubdomainPlace e, std::span<Record> velocity) {
   const Subdomain& mine = subdomains_[e];
   for (const Side& side : mine.sides)
     settle_pairs<Width>(velocity, std::span<const Pair>(side.taken), side.source, taken_over);
@@ -220,7 +220,7 @@ void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
 }
 
 template <std::size_t Width, class Record>
-void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
+void Gluing::glue_bodies(SubdomainPlace e, Mode mode, std::span<Record> velocity) {
   using Own = Numbers<Width, Record>;
   using Number = typename Own::value_type;
   Subdomain& mine = subdomains_[e];
@@ -283,12 +283,12 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
   const Decomposition& all = state_.decomposition;
   const auto each_shared = [&](const auto& work) {
     std::size_t k = 0;
-    for (std::size_t e = 0; e < subdomains_.size(); ++e)
+    for (const SubdomainPlace e : subdomains_.indices())
       for (const Slot slot : subdomains_[e].shared)
-        work(state_.bodies.velocity[at(slot)], field[e][at(slot) - all.slot_begin[e]], k++);
+        work(state_.bodies.velocity[at(slot)], field[e.at()][at(slot) - all.slots_of(e).begin], k++);
   };
-  const auto wall = [&](std::size_t e, std::size_t g) -> Vec3& {
-    return field[e][field[e].size() - walls_.size() + g].u;
+  const auto wall = [&](SubdomainPlace e, std::size_t g) -> Vec3& {
+    return field[e.at()][field[e.at()].size() - walls_.size() + g].u;
   };
   kept_.clear();
   each_shared([&](Velocity& v, const Twist& twist, std::size_t) {
@@ -296,14 +296,14 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
     std::copy_n(twist.u.data(), 3, v.u);
     std::copy_n(twist.w.data(), 3, v.w);
   });
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+  for (const SubdomainPlace e : subdomains_.indices()) {
     for (std::size_t g = 0; g < walls_.size(); ++g)
       std::copy_n(wall(e, g).data(), 3, &subdomains_[e].partial[3 * g]);
     publish(e, Mode::sum);
   }
   if (collects()) collect(Mode::sum);
   root(Mode::sum);
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+  for (const SubdomainPlace e : subdomains_.indices()) {
     glue(e, Mode::sum);
     for (std::size_t g = 0; g < walls_.size(); ++g) wall(e, g) = Eigen::Map<const Vec3>(&root_->sums[3 * g]);
   }

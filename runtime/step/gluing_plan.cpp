@@ -40,33 +40,31 @@ void Gluing::plan(bool rotation) {
   jumps_.assign(all.here.size(), {});
   messages_ = {};
   if (!needed_) return;
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+  for (const SubdomainPlace e : subdomains_.indices()) {
     plan_sides(e);
     plan_copies(e);
     subdomains_[e].tells = all.several() && !walls_.empty() && all.interfaces[e].hubs.empty();
   }
-  for (Subdomain& subdomain : subdomains_)
-    for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
-      Side& side = subdomain.sides[n];
-      if (side.local < 0) continue;
-      const auto e = static_cast<std::int32_t>(&subdomain - subdomains_.data());
-      for (const Side& back : subdomains_[at(side.local)].sides)
+  for (const SubdomainPlace e : subdomains_.indices())
+    for (Side& side : subdomains_[e].sides) {
+      if (side.local.none()) continue;
+      for (const Side& back : subdomains_[side.local].sides)
         if (back.local == e) side.source = detail::bytes_of(back.link.out);
     }
 }
 
-int Gluing::subdomain_colour(std::size_t e) const {
+int Gluing::subdomain_colour(SubdomainPlace e) const {
   return state_.decomposition.subdomain_colour_of(state_.decomposition.here[e]);
 }
 
-void Gluing::plan_sides(std::size_t e) {
+void Gluing::plan_sides(SubdomainPlace e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];
   mine.subdomain_colour = subdomain_colour(e);
   mine.wall_copies.resize(walls_.size());
   if (!all.several()) return;
   const SubdomainInterface& interface = all.interfaces[e];
-  const auto slot_of = [&](std::int32_t body) { return static_cast<Slot>(all.slot_begin[e] + at(body)); };
+  const auto slot_of = [&](std::int32_t body) { return static_cast<Slot>(all.slots_of(e).begin + at(body)); };
   for (std::int32_t s : interface.shared) mine.shared.push_back(slot_of(s));
   if (settings_.coupling == Coupling::schwarz) mine.base.resize(mine.shared.size() * width_);
   mine.sides.resize(interface.neighbours.size());
@@ -76,12 +74,11 @@ void Gluing::plan_sides(std::size_t e) {
     for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
       side.slots.push_back(slot_of(interface.exchange[at(k)]));
     side.subdomain_colour = all.subdomain_colour_of(neighbour.subdomain);
-    const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
+    const std::int32_t rank = all.rank_of[neighbour.subdomain];
     const std::size_t length = side.slots.size() * width_;
     side.link.out.resize(length);
     if (rank == ranks_.rank()) {
-      side.local = static_cast<std::int32_t>(
-          std::lower_bound(all.here.begin(), all.here.end(), neighbour.subdomain) - all.here.begin());
+      side.local = all.place_of(neighbour.subdomain);
       continue;
     }
     side.link.in.resize(length);
@@ -91,16 +88,16 @@ void Gluing::plan_sides(std::size_t e) {
         ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
     side.link.receiver =
         ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
-    side.link.out_name = trace::message_name(static_cast<std::uint32_t>(interface.subdomain),
-                                             static_cast<std::uint32_t>(neighbour.subdomain));
-    side.link.in_name = trace::message_name(static_cast<std::uint32_t>(neighbour.subdomain),
-                                            static_cast<std::uint32_t>(interface.subdomain));
+    const auto mine_of_all = static_cast<std::uint32_t>(interface.subdomain.value());
+    const auto other = static_cast<std::uint32_t>(neighbour.subdomain.value());
+    side.link.out_name = trace::message_name(mine_of_all, other);
+    side.link.in_name = trace::message_name(other, mine_of_all);
     side.link.receiver->start();
   }
 }
 
 /// Who reads which copies of a shared body, and when.
-void Gluing::plan_copies(std::size_t e) {
+void Gluing::plan_copies(SubdomainPlace e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];
   for (std::size_t s = 0; s < mine.shared.size(); ++s) {
@@ -143,11 +140,9 @@ void Gluing::count_messages() {
     count[2] += between ? 1 : 0;
     count[3] += between ? static_cast<std::int64_t>(8 * doubles) : 0;
   };
-  const Decomposition& all = state_.decomposition;
-  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
-    const Subdomain& subdomain = subdomains_[e];
-    for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local < 0);
-    if (subdomain.partial.empty()) continue;
+  for (const Subdomain& subdomain : subdomains_) {
+    for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local.none());
+    if (subdomain.partial.empty() || !state_.decomposition.several()) continue;
     add(subdomain.partial.size(), false);                                // to the root
     add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
   }
@@ -166,29 +161,31 @@ std::vector<trace::Message> Gluing::message_plan() const {
     plan.push_back({static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(to),
                     static_cast<std::uint32_t>(8 * doubles)});
   };
-  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
+  if (!all.several()) return plan;
+  for (const SubdomainPlace e : subdomains_.indices()) {
     const Subdomain& subdomain = subdomains_[e];
+    const std::int32_t own = all.here[e].value();
     for (std::size_t n = 0; n < subdomain.sides.size(); ++n)
-      add(all.here[e], all.interfaces[e].neighbours[n].subdomain, subdomain.sides[n].slots.size() * width_);
+      add(own, all.interfaces[e].neighbours[n].subdomain.value(), subdomain.sides[n].slots.size() * width_);
     if (subdomain.partial.empty()) continue;
-    add(all.here[e], trace::root_group, subdomain.partial.size());
-    add(trace::root_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
+    add(own, trace::root_group, subdomain.partial.size());
+    add(trace::root_group, own, 3 * walls_.size() + subdomain.hub_item.size() * width_);
   }
   return plan;
 }
 
-std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
-  std::vector<std::uint32_t> readers;
+std::vector<SubdomainPlace> Gluing::readers_here(SubdomainPlace e) const {
+  std::vector<SubdomainPlace> readers;
   for (const Side& side : subdomains_[e].sides)
-    if (side.local >= 0) readers.push_back(static_cast<std::uint32_t>(side.local));
+    if (!side.local.none()) readers.push_back(side.local);
   return readers;
 }
 
-bool Gluing::tells(std::size_t e) const {
+bool Gluing::tells(SubdomainPlace e) const {
   return subdomains_[e].tells;
 }
 
-std::span<const Slot> Gluing::taken(std::size_t e) const {
+std::span<const Slot> Gluing::taken(SubdomainPlace e) const {
   return subdomains_[e].taken;
 }
 

@@ -15,11 +15,11 @@ using detail::root_tag;
 struct Gluing::RootTraffic {
   /// A body that goes through the root, as a subdomain names it.
   struct Hub {
-    std::int64_t subdomain;
+    SubdomainId subdomain;
     std::int64_t id;
   };
   std::vector<Hub> hubs;                    ///< of all subdomains, one after the other
-  std::vector<std::size_t> length;          ///< per subdomain: of its part
+  Per<SubdomainId, std::size_t> length;     ///< of the part of a subdomain
   std::vector<std::size_t> length_of_rank;  ///< of the parts of its subdomains together
 
   bool none() const {
@@ -43,7 +43,7 @@ std::size_t place_of(const std::vector<std::int64_t>& ids, std::int64_t id) {
 
 void Gluing::plan_tree(std::uint64_t contacts) {
   graph::RankLoad load{contacts, false};
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+  for (const SubdomainPlace e : subdomains_.indices()) {
     load.waits = load.waits || (needed_ && subdomain_colour(e) > 0);
     load.work += graph::load_of_neighbour * subdomains_[e].sides.size();
   }
@@ -61,7 +61,7 @@ void Gluing::plan_tree(std::uint64_t contacts) {
 Gluing::RootTraffic Gluing::gather_traffic() const {
   const Decomposition& all = state_.decomposition;
   std::vector<RootTraffic::Hub> mine;
-  for (std::size_t e = 0; e < all.here.size() && all.several(); ++e)
+  for (const SubdomainPlace e : all.interfaces.indices())
     for (std::int32_t hub : all.interfaces[e].hubs) {
       const std::size_t slot = at(subdomains_[e].shared[at(hub)]);
       mine.push_back({all.here[e], static_cast<std::int64_t>(state_.bodies.id[slot])});
@@ -70,9 +70,9 @@ Gluing::RootTraffic Gluing::gather_traffic() const {
   traffic.hubs = ranks_.gather_records(std::span<const RootTraffic::Hub>(mine));
   std::ranges::stable_sort(traffic.hubs, {}, &RootTraffic::Hub::subdomain);
   traffic.length.assign(at(all.partition.subdomains), 3 * walls_.size());
-  for (const auto& hub : traffic.hubs) traffic.length[static_cast<std::size_t>(hub.subdomain)] += width_;
+  for (const auto& hub : traffic.hubs) traffic.length[hub.subdomain] += width_;
   traffic.length_of_rank.assign(at(ranks_.ranks()), 0);
-  for (std::size_t e = 0; e < traffic.length.size(); ++e)
+  for (const SubdomainId e : traffic.length.indices())
     traffic.length_of_rank[at(all.rank_of[e])] += traffic.length[e];
   return traffic;
 }
@@ -82,7 +82,7 @@ std::vector<std::int64_t> Gluing::items_below(const RootTraffic& traffic, int to
   const std::vector<int> branch = tree_.branch(top);
   std::vector<std::int64_t> ids;
   for (const auto& [subdomain, id] : traffic.hubs)
-    if (const int rank = state_.decomposition.rank_of[static_cast<std::size_t>(subdomain)];
+    if (const int rank = state_.decomposition.rank_of[subdomain];
         std::ranges::find(branch, rank) != branch.end())
       ids.push_back(id);
   std::ranges::sort(ids);
@@ -95,9 +95,9 @@ void Gluing::plan_parts(const RootTraffic& traffic) {
   const Decomposition& all = state_.decomposition;
   const std::vector<std::int64_t> items = items_below(traffic, ranks_.rank());
   root_->sums.resize(3 * walls_.size() + items.size() * width_);
-  for (std::size_t e = 0; e < all.here.size(); ++e) {
+  for (const SubdomainPlace e : all.here.indices()) {
     Subdomain& subdomain = subdomains_[e];
-    subdomain.partial.resize(traffic.length[at(all.here[e])]);
+    subdomain.partial.resize(traffic.length[all.here[e]]);
     for (const auto& hub : traffic.hubs)
       if (hub.subdomain == all.here[e]) subdomain.hub_item.push_back(place_of(items, hub.id));
   }
@@ -105,7 +105,7 @@ void Gluing::plan_parts(const RootTraffic& traffic) {
 
 /// Channels to this rank's children and its parent.
 void Gluing::open_links(const RootTraffic& traffic) {
-  const std::vector<std::int32_t>& rank_of = state_.decomposition.rank_of;
+  const Per<SubdomainId, std::int32_t>& rank_of = state_.decomposition.rank_of;
   const int me = ranks_.rank();
   // A message is named after the first subdomain of the child; its parent speaks for the root.
   const auto open = [&](int child, std::size_t out, std::size_t in) {
@@ -146,18 +146,17 @@ void Gluing::find_contributions(const RootTraffic& traffic) {
     }
   }
   const std::vector<std::int64_t> items = items_below(traffic, me);
-  for (std::size_t e = 0; e < traffic.length.size(); ++e) {
+  for (const SubdomainId e : traffic.length.indices()) {
     Root::Contribution contribution;
     const std::int32_t rank = all.rank_of[e];
     if (rank == me) {
-      const auto local = std::ranges::lower_bound(all.here, static_cast<std::int32_t>(e)) - all.here.begin();
-      contribution.partial = subdomains_[static_cast<std::size_t>(local)].partial.data();
+      contribution.partial = subdomains_[all.place_of(e)].partial.data();
     } else if (const double*& from = parts[at(rank)]) {
       contribution.partial = from;
       from += traffic.length[e];
     }
     for (const auto& hub : traffic.hubs)
-      if (hub.subdomain == static_cast<std::int64_t>(e)) contribution.item.push_back(place_of(items, hub.id));
+      if (hub.subdomain == e) contribution.item.push_back(place_of(items, hub.id));
     root_->contributions.push_back(std::move(contribution));
   }
 }

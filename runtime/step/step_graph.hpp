@@ -91,7 +91,7 @@ class StepGraph {
   bool walls_left_margin() const;
   bool out_of_balance() const;
   std::vector<double> work() const;
-  std::vector<double> costs(std::span<const double> work) const;
+  Per<SubdomainId, double> costs(std::span<const double> work) const;
 
   StepState& state_;
   const StepParameters& parameters_;

@@ -19,11 +19,11 @@ std::size_t at(std::int32_t k) {
 /// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
 /// without knowing of one another. Hubs are glued once a sweep, whosever subdomain colour it is.
 std::int32_t parts_of(const Decomposition& decomposition, Coupling coupling,
-                      std::span<const std::int32_t> standings, std::int32_t subdomain, std::int32_t hubs) {
+                      std::span<const SubdomainId> standings, SubdomainId subdomain, std::int32_t hubs) {
   const auto m = static_cast<std::int32_t>(standings.size());
   if (coupling == Coupling::schwarz) return 1;
   if (coupling == Coupling::nscdd || m >= hubs) return m;
-  return static_cast<std::int32_t>(std::ranges::count_if(standings, [&](std::int32_t other) {
+  return static_cast<std::int32_t>(std::ranges::count_if(standings, [&](SubdomainId other) {
     return decomposition.subdomain_colour_of(other) == decomposition.subdomain_colour_of(subdomain);
   }));
 }
@@ -55,7 +55,7 @@ void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubd
           parts_of(decomposition, coupling, standings.of(b), interface.subdomain, hubs);
       decomposition.parts.push_back(static_cast<std::uint16_t>(parts));
       if (decomposition.subdomain_colour.empty()) continue;
-      const bool taken = m < hubs && std::ranges::any_of(standings.of(b), [&](std::int32_t other) {
+      const bool taken = m < hubs && std::ranges::any_of(standings.of(b), [&](SubdomainId other) {
                            return decomposition.subdomain_colour_of(other) <
                                   decomposition.subdomain_colour_of(interface.subdomain);
                          });
@@ -92,13 +92,12 @@ Bodies make_copies(Decomposition& decomposition, Bodies& around) {
 std::int64_t arrivals(const Decomposition& decomposition, const Surroundings& around,
                       std::span<const std::size_t> slot_begin) {
   std::int64_t count = 0;
-  std::vector<std::int32_t> stood_in(around.by_id.size(), -1);
-  for (std::size_t e = 0; e < decomposition.interfaces.size(); ++e) {
-    const auto local = static_cast<std::int32_t>(e);
-    for (std::size_t s = slot_begin[e]; s < slot_begin[e + 1]; ++s)
-      if (around.of_slot[s] >= 0) stood_in[at(around.of_slot[s])] = local;
+  std::vector<SubdomainPlace> stood_in(around.by_id.size());
+  for (const SubdomainPlace e : decomposition.interfaces.indices()) {
+    for (std::size_t s = slot_begin[e.at()]; s < slot_begin[e.at() + 1]; ++s)
+      if (around.of_slot[s] >= 0) stood_in[at(around.of_slot[s])] = e;
     const std::vector<Slot>& now = decomposition.interfaces[e].bodies;
-    count += std::count_if(now.begin(), now.end(), [&](Slot body) { return stood_in[at(body)] != local; });
+    count += std::count_if(now.begin(), now.end(), [&](Slot body) { return stood_in[at(body)] != e; });
   }
   return count;
 }

@@ -58,7 +58,7 @@ void settle_pairs(std::span<Record> velocity, std::span<const Pair> pairs, const
   using Number = typename Numbers<Width, Record>::value_type;
   for (const Pair& pair : pairs) {
     Record& v = velocity[at(pair.slot)];
-    const std::byte* const other = message + at(pair.place) * sizeof(Numbers<Width, Record>);
+    const std::byte* const other = message + pair.place.at() * sizeof(Numbers<Width, Record>);
     for (std::size_t k = 0; k < 3; ++k) v.u[k] = rule(v.u[k], number_at<Number>(other, k));
     if constexpr (Width == 6)
       for (std::size_t k = 0; k < 3; ++k) v.w[k] = rule(v.w[k], number_at<Number>(other, k + 3));
