@@ -80,7 +80,7 @@ Cut cut_sample(const PartitionOptions& options, const Bodies& bodies, const Cont
       wall_subdomains(walls, contacts.walls, std::span(subdomain).subspan(contacts.grains.size()));
   for (std::size_t body = 0; body < bodies.size(); ++body)
     cut.multiplicity.push_back(grains.multiplicity(body));
-  const auto numbers = first<SubdomainId>(static_cast<std::size_t>(options.subdomains));
+  const FirstNumbers<SubdomainId> numbers(static_cast<std::size_t>(options.subdomains));
   const std::vector<SubdomainId> all(numbers.begin(), numbers.end());
   cut.load =
       measure_load(options.subdomains, build_interfaces(grains, bodies.id, all), grains, of_walls, subdomain);

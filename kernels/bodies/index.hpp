@@ -12,7 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <ranges>
+#include <iterator>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -39,12 +39,39 @@ class Index {
   std::int32_t value_ = -1;
 };
 
-/// The first `count` numbers of a kind.
+/// The first `count` numbers of a kind, to go through one by one. (std::views would do the same, but clang 14
+/// does not compile those of libstdc++ 12.)
 template <class Kind>
-auto first(std::size_t count) {
-  return std::views::iota(std::int32_t{0}, static_cast<std::int32_t>(count)) |
-         std::views::transform([](std::int32_t k) { return Kind(k); });
-}
+class FirstNumbers {
+ public:
+  class Iterator {
+   public:
+    using iterator_category = std::input_iterator_tag;
+    using value_type = Kind;
+    using difference_type = std::ptrdiff_t;
+    using pointer = const Kind*;
+    using reference = Kind;
+    constexpr Iterator() = default;
+    constexpr explicit Iterator(std::int32_t at) : at_(at) {}
+    constexpr Kind operator*() const { return Kind(at_); }
+    constexpr Iterator& operator++() {
+      ++at_;
+      return *this;
+    }
+    constexpr Iterator operator++(int) { return Iterator(at_++); }
+    friend constexpr bool operator==(Iterator, Iterator) = default;
+
+   private:
+    std::int32_t at_ = 0;
+  };
+
+  constexpr explicit FirstNumbers(std::size_t count) : count_(static_cast<std::int32_t>(count)) {}
+  constexpr Iterator begin() const { return Iterator(0); }
+  constexpr Iterator end() const { return Iterator(count_); }
+
+ private:
+  std::int32_t count_;
+};
 
 /// A vector with one entry per thing of a kind: it takes no number of another kind.
 template <class Kind, class T>
@@ -54,7 +81,7 @@ class Per : public std::vector<T> {
   T& operator[](Kind k) { return std::vector<T>::operator[](k.at()); }
   const T& operator[](Kind k) const { return std::vector<T>::operator[](k.at()); }
   /// The numbers of its entries.
-  auto indices() const { return first<Kind>(this->size()); }
+  FirstNumbers<Kind> indices() const { return FirstNumbers<Kind>(this->size()); }
 };
 
 /// The numbers themselves, for kernels that take plain ones.

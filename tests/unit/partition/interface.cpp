@@ -30,7 +30,7 @@ struct Decomposed {
 };
 
 std::vector<SubdomainId> up_to(std::int32_t n) {
-  const auto all = first<SubdomainId>(at(n));
+  const FirstNumbers<SubdomainId> all(at(n));
   return {all.begin(), all.end()};
 }
 
