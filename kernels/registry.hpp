@@ -26,6 +26,26 @@ struct Entry {
   Maker make = {};
 };
 
+/// Base of kinds that only their names tell from one another, so that one more needs no line but that of its
+/// registry. A kind names as constants those that code asks for:
+///
+///   class Dish : public NamedKind<Dish> {
+///     using NamedKind::NamedKind;
+///     static const Dish soup;
+///   };
+///   inline constexpr Dish Dish::soup("soup");
+template <class Kind>
+class NamedKind {
+ public:
+  /// `name` is that of a line of the registry, and lives as long as the program.
+  constexpr explicit NamedKind(std::string_view name) : name_(name) {}
+  constexpr std::string_view name() const { return name_; }
+  friend constexpr bool operator==(const Kind& a, const Kind& b) { return a.name() == b.name(); }
+
+ private:
+  std::string_view name_;
+};
+
 /// A way that only its name tells from the others; `Kind` is made from the name.
 template <class Kind = std::string_view, class Maker>
 constexpr Entry<Kind, Maker> named(std::string_view name, std::string_view sentence, Maker make) {

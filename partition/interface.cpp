@@ -30,11 +30,11 @@ void list_shared(SubdomainInterface& here, const BodySubdomains& standings, std:
 /// is its place in the list of F with E, as both hold the same grains in the same order.
 void list_exchanges(SubdomainInterface& here, const BodySubdomains& standings,
                     std::int32_t hub_multiplicity) {
-  std::vector<std::pair<std::int32_t, std::int32_t>> ties;  // (other subdomain, index into shared)
+  std::vector<std::pair<SubdomainId, std::int32_t>> ties;  // (other subdomain, index into shared)
   for (std::size_t s = 0; s < here.shared.size(); ++s) {
     const std::int32_t k = here.shared[s];
     if (here.multiplicity[at(k)] >= hub_multiplicity) continue;
-    for (std::int32_t other : standings.of(at(here.bodies[at(k)])))
+    for (const SubdomainId other : standings.of(at(here.bodies[at(k)])))
       if (other != here.subdomain) ties.emplace_back(other, static_cast<std::int32_t>(s));
   }
   std::sort(ties.begin(), ties.end());
@@ -51,7 +51,7 @@ void list_exchanges(SubdomainInterface& here, const BodySubdomains& standings,
   std::vector<char> own(here.shared.size(), 0);
   const auto put_own = [&](std::size_t s) {
     own[s] = 1;
-    here.copies[at(filled[s]++)] = {-1, here.shared[s]};
+    here.copies[at(filled[s]++)] = {-1, {}};
   };
   for (const auto& [other, index] : ties) {
     const std::size_t s = at(index);
@@ -62,7 +62,7 @@ void list_exchanges(SubdomainInterface& here, const BodySubdomains& standings,
     Neighbour& neighbour = here.neighbours.back();
     if (other > here.subdomain && own[s] == 0) put_own(s);
     here.copies[at(filled[s]++)] = {static_cast<std::int32_t>(here.neighbours.size() - 1),
-                                    neighbour.end - neighbour.begin};
+                                    MessagePlace(neighbour.end - neighbour.begin)};
     here.exchange.push_back(here.shared[s]);
     ++neighbour.end;
   }
@@ -76,7 +76,8 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
   std::vector<std::int32_t> begin(bodies + 1, 0);
   for (const Standing& standing : standings) ++begin[at(standing.body) + 1];
   for (std::size_t k = 0; k < bodies; ++k) begin[k + 1] += begin[k];
-  std::vector<std::int32_t> all(standings.size()), next(begin.begin(), begin.end() - 1);
+  std::vector<SubdomainId> all(standings.size());
+  std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
   for (const Standing& standing : standings) all[at(next[at(standing.body)]++)] = standing.subdomain;
 
   BodySubdomains result;
@@ -91,16 +92,16 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 }
 
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
-                                std::span<const WallPair> wall_pairs, std::span<const std::int32_t> subdomain,
-                                std::span<const std::int32_t> home) {
+                                std::span<const WallPair> wall_pairs, std::span<const SubdomainId> subdomain,
+                                std::span<const SubdomainId> home) {
   // Most grains stand in one subdomain: repetitions of its first standing are not listed.
   std::vector<Standing> standings;
   standings.reserve(grains);
-  std::vector<std::int32_t> first(grains, -1);
-  const auto stands = [&](Slot body, std::int32_t in) {
-    std::int32_t& seen = first[at(body)];
+  std::vector<SubdomainId> first(grains);
+  const auto stands = [&](Slot body, SubdomainId in) {
+    SubdomainId& seen = first[at(body)];
     if (seen == in) return;
-    if (seen < 0) seen = in;
+    if (seen.none()) seen = in;
     standings.push_back({body, in});
   };
   for (std::size_t k = 0; k < grain_pairs.size(); ++k) {
@@ -110,28 +111,28 @@ BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> g
   for (std::size_t k = 0; k < wall_pairs.size(); ++k)
     stands(wall_pairs[k].body, subdomain[grain_pairs.size() + k]);
   for (std::size_t k = 0; k < home.size(); ++k)
-    if (first[k] < 0) standings.push_back({static_cast<Slot>(k), home[k]});
+    if (first[k].none()) standings.push_back({static_cast<Slot>(k), home[k]});
   return collect_standings(grains, standings);
 }
 
 BodySubdomains wall_subdomains(std::size_t walls, std::span<const WallPair> wall_pairs,
-                               std::span<const std::int32_t> subdomain) {
+                               std::span<const SubdomainId> subdomain) {
   std::vector<Standing> standings;
   for (std::size_t k = 0; k < wall_pairs.size(); ++k) standings.push_back({wall_pairs[k].wall, subdomain[k]});
   return collect_standings(walls, standings);
 }
 
 std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& standings, std::span<const BodyId> id,
-                                                 std::span<const std::int32_t> here,
+                                                 std::span<const SubdomainId> here,
                                                  std::int32_t hub_multiplicity) {
   std::vector<SubdomainInterface> interfaces(here.size());
-  std::unordered_map<std::int32_t, std::size_t> place;  // looked up only; its order reaches no result
+  std::unordered_map<SubdomainId, std::size_t> place;  // looked up only; its order reaches no result
   for (std::size_t k = 0; k < here.size(); ++k) {
     interfaces[k].subdomain = here[k];
     place.emplace(here[k], k);
   }
   for (std::size_t body = 0; body < standings.bodies(); ++body)
-    for (std::int32_t subdomain : standings.of(body)) {
+    for (const SubdomainId subdomain : standings.of(body)) {
       const auto found = place.find(subdomain);
       if (found == place.end()) continue;
       interfaces[found->second].bodies.push_back(static_cast<Slot>(body));

@@ -10,6 +10,7 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "partition/subdomain.hpp"
 
 namespace talus {
 
@@ -17,7 +18,7 @@ namespace talus {
 /// lies there.
 struct Standing {
   std::int32_t body;
-  std::int32_t subdomain;
+  SubdomainId subdomain;
   bool operator==(const Standing&) const = default;
 };
 
@@ -26,11 +27,11 @@ struct Standing {
 /// 5}.
 struct BodySubdomains {
   std::vector<std::int32_t> begin{0};  ///< bodies + 1 offsets into `subdomain`
-  std::vector<std::int32_t> subdomain;
+  std::vector<SubdomainId> subdomain;
 
   std::size_t bodies() const { return begin.size() - 1; }
   std::int32_t multiplicity(std::size_t body) const { return begin[body + 1] - begin[body]; }
-  std::span<const std::int32_t> of(std::size_t body) const {
+  std::span<const SubdomainId> of(std::size_t body) const {
     return std::span(subdomain).subspan(static_cast<std::size_t>(begin[body]),
                                         static_cast<std::size_t>(multiplicity(body)));
   }
@@ -48,24 +49,27 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 /// so they add no subdomain.) With `home` (one per grain, or empty) a grain without candidates stands in its
 /// home, the subdomain of its centre: every grain then stands in some subdomain, which integrates its motion.
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
-                                std::span<const WallPair> wall_pairs, std::span<const std::int32_t> subdomain,
-                                std::span<const std::int32_t> home = {});
+                                std::span<const WallPair> wall_pairs, std::span<const SubdomainId> subdomain,
+                                std::span<const SubdomainId> home = {});
 
 /// The same for walls; a wall stands where one of its candidates is. `subdomain`: of the wall pairs.
 BodySubdomains wall_subdomains(std::size_t walls, std::span<const WallPair> wall_pairs,
-                               std::span<const std::int32_t> subdomain);
+                               std::span<const SubdomainId> subdomain);
 
 /// A subdomain that stands around shared grains with this one.
 struct Neighbour {
-  std::int32_t subdomain;
+  SubdomainId subdomain;
   std::int32_t begin;  ///< into SubdomainInterface::exchange
   std::int32_t end;
 };
 
+/// Place of a body in the message between two subdomains: in the exchange list of one for the other.
+using MessagePlace = Index<struct MessagePlaceTag>;
+
 /// Where the copies of a shared grain are: in which neighbour's message, at which place of it.
 struct CopySource {
   std::int32_t neighbour;  ///< index into `neighbours`, -1 for the copy of this subdomain
-  std::int32_t place;      ///< in that neighbour's exchange list; for the own copy, the index into `bodies`
+  MessagePlace place;      ///< in what that neighbour sends; none for the own copy
 };
 
 /// One subdomain's side of the interface. Everything is in an order that depends on ids and numbers of
@@ -76,11 +80,11 @@ struct CopySource {
 /// 2}: grains 11 and 12 with subdomain 1, grain 12 with subdomain 2. Copies of 11: own, then place 0 of
 /// neighbour 0; of 12: own, place 1 of neighbour 0, place 0 of neighbour 1.
 struct SubdomainInterface {
-  std::int32_t subdomain = 0;
+  SubdomainId subdomain{0};
   std::vector<Slot> bodies;                ///< the grains that stand here, in order of slot
   std::vector<std::int32_t> multiplicity;  ///< m_i >= 1 of each
   std::vector<std::int32_t> shared;        ///< indices into `bodies` of those with m_i > 1, in order of id
-  std::vector<std::int32_t> owner;         ///< of each of `shared`: the lowest subdomain it stands in
+  std::vector<SubdomainId> owner;          ///< of each of `shared`: the lowest subdomain it stands in
   /// Of grains with m_i < hub_multiplicity: both sides of a pair of subdomains list the same grains in order
   /// of id, so that a message needs no ids.
   std::vector<Neighbour> neighbours;       ///< by ascending subdomain
@@ -97,7 +101,7 @@ struct SubdomainInterface {
 /// meet in a corner exchange directly. Walls are not among the bodies: a wall that k subdomains touch is a
 /// reduction over its `wall_subdomains`.
 std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& standings, std::span<const BodyId> id,
-                                                 std::span<const std::int32_t> here,
+                                                 std::span<const SubdomainId> here,
                                                  std::int32_t hub_multiplicity = 9);
 
 std::size_t memory_used(const BodySubdomains& standings);

@@ -37,15 +37,15 @@ Spread spread_of(std::span<const std::int64_t> values) {
 
 LoadTable measure_load(std::int32_t subdomains, std::span<const SubdomainInterface> interfaces,
                        const BodySubdomains& grains, const BodySubdomains& walls,
-                       std::span<const std::int32_t> contacts, const Reduction& reduction) {
+                       std::span<const SubdomainId> contacts, const Reduction& reduction) {
   LoadTable table;
   for (const Row& row : rows) (table.*row.values).assign(static_cast<std::size_t>(subdomains), 0);
-  for (std::int32_t subdomain : contacts) ++table.contacts[static_cast<std::size_t>(subdomain)];
+  for (const SubdomainId subdomain : contacts) ++table.contacts[subdomain.at()];
   for (const SubdomainInterface& interface : interfaces) {
-    const auto e = static_cast<std::size_t>(interface.subdomain);
+    const std::size_t e = interface.subdomain.at();
     // Neighbours are counted from the standings, not from the exchange lists, which leave out the subdomains
     // of a hub.
-    std::set<std::int32_t> others;
+    std::set<SubdomainId> others;
     for (std::int32_t k : interface.shared) {
       const auto in = grains.of(static_cast<std::size_t>(interface.bodies[static_cast<std::size_t>(k)]));
       others.insert(in.begin(), in.end());

@@ -36,7 +36,7 @@ Spread spread_of(std::span<const std::int64_t> values);
 /// ranks.
 LoadTable measure_load(std::int32_t subdomains, std::span<const SubdomainInterface> interfaces,
                        const BodySubdomains& grains, const BodySubdomains& walls,
-                       std::span<const std::int32_t> contacts, const Reduction& reduction = {});
+                       std::span<const SubdomainId> contacts, const Reduction& reduction = {});
 
 /// Tables side by side, one column block (min, max, variation) per partitioner, as text.
 std::string load_text(std::span<const std::string_view> names, std::span<const LoadTable> tables);

@@ -58,10 +58,10 @@ PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainP
   return points;
 }
 
-std::int32_t Partition::subdomain_of(const Vec3& point) const {
-  if (subdomains == 1) return 0;
+SubdomainId Partition::subdomain_of(const Vec3& point) const {
+  if (subdomains == 1) return SubdomainId(0);
   const auto q = frame.coordinates(point);
-  return table.subdomain.empty() ? detail::leaf_of(tree, q) : table.subdomain[table.cell_of(q)];
+  return SubdomainId(table.subdomain.empty() ? detail::leaf_of(tree, q) : table.subdomain[table.cell_of(q)]);
 }
 
 Partition make_partition(const PartitionPoints& points, const PartitionOptions& options,
@@ -81,8 +81,8 @@ Partition make_partition(const PartitionPoints& points, const PartitionOptions& 
   return partition;
 }
 
-std::vector<std::int32_t> subdomains_of(const Partition& partition, std::span<const Vec3> points) {
-  std::vector<std::int32_t> result;
+std::vector<SubdomainId> subdomains_of(const Partition& partition, std::span<const Vec3> points) {
+  std::vector<SubdomainId> result;
   result.reserve(points.size());
   for (const Vec3& point : points) result.push_back(partition.subdomain_of(point));
   return result;
@@ -92,8 +92,7 @@ std::vector<std::int64_t> weight_per_subdomain(const Partition& partition, const
                                                const Reduction& reduction) {
   std::vector<std::int64_t> weights(static_cast<std::size_t>(partition.subdomains), 0);
   for (std::size_t k = 0; k < points.x.size(); ++k)
-    weights[static_cast<std::size_t>(partition.subdomain_of(points.x[k]))] +=
-        points.weight.empty() ? 1 : points.weight[k];
+    weights[partition.subdomain_of(points.x[k]).at()] += points.weight.empty() ? 1 : points.weight[k];
   reduction.sum(weights);
   return weights;
 }

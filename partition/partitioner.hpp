@@ -14,25 +14,20 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "kernels/registry.hpp"
 #include "partition/frame.hpp"
 #include "partition/reduction.hpp"
+#include "partition/subdomain.hpp"
 
 namespace talus {
 
 /// A way of cutting space, known by its name in the registry (partition/partitioners.hpp). The constants are
 /// those that code asks for.
-class PartitionKind {
+class PartitionKind : public NamedKind<PartitionKind> {
  public:
+  using NamedKind::NamedKind;
   static const PartitionKind automatic;  ///< "auto"
   static const PartitionKind boxes, fitted, rcb, metis;
-
-  /// `name` is that of a line of the registry, and lives as long as the program.
-  constexpr explicit PartitionKind(std::string_view name) : name_(name) {}
-  constexpr std::string_view name() const { return name_; }
-  friend constexpr bool operator==(PartitionKind, PartitionKind) = default;
-
- private:
-  std::string_view name_;
 };
 inline constexpr PartitionKind PartitionKind::automatic("auto");
 inline constexpr PartitionKind PartitionKind::boxes("boxes");
@@ -74,7 +69,7 @@ struct CutTree {
 /// A grid of equal cells over the frame, each with its subdomain.
 struct CellTable {
   std::array<std::int32_t, 3> cells{};  ///< per axis
-  std::vector<std::int32_t> subdomain;  ///< per cell, x fastest
+  std::vector<std::int32_t> subdomain;  ///< number per cell, x fastest
 
   std::size_t cell_of(const std::array<std::uint32_t, 3>& q) const {
     std::array<std::size_t, 3> c;
@@ -94,7 +89,7 @@ struct Partition {
   CellTable table;  ///< of partitioners that deal out cells; else empty
 
   /// Subdomain 0 .. subdomains - 1 of a finite point [m], inside or outside the box of the sample.
-  std::int32_t subdomain_of(const Vec3& point) const;
+  SubdomainId subdomain_of(const Vec3& point) const;
 };
 
 struct PartitionOptions {
@@ -120,7 +115,7 @@ Partition make_partition(const PartitionPoints& points, const PartitionOptions& 
                          const Reduction& reduction = {});
 
 /// Subdomain of every point, in order.
-std::vector<std::int32_t> subdomains_of(const Partition& partition, std::span<const Vec3> points);
+std::vector<SubdomainId> subdomains_of(const Partition& partition, std::span<const Vec3> points);
 
 /// Weight per subdomain over all ranks. The heaviest over the mean decides when to partition anew.
 std::vector<std::int64_t> weight_per_subdomain(const Partition& partition, const PartitionPoints& points,

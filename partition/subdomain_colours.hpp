@@ -7,12 +7,14 @@
 #include <span>
 #include <vector>
 
+#include "partition/subdomain.hpp"
+
 namespace talus {
 
 /// Two subdomains, and how many grains they share. Each pair in both directions.
 struct Tie {
-  std::int32_t subdomain;
-  std::int32_t other;
+  SubdomainId subdomain;
+  SubdomainId other;
   std::int32_t grains;
 };
 
@@ -22,6 +24,6 @@ struct Tie {
 /// grains between subdomains of one colour: two for boxes, which come out like a chessboard, three for
 /// subdomains cut by METIS. The result depends on the ties alone, not on their order. Throws
 /// std::out_of_range when a tie names no subdomain.
-std::vector<char> choose_subdomain_colours(std::int32_t subdomains, std::span<const Tie> ties);
+Per<SubdomainId, char> choose_subdomain_colours(std::int32_t subdomains, std::span<const Tie> ties);
 
 }  // namespace talus

@@ -71,16 +71,17 @@ struct Cut {
 Cut cut_sample(const PartitionOptions& options, const Bodies& bodies, const ContactPairs& contacts,
                std::size_t walls, const PartitionPoints& points) {
   Cut cut{options.kind, make_partition(points, options), {}, {}, {}};
-  const std::vector<std::int32_t> subdomain = subdomains_of(cut.partition, points.x);
-  cut.home = subdomains_of(cut.partition, bodies.x);
+  const std::vector<SubdomainId> subdomain = subdomains_of(cut.partition, points.x),
+                                 home = subdomains_of(cut.partition, bodies.x);
+  for (const SubdomainId at_centre : home) cut.home.push_back(at_centre.value());
   const BodySubdomains grains =
-      grain_subdomains(bodies.size(), contacts.grains, contacts.walls, subdomain, cut.home);
+      grain_subdomains(bodies.size(), contacts.grains, contacts.walls, subdomain, home);
   const BodySubdomains of_walls =
       wall_subdomains(walls, contacts.walls, std::span(subdomain).subspan(contacts.grains.size()));
   for (std::size_t body = 0; body < bodies.size(); ++body)
     cut.multiplicity.push_back(grains.multiplicity(body));
-  std::vector<std::int32_t> all(static_cast<std::size_t>(options.subdomains));
-  std::iota(all.begin(), all.end(), 0);
+  const FirstNumbers<SubdomainId> numbers(static_cast<std::size_t>(options.subdomains));
+  const std::vector<SubdomainId> all(numbers.begin(), numbers.end());
   cut.load =
       measure_load(options.subdomains, build_interfaces(grains, bodies.id, all), grains, of_walls, subdomain);
   return cut;

@@ -52,6 +52,44 @@ class DampedSweep {
   std::int64_t sweeps_ = 0;
 };
 
+/// Sweeps over a problem until its goal is reached, with checks of the error now and then.
+class CheckedSweeps {
+ public:
+  /// `answer` has not reached the goal yet.
+  CheckedSweeps(const DelassusProblem& problem, const DelassusGoal& goal, double damping, BestAnswer& answer)
+      : goal_(goal), answer_(answer), weight_(weights_of(problem)), sweep_(problem, weight_, damping) {}
+
+  /// D_c, one per contact.
+  std::span<const double> weight() const { return weight_; }
+  bool done() const {
+    const DelassusReport& report = answer_.report();
+    return report.converged || report.stopped || report.iterations >= goal_.max_iterations;
+  }
+  /// Number of the last sweep that a check found better than all before; 0: none.
+  std::int64_t best_iteration() const { return best_iteration_; }
+
+  /// One sweep, from `start` to `r`; true when its error was checked.
+  bool operator()(std::span<const double> start, std::span<double> r) {
+    DelassusReport& report = answer_.report();
+    std::copy(start.begin(), start.end(), r.begin());
+    report.failed_contacts = sweep_(r);
+    ++report.iterations;
+    report.stopped = goal_.stop && goal_.stop();
+    if (report.iterations < next_check_ && report.iterations != goal_.max_iterations && !report.stopped)
+      return false;
+    next_check_ = report.iterations + check_interval(report.iterations);
+    if (answer_.offer(report.iterations, r)) best_iteration_ = report.iterations;
+    return true;
+  }
+
+ private:
+  const DelassusGoal& goal_;
+  BestAnswer& answer_;
+  std::vector<double> weight_;
+  DampedSweep sweep_;
+  std::int64_t next_check_ = 1, best_iteration_ = 0;
+};
+
 /// Nesterov's momentum for a fixed-point iteration, with its two reasons to begin anew.
 class Momentum {
  public:
@@ -124,38 +162,31 @@ DelassusReport solve_nlgs(const DelassusProblem& problem, const DelassusGoal& go
   BestAnswer answer(problem, goal, r);
   if (answer.done()) return answer.hand_back();
   DelassusReport& report = answer.report();
-  const std::vector<double> weight = weights_of(problem);
   std::vector<double> start(r.begin(), r.end()), previous(start);
-  DampedSweep sweep(problem, weight, settings.damping);
+  CheckedSweeps sweep(problem, goal, settings.damping, answer);
   Momentum momentum;
   momentum.restart(settings.momentum);
-  std::int64_t next_check = 1, best_iteration = 0, phase_begin = 0;
-  while (!report.converged && !report.stopped && report.iterations < goal.max_iterations) {
-    std::copy(start.begin(), start.end(), r.begin());
-    report.failed_contacts = sweep(r);
-    ++report.iterations;
-    report.stopped = goal.stop && goal.stop();
-    if (report.iterations >= next_check || report.iterations == goal.max_iterations || report.stopped) {
-      next_check = report.iterations + check_interval(report.iterations);
-      if (answer.offer(report.iterations, r)) best_iteration = report.iterations;
-      if (report.converged || report.stopped) break;
-      if (settings.intervene && settings.intervene(answer)) {
-        best_iteration = report.iterations;
-        momentum.restart(settings.momentum);
-        start.assign(answer.best().begin(), answer.best().end());
-        previous = start;
-        continue;
-      }
+  const auto begin_anew = [&](double most_momentum) {
+    momentum.restart(most_momentum);
+    start.assign(answer.best().begin(), answer.best().end());
+    previous = start;
+  };
+  std::int64_t intervened = 0, rescued = 0;  // iterations
+  while (!sweep.done()) {
+    const bool checked = sweep(start, r);
+    if (report.converged || report.stopped) break;
+    if (checked && settings.intervene && settings.intervene(answer)) {
+      intervened = report.iterations;
+      begin_anew(settings.momentum);
+      continue;
     }
-    if (report.iterations - std::max(best_iteration, phase_begin) >
-        std::max<std::int64_t>(1000, best_iteration)) {
+    const std::int64_t improved = std::max(sweep.best_iteration(), intervened);
+    if (report.iterations - std::max(improved, rescued) > std::max<std::int64_t>(1000, improved)) {
       constexpr double limits[] = {1, 0.9, 0};
-      momentum.restart(std::min(settings.momentum, limits[++report.rescues % 3]));
-      phase_begin = report.iterations;
-      start.assign(answer.best().begin(), answer.best().end());
-      previous = start;
+      begin_anew(std::min(settings.momentum, limits[++report.rescues % 3]));
+      rescued = report.iterations;
     } else {
-      momentum.advance(r, weight, previous, start);
+      momentum.advance(r, sweep.weight(), previous, start);
     }
   }
   return answer.hand_back();
@@ -165,21 +196,12 @@ DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& go
                           std::span<double> r) {
   BestAnswer answer(problem, goal, r);
   if (answer.done()) return answer.hand_back();
-  DelassusReport& report = answer.report();
-  const std::vector<double> weight = weights_of(problem);
   std::vector<double> start(r.begin(), r.end()), direction(r.size(), 0.0);
-  DampedSweep sweep(problem, weight, damping);
+  CheckedSweeps sweep(problem, goal, damping, answer);
+  const std::span<const double> weight = sweep.weight();
   double last = std::numeric_limits<double>::infinity();
-  std::int64_t next_check = 1;
-  while (!report.converged && !report.stopped && report.iterations < goal.max_iterations) {
-    std::copy(start.begin(), start.end(), r.begin());
-    report.failed_contacts = sweep(r);
-    ++report.iterations;
-    report.stopped = goal.stop && goal.stop();
-    if (report.iterations >= next_check || report.iterations == goal.max_iterations || report.stopped) {
-      next_check = report.iterations + check_interval(report.iterations);
-      answer.offer(report.iterations, r);
-    }
+  while (!sweep.done()) {
+    sweep(start, r);
     double squared = 0;
     for (std::size_t k = 0; k < r.size(); ++k)
       squared += weight[k / 3] * (start[k] - r[k]) * (start[k] - r[k]);

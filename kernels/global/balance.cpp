@@ -13,23 +13,6 @@ namespace talus {
 
 namespace {
 
-/// rho W_nn over estimate_stiffness. That looks at masses and layers only: in a wedge of half angle a the
-/// load excites an eigenvalue smaller by sin^2 a.
-constexpr double firmness = 1e4;
-/// Of the conjugate gradients' error over what they found.
-constexpr double linear_tolerance = 0.25;
-constexpr int max_linear = 128;
-/// How far they have still to go shows in how they went.
-constexpr int few_linear = 16;
-/// Of open contacts that join those that carry.
-constexpr int max_rounds = 6;
-/// The gradients see a preconditioned residual, which is smaller than the error.
-constexpr double caution = 3;
-/// Of the impulses between walls, over those of the step: what is smaller is of no interest.
-constexpr double interest = 1e-2;
-/// What rounding leaves of the sample's momentum, over it: grains that fly side by side.
-constexpr double rounding = 1e-12;
-
 /// What the contacts of one part that carry ask of the velocities, and those that do not carry.
 struct Wishes {
   std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s], in order of contact
@@ -41,7 +24,7 @@ struct Wishes {
 };
 
 /// Keeps those that carry in `problem`.
-Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
+Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceThresholds& thresholds) {
   Wishes wishes;
   std::size_t kept = 0;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
@@ -56,7 +39,7 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V) {
     const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
     Vec3 change = y - c.mu * slip.norm() * c.normal - v;
     const double most = c.mu * c.normal.dot(carried);
-    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - 1e-6) * most)
+    if (c.mu > 0 && slip != Vec3::Zero() && tangential(c, carried).norm() > (1 - thresholds.sliding) * most)
       c.mu = 0;  // it slides: along the plane it asks for nothing
     if (carried == Vec3::Zero()) {
       c.mu = 0;
@@ -149,7 +132,8 @@ struct Scales {
   double most(double energy) const { return std::sqrt(mass * energy); }
 };
 
-Scales scales_of(const BodyParts& parts, const std::vector<Wishes>& wishes, const PartField& V) {
+Scales scales_of(const BodyParts& parts, const std::vector<Wishes>& wishes, const PartField& V,
+                 const BalanceThresholds& thresholds) {
   enum { contacts, mass, pressed, incoming, drive, fastest, width };
   const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
     row[contacts] = static_cast<double>(wishes[p].change.size());
@@ -174,21 +158,22 @@ Scales scales_of(const BodyParts& parts, const std::vector<Wishes>& wishes, cons
   // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
   const double sound = scales.most(all[incoming]) + all[mass] * all[fastest];
   scales.momentum = std::max({std::min(distance(parts, V, free), sound),
-                              all[drive] > 0 ? all[mass] * all[drive] : interest * all[pressed],
-                              rounding * scales.most(all[incoming])});
+                              all[drive] > 0 ? all[mass] * all[drive] : thresholds.interest * all[pressed],
+                              thresholds.rounding * scales.most(all[incoming])});
   return scales;
 }
 
 }  // namespace
 
-VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough) {
+VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough,
+                             const BalanceThresholds& thresholds) {
   const BodyParts parts(problems, link);
-  const double kappa = firmness * estimate_stiffness(parts);
+  const double kappa = thresholds.firmness * estimate_stiffness(parts);
   const PartField V = velocities_of(parts, impulses_of(parts));
   std::vector<Wishes> wishes(parts.size());
-  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p]); });
+  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p], thresholds); });
 
-  const Scales scales = scales_of(parts, wishes, V);
+  const Scales scales = scales_of(parts, wishes, V, thresholds);
   if (scales.contacts == 0) return {};
   const double scale = scales.momentum;
   VelocityError error;
@@ -204,8 +189,10 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     for (Twist& v : stop[p]) v = {-v.u, -v.w};
   });
   double left = 0, found = 0, missed = 0;
-  const auto small = [&](double part) { return part <= linear_tolerance * std::max(found, enough * scale); };
-  for (int round = 0; round < max_rounds; ++round) {
+  const auto small = [&](double part) {
+    return part <= thresholds.linear_tolerance * std::max(found, enough * scale);
+  };
+  for (int round = 0; round < thresholds.most_rounds; ++round) {
     std::vector<std::vector<double>> rho(parts.size());
     PartField force = parts.field();
     parts.each([&](std::size_t p) {
@@ -223,18 +210,19 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     if (fit_of(parts, stop, wishes, kappa).cost < fit_of(parts, motion, wishes, kappa).cost) motion = stop;
     BodySolver solver(parts, rho);
     PartField then = motion;
-    left = caution * scales.most(solver.begin(force, motion));
+    left = thresholds.caution * scales.most(solver.begin(force, motion));
     found = momentum(parts, motion);
     // The bound gives light bodies the mass of all: beside a heavy one what is left shows in how far the last
     // half of the iterations went, and the quarter before it.
     double before = std::numeric_limits<double>::infinity();
-    for (int k = 1; k <= max_linear && !small(left); ++k) {
-      const double bound = caution * scales.most(solver.iterate(motion));
+    for (int k = 1; k <= thresholds.most_linear && !small(left); ++k) {
+      const double bound = thresholds.caution * scales.most(solver.iterate(motion));
       ++error.linear_iterations;
       if (!std::has_single_bit(static_cast<unsigned>(k)) && !small(bound)) continue;
       found = momentum(parts, motion);
       const double change = distance(parts, motion, then);
-      left = k < few_linear ? bound : std::min(bound, left_over(change, before));
+      left = k < thresholds.few_linear ? bound
+                                       : std::min(bound, left_over(change, before, thresholds.unsettled));
       before = change;
       then = motion;
     }
@@ -248,9 +236,9 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
   return error;
 }
 
-VelocityError velocity_error(BodyProblem problem, double enough) {
+VelocityError velocity_error(BodyProblem problem, double enough, const BalanceThresholds& thresholds) {
   const PartLink alone;
-  return velocity_error({&problem, 1}, alone, enough);
+  return velocity_error({&problem, 1}, alone, enough, thresholds);
 }
 
 }  // namespace talus

@@ -11,16 +11,39 @@
 
 namespace talus {
 
-/// Number of sweeps that a problem needs. Below it NLGS alone converges, and ADMM is not tried.
-constexpr double stiff = 1000;
+/// Every number that the estimates of this header depend on, besides what the caller need not know more
+/// exactly. Ratios have no unit; iterations are those of conjugate gradients.
+struct BalanceThresholds {
+  /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
+  double unsettled = 20;
+  /// A contact slides when its tangential impulse is within this part of mu r_n, in (0, 1).
+  double sliding = 1e-6;
+  /// rho W_nn over estimate_stiffness, >> 1. That looks at masses and layers only: in a wedge of half angle a
+  /// the load excites an eigenvalue smaller by sin^2 a.
+  double firmness = 1e4;
+  /// The gradients' error over what they found, at which they are let be, in (0, 1).
+  double linear_tolerance = 0.25;
+  /// Iterations of a linear solve, at most, >= 1.
+  int most_linear = 128;
+  /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
+  int few_linear = 16;
+  /// Linear solves, at most, >= 1: before each further one, open contacts join those that carry.
+  int most_rounds = 6;
+  /// Factor on the gradients' bound, >= 1: they see a preconditioned residual, which is smaller than the
+  /// error.
+  double caution = 3;
+  /// Of the impulses between walls, in (0, 1): a step that does less is measured by this part of them.
+  double interest = 1e-2;
+  /// What rounding leaves of the sample's momentum, over it, > 0: grains that fly side by side.
+  double rounding = 1e-12;
+};
 
 /// The change still to come if changes go on as they did: the larger of `change`, over the second half of the
 /// sweeps, and its extrapolation from the change `before`, over the second quarter. An error that decays as
 /// exp(-k/t) changes by s (1 + s) as much over the second half as over the quarter before, with s =
 /// exp(-n/4t); what is left is s^2/(1 - s^2) of the last change. Where changes still grow nothing has
-/// settled, and `unsettled` times the change is taken.
-inline double left_over(double change, double before) {
-  constexpr double unsettled = 20;
+/// settled, and `unsettled` times the change is taken (BalanceThresholds).
+inline double left_over(double change, double before, double unsettled = BalanceThresholds{}.unsettled) {
   if (!(change < 2 * before)) return unsettled * change;
   const double s = (std::sqrt(1 + 4 * change / before) - 1) / 2;
   return change * std::clamp(s * s / (1 - s * s), 1.0, unsettled);
@@ -63,10 +86,11 @@ struct VelocityError {
 ///
 /// The scale is sum m |V(r) - V_free|, what the contacts do, as far as what comes in explains it; or the
 /// speed of driven walls times the whole mass, if that is more; where no wall is driven, at least a hundredth
-/// of the impulses between walls, as grains pressed at rest gain nothing; never less than what rounding
-/// leaves of the sample's own momentum. Takes about as long as a hundred sweeps.
-VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough);
+/// (BalanceThresholds::interest) of the impulses between walls, as grains pressed at rest gain nothing; never
+/// less than what rounding leaves of the sample's own momentum. Takes about as long as a hundred sweeps.
+VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough,
+                             const BalanceThresholds& thresholds = {});
 /// The whole problem in one part.
-VelocityError velocity_error(BodyProblem problem, double enough);
+VelocityError velocity_error(BodyProblem problem, double enough, const BalanceThresholds& thresholds = {});
 
 }  // namespace talus

@@ -235,7 +235,7 @@ void keep_numbers(CellTable& table, const Partition& previous, const PartitionPo
                   const IntegerFrame& frame, std::int32_t n, const Reduction& reduction) {
   std::vector<std::int64_t> common(at(n) * at(n), 0);
   for (std::size_t k = 0; k < points.x.size(); ++k) {
-    const auto before = at(previous.subdomain_of(points.x[k]));
+    const auto before = previous.subdomain_of(points.x[k]).at();
     const auto now = at(table.subdomain[table.cell_of(frame.coordinates(points.x[k]))]);
     common[before * at(n) + now] += points.weight.empty() ? 1 : points.weight[k];
   }

@@ -85,6 +85,7 @@ class EpochGraph {
  private:
   template <class Program>
   friend bool run_epochs(EpochGraph& graph, Worker& me, Program& program);
+  friend class EpochPeers;
 
   /// Before its node, the walk needs counter of `thread` >= epoch * stride(thread) + place.
   struct Wait {

@@ -24,6 +24,8 @@
 
 #include <concepts>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -54,6 +56,62 @@ void run_epochs(EpochGraph& graph, Program& program) {
   }
 }
 
+/// What one thread of the team knows of the others while it walks.
+class EpochPeers {
+ public:
+  EpochPeers(EpochGraph& graph, Worker& me) : graph_(graph), me_(me) {
+    for (int thread = 0; thread < graph.threads(); ++thread)
+      peers_.push_back(
+          {&graph.counters_[static_cast<std::size_t>(thread)].finished, graph.stride(thread), 0});
+  }
+
+  /// Steps per epoch of a thread.
+  std::int64_t stride(std::size_t thread) const { return peers_[thread].stride; }
+
+  /// Until `thread` has finished `place` steps of the epoch that is number `now` since the graph was built.
+  /// False when this thread was told to stop.
+  bool wait_for(std::size_t thread, std::int64_t now, std::int64_t place) {
+    Peer& peer = peers_[thread];
+    const std::int64_t needed = now * peer.stride + place;
+    return peer.seen >= needed || me_.wait([&] {
+      peer.seen = peer.finished->load(std::memory_order_acquire);
+      return peer.seen >= needed;
+    });
+  }
+
+  /// What program.decide(epoch) says behind the epoch `now`, which this thread has finished: thread 0 asks it
+  /// when all have come here, and the others hear of it. None when this thread was told to stop.
+  template <class Program>
+  std::optional<bool> decide(Program& program, int epoch, std::int64_t now) {
+    std::atomic<std::int64_t>& decision = graph_.decision_.value;
+    if (me_.thread() == 0) {
+      for (std::size_t thread = 0; thread < peers_.size(); ++thread)
+        if (!wait_for(thread, now + 1, 0)) return std::nullopt;
+      me_.delay();
+      const bool goes_on = program.decide(epoch);
+      decision.store(2 * (now + 1) + (goes_on ? 0 : 1), std::memory_order_release);
+      return goes_on;
+    }
+    std::int64_t decided = 0;
+    const bool told = me_.wait([&] {
+      if constexpr (requires { program.assist(); }) program.assist();
+      return (decided = decision.load(std::memory_order_acquire)) >= 2 * (now + 1);
+    });
+    if (!told) return std::nullopt;
+    return decided % 2 == 0;  // of this very epoch: thread 0 cannot pass the next gate without this thread
+  }
+
+ private:
+  struct Peer {
+    const std::atomic<std::int64_t>* finished;
+    std::int64_t stride;
+    std::int64_t seen;  ///< last value read; spares a look at a line that its owner keeps writing
+  };
+  EpochGraph& graph_;
+  Worker& me_;
+  std::vector<Peer> peers_;
+};
+
 /// One thread's part of the loop; to be called by all threads of the team, with the same graph and program.
 /// True when decide() ended the loop, false when the thread left because a task of the run has failed
 /// elsewhere. What the program throws passes through; whoever catches it raises the stop flag of the workers
@@ -73,28 +131,13 @@ bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
     return true;
   }
 
-  /// What this thread knows of another one.
-  struct Peer {
-    const std::atomic<std::int64_t>* finished;
-    std::int64_t stride;
-    std::int64_t seen;  ///< last value read; spares a look at a line that its owner keeps writing
-  };
-  std::vector<Peer> peers;
-  for (int thread = 0; thread < graph.threads(); ++thread)
-    peers.push_back({&graph.counters_[static_cast<std::size_t>(thread)].finished, graph.stride(thread), 0});
-  const auto reached = [&me](Peer& peer, std::int64_t needed) {
-    return peer.seen >= needed || me.wait([&] {
-      peer.seen = peer.finished->load(std::memory_order_acquire);
-      return peer.seen >= needed;
-    });
-  };
-
+  EpochPeers peers(graph, me);
   const auto self = static_cast<std::size_t>(me.thread());
   EpochGraph::Counter& mine = graph.counters_[self];
   if (mine.walking)
     throw std::logic_error("an epoch graph whose last run failed is run again without EpochGraph::reset");
   mine.walking = true;
-  const std::int64_t stride = peers[self].stride;
+  const std::int64_t stride = peers.stride(self);
   const auto steps =
       std::span(graph.steps_)
           .subspan(graph.first_step_[self], graph.first_step_[self + 1] - graph.first_step_[self]);
@@ -110,10 +153,8 @@ bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
     for (const EpochGraph::Step& step : steps) {
       if constexpr (requires { program.about_to_wait(); })
         if (step.waits > 0) program.about_to_wait();
-      for (const EpochGraph::Wait* const end = wait + step.waits; wait != end; ++wait) {
-        Peer& peer = peers[wait->thread];
-        if (!reached(peer, now * peer.stride + wait->place)) return false;
-      }
+      for (const EpochGraph::Wait* const end = wait + step.waits; wait != end; ++wait)
+        if (!peers.wait_for(wait->thread, now, wait->place)) return false;
       me.delay();
       program.node(step.node, epoch);
       ++finished;
@@ -122,25 +163,9 @@ bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
     if (!gated) continue;
 
     mine.finished.store((now + 1) * stride, std::memory_order_release);
-    std::atomic<std::int64_t>& decision = graph.decision_.value;
-    bool goes_on = false;
-    if (self == 0) {
-      for (Peer& peer : peers)
-        if (!reached(peer, (now + 1) * peer.stride)) return false;
-      me.delay();
-      goes_on = program.decide(epoch);
-      decision.store(2 * (now + 1) + (goes_on ? 0 : 1), std::memory_order_release);
-    } else {
-      std::int64_t decided = 0;
-      if (!me.wait([&] {
-            if constexpr (requires { program.assist(); }) program.assist();
-            return (decided = decision.load(std::memory_order_acquire)) >= 2 * (now + 1);
-          }))
-        return false;
-      goes_on =
-          decided % 2 == 0;  // of this very epoch: thread 0 cannot pass the next gate without this thread
-    }
-    if (!goes_on) {
+    const std::optional<bool> goes_on = peers.decide(program, epoch, now);
+    if (!goes_on) return false;
+    if (!*goes_on) {
       mine.past_epochs = now + 1;
       mine.walking = false;
       return true;

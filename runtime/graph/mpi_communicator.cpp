@@ -151,20 +151,21 @@ void MpiCommunicator::exchange(std::span<const std::span<const std::byte>> to,
   check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
 }
 
-void MpiCommunicator::sum(std::span<std::int64_t> values) const {
+/// Of each value over all ranks, in place.
+template <class Number>
+void reduce_values(std::span<Number> values, MPI_Datatype type, MPI_Op op, trace::Recorder* trace) {
   if (values.empty()) return;  // SimGrid's calls divide by their number
-  const trace::Span span(trace(), trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
-  check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_INT64_T, MPI_SUM,
-                      MPI_COMM_WORLD),
+  const trace::Span span(trace, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
+  check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, op, MPI_COMM_WORLD),
         "MPI_Allreduce");
 }
 
+void MpiCommunicator::sum(std::span<std::int64_t> values) const {
+  reduce_values(values, MPI_INT64_T, MPI_SUM, trace());
+}
+
 void MpiCommunicator::max(std::span<double> values) const {
-  if (values.empty()) return;  // SimGrid's calls divide by their number
-  const trace::Span span(trace(), trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
-  check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), MPI_DOUBLE, MPI_MAX,
-                      MPI_COMM_WORLD),
-        "MPI_Allreduce");
+  reduce_values(values, MPI_DOUBLE, MPI_MAX, trace());
 }
 
 std::vector<std::byte> MpiCommunicator::gather(std::span<const std::byte> part) const {
@@ -196,14 +197,14 @@ void MpiCommunicator::to_first(std::span<const std::byte> part, std::size_t piec
   if (rank() != 0) {
     const std::uint64_t bytes = part.size();
     check(MPI_Send(&bytes, 1, MPI_UINT64_T, 0, 0, MPI_COMM_WORLD), "MPI_Send");
-    detail::in_pieces(part.size(), piece, [&](std::size_t begin, std::size_t size) {
-      check(MPI_Send(part.data() + begin, static_cast<int>(size), MPI_BYTE, 0, 0, MPI_COMM_WORLD),
+    detail::each_piece(part, piece, [](std::span<const std::byte> bytes_of_piece) {
+      check(MPI_Send(bytes_of_piece.data(), static_cast<int>(bytes_of_piece.size()), MPI_BYTE, 0, 0,
+                     MPI_COMM_WORLD),
             "MPI_Send");
     });
     return;
   }
-  detail::in_pieces(part.size(), piece,
-                    [&](std::size_t begin, std::size_t size) { take(part.subspan(begin, size)); });
+  detail::each_piece(part, piece, take);
   std::vector<std::byte> received;
   for (int rank = 1; rank < ranks(); ++rank) {
     std::uint64_t bytes = 0;

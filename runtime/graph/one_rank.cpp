@@ -50,8 +50,7 @@ std::vector<std::byte> OneRank::gather(std::span<const std::byte> part) const {
 
 void OneRank::to_first(std::span<const std::byte> part, std::size_t piece,
                        const std::function<void(std::span<const std::byte>)>& take) const {
-  detail::in_pieces(part.size(), piece,
-                    [&](std::size_t begin, std::size_t size) { take(part.subspan(begin, size)); });
+  detail::each_piece(part, piece, take);
 }
 
 void OneRank::abort(int code) const {

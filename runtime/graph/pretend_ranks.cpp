@@ -195,9 +195,7 @@ class PretendCommunicator final : public Communicator {
     if (rank() != 0) return;
     for (int r = 0; r < ranks(); ++r) {
       const Bytes message = take(r);
-      detail::in_pieces(message.size(), piece, [&](std::size_t begin, std::size_t size) {
-        take_piece(std::span(message).subspan(begin, size));
-      });
+      detail::each_piece(message, piece, take_piece);
     }
   }
   [[noreturn]] void abort(int code) const override {

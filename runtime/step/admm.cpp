@@ -138,10 +138,11 @@ std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
     parts.push_back(gather(source));
     return parts;
   }
-  for (std::size_t e = 0; e < all.here.size(); ++e)
-    parts.push_back(
-        gather(source, BodyProblemPart{all.here[e], static_cast<std::int32_t>(e), all.slot_begin[e],
-                                       all.slot_begin[e + 1], all.counts, all.multiplicity}));
+  for (const SubdomainPlace e : all.here.indices()) {
+    const auto [begin, end] = all.slots_of(e);
+    parts.push_back(gather(
+        source, BodyProblemPart{all.here[e].value(), e.value(), begin, end, all.counts, all.multiplicity}));
+  }
   return parts;
 }
 

@@ -49,7 +49,7 @@ std::size_t check_row_width(std::size_t walls) {
 std::vector<double> check_rows(const StepState& state, std::span<const ErrorSums> sums,
                                std::span<const JumpSums> jumps) {
   const std::size_t width = check_row_width(state.walls.size());
-  const std::vector<std::int32_t>& here = state.decomposition.here;
+  const auto& here = state.decomposition.here;
   std::vector<double> rows(here.size() * width, 0.0);
   std::vector<ErrorSums> added(here.size());
   for (std::size_t c = 0; c < sums.size(); ++c) {
@@ -62,7 +62,7 @@ std::vector<double> check_rows(const StepState& state, std::span<const ErrorSums
   for (std::size_t e = 0; e < here.size(); ++e) {
     const JumpSums jump = jumps.empty() ? JumpSums{} : jumps[e];
     const ErrorSums& own = added[e];
-    write_row(CheckRow{.subdomain = static_cast<double>(here[e]),
+    write_row(CheckRow{.subdomain = static_cast<double>(here[SubdomainPlace(e)].value()),
                        .residual2 = own.residual2,
                        .residual_max2 = own.residual_max2,
                        .impulse2 = own.impulse2,
@@ -103,12 +103,12 @@ CheckSums add_check_rows(std::span<const double> rows, std::size_t walls, std::i
 
 std::vector<double> number_rows(const StepState& state, std::span<const double> numbers) {
   constexpr std::size_t width = width_of<NumberRow>;
-  const std::vector<std::int32_t>& here = state.decomposition.here;
+  const auto& here = state.decomposition.here;
   std::vector<double> added(here.size(), 0.0), rows(width * here.size());
   for (std::size_t c = 0; c < numbers.size(); ++c)
     added[static_cast<std::size_t>(state.chunks.subdomain[c])] += numbers[c];
   for (std::size_t e = 0; e < here.size(); ++e)
-    write_row(NumberRow{static_cast<double>(here[e]), added[e]}, &rows[width * e]);
+    write_row(NumberRow{static_cast<double>(here[SubdomainPlace(e)].value()), added[e]}, &rows[width * e]);
   return rows;
 }
 

@@ -62,7 +62,7 @@ std::vector<std::int32_t> receivers(Sample& sample, const DecompositionSettings&
   points.x.swap(sample.x);
   std::vector<std::int32_t> rank(sample.size());
   for (std::size_t k = 0; k < rank.size(); ++k)
-    rank[k] = decomposition.rank_of[static_cast<std::size_t>(partition.subdomain_of(sample.x[k]))];
+    rank[k] = decomposition.rank_of[partition.subdomain_of(sample.x[k])];
   return rank;
 }
 

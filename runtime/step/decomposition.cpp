@@ -76,7 +76,7 @@ PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& 
         std::clamp(std::floor(std::ldexp(1.0, 30) / static_cast<double>(all_candidates)), 1.0, 64.0);
     for (const Vec3& x : decomposition.cost.empty() ? std::vector<Vec3>() : points.x)
       points.weight.push_back(static_cast<std::int32_t>(std::lround(
-          unit * std::clamp(decomposition.cost[at(decomposition.partition.subdomain_of(x))], 0.1, 10.0))));
+          unit * std::clamp(decomposition.cost[decomposition.partition.subdomain_of(x)], 0.1, 10.0))));
     return points;
   }
   for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -107,8 +107,9 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
       gathered.own.push_back(static_cast<Slot>(s));
       continue;
     }
-    for (std::int32_t subdomain : subdomains_within(decomposition.partition, bodies.x[s], 3 * largest[0])) {
-      const std::size_t rank = at(decomposition.rank_of[at(subdomain)]);
+    for (const SubdomainId subdomain :
+         subdomains_within(decomposition.partition, bodies.x[s], 3 * largest[0])) {
+      const std::size_t rank = at(decomposition.rank_of[subdomain]);
       if (sent[rank] == s) continue;
       sent[rank] = s;
       if (rank == here)
@@ -197,7 +198,7 @@ Decomposition make_decomposition(const DecompositionSettings& settings, const gr
                                   ? e % ranks.ranks()
                                   : static_cast<std::int32_t>(std::int64_t{e} * ranks.ranks() / subdomains);
     decomposition.rank_of.push_back(rank);
-    if (rank == ranks.rank()) decomposition.here.push_back(e);
+    if (rank == ranks.rank()) decomposition.here.emplace_back(e);
   }
   decomposition.slot_begin.assign(decomposition.here.size() + 1, 0);
   return decomposition;
@@ -233,10 +234,10 @@ void index_by_id(Surroundings& around, std::span<const BodyId> id_of_slot) {
 }  // namespace
 
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
-                                  const graph::Communicator& ranks, Bodies& bodies,
-                                  std::span<const double> reach, const Candidates& candidates,
-                                  bool partition_anew) {
-  if (partition_anew) cut_space(decomposition, settings, ranks, bodies, candidates);
+                                  const graph::Communicator& ranks, const RankSample& sample,
+                                  std::span<const double> reach, bool partition_anew) {
+  Bodies& bodies = sample.bodies;
+  if (partition_anew) cut_space(decomposition, settings, ranks, bodies, sample.candidates);
   Gathered gathered = exchange_surroundings(decomposition, ranks, bodies, reach);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
   /// `source`: into the own slots, then into what came.

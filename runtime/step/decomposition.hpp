@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/motion.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "partition/interface.hpp"
 #include "partition/partitioner.hpp"
@@ -17,6 +18,10 @@
 #include "runtime/step/setup.hpp"
 
 namespace talus {
+
+/// Place of a subdomain among those of this rank, which stand by ascending number; groups of the loop
+/// (runtime/graph/loop_plan.hpp) and Chunks::subdomain count in it.
+using SubdomainPlace = Index<struct SubdomainPlaceTag>;
 
 /// How space is cut, who has which subdomain, and which copies stand here. The slots of this rank are those
 /// of its first subdomain, then those of the second, ...; within a subdomain bodies stand in Morton order,
@@ -27,33 +32,36 @@ namespace talus {
 /// counts[5] = 0.
 struct Decomposition {
   Partition partition;
-  std::vector<std::int32_t> rank_of;    ///< of every subdomain
-  std::vector<std::int32_t> here;       ///< subdomains of this rank, ascending
-  std::vector<std::size_t> slot_begin;  ///< here + 1 offsets into the slots
-  std::vector<char>
-      subdomain_colour;  ///< per subdomain of all: choose_subdomain_colours; empty unless they alternate
+  Per<SubdomainId, std::int32_t> rank_of;   ///< of every subdomain
+  Per<SubdomainPlace, SubdomainId> here;    ///< subdomains of this rank, ascending
+  std::vector<std::size_t> slot_begin;      ///< here + 1 offsets into the slots
+  Per<SubdomainId, char> subdomain_colour;  ///< choose_subdomain_colours; empty unless they alternate
   std::vector<std::uint16_t> multiplicity;  ///< m_i per slot; empty with one subdomain
   std::vector<std::uint16_t> parts;         ///< per slot: the copy carries M/parts; empty likewise
   std::vector<char> taken;   ///< per slot: a body that stands in a subdomain of an earlier subdomain colour,
                              ///< too, and no hub; empty unless they alternate
   std::vector<char> counts;  ///< per slot: the copy of the lowest subdomain; empty likewise
-  std::vector<std::array<double, 2>> whole;  ///< 1/M and R^2/I of the body [1/kg]; empty likewise
-  std::vector<SubdomainInterface>
-      interfaces;             ///< per `here`; bodies[k] stands in slot_begin + k. Empty likewise
-  bool orientation = false;   ///< bodies have orientations, also where there is no body
-  bool materials = false;     ///< likewise materials
-  std::int64_t migrants = 0;  ///< bodies that came to a subdomain where they did not stand, all ranks
-  double imbalance = 0;       ///< candidates of the fullest subdomain over the mean, less 1
-  std::vector<double> cost;   ///< of a candidate, per subdomain, the mean being 1; empty: all equal
-  bool blind = false;         ///< space was cut when no candidate was known
+  std::vector<std::array<double, 2>> whole;            ///< 1/M and R^2/I of the body [1/kg]; empty likewise
+  Per<SubdomainPlace, SubdomainInterface> interfaces;  ///< bodies[k] stands in slot_begin + k. Empty likewise
+  bool orientation = false;       ///< bodies have orientations, also where there is no body
+  bool materials = false;         ///< likewise materials
+  std::int64_t migrants = 0;      ///< bodies that came to a subdomain where they did not stand, all ranks
+  double imbalance = 0;           ///< candidates of the fullest subdomain over the mean, less 1
+  Per<SubdomainId, double> cost;  ///< of a candidate, the mean being 1; empty: all equal
+  bool blind = false;             ///< space was cut when no candidate was known
 
   bool several() const { return partition.subdomains > 1; }
   bool in_colours() const {
     return std::ranges::any_of(subdomain_colour, [](char t) { return t > 0; });
   }
-  int subdomain_colour_of(std::int32_t subdomain) const {
-    return subdomain_colour.empty() ? 0 : subdomain_colour[static_cast<std::size_t>(subdomain)];
+  int subdomain_colour_of(SubdomainId subdomain) const {
+    return subdomain_colour.empty() ? 0 : subdomain_colour[subdomain];
   }
+  /// Of a subdomain of this rank.
+  SubdomainPlace place_of(SubdomainId subdomain) const {
+    return SubdomainPlace(std::ranges::lower_bound(here, subdomain) - here.begin());
+  }
+  SlotRange slots_of(SubdomainPlace e) const { return {slot_begin[e.at()], slot_begin[e.at() + 1]}; }
 };
 
 /// Of the copies of a body this one stands for it.
@@ -84,23 +92,33 @@ struct Surroundings {
   Slot find(std::int64_t id) const;                  ///< -1 when it is not among them
 };
 
+/// Bodies and candidates of a rank, which are replaced when the sample is dealt out anew.
+struct RankSample {
+  Bodies& bodies;
+  Candidates& candidates;
+};
+
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of
 /// the largest reaches of this rank's regions, so that each candidate whose midpoint is here, and each other
-/// candidate of its bodies, is found here without further messages. `reach` [m]: of the slots of `bodies`.
-/// The state of the bodies goes over to the surroundings: of `bodies`, ids and centres stay for `distribute`.
+/// candidate of its bodies, is found here without further messages. `reach` [m]: of the slots of the sample.
+/// The state of the bodies goes over to the surroundings: ids and centres stay in the sample for
+/// `distribute`.
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
-                                  const graph::Communicator& ranks, Bodies& bodies,
-                                  std::span<const double> reach, const Candidates& candidates,
-                                  bool partition_anew);
+                                  const graph::Communicator& ranks, const RankSample& sample,
+                                  std::span<const double> reach, bool partition_anew);
 
-/// Collective. From the candidates `found` among the surroundings (no impulses) to the copies, candidates
-/// with the impulses of `candidates`, and groups of this rank. `bodies` and `candidates` are replaced; the
-/// bodies of the surroundings are gone afterwards, their reaches stay. `glued[wall]`: the wall has a finite
-/// mass.
+/// Candidates found among the surroundings.
+struct FoundCandidates {
+  Candidates candidates;        ///< between places in the surroundings; without impulses
+  std::span<const char> glued;  ///< per wall: it has a finite mass
+};
+
+/// Collective. From the candidates found to the copies, candidates with the impulses of those in `sample`,
+/// and groups of this rank. The sample is replaced; the bodies of the surroundings are gone afterwards, their
+/// reaches stay.
 std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
                                        const graph::Communicator& ranks, Surroundings& around,
-                                       Candidates found, std::span<const char> glued, Bodies& bodies,
-                                       Candidates& candidates);
+                                       FoundCandidates among, const RankSample& sample);
 
 std::size_t memory_used(const Decomposition& decomposition);
 

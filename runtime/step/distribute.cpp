@@ -1,15 +1,14 @@
-#include <fmt/format.h>
+/// From the candidates that were found to the groups of this rank, and the impulses that follow them.
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <numeric>
-#include <stdexcept>
 
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "partition/subdomain_colours.hpp"
 #include "runtime/step/decomposition.hpp"
+#include "runtime/step/detail/copies.hpp"
 
 namespace talus {
 
@@ -59,8 +58,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     const std::int32_t rank =
         ranks.ranks() == 1
             ? 0
-            : decomposition
-                  .rank_of[at(decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x)))];
+            : decomposition.rank_of[decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x))];
     if (rank == ranks.rank()) {
       if (wall)
         old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)], at_wall.feature});
@@ -96,22 +94,6 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
   return old;
 }
 
-/// Bodies of the surroundings that stand in a subdomain of this rank now and did not before, each counted per
-/// subdomain. `slot_begin`: of the slots before.
-std::int64_t arrivals(const Decomposition& decomposition, const Surroundings& around,
-                      std::span<const std::size_t> slot_begin) {
-  std::int64_t count = 0;
-  std::vector<std::int32_t> stood_in(around.by_id.size(), -1);
-  for (std::size_t e = 0; e < decomposition.interfaces.size(); ++e) {
-    const auto local = static_cast<std::int32_t>(e);
-    for (std::size_t s = slot_begin[e]; s < slot_begin[e + 1]; ++s)
-      if (around.of_slot[s] >= 0) stood_in[at(around.of_slot[s])] = local;
-    const std::vector<Slot>& now = decomposition.interfaces[e].bodies;
-    count += std::count_if(now.begin(), now.end(), [&](Slot body) { return stood_in[at(body)] != local; });
-  }
-  return count;
-}
-
 /// The candidates of this rank in the order of its groups: grain pairs by subdomain, those at the interface
 /// first; then wall pairs by wall, by subdomain, and those at the interface first again.
 struct OwnCandidates {
@@ -120,23 +102,23 @@ struct OwnCandidates {
 };
 
 OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& found,
-                       std::span<const std::int32_t> subdomain, const BodySubdomains& standings,
+                       std::span<const SubdomainId> subdomain, const BodySubdomains& standings,
                        std::span<const char> glued) {
   const std::size_t grains = found.grain_pairs.size(), here = decomposition.here.size();
-  std::vector<std::int32_t> local_of(at(decomposition.partition.subdomains), -1);
-  for (std::size_t e = 0; e < here; ++e) local_of[at(decomposition.here[e])] = static_cast<std::int32_t>(e);
+  Per<SubdomainId, SubdomainPlace> place_of(at(decomposition.partition.subdomains));
+  for (const SubdomainPlace e : decomposition.here.indices()) place_of[decomposition.here[e]] = e;
   const auto shared = [&](Slot body) { return standings.multiplicity(at(body)) > 1; };
   std::vector<std::int32_t> group(found.size(), -1);
   OwnCandidates own;
   own.begin.assign(2 * here * (glued.size() + 1) + 1, 0);
   for (std::size_t k = 0; k < found.size(); ++k) {
-    const std::int32_t local = local_of[at(subdomain[k])];
-    if (local < 0) continue;
+    const SubdomainPlace local = place_of[subdomain[k]];
+    if (local.none()) continue;
     const std::int32_t wall = k < grains ? -1 : found.wall_pairs[k - grains].wall;
     const bool boundary = k < grains
                               ? shared(found.grain_pairs[k].first) || shared(found.grain_pairs[k].second)
                               : glued[at(wall)] != 0 || shared(found.wall_pairs[k - grains].body);
-    group[k] = ((wall + 1) * static_cast<std::int32_t>(here) + local) * 2 + (boundary ? 0 : 1);
+    group[k] = ((wall + 1) * static_cast<std::int32_t>(here) + local.value()) * 2 + (boundary ? 0 : 1);
     ++own.begin[at(group[k]) + 1];
   }
   std::partial_sum(own.begin.begin(), own.begin.end(), own.begin.begin());
@@ -148,26 +130,18 @@ OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& fou
   return own;
 }
 
-/// Grains are hubs from this multiplicity on, glued once a sweep through one rank. By then those of all
-/// subdomain colours must have been swept, and what waits for them cannot be hidden: where there is one,
-/// there are no subdomain colours.
-std::int32_t hubs_from(const DecompositionSettings& settings) {
-  if (settings.exchange == ExchangeScheme::ccs) return 2;
-  return settings.coupling == Coupling::alternating ? 33 : 9;
-}
-
-/// Collective.
-void settle_turns(Decomposition& decomposition, const graph::Communicator& ranks,
-                  const BodySubdomains& standings, std::int32_t hubs) {
-  const auto is_here = [&](std::int32_t e) { return decomposition.rank_of[at(e)] == ranks.rank(); };
-  std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t> shared;
+/// The subdomain colours, none where there is a hub. Collective.
+void settle_colours(Decomposition& decomposition, const graph::Communicator& ranks,
+                    const BodySubdomains& standings, std::int32_t hubs) {
+  const auto is_here = [&](SubdomainId e) { return decomposition.rank_of[e] == ranks.rank(); };
+  std::map<std::pair<SubdomainId, SubdomainId>, std::int32_t> shared;
   double hub[1] = {0};
   for (std::size_t b = 0; b < standings.bodies(); ++b) {
     const auto stands = standings.of(b);
-    for (const std::int32_t e : stands) {
+    for (const SubdomainId e : stands) {
       if (stands.size() == 1 || !is_here(e)) continue;
       if (standings.multiplicity(b) >= hubs) hub[0] = 1;
-      for (const std::int32_t other : stands)
+      for (const SubdomainId other : stands)
         if (other != e && hub[0] == 0) ++shared[{e, other}];
     }
   }
@@ -183,22 +157,22 @@ void settle_turns(Decomposition& decomposition, const graph::Communicator& ranks
 /// comes first: a later subdomain colour then has its walls swept, and can tell, before it takes over what
 /// others did to its grains. Collective: impulses of what goes to another rank follow.
 void move_wall_contacts(const Decomposition& decomposition, const graph::Communicator& ranks,
-                        const BodySubdomains& standings, const Surroundings& around,
-                        std::span<const char> glued, Candidates& found,
-                        std::vector<std::int32_t>& subdomain) {
+                        const BodySubdomains& standings, const Surroundings& around, FoundCandidates& among,
+                        std::vector<SubdomainId>& subdomain) {
+  Candidates& found = among.candidates;
   const std::size_t grains = found.grain_pairs.size();
   const auto components = static_cast<std::size_t>(found.components);
   std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
   for (std::size_t k = grains; k < found.size(); ++k) {
     const WallPair& pair = found.wall_pairs[k - grains];
-    if (glued[at(pair.wall)] == 0) continue;
+    if (among.glued[at(pair.wall)] == 0) continue;
     const auto stands = standings.of(at(pair.body));
-    const std::int32_t first = *std::ranges::min_element(
-        stands, {}, [&](std::int32_t e) { return decomposition.subdomain_colour_of(e); });
-    const std::int32_t before = subdomain[k];
+    const SubdomainId first = *std::ranges::min_element(
+        stands, {}, [&](SubdomainId e) { return decomposition.subdomain_colour_of(e); });
+    const SubdomainId before = subdomain[k];
     if (decomposition.subdomain_colour_of(first) == decomposition.subdomain_colour_of(before)) continue;
     subdomain[k] = first;
-    const std::int32_t from = decomposition.rank_of[at(before)], rank = decomposition.rank_of[at(first)];
+    const std::int32_t from = decomposition.rank_of[before], rank = decomposition.rank_of[first];
     if (from != ranks.rank() || rank == from) continue;
     ImpulseRecord record{};
     record.first = static_cast<std::int64_t>(around.bodies.id[at(pair.body)]);
@@ -218,81 +192,11 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     }
 }
 
-/// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
-/// without knowing of one another. Hubs are glued once a sweep, whosever subdomain colour it is.
-std::int32_t parts_of(const Decomposition& decomposition, Coupling coupling,
-                      std::span<const std::int32_t> standings, std::int32_t subdomain, std::int32_t hubs) {
-  const auto m = static_cast<std::int32_t>(standings.size());
-  if (coupling == Coupling::schwarz) return 1;
-  if (coupling == Coupling::nscdd || m >= hubs) return m;
-  return static_cast<std::int32_t>(std::ranges::count_if(standings, [&](std::int32_t other) {
-    return decomposition.subdomain_colour_of(other) == decomposition.subdomain_colour_of(subdomain);
-  }));
-}
-
-/// Multiplicities of the copies, their parts of the mass, who counts, and where each subdomain's begin.
-void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& standings,
-                 std::span<const BodyId> id, std::int32_t hubs) {
-  decomposition.slot_begin.assign(1, 0);
-  decomposition.multiplicity.clear();
-  decomposition.parts.clear();
-  decomposition.taken.clear();
-  decomposition.counts.clear();
-  for (const SubdomainInterface& interface : decomposition.interfaces) {
-    for (std::size_t k = 0; k < interface.bodies.size(); ++k) {
-      const std::size_t b = at(interface.bodies[k]);
-      const std::int32_t m = interface.multiplicity[k];
-      if (m > std::numeric_limits<std::uint16_t>::max())
-        throw std::runtime_error(fmt::format("body {} stands in {} subdomains; use fewer subdomains",
-                                             static_cast<std::int64_t>(id[b]), m));
-      decomposition.multiplicity.push_back(static_cast<std::uint16_t>(m));
-      decomposition.counts.push_back(standings.of(b).front() == interface.subdomain ? 1 : 0);
-      const std::int32_t parts =
-          parts_of(decomposition, coupling, standings.of(b), interface.subdomain, hubs);
-      decomposition.parts.push_back(static_cast<std::uint16_t>(parts));
-      if (decomposition.subdomain_colour.empty()) continue;
-      const bool taken = m < hubs && std::ranges::any_of(standings.of(b), [&](std::int32_t other) {
-                           return decomposition.subdomain_colour_of(other) <
-                                  decomposition.subdomain_colour_of(interface.subdomain);
-                         });
-      decomposition.taken.push_back(taken ? 1 : 0);
-    }
-    decomposition.slot_begin.push_back(decomposition.multiplicity.size());
-  }
-}
-
-/// Copies of the bodies of the interfaces, field by field: each field of the surroundings goes when it has
-/// been copied.
-Bodies make_copies(Decomposition& decomposition, Bodies& around) {
-  Bodies copies;
-  const auto copy = [&](auto& from, auto& to) {
-    to.reserve(decomposition.slot_begin.back());
-    for (const SubdomainInterface& interface : decomposition.interfaces)
-      for (Slot body : interface.bodies) to.push_back(from[at(body)]);
-    release(from);
-  };
-  copy(around.id, copies.id);
-  copy(around.x, copies.x);
-  copy(around.radius, copies.radius);
-  copy(around.velocity, copies.velocity);
-  if (decomposition.orientation) copy(around.orientation, copies.orientation);
-  if (decomposition.materials) copy(around.material, copies.material);
-  decomposition.whole.clear();
-  decomposition.whole.reserve(copies.size());
-  for (std::size_t s = 0; s < copies.size(); ++s) {
-    Velocity& v = copies.velocity[s];
-    decomposition.whole.push_back({v.inv_mass, v.spin_mobility});
-    v.inv_mass *= decomposition.parts[s];
-    v.spin_mobility *= decomposition.parts[s];
-  }
-  return copies;
-}
-
 /// What the groups of candidates depend on beside the candidates.
 struct GroupRules {
-  std::span<const std::int64_t> load;  ///< candidates per subdomain of all
-  std::int64_t all;                    ///< their sum
-  std::span<const char> glued;         ///< per wall: of finite mass
+  const Per<SubdomainId, std::int64_t>& load;  ///< candidates
+  std::int64_t all;                            ///< their sum
+  std::span<const char> glued;                 ///< per wall: of finite mass
 };
 
 /// The groups of this rank, and in `cut` their candidates between the slots of the copies, with impulses.
@@ -310,7 +214,7 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
     const auto begin = static_cast<std::int32_t>(own.begin[group]);
     const auto end = static_cast<std::int32_t>(own.begin[group + 1]);
     if (begin == end) continue;
-    const std::size_t local = group / 2 % decomposition.here.size();
+    const SubdomainPlace local(group / 2 % decomposition.here.size());
     const auto wall = static_cast<std::int32_t>(group / 2 / decomposition.here.size()) - 1;
     const ChunkSide side = group % 2 == 1                            ? ChunkSide::inside
                            : wall >= 0 && given.glued[at(wall)] != 0 ? ChunkSide::wall
@@ -318,17 +222,17 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
                                ? ChunkSide::late
                                : ChunkSide::border;
     // Small subdomains have no smaller chunks: these have poor groups, and subdomains run beside one another.
-    const int target = chunk_target(given.all, given.load[at(decomposition.here[local])]);
-    groups.push_back({begin, end, wall, static_cast<std::int32_t>(local), side, target});
+    const int target = chunk_target(given.all, given.load[decomposition.here[local]]);
+    groups.push_back({begin, end, wall, local.value(), side, target});
     const std::size_t first_at_wall = cut.wall_pairs.size();
     const auto push_at_wall = [&](const WallPair& pair, std::int32_t place) {
       cut.wall_pairs.push_back({wall, slot[at(pair.body)], pair.feature});
       const std::size_t last = cut.wall_pairs.size() - 1;
       if (last == first_at_wall || !begins_layer(cut.wall_pairs, last)) return;
       groups.back().end = place;
-      groups.push_back({place, end, wall, static_cast<std::int32_t>(local), side, target});
+      groups.push_back({place, end, wall, local.value(), side, target});
     };
-    auto next = static_cast<Slot>(decomposition.slot_begin[local]);
+    auto next = static_cast<Slot>(decomposition.slots_of(local).begin);
     for (Slot body : decomposition.interfaces[local].bodies) slot[at(body)] = next++;
     for (std::int32_t place = begin; place < end; ++place) {
       const std::size_t k = at(own.candidate[at(place)]);
@@ -347,19 +251,20 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
 
 std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
                                        const graph::Communicator& ranks, Surroundings& around,
-                                       Candidates found, std::span<const char> glued, Bodies& bodies,
-                                       Candidates& candidates) {
+                                       FoundCandidates among, const RankSample& sample) {
   const Partition& partition = decomposition.partition;
-  match_impulses(collect_impulses(decomposition, ranks, around, bodies, std::move(candidates)), found);
-  candidates = {};
-  release(bodies.x);
+  Candidates& found = among.candidates;
+  match_impulses(collect_impulses(decomposition, ranks, around, sample.bodies, std::move(sample.candidates)),
+                 found);
+  sample.candidates = {};
+  release(sample.bodies.x);
 
-  std::vector<std::int64_t> load(at(partition.subdomains), 0);
+  Per<SubdomainId, std::int64_t> load(at(partition.subdomains), 0);
   OwnCandidates own;
   const std::vector<std::size_t> slot_begin_before = decomposition.slot_begin;
   const bool first = decomposition.interfaces.empty();
   {
-    std::vector<std::int32_t> subdomain(found.size()), home;
+    std::vector<SubdomainId> subdomain(found.size()), home;
     for (std::size_t k = 0; k < found.size(); ++k)
       subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x));
     for (const Vec3& x : around.bodies.x) home.push_back(partition.subdomain_of(x));
@@ -367,18 +272,21 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
       return grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);
     };
     BodySubdomains standings = stand();
-    const std::int32_t hubs = hubs_from(settings);
+    const std::int32_t hubs = detail::hubs_from(settings);
     if (settings.coupling == Coupling::alternating) {
-      settle_turns(decomposition, ranks, standings, hubs);
-      if (decomposition.in_colours() && std::ranges::find(glued, 1) != glued.end()) {
-        move_wall_contacts(decomposition, ranks, standings, around, glued, found, subdomain);
+      settle_colours(decomposition, ranks, standings, hubs);
+      if (decomposition.in_colours() && std::ranges::find(among.glued, 1) != among.glued.end()) {
+        move_wall_contacts(decomposition, ranks, standings, around, among, subdomain);
         standings = stand();
       }
     }
-    decomposition.interfaces = build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
-    list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);
-    own = sort_own(decomposition, found, subdomain, standings, glued);
-    for (std::int32_t k : own.candidate) ++load[at(subdomain[at(k)])];
+    std::vector<SubdomainInterface> interfaces =
+        build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
+    decomposition.interfaces.assign(std::move_iterator(interfaces.begin()),
+                                    std::move_iterator(interfaces.end()));
+    detail::list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);
+    own = sort_own(decomposition, found, subdomain, standings, among.glued);
+    for (std::int32_t k : own.candidate) ++load[subdomain[at(k)]];
   }
   ranks.sum(load);
   const std::int64_t all = std::accumulate(load.begin(), load.end(), std::int64_t{0});
@@ -386,17 +294,17 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   Candidates cut;
   cut.components = found.components;
   const std::vector<CandidateGroup> groups =
-      cut_groups(decomposition, found, own, {load, all, glued}, around.bodies.size(), cut);
+      cut_groups(decomposition, found, own, {load, all, among.glued}, around.bodies.size(), cut);
   own = {};
   found = {};
 
-  Bodies copies = make_copies(decomposition, around.bodies);
-  std::int64_t migrants[1] = {arrivals(decomposition, around, slot_begin_before)};
+  Bodies copies = detail::make_copies(decomposition, around.bodies);
+  std::int64_t migrants[1] = {detail::arrivals(decomposition, around, slot_begin_before)};
   ranks.sum(migrants);
   decomposition.migrants = first ? 0 : migrants[0];
   decomposition.imbalance = imbalance(load);
-  bodies = std::move(copies);
-  candidates = std::move(cut);
+  sample.bodies = std::move(copies);
+  sample.candidates = std::move(cut);
   return groups;
 }
 

@@ -1,248 +1,28 @@
 #include "runtime/step/gluing.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
-#include <cstring>
-#include <iterator>
-#include <stdexcept>
-#include <type_traits>
 #include <utility>
 
 #include "kernels/sweeps/fetch_lines.hpp"
 #include "runtime/step/detail/gluing_parts.hpp"
+#include "runtime/step/detail/packed_velocity.hpp"
 
 namespace talus {
 
+using detail::any_colour;
+using detail::assign;
 using detail::at;
 using detail::await;
+using detail::behind_all;
+using detail::mean;
+using detail::number_at;
+using detail::Numbers;
+using detail::numbers_of;
+using detail::Pair;
+using detail::settle_pairs;
 using detail::start;
-using detail::tag_of;
-
-namespace {
-
-/// A body's velocity as it travels: numbers of the record, 6, or 3 without rotation.
-template <std::size_t Width, class Record>
-using Numbers = std::array<std::remove_cvref_t<decltype(Record{}.u[0])>, Width>;
-
-template <std::size_t Width, class Record>
-Numbers<Width, Record> numbers_of(const Record& v) {
-  Numbers<Width, Record> numbers;
-  std::copy_n(v.u, 3, numbers.data());
-  if constexpr (Width == 6) std::copy_n(v.w, 3, numbers.data() + 3);
-  return numbers;
-}
-
-template <std::size_t Width, class Record>
-void assign(const Numbers<Width, Record>& numbers, Record& v) {
-  std::copy_n(numbers.data(), 3, v.u);
-  if constexpr (Width == 6) std::copy_n(numbers.data() + 3, 3, v.w);
-}
-
-/// Number `k` of those that begin at `from`. One by one: what is copied as a whole goes over the stack.
-template <class Number>
-Number number_at(const std::byte* from, std::size_t k) {
-  Number number;
-  std::memcpy(&number, from + k * sizeof number, sizeof number);
-  return number;
-}
-
-template <std::size_t Width, class Record>
-void write_velocities(std::span<const Record> velocity, std::span<const Slot> slots, std::byte* out) {
-  for (const Slot slot : slots) {
-    const Record& v = velocity[at(slot)];
-    std::memcpy(out, v.u, sizeof v.u);
-    if constexpr (Width == 6) std::memcpy(out + sizeof v.u, v.w, sizeof v.w);
-    out += sizeof(Numbers<Width, Record>);
-  }
-}
-
-/// Turns are below the first of these; the second stands for all of them.
-constexpr int no_turn = 1000, any_colour = no_turn + 1;
-
-/// Each copy goes on with rule(own, the neighbour's), number by number.
-template <std::size_t Width, class Record, class Rule>
-void settle_pairs(std::span<Record> velocity, std::span<const detail::Pair> pairs, const std::byte* message,
-                  const Rule& rule) {
-  using Number = typename Numbers<Width, Record>::value_type;
-  for (const detail::Pair& pair : pairs) {
-    Record& v = velocity[at(pair.slot)];
-    const std::byte* const other = message + at(pair.place) * sizeof(Numbers<Width, Record>);
-    for (std::size_t k = 0; k < 3; ++k) v.u[k] = rule(v.u[k], number_at<Number>(other, k));
-    if constexpr (Width == 6)
-      for (std::size_t k = 0; k < 3; ++k) v.w[k] = rule(v.w[k], number_at<Number>(other, k + 3));
-  }
-}
-constexpr auto mean = [](auto own, auto other) { return (own + other) / 2; };
-constexpr auto taken_over = [](auto, auto other) { return other; };
-
-}  // namespace
-
-Gluing::Gluing(StepState& state, const DecompositionSettings& settings, const graph::Communicator& ranks)
-    : state_(state), settings_(settings), ranks_(ranks) {}
-
-Gluing::~Gluing() = default;
-
-void Gluing::plan(bool rotation) {
-  const Decomposition& all = state_.decomposition;
-  width_ = rotation ? 6 : 3;
-  walls_.clear();
-  for (std::size_t w = 0; w < state_.walls.size(); ++w)
-    if (state_.walls[w].inv_mass() > 0) walls_.push_back(static_cast<std::int32_t>(w));
-  needed_ = all.several() || !walls_.empty();
-  if (const std::int64_t subdomains = all.partition.subdomains;
-      ranks_.ranks() > 1 && subdomains * subdomains + detail::root_tag > ranks_.largest_tag())
-    throw std::invalid_argument(fmt::format(
-        "{} subdomains on several ranks need message tags up to {}, and this MPI has {}: take fewer "
-        "subdomains",
-        subdomains, subdomains * subdomains + detail::root_tag, ranks_.largest_tag()));
-  // Channels of the plan before must be closed on all ranks before new ones of the same tag are used.
-  subdomains_.clear();
-  root_.reset();
-  subdomains_.resize(all.here.size());
-  jumps_.assign(all.here.size(), {});
-  messages_ = {};
-  if (!needed_) return;
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
-    plan_sides(e);
-    plan_copies(e);
-    subdomains_[e].tells = all.several() && !walls_.empty() && all.interfaces[e].hubs.empty();
-  }
-  for (Subdomain& subdomain : subdomains_)
-    for (std::size_t n = 0; n < subdomain.sides.size(); ++n) {
-      Side& side = subdomain.sides[n];
-      if (side.local < 0) continue;
-      const auto e = static_cast<std::int32_t>(&subdomain - subdomains_.data());
-      for (const Side& back : subdomains_[at(side.local)].sides)
-        if (back.local == e) side.source = detail::bytes_of(back.link.out);
-    }
-}
-
-int Gluing::subdomain_colour(std::size_t e) const {
-  return state_.decomposition.subdomain_colour_of(state_.decomposition.here[e]);
-}
-
-void Gluing::plan_sides(std::size_t e) {
-  const Decomposition& all = state_.decomposition;
-  Subdomain& mine = subdomains_[e];
-  mine.subdomain_colour = subdomain_colour(e);
-  mine.wall_copies.resize(walls_.size());
-  if (!all.several()) return;
-  const SubdomainInterface& interface = all.interfaces[e];
-  const auto slot_of = [&](std::int32_t body) { return static_cast<Slot>(all.slot_begin[e] + at(body)); };
-  for (std::int32_t s : interface.shared) mine.shared.push_back(slot_of(s));
-  if (settings_.coupling == Coupling::schwarz) mine.base.resize(mine.shared.size() * width_);
-  mine.sides.resize(interface.neighbours.size());
-  for (std::size_t n = 0; n < mine.sides.size(); ++n) {
-    const Neighbour& neighbour = interface.neighbours[n];
-    Side& side = mine.sides[n];
-    for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
-      side.slots.push_back(slot_of(interface.exchange[at(k)]));
-    side.subdomain_colour = all.subdomain_colour_of(neighbour.subdomain);
-    const std::int32_t rank = all.rank_of[at(neighbour.subdomain)];
-    const std::size_t length = side.slots.size() * width_;
-    side.link.out.resize(length);
-    if (rank == ranks_.rank()) {
-      side.local = static_cast<std::int32_t>(
-          std::lower_bound(all.here.begin(), all.here.end(), neighbour.subdomain) - all.here.begin());
-      continue;
-    }
-    side.link.in.resize(length);
-    side.source = detail::bytes_of(side.link.in);
-    const std::int32_t count = all.partition.subdomains;
-    side.link.sender =
-        ranks_.open_send(rank, tag_of(interface.subdomain, neighbour.subdomain, count), side.link.out);
-    side.link.receiver =
-        ranks_.open_receive(rank, tag_of(neighbour.subdomain, interface.subdomain, count), side.link.in);
-    side.link.out_name = trace::message_name(static_cast<std::uint32_t>(interface.subdomain),
-                                             static_cast<std::uint32_t>(neighbour.subdomain));
-    side.link.in_name = trace::message_name(static_cast<std::uint32_t>(neighbour.subdomain),
-                                            static_cast<std::uint32_t>(interface.subdomain));
-    side.link.receiver->start();
-  }
-}
-
-/// Of interfaces[e].shared[s]; none of a hub.
-std::span<const CopySource> Gluing::copies_of(std::size_t e, std::size_t s) const {
-  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
-  return std::span(interface.copies)
-      .subspan(at(interface.copies_begin[s]), at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
-}
-
-int Gluing::subdomain_colour_of(std::size_t e, const CopySource& copy) const {
-  return copy.neighbour < 0 ? subdomains_[e].subdomain_colour
-                            : subdomains_[e].sides[at(copy.neighbour)].subdomain_colour;
-}
-
-/// The latest subdomain colour below `before` that a copy of interfaces[e].shared[s] has; -1: none.
-int Gluing::latest_colour(std::size_t e, std::size_t s, int before) const {
-  int latest = -1;
-  for (const CopySource& copy : copies_of(e, s))
-    if (const int subdomain_colour = subdomain_colour_of(e, copy); subdomain_colour < before)
-      latest = std::max(latest, subdomain_colour);
-  return latest;
-}
-
-/// Who reads which copies of a shared body, and when.
-void Gluing::plan_copies(std::size_t e) {
-  const Decomposition& all = state_.decomposition;
-  Subdomain& mine = subdomains_[e];
-  for (std::size_t s = 0; s < mine.shared.size(); ++s) {
-    const auto copies = copies_of(e, s);
-    if (copies.empty()) continue;  // a hub
-    const Slot slot = mine.shared[s];
-    const auto latest_before = [&](int subdomain_colour) {
-      std::vector<CopySource> latest;
-      const int before = latest_colour(e, s, subdomain_colour);
-      std::ranges::copy_if(copies, std::back_inserter(latest),
-                           [&](const CopySource& copy) { return subdomain_colour_of(e, copy) == before; });
-      return latest;
-    };
-    if (!all.taken.empty() && all.taken[at(slot)] != 0) {
-      const std::vector<CopySource> earlier = latest_before(mine.subdomain_colour);
-      mine.taken.push_back(slot);
-      if (earlier.size() > 1)
-        mine.taken_corners.push_back(static_cast<std::int32_t>(s));
-      else
-        mine.sides[at(earlier[0].neighbour)].taken.push_back({slot, earlier[0].place});
-    }
-    const std::vector<CopySource> last = latest_before(no_turn);
-    const bool own = subdomain_colour_of(e, last[0]) == mine.subdomain_colour;
-    if (last.size() > 2 || (last.size() == 2 && !own)) {
-      mine.corners.push_back(static_cast<std::int32_t>(s));
-    } else if (last.size() == 2) {
-      const CopySource& other = last[last[0].neighbour < 0 ? 1 : 0];
-      mine.sides[at(other.neighbour)].pairs.push_back({slot, other.place});
-    } else if (!own) {
-      mine.sides[at(last[0].neighbour)].given.push_back({slot, last[0].place});
-    }
-  }
-}
-
-void Gluing::count_messages() {
-  std::array<std::int64_t, 4> count{};
-  const auto add = [&](std::size_t doubles, bool between) {
-    count[0] += 1;
-    count[1] += static_cast<std::int64_t>(8 * doubles);
-    count[2] += between ? 1 : 0;
-    count[3] += between ? static_cast<std::int64_t>(8 * doubles) : 0;
-  };
-  const Decomposition& all = state_.decomposition;
-  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
-    const Subdomain& subdomain = subdomains_[e];
-    for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local < 0);
-    if (subdomain.partial.empty()) continue;
-    add(subdomain.partial.size(), false);                                // to the root
-    add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
-  }
-  if (root_ && root_->up) {
-    count[2] += 2;
-    count[3] += static_cast<std::int64_t>(8 * (root_->up->out.size() + root_->up->in.size()));
-  }
-  ranks_.sum(count);
-  messages_ = {count[0], count[1], count[2], count[3]};
-}
+using detail::taken_over;
+using detail::write_velocities;
 
 void Gluing::begin() {
   for (Subdomain& subdomain : subdomains_) {
@@ -256,23 +36,29 @@ void Gluing::begin() {
   if (!walls_.empty()) ranks_.sum(copies);
   for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].copies_everywhere = copies[w];
   for (std::size_t g = 0; g < walls_.size(); ++g)
-    for (std::int32_t c : state_.wall_states[at(walls_[g])].copies)
-      subdomains_[at(state_.chunks.subdomain[at(c)])].wall_copies[g].push_back(c);
+    for (const ChunkId c : state_.wall_states[at(walls_[g])].copies)
+      subdomains_[SubdomainPlace(state_.chunks.subdomain[c.at()])].wall_copies[g].push_back(c);
 }
 
-std::vector<std::uint32_t> Gluing::readers_here(std::size_t e) const {
-  std::vector<std::uint32_t> readers;
-  for (const Side& side : subdomains_[e].sides)
-    if (side.local >= 0) readers.push_back(static_cast<std::uint32_t>(side.local));
-  return readers;
+/// Of interfaces[e].shared[s]; none of a hub.
+std::span<const CopySource> Gluing::copies_of(SubdomainPlace e, std::size_t s) const {
+  const SubdomainInterface& interface = state_.decomposition.interfaces[e];
+  return std::span(interface.copies)
+      .subspan(at(interface.copies_begin[s]), at(interface.copies_begin[s + 1] - interface.copies_begin[s]));
 }
 
-bool Gluing::tells(std::size_t e) const {
-  return subdomains_[e].tells;
+int Gluing::subdomain_colour_of(SubdomainPlace e, const CopySource& copy) const {
+  return copy.neighbour < 0 ? subdomains_[e].subdomain_colour
+                            : subdomains_[e].sides[at(copy.neighbour)].subdomain_colour;
 }
 
-std::span<const Slot> Gluing::taken(std::size_t e) const {
-  return subdomains_[e].taken;
+/// The latest subdomain colour below `before` that a copy of interfaces[e].shared[s] has; -1: none.
+int Gluing::latest_colour(SubdomainPlace e, std::size_t s, int before) const {
+  int latest = -1;
+  for (const CopySource& copy : copies_of(e, s))
+    if (const int subdomain_colour = subdomain_colour_of(e, copy); subdomain_colour < before)
+      latest = std::max(latest, subdomain_colour);
+  return latest;
 }
 
 /// Calls work<width>(velocities) with the records that sweeps work on.
@@ -291,7 +77,7 @@ void Gluing::with_bodies(bool single, const Work& work) {
 }
 
 template <std::size_t Width, class Record>
-void Gluing::publish_bodies(std::size_t e, std::span<const Record> velocity) {
+void Gluing::publish_bodies(SubdomainPlace e, std::span<const Record> velocity) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides) {
     if (side.link.sender) await(*side.link.sender, mine.waited, ranks_.trace(), side.link.out_name);
@@ -305,7 +91,7 @@ void Gluing::publish_bodies(std::size_t e, std::span<const Record> velocity) {
   }
 }
 
-void Gluing::publish(std::size_t e, Mode mode, bool single) {
+void Gluing::publish(SubdomainPlace e, Mode mode, bool single) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   with_bodies(single, [&]<std::size_t Width, class Record>(std::span<Record> velocity) {
@@ -316,14 +102,14 @@ void Gluing::publish(std::size_t e, Mode mode, bool single) {
   if (!mine.tells || mode == Mode::sum) tell(e, mode);
 }
 
-void Gluing::tell(std::size_t e, Mode mode) {
+void Gluing::tell(SubdomainPlace e, Mode mode) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);
-    for (std::int32_t c : mine.wall_copies[g])
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[at(c)].velocity[k];
+    for (const ChunkId c : mine.wall_copies[g])
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[c.at()].velocity[k];
   }
   if (!root_->up || !root_->links.empty()) return;
   // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
@@ -332,18 +118,18 @@ void Gluing::tell(std::size_t e, Mode mode) {
   send_up();
 }
 
-void Gluing::glue(std::size_t e, Mode mode, bool single) {
+void Gluing::glue(SubdomainPlace e, Mode mode, bool single) {
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
     const auto& copies = mine.wall_copies[g];
     if (copies.empty()) continue;
     if (mode == Mode::local) {
-      glue_copies(state_.copies, copies);
+      glue_copies(state_.copies, numbers(std::span<const ChunkId>(copies)));
       continue;
     }
     const double part = 1 / static_cast<double>(state_.wall_states[at(walls_[g])].copies_everywhere);
-    for (std::int32_t c : copies)
-      for (std::size_t k = 0; k < 3; ++k) state_.copies[at(c)].velocity[k] = part * root_->sums[3 * g + k];
+    for (const ChunkId c : copies)
+      for (std::size_t k = 0; k < 3; ++k) state_.copies[c.at()].velocity[k] = part * root_->sums[3 * g + k];
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
   const auto of_glue = [&](const Side& side) {
@@ -356,7 +142,7 @@ void Gluing::glue(std::size_t e, Mode mode, bool single) {
   ask_for_messages(e, of_glue);
 }
 
-void Gluing::take(std::size_t e, bool single) {
+void Gluing::take(SubdomainPlace e, bool single) {
   const auto of_take = [mine = subdomain_colour(e)](const Side& side) {
     return side.subdomain_colour < mine;
   };
@@ -368,7 +154,7 @@ void Gluing::take(std::size_t e, bool single) {
 }
 
 template <class Which>
-void Gluing::await_messages(std::size_t e, const Which& which) {
+void Gluing::await_messages(SubdomainPlace e, const Which& which) {
   Subdomain& mine = subdomains_[e];
   for (Side& side : mine.sides)
     if (side.link.receiver && which(side))
@@ -376,7 +162,7 @@ void Gluing::await_messages(std::size_t e, const Which& which) {
 }
 
 template <class Which>
-void Gluing::ask_for_messages(std::size_t e, const Which& which) {
+void Gluing::ask_for_messages(SubdomainPlace e, const Which& which) {
   for (Side& side : subdomains_[e].sides)
     if (side.link.receiver && which(side)) side.link.receiver->start();
 }
@@ -384,7 +170,7 @@ void Gluing::ask_for_messages(std::size_t e, const Which& which) {
 /// The copies of interface.shared[s] that are of the latest subdomain colour below `before`, or all with
 /// `any_colour`: their sum in order of subdomain, how many they are, and whether the own one is among them.
 template <std::size_t Width, class Record>
-auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const {
+auto Gluing::add_copies(SubdomainPlace e, std::size_t s, int before, std::span<const Record> velocity) const {
   using Own = Numbers<Width, Record>;
   using Number = typename Own::value_type;
   const Subdomain& mine = subdomains_[e];
@@ -403,13 +189,13 @@ auto Gluing::add_copies(std::size_t e, std::size_t s, int before, std::span<cons
       added.own = true;
       continue;
     }
-    const std::byte* const from = mine.sides[at(copy.neighbour)].source + at(copy.place) * sizeof(Own);
+    const std::byte* const from = mine.sides[at(copy.neighbour)].source + copy.place.at() * sizeof(Own);
     for (std::size_t k = 0; k < Width; ++k) added.sum[k] += number_at<Number>(from, k);
   }
   return added;
 }
 
-void Gluing::fetch(std::size_t e) const {
+void Gluing::fetch(SubdomainPlace e) const {
   if (!needed_) return;
   const auto fetch = [](const auto&... lists) { (fetch_lines(std::span(std::as_const(lists))), ...); };
   const Subdomain& mine = subdomains_[e];
@@ -422,10 +208,10 @@ void Gluing::fetch(std::size_t e) const {
 }
 
 template <std::size_t Width, class Record>
-void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
+void Gluing::take_bodies(SubdomainPlace e, std::span<Record> velocity) {
   const Subdomain& mine = subdomains_[e];
   for (const Side& side : mine.sides)
-    settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.taken), side.source, taken_over);
+    settle_pairs<Width>(velocity, std::span<const Pair>(side.taken), side.source, taken_over);
   for (const std::int32_t s : mine.taken_corners) {
     auto earlier = add_copies<Width, Record>(e, at(s), mine.subdomain_colour, velocity);
     for (auto& number : earlier.sum) number /= earlier.count;
@@ -434,7 +220,7 @@ void Gluing::take_bodies(std::size_t e, std::span<Record> velocity) {
 }
 
 template <std::size_t Width, class Record>
-void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
+void Gluing::glue_bodies(SubdomainPlace e, Mode mode, std::span<Record> velocity) {
   using Own = Numbers<Width, Record>;
   using Number = typename Own::value_type;
   Subdomain& mine = subdomains_[e];
@@ -468,13 +254,14 @@ void Gluing::glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity) {
     if (schwarz && mode != Mode::sum) std::copy(next.begin(), next.end(), base);
   };
   const auto settle_copies = [&](std::size_t s) {
-    const auto copies = add_copies<Width, Record>(e, s, mode == Mode::sum ? any_colour : no_turn, velocity);
+    const auto copies =
+        add_copies<Width, Record>(e, s, mode == Mode::sum ? any_colour : behind_all, velocity);
     settle(s, copies.sum, copies.count, copies.own);
   };
   if (!schwarz && mode != Mode::measured && mode != Mode::sum) {
     for (const Side& side : mine.sides) {
-      settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.pairs), side.source, mean);
-      settle_pairs<Width>(velocity, std::span<const detail::Pair>(side.given), side.source, taken_over);
+      settle_pairs<Width>(velocity, std::span<const Pair>(side.pairs), side.source, mean);
+      settle_pairs<Width>(velocity, std::span<const Pair>(side.given), side.source, taken_over);
     }
     for (const std::int32_t s : mine.corners) settle_copies(at(s));
   } else {
@@ -496,12 +283,12 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
   const Decomposition& all = state_.decomposition;
   const auto each_shared = [&](const auto& work) {
     std::size_t k = 0;
-    for (std::size_t e = 0; e < subdomains_.size(); ++e)
+    for (const SubdomainPlace e : subdomains_.indices())
       for (const Slot slot : subdomains_[e].shared)
-        work(state_.bodies.velocity[at(slot)], field[e][at(slot) - all.slot_begin[e]], k++);
+        work(state_.bodies.velocity[at(slot)], field[e.at()][at(slot) - all.slots_of(e).begin], k++);
   };
-  const auto wall = [&](std::size_t e, std::size_t g) -> Vec3& {
-    return field[e][field[e].size() - walls_.size() + g].u;
+  const auto wall = [&](SubdomainPlace e, std::size_t g) -> Vec3& {
+    return field[e.at()][field[e.at()].size() - walls_.size() + g].u;
   };
   kept_.clear();
   each_shared([&](Velocity& v, const Twist& twist, std::size_t) {
@@ -509,14 +296,14 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
     std::copy_n(twist.u.data(), 3, v.u);
     std::copy_n(twist.w.data(), 3, v.w);
   });
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+  for (const SubdomainPlace e : subdomains_.indices()) {
     for (std::size_t g = 0; g < walls_.size(); ++g)
       std::copy_n(wall(e, g).data(), 3, &subdomains_[e].partial[3 * g]);
     publish(e, Mode::sum);
   }
   if (collects()) collect(Mode::sum);
   root(Mode::sum);
-  for (std::size_t e = 0; e < subdomains_.size(); ++e) {
+  for (const SubdomainPlace e : subdomains_.indices()) {
     glue(e, Mode::sum);
     for (std::size_t g = 0; g < walls_.size(); ++g) wall(e, g) = Eigen::Map<const Vec3>(&root_->sums[3 * g]);
   }
@@ -525,24 +312,6 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
     if (width_ == 6) std::copy_n(v.w, 3, twist.w.data());
     v = kept_[k];
   });
-}
-
-std::vector<trace::Message> Gluing::message_plan() const {
-  const Decomposition& all = state_.decomposition;
-  std::vector<trace::Message> plan;
-  const auto add = [&](std::int32_t from, std::int32_t to, std::size_t doubles) {
-    plan.push_back({static_cast<std::uint16_t>(from), static_cast<std::uint16_t>(to),
-                    static_cast<std::uint32_t>(8 * doubles)});
-  };
-  for (std::size_t e = 0; e < subdomains_.size() && all.several(); ++e) {
-    const Subdomain& subdomain = subdomains_[e];
-    for (std::size_t n = 0; n < subdomain.sides.size(); ++n)
-      add(all.here[e], all.interfaces[e].neighbours[n].subdomain, subdomain.sides[n].slots.size() * width_);
-    if (subdomain.partial.empty()) continue;
-    add(all.here[e], trace::root_group, subdomain.partial.size());
-    add(trace::root_group, all.here[e], 3 * walls_.size() + subdomain.hub_item.size() * width_);
-  }
-  return plan;
 }
 
 double Gluing::exposed() const {

@@ -71,17 +71,17 @@ class Gluing {
   /// False when there is nothing to glue: no tasks then.
   bool needed() const { return needed_; }
   std::span<const std::int32_t> walls() const { return walls_; }  ///< of finite mass
-  /// Subdomains here (index among those) that read what e publishes; ascending, without e. They do so in
+  /// Subdomains here that read what e publishes; ascending, without e. They do so in
   /// their take where reads_early() is true, else in their glue.
-  std::vector<std::uint32_t> readers_here(std::size_t e) const;
-  bool reads_early(std::size_t reader, std::size_t from) const {
+  std::vector<SubdomainPlace> readers_here(SubdomainPlace e) const;
+  bool reads_early(SubdomainPlace reader, SubdomainPlace from) const {
     return subdomain_colour(from) < subdomain_colour(reader);
   }
-  int subdomain_colour(std::size_t e) const;
+  int subdomain_colour(SubdomainPlace e) const;
   /// Slots of the copies that its take writes.
-  std::span<const Slot> taken(std::size_t e) const;
+  std::span<const Slot> taken(SubdomainPlace e) const;
   /// The part of a subdomain for the root leaves with its tell; else with its publish.
-  bool tells(std::size_t e) const;
+  bool tells(SubdomainPlace e) const;
   /// This rank stands between the top and the leaves of the tree of ranks, so that collect is called.
   bool collects() const;
 
@@ -99,18 +99,18 @@ class Gluing {
 
   /// `single`: of the velocities that sweeps in single precision work on (StepState::single), which travel
   /// and are added up as they are.
-  void publish(std::size_t e, Mode mode, bool single = false);
-  void tell(std::size_t e, Mode mode);
+  void publish(SubdomainPlace e, Mode mode, bool single = false);
+  void tell(SubdomainPlace e, Mode mode);
   void collect(Mode mode);
   void root(Mode mode);
-  void take(std::size_t e, bool single);
-  void glue(std::size_t e, Mode mode, bool single = false);
+  void take(SubdomainPlace e, bool single);
+  void glue(SubdomainPlace e, Mode mode, bool single = false);
 
   /// Brings what publish, take and glue of e read, messages of its neighbours included, into the cache of the
   /// core that calls.
-  void fetch(std::size_t e) const;
+  void fetch(SubdomainPlace e) const;
 
-  const std::vector<JumpSums>& jumps() const { return jumps_; }  ///< per subdomain here
+  const Per<SubdomainPlace, JumpSums>& jumps() const { return jumps_; }
   void forget_jumps() { jumps_.assign(jumps_.size(), {}); }
   const MessageCount& messages() const { return messages_; }
   /// What each subdomain here sends, and gets from the root, as if alone on its rank; of an exchange.
@@ -122,29 +122,35 @@ class Gluing {
   struct Side;
   struct Subdomain;
   struct Root;
-  void plan_sides(std::size_t e);
-  void plan_copies(std::size_t e);
-  std::span<const CopySource> copies_of(std::size_t e, std::size_t s) const;
-  int subdomain_colour_of(std::size_t e, const CopySource& copy) const;
-  int latest_colour(std::size_t e, std::size_t s, int before) const;
+  struct RootTraffic;
+  void plan_sides(SubdomainPlace e);
+  void plan_copies(SubdomainPlace e);
+  std::span<const CopySource> copies_of(SubdomainPlace e, std::size_t s) const;
+  int subdomain_colour_of(SubdomainPlace e, const CopySource& copy) const;
+  int latest_colour(SubdomainPlace e, std::size_t s, int before) const;
   void count_messages();
+  RootTraffic gather_traffic() const;
+  std::vector<std::int64_t> items_below(const RootTraffic& traffic, int top) const;
+  void plan_parts(const RootTraffic& traffic);
+  void open_links(const RootTraffic& traffic);
+  void find_contributions(const RootTraffic& traffic);
   template <class Which>
-  void await_messages(std::size_t e, const Which& which);
+  void await_messages(SubdomainPlace e, const Which& which);
   template <class Which>
-  void ask_for_messages(std::size_t e, const Which& which);
+  void ask_for_messages(SubdomainPlace e, const Which& which);
   template <std::size_t Width, class Record>
-  auto add_copies(std::size_t e, std::size_t s, int before, std::span<const Record> velocity) const;
+  auto add_copies(SubdomainPlace e, std::size_t s, int before, std::span<const Record> velocity) const;
   void send_up();
   void await_children();
   void answer();
   template <class Work>
   void with_bodies(bool single, const Work& work);
   template <std::size_t Width, class Record>
-  void publish_bodies(std::size_t e, std::span<const Record> velocity);
+  void publish_bodies(SubdomainPlace e, std::span<const Record> velocity);
   template <std::size_t Width, class Record>
-  void take_bodies(std::size_t e, std::span<Record> velocity);
+  void take_bodies(SubdomainPlace e, std::span<Record> velocity);
   template <std::size_t Width, class Record>
-  void glue_bodies(std::size_t e, Mode mode, std::span<Record> velocity);
+  void glue_bodies(SubdomainPlace e, Mode mode, std::span<Record> velocity);
 
   StepState& state_;
   const DecompositionSettings& settings_;
@@ -152,10 +158,10 @@ class Gluing {
   bool needed_ = false;
   std::size_t width_ = 6;  ///< numbers per body
   std::vector<std::int32_t> walls_;
-  std::vector<Subdomain> subdomains_;  ///< per subdomain here
+  Per<SubdomainPlace, Subdomain> subdomains_;
   graph::Tree tree_;
   std::unique_ptr<Root> root_;
-  std::vector<JumpSums> jumps_;
+  Per<SubdomainPlace, JumpSums> jumps_;
   MessageCount messages_;
   std::vector<Velocity> kept_;  ///< by sum_copies
 };

@@ -1,5 +1,7 @@
 #include "runtime/step/loop_nodes.hpp"
 
+#include <utility>
+
 namespace talus {
 
 namespace {
@@ -40,15 +42,19 @@ graph::LoopSpec loop_spec(const StepState& state, const Gluing& gluing, const De
   spec.only_first_thread_exchanges = ranks.ranks() > 1 && !ranks.any_thread();
   spec.threads = threads;
   spec.rank = ranks.rank();
-  for (std::size_t e = 0; e < state.decomposition.here.size(); ++e)
+  for (const SubdomainPlace e : state.decomposition.here.indices()) {
+    std::vector<std::uint32_t> readers;
+    for (const SubdomainPlace reader : gluing.readers_here(e))
+      readers.push_back(static_cast<std::uint32_t>(reader.value()));
     spec.groups.push_back({.colour = static_cast<char>(gluing.subdomain_colour(e)),
                            .exchanges = gluing.needed(),
                            .tells = gluing.tells(e),
-                           .readers = gluing.readers_here(e)});
+                           .readers = std::move(readers)});
+  }
   for (std::size_t c = 0; c < chunks.size(); ++c) {
-    const auto e = static_cast<std::uint32_t>(chunks.subdomain[c]);
+    const SubdomainPlace e(chunks.subdomain[c]);
     spec.work.push_back({.side = side_of(chunks.side[c], gluing.tells(e)),
-                         .group = e,
+                         .group = static_cast<std::uint32_t>(e.value()),
                          .colour = static_cast<std::uint32_t>(chunks.colour[c]),
                          .weight = work_of_chunk(state, c),
                          .place = place_of_chunk(chunks, c)});

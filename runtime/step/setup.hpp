@@ -51,15 +51,27 @@ struct DetectionSettings {
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
 
-/// What makes of sweeps a solver: runtime/step/methods/ has a file for each, and their names.
-enum class SolverMethod {
-  automatic,  ///< momentum (plain sweeps for Schwarz, whose damped iteration is no descent);
-              ///< ADMM once sweeps leave the forces out of balance in a problem that is too stiff for them
-  nlgs,       ///< nothing: nonlinear Gauss-Seidel as it is (Jean 1999)
-  momentum,   ///< each sweep begins beyond where the last one ended (Nesterov 1983), with restarts
-  nncg,       ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe, Erleben 2010)
-  admm,       ///< one call of ADMM in body space (kernels/global/admm.hpp), then sweeps as they are
+/// What makes of sweeps a solver, known by its name in the registry: runtime/step/methods/ has a file for
+/// each. The constants are those that code asks for.
+class SolverMethod : public NamedKind<SolverMethod> {
+ public:
+  using NamedKind::NamedKind;
+  /// "auto": momentum (plain sweeps for Schwarz, whose damped iteration is no descent); ADMM once sweeps
+  /// leave the forces out of balance in a problem that is too stiff for them.
+  static const SolverMethod automatic;
+  static const SolverMethod nlgs;      ///< nonlinear Gauss-Seidel as it is (Jean 1999)
+  static const SolverMethod momentum;  ///< "nlgs+momentum": each sweep begins beyond where the last one ended
+                                       ///< (Nesterov 1983), with restarts
+  static const SolverMethod nncg;      ///< nonsmooth nonlinear conjugate gradients (Silcowitz-Hansen, Niebe,
+                                       ///< Erleben 2010)
+  static const SolverMethod admm;  ///< one call of ADMM in body space (kernels/global/admm.hpp), then sweeps
+                                   ///< as they are
 };
+inline constexpr SolverMethod SolverMethod::automatic("auto");
+inline constexpr SolverMethod SolverMethod::nlgs("nlgs");
+inline constexpr SolverMethod SolverMethod::momentum("nlgs+momentum");
+inline constexpr SolverMethod SolverMethod::nncg("nncg");
+inline constexpr SolverMethod SolverMethod::admm("admm");
 
 /// Numbers of the sweeps. All that is judged and written is in double precision.
 enum class Precision {

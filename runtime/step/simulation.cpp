@@ -1,17 +1,14 @@
 #include "runtime/step/simulation.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <unordered_map>
 
-#include "kernels/bodies/larger.hpp"
 #include "kernels/detection/domain.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
+#include "runtime/step/runaway.hpp"
+#include "runtime/step/step_report.hpp"
 
 namespace talus {
 
@@ -22,17 +19,6 @@ double energy_of(const Wall& wall, const Vec3& velocity) {
   return wall.load.pushed() ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0;
 }
 
-std::string describe(const Bodies& bodies, Slot slot) {
-  if (slot < 0) return "the fastest body is on another rank";
-  const auto s = static_cast<std::size_t>(slot);
-  const Velocity& v = bodies.velocity[s];
-  const Vec3& x = bodies.x[s];
-  return fmt::format(
-      "body {}: x = ({}, {}, {}) m, radius = {} m, u = ({}, {}, {}) m/s, R omega = ({}, {}, {}) m/s",
-      static_cast<std::int64_t>(bodies.id[s]), x[0], x[1], x[2], bodies.radius[s], v.u[0], v.u[1], v.u[2],
-      v.w[0], v.w[1], v.w[2]);
-}
-
 }  // namespace
 
 struct Simulation::Implementation {
@@ -41,7 +27,7 @@ struct Simulation::Implementation {
         ranks(ranks_),
         state(start(setup, std::move(bodies), ranks_)),
         size(measure_sample(state.bodies, ranks_)),
-        graph(state, parameters, setup.solver, setup.decomposition, size.bodies, executor, ranks_) {
+        graph(state, parameters, setup, size.bodies, executor, ranks_) {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
     const double unit = size.bodies > 0 ? size.smallest : 1;
@@ -126,16 +112,10 @@ struct Simulation::Implementation {
     lengths_at_start = Domain{}.lengths(state.walls);
   }
 
-  /// The stage began with a box; when it is none any more, walls have run through one another.
-  double pressed_area(std::size_t w) const {
-    try {
-      return face_area(state.walls, w);
-    } catch (const std::invalid_argument&) {
-      throw RunawayError(fmt::format(
-          "step {} (stage '{}'): the walls beside wall '{}' have passed each other, so its "
-          "pressure acts on nothing. Are there grains between them? Reduce the time step or the pressure",
-          report.step + 1, setup.stages[stage_index].name, state.walls[w].name));
-    }
+  StepName next_step() const { return {report.step + 1, setup.stages[stage_index].name}; }
+  /// Of the step that the graph has run last.
+  StepOutcome outcome() const {
+    return {next_step(), setup, size, parameters, state, graph.sums(), graph.loop().result()};
   }
 
   /// Loads of the walls for the step: applied forces and free velocities.
@@ -143,127 +123,16 @@ struct Simulation::Implementation {
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       Wall& wall = state.walls[w];
       WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.load.drive == WallDrive::pressure ? wall.load.pressure * pressed_area(w)
-                           : wall.load.drive == WallDrive::force  ? wall.load.force
-                                                                  : 0;
+      wall_state.applied = wall.load.drive == WallDrive::pressure
+                               ? wall.load.pressure * pressed_area(state.walls, w, next_step())
+                           : wall.load.drive == WallDrive::force ? wall.load.force
+                                                                 : 0;
       wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
       wall_state.free_velocity = wall.velocity + wall.gain;
     }
   }
 
-  /// Walls do not feel one another: two that face each other have run through when nothing between held them.
-  void check_walls_apart(std::int64_t step) const {
-    for (const Wall& moving : state.walls)
-      for (const Wall& other : state.walls)
-        if (moving.load.drive != WallDrive::fixed && (moving.normal + other.normal).norm() < 1e-12 &&
-            (other.point - moving.point).dot(moving.normal) < 0)
-          throw RunawayError(
-              fmt::format("step {} (stage '{}'): wall '{}' has passed wall '{}', which faces it. Are there "
-                          "grains between "
-                          "them? Reduce the load, the velocity or the time step",
-                          step, setup.stages[stage_index].name, moving.name, other.name));
-  }
-
-  void check_for_runaway(double wall_energy_free) const {
-    const MotionSums& motion = graph.sums().motion;
-    const std::int64_t step = report.step + 1;
-    if (graph.loop().result().diverged)
-      throw RunawayError(fmt::format(
-          "step {} (stage '{}'): the iterations diverge, error {:.3g} after {} of them. {}", step,
-          setup.stages[stage_index].name, graph.loop().result().error_rms, graph.loop().result().iterations,
-          setup.decomposition.coupling == Coupling::schwarz && !setup.decomposition.damping
-              ? "Undamped Schwarz does so where bodies stand in more than two subdomains: set "
-                "decomposition.damping = true or coupling = \"nscdd\""
-              : "Reduce the time step, or look for masses too far apart"));
-    if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) ||
-        std::isnan(graph.loop().result().error_rms))
-      throw RunawayError(fmt::format(
-          "step {} (stage '{}'): the state is not finite; {}. Reduce the time step or look for overlapping "
-          "grains",
-          step, setup.stages[stage_index].name, describe(state.bodies, motion.fastest)));
-    check_walls_apart(step);
-    double fastest_wall2 = 0;
-    for (const Wall& wall : state.walls)
-      fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
-    const double energy = motion.energy.translation + motion.energy.rotation;
-    // So fast part two grains whose overlap is opened within the step, and the faster the more of them stand
-    // in a row; deep ones are no supply that anybody wants.
-    constexpr double deep = 1e-2;  // of the smallest radius
-    const double opened = setup.solver.overlap_correction *
-                          std::min(graph.sums().contacts.penetration_max, deep * size.smallest) /
-                          parameters.time_step;
-    const double supplied =
-        motion.energy_free + wall_energy_free +
-        size.total_mass * (fastest_wall2 + 0.5 * opened * opened * static_cast<double>(size.bodies));
-    if (energy > 100 * supplied && energy > 0)
-      throw RunawayError(fmt::format(
-          "step {} (stage '{}'): the kinetic energy rose to {} J where at most {} J were supplied; {}. "
-          "Reduce the time step or raise solver.max_iterations; with solver.overlap_correction, begin "
-          "without "
-          "deep overlaps",
-          step, setup.stages[stage_index].name, energy, supplied, describe(state.bodies, motion.fastest)));
-  }
-
-  void write_report(double elapsed) {
-    const StepSums& sums = graph.sums();
-    const IterationResult& result = graph.loop().result();
-    // Grains at rest between pressed walls gain nothing, and what the walls give cancels: the walls' impulses
-    // are the measure then.
-    double impulse_unit = std::max(sums.motion.impulse_scale, std::numeric_limits<double>::min());
-    Vec3 from_walls = Vec3::Zero();
-    for (const WallState& wall : state.wall_states) {
-      from_walls += wall.impulse;
-      impulse_unit = std::max(impulse_unit, wall.impulse.norm());
-    }
-    // What rounding leaves of the sample's momentum, at most sqrt(2 E M), is no defect.
-    const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
-    impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * size.total_mass));
-    const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
-    ++stage_steps;
-    ++report.step;
-    report.time += parameters.time_step;
-    report.candidates = sums.candidates;
-    report.contacts = result.contacts;
-    report.active = result.active;
-    report.iterations = result.iterations;
-    report.error_rms = result.error_rms;
-    report.error_max = result.error_max;
-    report.balance = larger(result.unbalance, defect);
-    report.jump = result.jump;
-    report.migrants = sums.migrants;
-    report.imbalance = 1 + state.decomposition.imbalance;
-    report.penetration_mean =
-        sums.contacts.overlapping > 0
-            ? sums.contacts.penetration / static_cast<double>(sums.contacts.overlapping) / size.smallest
-            : 0;
-    report.penetration_max =
-        sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / size.smallest : 0;
-    report.passed = sums.contacts.passed;
-    report.kinetic_translation = sums.motion.energy.translation;
-    report.kinetic_rotation = sums.motion.energy.rotation;
-    const double box = Domain{}.volume(state.walls);
-    report.solid_fraction = box > 0 ? size.volume / box : 0;
-    report.wall_s = elapsed;
-    report.converged = certified(result, defect, report.passed, setup.solver);
-  }
-
-  /// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x
-  /// grain diameter.
-  double unrest() const {
-    const double h = parameters.time_step;
-    double load = size.total_mass * parameters.gravity.norm(), net = 0;
-    for (std::size_t w = 0; w < state.walls.size(); ++w) {
-      const double applied = state.wall_states[w].applied;
-      if (applied == 0) continue;
-      load += std::abs(applied);
-      net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
-                              std::abs(applied));
-    }
-    const double energy = report.kinetic_translation + report.kinetic_rotation;
-    if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
-    const Vec3 gained = graph.sums().motion.impulse / h + size.total_mass * parameters.gravity;
-    return std::max({net, gained.norm() / load, energy / (load * size.mean_diameter)});
-  }
+  double unrest() const { return talus::unrest(outcome(), report); }
 
   double strain(int axis) const {
     return Domain{}.strain(Domain{}.lengths(state.walls)[axis], lengths_at_start[axis]);
@@ -288,36 +157,6 @@ struct Simulation::Implementation {
     if (end.strain) consider("strain", std::abs(strain(end.strain_axis)) / *end.strain);
     if (end.equilibrium && unrest() <= *end.equilibrium) consider("equilibrium", 1);
     return nearest;
-  }
-
-  /// Mean number of active contacts of the grains that are no rattlers: those with fewer than 4 without
-  /// friction, 2 with it (a frictionless grain cannot be held by three).
-  double coordination() const {
-    const std::int32_t rattler_below = parameters.friction ? 2 : 4;
-    std::vector<std::int32_t> touching = count_active(state.contacts, state.chunks, state.bodies.size());
-    const Decomposition& all = state.decomposition;
-    if (all.several()) {
-      struct Part {
-        std::int64_t id, count;
-      };
-      std::vector<Part> parts;  // of bodies whose contacts are spread over subdomains
-      for (std::size_t s = 0; s < touching.size(); ++s)
-        if (all.multiplicity[s] > 1)
-          parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
-      parts = ranks.gather_records(std::span<const Part>(parts));
-      std::unordered_map<std::int64_t, std::int32_t> whole;
-      for (const Part& part : parts) whole[part.id] += static_cast<std::int32_t>(part.count);
-      for (std::size_t s = 0; s < touching.size(); ++s)
-        if (all.multiplicity[s] > 1) touching[s] = whole[static_cast<std::int64_t>(state.bodies.id[s])];
-    }
-    std::int64_t sums[2] = {0, 0};
-    for (std::size_t s = 0; s < touching.size(); ++s) {
-      if (touching[s] < rattler_below || (!all.counts.empty() && !all.counts[s])) continue;
-      ++sums[0];
-      sums[1] += touching[s];
-    }
-    ranks.sum(sums);
-    return sums[0] > 0 ? static_cast<double>(sums[1]) / static_cast<double>(sums[0]) : 0;
   }
 
   void pass_ended_stages() {
@@ -379,8 +218,10 @@ const StepReport& Simulation::step() {
   for (std::size_t w = 0; w < impl_->state.walls.size(); ++w)
     wall_energy_free += energy_of(impl_->state.walls[w], impl_->state.wall_states[w].free_velocity);
   impl_->graph.run();
-  impl_->check_for_runaway(wall_energy_free);
-  impl_->write_report(graph::seconds_now() - start);
+  const StepOutcome outcome = impl_->outcome();
+  check_for_runaway(outcome, wall_energy_free);
+  add_step(impl_->report, outcome, graph::seconds_now() - start);
+  ++impl_->stage_steps;
   return impl_->report;
 }
 
@@ -468,7 +309,7 @@ std::optional<TriaxialReport> Simulation::triaxial() const {
   out.strain_shear = out.strain[axial] - 0.5 * (out.strain[first] + out.strain[second]);
   out.q = out.stress[axial] - 0.5 * (out.stress[first] + out.stress[second]);
   out.q_over_p = out.p > 0 ? out.q / out.p : 0;
-  out.coordination = impl_->coordination();
+  out.coordination = coordination(impl_->state, impl_->ranks, impl_->parameters.friction);
   return out;
 }
 

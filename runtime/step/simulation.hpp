@@ -3,25 +3,19 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/runaway.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/solver_loop.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/step_graph.hpp"
 
 namespace talus {
-
-/// The state blew up: NaN, or energy that no load supplied. The message has the step, the body and its state.
-class RunawayError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// What a simulation goes on from between two steps, as one subdomain on one rank has it. Loads and
 /// velocities in force are in the walls; the impulses of the last step, if there was one, in the candidates.

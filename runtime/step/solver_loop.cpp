@@ -139,14 +139,13 @@ void SolverLoop::split_walls() {
   state_.copies.assign(chunks.size(), {});
   for (std::size_t c = 0; c < chunks.size(); ++c)
     if (chunks.wall[c] >= 0 && state_.contacts.count[c] > 0)
-      state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.push_back(
-          static_cast<std::int32_t>(c));
+      state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.emplace_back(c);
   gluing_.begin();
   gluing_.forget_jumps();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const WallState& wall = state_.wall_states[w];
     const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
-    for (std::int32_t c : wall.copies) state_.copies[static_cast<std::size_t>(c)].inv_mass = split;
+    for (const ChunkId c : wall.copies) state_.copies[c.at()].inv_mass = split;
   }
 }
 
@@ -194,7 +193,7 @@ Gluing::Mode SolverLoop::gluing_mode(int epoch) const {
 }
 
 void SolverLoop::node(std::uint32_t node, int epoch) {
-  const auto [role, e] = plan_.nodes[node];
+  const auto [role, group] = plan_.nodes[node];
   if (role == graph::LoopRole::work) {
     work_.run(node, epoch);
     // Long messages advance only while somebody calls MPI.
@@ -204,6 +203,7 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
   if (schedule_.work(epoch) == Work::measure) return;
   const Gluing::Mode mode = gluing_mode(epoch);
   const bool single = work_.single(epoch);
+  const SubdomainPlace e(group);  // means nothing for collect and root
   switch (role) {
     case graph::LoopRole::work:
       return;
@@ -224,7 +224,7 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
 
 /// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
 /// look for it with the first of them.
-void SolverLoop::take(std::size_t e, int epoch) {
+void SolverLoop::take(SubdomainPlace e, int epoch) {
   const bool now = work_.single(epoch);
   if (now && !work_.single_before(epoch))
     narrow_bodies(gluing_.taken(e), state_.bodies.velocity, state_.single);
@@ -255,8 +255,9 @@ void SolverLoop::fetch(std::size_t subdomain) const {
   const Contacts& contacts = state_.contacts;
   const SingleContacts& single = state_.single.contacts;
   const Decomposition& all = state_.decomposition;
-  const std::size_t first = all.several() ? all.slot_begin[subdomain] : 0,
-                    last = all.several() ? all.slot_begin[subdomain + 1] : state_.bodies.size();
+  const SubdomainPlace own(subdomain);
+  const std::size_t first = all.several() ? all.slots_of(own).begin : 0,
+                    last = all.several() ? all.slots_of(own).end : state_.bodies.size();
   // What single sweeps want comes last, and is nearest then.
   fetch(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, acceleration.last_v,
         acceleration.step_v);
@@ -274,7 +275,7 @@ void SolverLoop::fetch(std::size_t subdomain) const {
               contacts.rz, contacts.rn, contacts.mu);
     }
   fetch(first, last, state_.single.velocity, state_.single.last_v);
-  gluing_.fetch(subdomain);
+  gluing_.fetch(own);
 }
 
 bool SolverLoop::decide(int epoch) {

@@ -93,7 +93,7 @@ class SolverLoop {
   bool schwarz() const;
   Gluing::Mode gluing_mode(int epoch) const;
   void split_walls();
-  void take(std::size_t e, int epoch);
+  void take(SubdomainPlace e, int epoch);
   bool measured(int epoch);
   bool swept(int epoch);
   bool judge();

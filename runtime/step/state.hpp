@@ -28,11 +28,14 @@ struct StepParameters {
   double skin = 0;       ///< [m]
 };
 
+/// Number of a chunk of this rank, as in Chunks.
+using ChunkId = Index<struct ChunkTag>;
+
 /// One wall during a step.
 struct WallState {
   Vec3 free_velocity = Vec3::Zero();   ///< without contacts [m/s]
   double applied = 0;                  ///< force pushed with, along the normal [N]
-  std::vector<std::int32_t> copies;    ///< chunks here that hold a copy, ascending; filled before the sweeps
+  std::vector<ChunkId> copies;         ///< chunks here that hold a copy, ascending; filled before the sweeps
   std::int64_t copies_everywhere = 0;  ///< on all ranks
   Vec3 impulse = Vec3::Zero();         ///< of the wall on the grains [N s], from the last check
 };

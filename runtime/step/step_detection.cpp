@@ -123,8 +123,8 @@ void StepGraph::make_cells() {
     make_room();
     const double began = graph::seconds_now();
     trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
-    around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, bodies, reach,
-                                   state_.candidates, anew);
+    around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, {bodies, state_.candidates},
+                                   reach, anew);
     span.end();
     sums_.times.dealing = graph::seconds_now() - began;
     cells_ = build_cells(around_.bodies.x, around_.reach);
@@ -159,8 +159,8 @@ void StepGraph::make_chunks() {
   const double began = graph::seconds_now();
   if (several) {
     const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
-    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, std::move(fresh), glued,
-                        state_.bodies, state_.candidates);
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, {std::move(fresh), glued},
+                        {state_.bodies, state_.candidates});
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
     sums_.times.dealing += graph::seconds_now() - began;

@@ -19,19 +19,18 @@ std::uint32_t lanes_for(std::size_t bodies) {
 
 }  // namespace
 
-StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
-                     const DecompositionSettings& decomposition, std::int64_t bodies,
-                     graph::Executor& executor, const graph::Communicator& ranks)
+StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup,
+                     std::int64_t bodies, graph::Executor& executor, const graph::Communicator& ranks)
     : state_(state),
       parameters_(parameters),
-      settings_(settings),
-      decomposition_(decomposition),
+      settings_(setup.solver),
+      decomposition_(setup.decomposition),
       executor_(executor),
       ranks_(ranks),
       shares_per_subdomain_(lanes_for(
           static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
       shares_(shares_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
-      loop_(state, parameters, settings, decomposition, ranks),
+      loop_(state, parameters, setup.solver, setup.decomposition, ranks),
       left_(shares_),
       pairs_(shares_),
       motion_(shares_) {

@@ -49,9 +49,8 @@ struct StepSums {
 class StepGraph {
  public:
   /// Keeps references. `bodies`: of all ranks.
-  StepGraph(StepState& state, const StepParameters& parameters, const SolverSettings& settings,
-            const DecompositionSettings& decomposition, std::int64_t bodies, graph::Executor& executor,
-            const graph::Communicator& ranks);
+  StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup, std::int64_t bodies,
+            graph::Executor& executor, const graph::Communicator& ranks);
 
   /// One step: poses, velocities, walls, impulses of `state` go from the beginning to the end of the step.
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
@@ -92,7 +91,7 @@ class StepGraph {
   bool walls_left_margin() const;
   bool out_of_balance() const;
   std::vector<double> work() const;
-  std::vector<double> costs(std::span<const double> work) const;
+  Per<SubdomainId, double> costs(std::span<const double> work) const;
 
   StepState& state_;
   const StepParameters& parameters_;

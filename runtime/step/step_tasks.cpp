@@ -15,10 +15,11 @@ SlotRange StepGraph::range_of_share(std::size_t count, std::uint32_t share) cons
 
 /// Slots of a share: a share of one subdomain.
 SlotRange StepGraph::slots(std::uint32_t share) const {
-  const std::size_t e = share / shares_per_subdomain_, part = share % shares_per_subdomain_;
+  const SubdomainPlace e(share / shares_per_subdomain_);
+  const std::size_t part = share % shares_per_subdomain_;
   const Decomposition& all = state_.decomposition;
-  const std::size_t begin = all.several() ? all.slot_begin[e] : 0;
-  const std::size_t count = all.several() ? all.slot_begin[e + 1] - begin : state_.bodies.size();
+  const auto [begin, end] = all.several() ? all.slots_of(e) : SlotRange{0, state_.bodies.size()};
+  const std::size_t count = end - begin;
   return {begin + count * part / shares_per_subdomain_, begin + count * (part + 1) / shares_per_subdomain_};
 }
 
@@ -57,14 +58,14 @@ std::vector<double> StepGraph::work() const {
 }
 
 /// Per subdomain: the work of a candidate over the mean, from the work of those here. Collective.
-std::vector<double> StepGraph::costs(std::span<const double> work) const {
+Per<SubdomainId, double> StepGraph::costs(std::span<const double> work) const {
   struct Row {
     double subdomain, work, candidates;
   };
   const Decomposition& all = state_.decomposition;
   std::vector<Row> rows;
-  for (std::size_t e = 0; e < all.here.size(); ++e)
-    rows.push_back({static_cast<double>(all.here[e]), work[e], 0});
+  for (const SubdomainPlace e : all.here.indices())
+    rows.push_back({static_cast<double>(all.here[e].value()), work[e.at()], 0});
   for (std::size_t c = 0; c < state_.chunks.size(); ++c)
     rows[static_cast<std::size_t>(state_.chunks.subdomain[c])].candidates +=
         state_.chunks.begin[c + 1] - state_.chunks.begin[c];
@@ -77,10 +78,11 @@ std::vector<double> StepGraph::costs(std::span<const double> work) const {
     candidates += row.candidates;
   }
   if (sum == 0 || candidates == 0) return {};
-  std::vector<double> cost(static_cast<std::size_t>(all.partition.subdomains), 1.0);
+  Per<SubdomainId, double> cost(static_cast<std::size_t>(all.partition.subdomains), 1.0);
   for (const Row& row : rows)
     if (row.candidates > 0)
-      cost[static_cast<std::size_t>(row.subdomain)] = row.work / row.candidates * (candidates / sum);
+      cost[SubdomainId(static_cast<std::int32_t>(row.subdomain))] =
+          row.work / row.candidates * (candidates / sum);
   return cost;
 }
 
@@ -123,7 +125,7 @@ void StepGraph::finish_walls() {
     const WallState& wall = state_.wall_states[w];
     const double* copy = wall.free_velocity.data();
     if (!wall.copies.empty())
-      copy = state_.copies[static_cast<std::size_t>(wall.copies.front())].velocity;
+      copy = state_.copies[wall.copies.front().at()].velocity;
     else if (wall.copies_everywhere > 0)
       continue;
     std::copy_n(copy, 3, &velocities[3 * w]);
@@ -150,8 +152,8 @@ namespace {
 /// What a subdomain adds to the report, as numbers that travel.
 constexpr std::size_t row_width = 1 + 9 + 14;
 
-void write_row(std::int32_t subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
-  const double head[] = {static_cast<double>(subdomain),
+void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
+  const double head[] = {static_cast<double>(subdomain.value()),
                          motion.energy.translation,
                          motion.energy.rotation,
                          motion.energy_free,
@@ -200,13 +202,13 @@ void StepGraph::sum_up() {
   for (std::size_t c = 0; c < contact_sums_.size(); ++c)
     contacts[static_cast<std::size_t>(state_.chunks.subdomain[c])].add(contact_sums_[c]);
   std::vector<double> rows(all.here.size() * row_width);
-  for (std::size_t e = 0; e < all.here.size(); ++e)
-    write_row(all.here[e], motion[e], contacts[e], &rows[e * row_width]);
+  for (const SubdomainPlace e : all.here.indices())
+    write_row(all.here[e], motion[e.at()], contacts[e.at()], &rows[e.at() * row_width]);
   rows = ranks_.gather_records(std::span<const double>(rows));
-  std::vector<const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
+  Per<SubdomainId, const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
   for (std::size_t k = 0; k < rows.size(); k += row_width)
-    by_subdomain[static_cast<std::size_t>(rows[k])] = &rows[k];
-  for (std::size_t e = 0; e < by_subdomain.size(); ++e)
+    by_subdomain[SubdomainId(static_cast<std::int32_t>(rows[k]))] = &rows[k];
+  for (const SubdomainId e : by_subdomain.indices())
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
   sums_.candidates = all_candidates_;
   sums_.times.detection = iterating_ - started_;

@@ -41,7 +41,7 @@ std::vector<trace::Task> StepGraph::declared_tasks() const {
     // bodies.
     if (const std::size_t bracket = task.name.find('['); bracket != std::string::npos) {
       const std::uint32_t track = static_cast<std::uint32_t>(std::stoul(task.name.substr(bracket + 1)));
-      task.group = state_.decomposition.here[track / shares_per_subdomain_];
+      task.group = state_.decomposition.here[SubdomainPlace(track / shares_per_subdomain_)].value();
     }
     for (graph::TaskId before : graph_.predecessors(id))
       task.predecessors.push_back(static_cast<std::uint32_t>(before));
@@ -51,7 +51,6 @@ std::vector<trace::Task> StepGraph::declared_tasks() const {
 
 trace::Plan StepGraph::describe_plan(const graph::LoopPlan& loop) const {
   const Chunks& chunks = state_.chunks;
-  const std::vector<std::int32_t>& here = state_.decomposition.here;
   trace::Plan plan;
   plan.colour = loop.colour;
   plan.offset = loop.offset;
@@ -61,11 +60,14 @@ trace::Plan StepGraph::describe_plan(const graph::LoopPlan& loop) const {
     const auto [role, group] = loop.nodes[n];
     const bool chunk = role == graph::LoopRole::work, none = group == graph::LoopPlan::none;
     plan.role.push_back(static_cast<std::uint8_t>(trace::role_of(role)));
-    plan.group.push_back(none ? trace::root_group : static_cast<std::uint32_t>(here[group]));
+    plan.group.push_back(
+        none ? trace::root_group
+             : static_cast<std::uint32_t>(state_.decomposition.here[SubdomainPlace(group)].value()));
     plan.weight.push_back(chunk ? work_of_chunk(state_, n) : 0);
-    plan.place.push_back(chunk  ? place_of_chunk(chunks, n)
-                         : none ? 0
-                                : static_cast<std::uint32_t>(loop_.gluing().subdomain_colour(group)));
+    plan.place.push_back(
+        chunk  ? place_of_chunk(chunks, n)
+        : none ? 0
+               : static_cast<std::uint32_t>(loop_.gluing().subdomain_colour(SubdomainPlace(group))));
   }
   plan.messages = loop_.gluing().message_plan();
   return plan;

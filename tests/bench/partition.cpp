@@ -110,8 +110,8 @@ int main(int argc, char** argv) {
 
   std::vector<BodyId> id;
   for (std::size_t k = 0; k < sample.x.size(); ++k) id.push_back(BodyId{static_cast<std::int64_t>(k)});
-  std::vector<std::int32_t> all(static_cast<std::size_t>(subdomains));
-  std::iota(all.begin(), all.end(), 0);
+  const FirstNumbers<SubdomainId> numbers(static_cast<std::size_t>(subdomains));
+  const std::vector<SubdomainId> all(numbers.begin(), numbers.end());
   const auto points = candidate_points(sample.x, sample.grain_pairs, sample.wall_pairs);
   // The same contacts after a shear of 0.1 % and a compression of 0.05 %.
   std::vector<Vec3> moved;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <map>
 #include <string>
 
 #include "apps/shared/options.hpp"
@@ -14,19 +13,16 @@ namespace talus {
 
 namespace {
 
-std::map<std::string, SolverMethod> methods_by_name() {
-  std::map<std::string, SolverMethod> known;
-  for (const auto& method : methods()) known.emplace(method.name, method.kind);
-  return known;
-}
-
 void add_options(CLI::App& app, StabilityOptions& options) {
   app.add_option("--only", options.only, "scenes with this in their name, may be repeated [all]")
       ->type_name("NAME")
       ->allow_extra_args(false);
-  app.add_option("--method", options.settings.method, "solver.method of every scene")
-      ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")))
-      ->transform(CLI::CheckedTransformer(methods_by_name()));
+  app.add_option_function<std::string>(
+         "--method",
+         [&options](const std::string& name) { options.settings.method = methods().named(name).kind; },
+         "solver.method of every scene")
+      ->check(CLI::IsMember(methods().names()))
+      ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")));
   app.add_option("--tolerance", options.settings.tolerance,
                  "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")
       ->type_name("T")

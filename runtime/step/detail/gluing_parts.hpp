@@ -50,13 +50,16 @@ inline std::byte* bytes_of(std::vector<double>& buffer) {
 /// A body, and the place of its copy in a neighbour's message.
 struct Pair {
   Slot slot;
-  std::int32_t place;
+  MessagePlace place;
 };
 
+/// Subdomain colours are below the first of these; the second stands for all of them.
+inline constexpr int behind_all = 1000, any_colour = behind_all + 1;
+
 inline constexpr int root_tag = graph::Communicator::first_tag;
-/// The largest is subdomains^2 + centre_tag.
-inline int tag_of(std::int32_t from, std::int32_t to, std::int32_t subdomains) {
-  return root_tag + 1 + from * subdomains + to;
+/// The largest is subdomains^2 + root_tag.
+inline int tag_of(SubdomainId from, SubdomainId to, std::int32_t subdomains) {
+  return root_tag + 1 + from.value() * subdomains + to.value();
 }
 
 }  // namespace talus::detail
@@ -74,7 +77,7 @@ struct Gluing::Side {
   detail::Link link;  ///< `in` and the channels: of neighbours on other ranks only
   const std::byte* source = nullptr;  ///< the neighbour's message to this subdomain
   int subdomain_colour = 0;           ///< of the neighbour
-  std::int32_t local = -1;            ///< the neighbour's place here, -1 on another rank
+  SubdomainPlace local;               ///< of the neighbour; none on another rank
 };
 
 struct Gluing::Subdomain {
@@ -87,9 +90,9 @@ struct Gluing::Subdomain {
       corners;  ///< indices into `shared`, without hubs: of the last subdomain colour are more copies
   std::vector<std::int32_t> taken_corners;  ///< likewise of the subdomain colour before this one's
   std::vector<double> base;                 ///< Schwarz: velocities after the last gluing, per shared body
-  std::vector<std::vector<std::int32_t>> wall_copies;  ///< per glued wall: chunks here that hold a copy
-  std::vector<double> partial;                         ///< to the root: 3 per wall, then width per hub
-  std::vector<std::size_t> hub_item;                   ///< per hub: its place in the root's results
+  std::vector<std::vector<ChunkId>> wall_copies;  ///< per glued wall: chunks here that hold a copy
+  std::vector<double> partial;                    ///< to the root: 3 per wall, then width per hub
+  std::vector<std::size_t> hub_item;              ///< per hub: its place in the root's results
   double waited = 0;
 };
 

@@ -5,13 +5,12 @@ namespace talus {
 namespace {
 
 constexpr Entry<SolverMethod, MethodMaker> entries[] = {
-    {SolverMethod::automatic, "auto", "momentum, and admm where sweeps leave forces out of balance",
-     make_automatic},
-    {SolverMethod::nlgs, "nlgs", "sweeps as they are", make_nlgs},
-    {SolverMethod::momentum, "nlgs+momentum", "each sweep begins beyond where the last one ended",
-     make_momentum},
-    {SolverMethod::nncg, "nncg", "nonsmooth conjugate gradients", make_nncg},
-    {SolverMethod::admm, "admm", "for long chains and heavy bodies, then sweeps", make_admm},
+    named<SolverMethod>("auto", "momentum, and admm where sweeps leave forces out of balance",
+                        make_automatic),
+    named<SolverMethod>("nlgs", "sweeps as they are", make_nlgs),
+    named<SolverMethod>("nlgs+momentum", "each sweep begins beyond where the last one ended", make_momentum),
+    named<SolverMethod>("nncg", "nonsmooth conjugate gradients", make_nncg),
+    named<SolverMethod>("admm", "for long chains and heavy bodies, then sweeps", make_admm),
 };
 
 }  // namespace

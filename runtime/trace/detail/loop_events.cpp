@@ -15,6 +15,31 @@ LoopEvents::LoopEvents(Stage& stage, const StepIndex& index, const LoopLayout& l
       worker_(layout.nodes.size(), 0),
       arrived_(2 * layout.nodes.size(), 0) {}
 
+StartedNode LoopEvents::start_node(std::uint32_t node, std::uint32_t e) {
+  StartedNode started{node, e, work_of(stage_, index_, layout_.nodes[node], node, epochs_[e], e), {}};
+  if (epochs_[e].exchange) {
+    started.exchange = exchange_work(stage_, layout_, node);
+    arrived_[inbox(node, e)] = 0;
+  }
+  return started;
+}
+
+double LoopEvents::work(const StartedNode& started, std::uint32_t worker, double taken) {
+  const double worked = taken + started.recorded.work + started.exchange.shares;
+  if (epochs_[started.epoch].exchange) send(started.node, worker, started.epoch, worked);
+  return worked + started.exchange.sends;
+}
+
+void LoopEvents::log(const StartedNode& started, std::uint32_t worker, const Log::TaskTime& time,
+                     const LastMessage& last) {
+  if (!started.recorded.recorded) return;
+  const auto epoch = static_cast<std::int32_t>(started.epoch);
+  const std::uint32_t first = layout_.rank_begin[layout_.nodes[started.node].rank];
+  stage_.log.task(worker, time, {started.node - first, epoch, started.recorded.kind});
+  if (time.waited > 0)
+    stage_.log.span(worker, last.at - time.waited, last.at, {last.name, epoch, kind_receive});
+}
+
 void LoopEvents::send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked) {
   worker_[node] = worker;
   const std::uint32_t first = layout_.send_begin[node];

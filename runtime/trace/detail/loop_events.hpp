@@ -11,6 +11,13 @@
 
 namespace talus::trace::detail {
 
+/// A node that has taken all it needs, and what it does in its epoch.
+struct StartedNode {
+  std::uint32_t node, epoch;
+  NodeWork recorded;
+  ExchangeWork exchange;  ///< all 0 in epochs that do not exchange
+};
+
 class LoopEvents {
  public:
   LoopEvents(Stage& stage, const StepIndex& index, const LoopLayout& layout,
@@ -72,14 +79,23 @@ class LoopEvents {
   bool all_arrived(std::uint32_t node, std::uint32_t epoch) const {
     return arrived(node, epoch) == layout_.incoming[node];
   }
-  void take_messages(std::uint32_t node, std::uint32_t epoch) { arrived_[inbox(node, epoch)] = 0; }
+  /// The messages that the node waited for are its own.
+  StartedNode start_node(std::uint32_t node, std::uint32_t epoch);
+  /// Its work begins when it has taken its messages, at `taken`; its own then leave. Returns its end [ns].
+  double work(const StartedNode& started, std::uint32_t worker, double taken);
+  /// The message that came last, and when [ns].
+  struct LastMessage {
+    std::uint32_t name;
+    double at;
+  };
+  /// Records the node, and its wait for the last message. Nothing where nothing was recorded.
+  void log(const StartedNode& started, std::uint32_t worker, const Log::TaskTime& time,
+           const LastMessage& last);
   /// True when the node sends in an epoch that exchanges.
   bool sends(std::uint32_t node) const {
     return layout_.send_begin[node + 1] > layout_.send_begin[node] ||
            (layout_.nodes[node].tells && layout_.to_root[layout_.nodes[node].rank].bytes > 0);
   }
-  /// Its messages leave one after the other, from the end of its work, `worked`.
-  void send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked);
   /// At the end of a node in an epoch that exchanges: the last of a leaf of the tree that tells sends for
   /// all.
   void send_up(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double now);
@@ -107,6 +123,8 @@ class LoopEvents {
     return number < layout_.sends.size() ? layout_.sends[number]
                                          : layout_.to_root[number - layout_.sends.size()];
   }
+  /// Its messages leave one after the other, from the end of its work, `worked`.
+  void send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked);
   void message_left(std::uint32_t number, std::uint32_t worker, std::uint32_t epoch, double now);
   void decide(std::uint32_t r, std::uint32_t e, double now);
   /// False when the rank leaves the loop.

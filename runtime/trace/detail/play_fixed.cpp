@@ -18,7 +18,6 @@ class FixedLoop {
   FixedLoop(Stage& stage, const StepIndex& index, const LoopLayout& layout,
             const std::vector<SimEpoch>& epochs, const std::vector<double>& start)
       : stage_(stage),
-        index_(index),
         layout_(layout),
         epochs_(epochs),
         threads_(static_cast<std::uint32_t>(stage.machine.threads)),
@@ -154,25 +153,14 @@ class FixedLoop {
   /// The node has taken all it needs. True when nobody has to see its end.
   bool start(std::uint32_t w, std::uint32_t node) {
     Worker& me = workers_[w];
-    const SimEpoch& epoch = epochs_[me.epoch];
-    const NodeWork recorded = work_of(stage_, index_, layout_.nodes[node], node, epoch, me.epoch);
-    ExchangeWork exchange;
-    if (epoch.exchange) {
-      exchange = exchange_work(stage_, layout_, node);
-      events_.take_messages(node, me.epoch);
-    }
+    const StartedNode started = events_.start_node(node, me.epoch);
     // Not by rounding alone.
-    const double waited = me.waited_to > me.time ? std::max(0.0, me.taken - me.time - exchange.takes) : 0,
-                 worked = me.taken + recorded.work + exchange.shares, end = worked + exchange.sends;
-    if (recorded.recorded) {
-      const auto number = static_cast<std::int32_t>(me.epoch);
-      stage_.log.task(w, {me.time, end, waited}, {node - layout_.rank_begin[me.rank], number, recorded.kind});
-      if (waited > 0)
-        stage_.log.span(w, me.waited_to - waited, me.waited_to, {me.last_name, number, kind_receive});
-    }
-    me.time = end + (recorded.recorded ? stage_.dispatch : 0);
-    if (epoch.exchange) events_.send(node, w, me.epoch, worked);
-    if (watched_[node] || (epoch.exchange && events_.sends(node))) {
+    const double waited =
+        me.waited_to > me.time ? std::max(0.0, me.taken - me.time - started.exchange.takes) : 0;
+    const double end = events_.work(started, w, me.taken);
+    events_.log(started, w, {me.time, end, waited}, {me.last_name, me.waited_to});
+    me.time = end + (started.recorded.recorded ? stage_.dispatch : 0);
+    if (watched_[node] || (epochs_[me.epoch].exchange && events_.sends(node))) {
       events_.end_node(node, w, end);
       return false;
     }
@@ -187,7 +175,6 @@ class FixedLoop {
   };
 
   Stage& stage_;
-  const StepIndex& index_;
   const LoopLayout& layout_;
   const std::vector<SimEpoch>& epochs_;
   const std::uint32_t threads_;

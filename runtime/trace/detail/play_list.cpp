@@ -16,7 +16,6 @@ class ListLoop {
   ListLoop(Stage& stage, const StepIndex& index, const LoopLayout& layout,
            const std::vector<SimEpoch>& epochs, const std::vector<double>& start)
       : stage_(stage),
-        index_(index),
         layout_(layout),
         epochs_(epochs),
         threads_(static_cast<std::uint32_t>(stage.machine.threads)),
@@ -130,34 +129,21 @@ class ListLoop {
 
   void start(std::uint32_t n, const Idle& thread, double now) {
     const std::uint32_t e = epoch_[n];
-    const SimEpoch& epoch = epochs_[e];
-    const NodeWork recorded = work_of(stage_, index_, layout_.nodes[n], n, epoch, e);
-    ExchangeWork exchange;
-    if (epoch.exchange) {
-      exchange = exchange_work(stage_, layout_, n);
-      // A thread that has nothing else to do takes each message as it comes; the last one is left.
-      if (stage_.machine.unbounded) exchange.takes = std::min(exchange.takes, stage_.network.overhead());
-      events_.take_messages(n, e);
-    }
-    const double worked = now + exchange.takes + recorded.work + exchange.shares,
-                 end = worked + exchange.sends;
-    if (epoch.exchange) events_.send(n, thread.worker, e, worked);
-    if (recorded.recorded) {
-      // A thread without work lacked the node's last message only.
-      const double waited = now - std::max(thread.since, ready_[n]);
-      const auto number = static_cast<std::int32_t>(e);
-      const std::uint32_t own_number = n - layout_.rank_begin[layout_.nodes[n].rank];
-      stage_.log.task(thread.worker, {now - waited, end, waited}, {own_number, number, recorded.kind});
-      if (waited > 0) stage_.log.span(thread.worker, now - waited, now, {last_name_, number, kind_receive});
-    }
+    const StartedNode started = events_.start_node(n, e);
+    double takes = started.exchange.takes;
+    // A thread that has nothing else to do takes each message as it comes; the last one is left.
+    if (stage_.machine.unbounded) takes = std::min(takes, stage_.network.overhead());
+    const double end = events_.work(started, thread.worker, now + takes);
+    // A thread without work lacked the node's last message only.
+    const double waited = now - std::max(thread.since, ready_[n]);
+    events_.log(started, thread.worker, {now - waited, end, waited}, {last_name_, now});
     ready_[n] = never;
     events_.end_node(n, thread.worker, end);
     if (!stage_.machine.unbounded)
-      events_.free_thread(thread.worker, end + (recorded.recorded ? stage_.dispatch : 0));
+      events_.free_thread(thread.worker, end + (started.recorded.recorded ? stage_.dispatch : 0));
   }
 
   Stage& stage_;
-  const StepIndex& index_;
   const LoopLayout& layout_;
   const std::vector<SimEpoch>& epochs_;
   const std::uint32_t threads_;

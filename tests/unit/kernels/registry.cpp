@@ -31,6 +31,22 @@ TEST(Registry, AnUnknownNameIsAnsweredWithTheOnesThereAre) {
   }
 }
 
+class Dish : public NamedKind<Dish> {
+ public:
+  using NamedKind::NamedKind;
+  static const Dish soup;
+};
+constexpr Dish Dish::soup("soup");
+
+TEST(Registry, KindsMadeOfTheirNamesAreEqualByName) {
+  static constexpr Entry<Dish, Press> dishes[] = {named<Dish, Press>("soup", "is hot", nullptr),
+                                                  named<Dish, Press>("stew", "is thick", nullptr)};
+  const Registry<Dish, Press> menu("dish", dishes);
+  EXPECT_EQ(menu.of(Dish::soup).sentence, "is hot");
+  EXPECT_EQ(menu.named("stew").kind, Dish("stew"));
+  EXPECT_FALSE(menu.named("stew").kind == Dish::soup);
+}
+
 TEST(Registry, AKindThatNobodyRegisteredIsOurMistake) {
   EXPECT_THROW(registry.of(Fruit::quince), std::logic_error);
 }

@@ -21,9 +21,9 @@ PartitionPoints lattice() {
 
 TEST(Hilbert, CurveVisitsEveryPlaceAndStepsToANeighbour) {
   const PartitionPoints points = lattice();
-  const std::vector<std::int32_t> number = subdomains_of(along_the_curve(points, 512), points.x);
+  const std::vector<SubdomainId> number = subdomains_of(along_the_curve(points, 512), points.x);
   std::vector<Vec3> visited(512, Vec3::Constant(-1));
-  for (std::size_t k = 0; k < number.size(); ++k) visited[static_cast<std::size_t>(number[k])] = points.x[k];
+  for (std::size_t k = 0; k < number.size(); ++k) visited[number[k].at()] = points.x[k];
   for (std::size_t k = 0; k < visited.size(); ++k) {
     ASSERT_GE(visited[k][0], 0) << "place " << k << " of the curve has no point, another has two";
     const double step = k > 0 ? (visited[k] - visited[k - 1]).norm() : 1;
@@ -44,7 +44,7 @@ TEST(Hilbert, StretchesHaveEqualWeightToTheHeaviestCell) {
 
 TEST(Hilbert, EightSubdomainsOfACubeAreItsOctants) {
   const PartitionPoints points = lattice();
-  const std::vector<std::int32_t> subdomain = subdomains_of(along_the_curve(points, 8), points.x);
+  const std::vector<SubdomainId> subdomain = subdomains_of(along_the_curve(points, 8), points.x);
   for (std::size_t k = 0; k < points.x.size(); ++k)
     for (std::size_t j = 0; j < k; ++j) {
       const bool one_octant = (points.x[k] / 4).array().floor().isApprox((points.x[j] / 4).array().floor());

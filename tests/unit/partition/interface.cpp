@@ -24,15 +24,18 @@ struct Decomposed {
   Bodies bodies;
   std::vector<Wall> walls;
   Candidates candidates;
-  std::vector<std::int32_t> subdomain;  // per candidate
+  std::vector<SubdomainId> subdomain;  // per candidate
   BodySubdomains grains, of_walls;
   std::int32_t subdomains;
 };
 
-std::vector<std::int32_t> up_to(std::int32_t n) {
-  std::vector<std::int32_t> all(at(n));
-  std::iota(all.begin(), all.end(), 0);
-  return all;
+std::vector<SubdomainId> up_to(std::int32_t n) {
+  const FirstNumbers<SubdomainId> all(at(n));
+  return {all.begin(), all.end()};
+}
+
+std::vector<SubdomainId> ids(std::initializer_list<int> numbers) {
+  return {numbers.begin(), numbers.end()};
 }
 
 Decomposed decompose(int edge, std::int32_t n, PartitionKind kind) {
@@ -61,8 +64,8 @@ std::vector<Decomposed> cases() {
 }
 
 /// By looking at all candidates of each body in turn.
-std::vector<std::set<std::int32_t>> standings_by_brute_force(const Decomposed& d) {
-  std::vector<std::set<std::int32_t>> sets(d.bodies.size());
+std::vector<std::set<SubdomainId>> standings_by_brute_force(const Decomposed& d) {
+  std::vector<std::set<SubdomainId>> sets(d.bodies.size());
   for (std::size_t k = 0; k < d.candidates.grain_pairs.size(); ++k) {
     sets[at(d.candidates.grain_pairs[k].first)].insert(d.subdomain[k]);
     sets[at(d.candidates.grain_pairs[k].second)].insert(d.subdomain[k]);
@@ -77,16 +80,16 @@ TEST(Standings, AreTheSubdomainsOfABodysCandidates) {
     const auto expected = standings_by_brute_force(d);
     for (std::size_t body = 0; body < d.bodies.size(); ++body) {
       const auto in = d.grains.of(body);
-      EXPECT_EQ(std::vector<std::int32_t>(in.begin(), in.end()),
-                std::vector<std::int32_t>(expected[body].begin(), expected[body].end()));
+      EXPECT_EQ(std::vector<SubdomainId>(in.begin(), in.end()),
+                std::vector<SubdomainId>(expected[body].begin(), expected[body].end()));
     }
     for (std::size_t wall = 0; wall < d.walls.size(); ++wall) {
-      std::set<std::int32_t> in;
+      std::set<SubdomainId> in;
       for (std::size_t k = 0; k < d.candidates.wall_pairs.size(); ++k)
         if (at(d.candidates.wall_pairs[k].wall) == wall)
           in.insert(d.subdomain[d.candidates.grain_pairs.size() + k]);
-      EXPECT_EQ(std::vector<std::int32_t>(d.of_walls.of(wall).begin(), d.of_walls.of(wall).end()),
-                std::vector<std::int32_t>(in.begin(), in.end()));
+      EXPECT_EQ(std::vector<SubdomainId>(d.of_walls.of(wall).begin(), d.of_walls.of(wall).end()),
+                std::vector<SubdomainId>(in.begin(), in.end()));
     }
   }
 }
@@ -102,16 +105,16 @@ TEST(Standings, OfPiecesPutTogetherAreThoseOfTheWhole) {
   std::vector<Standing> sent;
   for (const BodySubdomains* part : {&second, &first})
     for (std::size_t body = part->bodies(); body-- > 0;)
-      for (std::int32_t in : part->of(body)) sent.push_back({static_cast<Slot>(body), in});
+      for (const SubdomainId in : part->of(body)) sent.push_back({static_cast<Slot>(body), in});
   EXPECT_EQ(collect_standings(d.bodies.size(), sent), d.grains);
 }
 
 TEST(Standings, AGrainWithoutCandidatesStandsInItsHomeOnly) {
   const std::vector<GrainPair> pairs{{0, 2}};
-  const std::vector<std::int32_t> subdomain{7}, home{1, 2, 3, 4};
-  const BodySubdomains expected{{0, 1, 2, 3, 4}, {7, 2, 7, 4}};
+  const std::vector<SubdomainId> subdomain = ids({7}), home = ids({1, 2, 3, 4});
+  const BodySubdomains expected{{0, 1, 2, 3, 4}, ids({7, 2, 7, 4})};
   EXPECT_EQ(grain_subdomains(4, pairs, {}, subdomain, home), expected);
-  const BodySubdomains nowhere{{0, 1, 1, 2, 2}, {7, 7}};
+  const BodySubdomains nowhere{{0, 1, 1, 2, 2}, ids({7, 7})};
   EXPECT_EQ(grain_subdomains(4, pairs, {}, subdomain), nowhere);
 }
 
@@ -137,20 +140,20 @@ TEST(Interface, MultiplicitiesSumToTheCopiesOfAllSubdomains) {
 TEST(Interface, BothSidesListTheSameGrainsInOrderOfId) {
   for (const Decomposed& d : cases()) {
     const auto interfaces = build_interfaces(d.grains, d.bodies.id, up_to(d.subdomains));
-    std::map<std::pair<std::int32_t, std::int32_t>, std::vector<BodyId>> lists;
+    std::map<std::pair<SubdomainId, SubdomainId>, std::vector<BodyId>> lists;
     for (const SubdomainInterface& interface : interfaces)
       for (const Neighbour& neighbour : interface.neighbours) {
-        std::vector<BodyId> ids;
+        std::vector<BodyId> sent;
         for (std::int32_t k = neighbour.begin; k < neighbour.end; ++k)
-          ids.push_back(d.bodies.id[at(interface.bodies[at(interface.exchange[at(k)])])]);
-        EXPECT_TRUE(std::is_sorted(ids.begin(), ids.end()));
-        EXPECT_FALSE(ids.empty());
-        EXPECT_TRUE(lists.emplace(std::pair(interface.subdomain, neighbour.subdomain), ids).second);
+          sent.push_back(d.bodies.id[at(interface.bodies[at(interface.exchange[at(k)])])]);
+        EXPECT_TRUE(std::is_sorted(sent.begin(), sent.end()));
+        EXPECT_FALSE(sent.empty());
+        EXPECT_TRUE(lists.emplace(std::pair(interface.subdomain, neighbour.subdomain), sent).second);
       }
-    for (const auto& [pair, ids] : lists) {
+    for (const auto& [pair, sent] : lists) {
       const auto other = lists.find({pair.second, pair.first});
       ASSERT_NE(other, lists.end());
-      EXPECT_EQ(ids, other->second);
+      EXPECT_EQ(sent, other->second);
     }
   }
 }
@@ -173,28 +176,27 @@ TEST(Interface, EverySubdomainSumsTheSameCopiesInTheSameOrder) {
         ASSERT_EQ(at(end - begin), standing.size());
         for (std::int32_t c = begin; c < end; ++c) {
           const CopySource& copy = here.copies[at(c)];
-          const std::int32_t expected = standing[at(c - begin)];
+          const SubdomainId expected = standing[at(c - begin)];
           if (copy.neighbour < 0) {
             EXPECT_EQ(expected, here.subdomain);
-            EXPECT_EQ(here.bodies[at(copy.place)], body);
             continue;
           }
-          const std::int32_t other = here.neighbours[at(copy.neighbour)].subdomain;
+          const SubdomainId other = here.neighbours[at(copy.neighbour)].subdomain;
           EXPECT_EQ(other, expected);
-          const SubdomainInterface& there = interfaces[at(other)];
+          const SubdomainInterface& there = interfaces[other.at()];
           const auto back = std::find_if(there.neighbours.begin(), there.neighbours.end(),
                                          [&](const Neighbour& n) { return n.subdomain == here.subdomain; });
           ASSERT_NE(back, there.neighbours.end());
-          EXPECT_EQ(there.bodies[at(there.exchange[at(back->begin + copy.place)])], body);
+          EXPECT_EQ(there.bodies[at(there.exchange[at(back->begin + copy.place.value())])], body);
         }
       }
   }
 }
 
 TEST(Interface, TheExampleOfTheHeader) {
-  const BodySubdomains standings{{0, 1, 3, 6}, {0, 0, 1, 0, 1, 2}};
+  const BodySubdomains standings{{0, 1, 3, 6}, ids({0, 0, 1, 0, 1, 2})};
   const std::vector<BodyId> id{BodyId{10}, BodyId{11}, BodyId{12}};
-  const SubdomainInterface e = build_interfaces(standings, id, std::vector<std::int32_t>{0}).front();
+  const SubdomainInterface e = build_interfaces(standings, id, ids({0})).front();
   EXPECT_EQ(e.bodies, (std::vector<Slot>{0, 1, 2}));
   EXPECT_EQ(e.multiplicity, (std::vector<std::int32_t>{1, 2, 3}));
   EXPECT_EQ(e.shared, (std::vector<std::int32_t>{1, 2}));
@@ -203,7 +205,7 @@ TEST(Interface, TheExampleOfTheHeader) {
   EXPECT_EQ(e.exchange, (std::vector<std::int32_t>{1, 2, 2}));
   EXPECT_EQ(e.copies_begin, (std::vector<std::int32_t>{0, 2, 5}));
   EXPECT_EQ(e.copies[3].neighbour, 0);
-  EXPECT_EQ(e.copies[3].place, 1);
+  EXPECT_EQ(e.copies[3].place, MessagePlace(1));
 }
 
 /// The order of slots is each rank's own affair; what is exchanged is not.
@@ -217,7 +219,7 @@ TEST(Interface, DoesNotDependOnTheOrderOfSlots) {
   std::vector<BodyId> id;
   for (std::size_t k = 0; k < order.size(); ++k) {
     id.push_back(d.bodies.id[at(order[k])]);
-    for (std::int32_t in : d.grains.of(at(order[k]))) list.push_back({static_cast<Slot>(k), in});
+    for (const SubdomainId in : d.grains.of(at(order[k]))) list.push_back({static_cast<Slot>(k), in});
   }
   const auto a = build_interfaces(d.grains, d.bodies.id, up_to(12));
   const auto b = build_interfaces(collect_standings(order.size(), list), id, up_to(12));
@@ -238,16 +240,16 @@ TEST(Interface, DoesNotDependOnTheOrderOfSlots) {
 
 TEST(Interface, AGrainInManySubdomainsIsAHubAndInNoExchangeList) {
   std::vector<Standing> list;
-  for (std::int32_t e = 0; e < 20; ++e) list.push_back({0, e});
-  list.push_back({1, 3});
-  list.push_back({1, 4});
+  for (std::int32_t e = 0; e < 20; ++e) list.push_back({0, SubdomainId(e)});
+  list.push_back({1, SubdomainId(3)});
+  list.push_back({1, SubdomainId(4)});
   const std::vector<BodyId> id{BodyId{0}, BodyId{1}};
   const auto interfaces = build_interfaces(collect_standings(2, list), id, up_to(20));
   std::size_t ties = 0;
   for (const SubdomainInterface& e : interfaces) {
     ASSERT_EQ(e.hubs.size(), 1u);
     EXPECT_EQ(e.bodies[at(e.shared[at(e.hubs[0])])], 0);
-    EXPECT_EQ(e.owner[at(e.hubs[0])], 0);
+    EXPECT_EQ(e.owner[at(e.hubs[0])], SubdomainId(0));
     ties += e.exchange.size();
   }
   EXPECT_EQ(ties, 2u);
@@ -262,9 +264,9 @@ TEST(LoadTable, CountsWhatBruteForceCountsOnAnyNumberOfRanks) {
       measure_load(12, build_interfaces(d.grains, d.bodies.id, here), d.grains, d.of_walls, contacts);
   for (std::int32_t e = 0; e < 12; ++e) {
     std::int64_t bodies = 0, shared = 0, corner = 0;
-    std::set<std::int32_t> others;
+    std::set<SubdomainId> others;
     for (const auto& set : sets) {
-      if (set.count(e) == 0) continue;
+      if (set.count(SubdomainId(e)) == 0) continue;
       ++bodies;
       shared += set.size() > 1;
       corner += set.size() > 2;
@@ -275,7 +277,7 @@ TEST(LoadTable, CountsWhatBruteForceCountsOnAnyNumberOfRanks) {
     EXPECT_EQ(whole.corner_bodies[at(e)], corner);
     EXPECT_EQ(whole.neighbours[at(e)], static_cast<std::int64_t>(others.size()) - 1);
     EXPECT_GE(whole.wall_neighbours[at(e)], whole.neighbours[at(e)]);
-    EXPECT_EQ(whole.contacts[at(e)], std::count(d.subdomain.begin(), d.subdomain.end(), e));
+    EXPECT_EQ(whole.contacts[at(e)], std::count(d.subdomain.begin(), d.subdomain.end(), SubdomainId(e)));
   }
   std::vector<LoadTable> parts(3);
   graph::on_pretend_ranks(3, [&](const graph::Communicator& ranks) {

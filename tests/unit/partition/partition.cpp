@@ -45,8 +45,8 @@ PartitionOptions options_of(PartitionKind kind, std::int32_t subdomains) {
 }
 
 /// What the regions do to a fine lattice of places in and around the sample.
-std::vector<std::int32_t> map_of(const Partition& partition) {
-  std::vector<std::int32_t> map;
+std::vector<SubdomainId> map_of(const Partition& partition) {
+  std::vector<SubdomainId> map;
   for (int k = 0; k < 8000; ++k)
     map.push_back(partition.subdomain_of(
         {-4 + 8.0 / 19 * (k % 20), -3 + 6.0 / 19 * (k / 20 % 20), -2 + 4.0 / 19 * (k / 400)}));
@@ -73,12 +73,12 @@ TEST(Partition, EveryPointOfSpaceIsInExactlyOneSubdomain) {
   for (PartitionKind kind : kinds)
     for (std::int32_t n : {1, 2, 3, 7, 12, 96}) {
       const Partition partition = make_partition(points, options_of(kind, n));
-      std::set<std::int32_t> met;
-      for (std::int32_t subdomain : map_of(partition)) {
-        ASSERT_GE(subdomain, 0);
-        ASSERT_LT(subdomain, n);
+      std::set<SubdomainId> met;
+      for (const SubdomainId subdomain : map_of(partition)) {
+        ASSERT_GE(subdomain.value(), 0);
+        ASSERT_LT(subdomain.value(), n);
       }
-      for (std::int32_t subdomain : subdomains_of(partition, points.x)) met.insert(subdomain);
+      for (const SubdomainId subdomain : subdomains_of(partition, points.x)) met.insert(subdomain);
       EXPECT_EQ(met.size(), static_cast<std::size_t>(n)) << name_of(kind) << ": a subdomain is empty";
       EXPECT_NE(partition.kind, PartitionKind::automatic);
     }
@@ -153,7 +153,7 @@ TEST(Partition, IsTheSameForAnyOrderOfPointsAndAnyNumberOfRanks) {
       for (int count : {1, 2, 3, 7}) {
         const auto ranks = static_cast<std::size_t>(count);
         const auto parts = deal(points, ranks, ranks);
-        std::vector<std::vector<std::int32_t>> maps(ranks);
+        std::vector<std::vector<SubdomainId>> maps(ranks);
         graph::on_pretend_ranks(count, [&](const graph::Communicator& all) {
           const auto rank = static_cast<std::size_t>(all.rank());
           maps[rank] = map_of(make_partition(parts[rank], options_of(kind, 13), reduction_over(all)));
@@ -194,21 +194,21 @@ TEST(Partition, DegenerateSamplesAreDealtAndNotRefused) {
     for (PartitionKind kind : kinds)
       for (std::int32_t n : {1, 2, 12, 1000}) {
         const Partition partition = make_partition(points, options_of(kind, n));
-        for (std::int32_t subdomain : subdomains_of(partition, points.x)) {
-          EXPECT_GE(subdomain, 0);
-          EXPECT_LT(subdomain, n);
+        for (const SubdomainId subdomain : subdomains_of(partition, points.x)) {
+          EXPECT_GE(subdomain.value(), 0);
+          EXPECT_LT(subdomain.value(), n);
         }
-        EXPECT_LT(partition.subdomain_of({1e300, -1e300, 0}), n);
+        EXPECT_LT(partition.subdomain_of({1e300, -1e300, 0}).value(), n);
       }
   const auto equal = subdomains_of(make_partition(same, options_of(PartitionKind::rcb, 8)), same.x);
-  EXPECT_EQ(std::set<std::int32_t>(equal.begin(), equal.end()).size(), 1u) << "one place, two subdomains";
+  EXPECT_EQ(std::set<SubdomainId>(equal.begin(), equal.end()).size(), 1u) << "one place, two subdomains";
 }
 
 TEST(Partition, WithFewerPointsThanSubdomainsBisectionGivesEachPointItsOwn) {
   const PartitionPoints points = random_points(11, 6);
   for (PartitionKind kind : {PartitionKind::rcb, PartitionKind::fitted, PartitionKind::metis}) {
     const auto in = subdomains_of(make_partition(points, options_of(kind, 96)), points.x);
-    EXPECT_EQ(std::set<std::int32_t>(in.begin(), in.end()).size(), points.x.size()) << name_of(kind);
+    EXPECT_EQ(std::set<SubdomainId>(in.begin(), in.end()).size(), points.x.size()) << name_of(kind);
   }
 }
 
@@ -222,8 +222,8 @@ TEST(Partition, BoxesAreThePapersRegularGrid) {
   for (int x = 0; x < 4; ++x)
     for (int y = 0; y < 3; ++y)
       for (int z = 0; z < 2; ++z) {
-        const std::int32_t subdomain = partition.subdomain_of({x + 0.5, y + 0.5, z + 0.5});
-        ++count[static_cast<std::size_t>(subdomain)];
+        const SubdomainId subdomain = partition.subdomain_of({x + 0.5, y + 0.5, z + 0.5});
+        ++count[subdomain.at()];
         for (double shift : {-0.49, 0.49})
           EXPECT_EQ(partition.subdomain_of({x + 0.5 + shift, y + 0.5 - shift, z + 0.5 + shift}), subdomain);
       }

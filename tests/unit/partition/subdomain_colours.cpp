@@ -18,7 +18,7 @@ std::vector<Tie> grid(int n, int face) {
       const int dx = std::abs(a % n - b % n), dy = std::abs(a / n % n - b / n % n),
                 dz = std::abs(a / (n * n) - b / (n * n));
       if (std::max({dx, dy, dz}) != 1 || dx + dy + dz == 3) continue;
-      ties.push_back({a, b, dx + dy + dz == 1 ? face : 1});
+      ties.push_back({SubdomainId(a), SubdomainId(b), dx + dy + dz == 1 ? face : 1});
     }
   return ties;
 }
@@ -34,7 +34,7 @@ TEST(Turns, AreThreeWhereTwoLeaveTooManyTiesWithinOne) {
   std::vector<Tie> triangle;
   for (std::int32_t a = 0; a < 3; ++a)
     for (std::int32_t b = 0; b < 3; ++b)
-      if (a != b) triangle.push_back({a, b, 5});
+      if (a != b) triangle.push_back({SubdomainId(a), SubdomainId(b), 5});
   const std::vector<char> subdomain_colour = choose_subdomain_colours(3, triangle);
   EXPECT_EQ(std::set<char>(subdomain_colour.begin(), subdomain_colour.end()).size(), 3U);
 }
@@ -52,7 +52,7 @@ TEST(Turns, OfSubdomainsThatShareNothingAreTheFirst) {
 }
 
 TEST(Turns, RefuseATieOfASubdomainThatThereIsNot) {
-  const std::vector<Tie> ties = {{0, 2, 1}};
+  const std::vector<Tie> ties = {{SubdomainId(0), SubdomainId(2), 1}};
   EXPECT_THROW(choose_subdomain_colours(2, ties), std::out_of_range);
 }
 

@@ -165,11 +165,11 @@ TEST(Methods, AgreeWithoutFriction) {
   ASSERT_TRUE(plain.report.converged);
   for (SolverMethod method : {SolverMethod::automatic, SolverMethod::momentum, SolverMethod::nncg}) {
     const Solved other = solve(method, 0, 1e-11);
-    ASSERT_TRUE(other.report.converged) << static_cast<int>(method);
-    EXPECT_LT(other.report.iterations, plain.report.iterations) << static_cast<int>(method);
+    ASSERT_TRUE(other.report.converged) << method.name();
+    EXPECT_LT(other.report.iterations, plain.report.iterations) << method.name();
     for (std::size_t s = 0; s < plain.velocity.size(); ++s)
       for (int k = 0; k < 3; ++k)
-        ASSERT_NEAR(other.velocity[s].u[k], plain.velocity[s].u[k], 1e-8) << static_cast<int>(method);
+        ASSERT_NEAR(other.velocity[s].u[k], plain.velocity[s].u[k], 1e-8) << method.name();
   }
 }
 
@@ -179,7 +179,7 @@ TEST(Methods, ReachTheToleranceWithFrictionOnSubdomains) {
   for (SolverMethod method : {SolverMethod::automatic, SolverMethod::momentum, SolverMethod::nncg})
     for (int subdomains : {1, 2, 8}) {
       const Solved solved = solve(method, 0.3, 1e-4, subdomains);
-      EXPECT_TRUE(solved.report.converged) << static_cast<int>(method) << " on " << subdomains;
+      EXPECT_TRUE(solved.report.converged) << method.name() << " on " << subdomains;
     }
 }
 
@@ -192,7 +192,7 @@ TEST(Methods, AutoTakesMomentum) {
 TEST(Methods, GiveTheSameBitsOnAnyNumberOfThreads) {
   for (SolverMethod method : {SolverMethod::nlgs, SolverMethod::momentum, SolverMethod::nncg})
     EXPECT_EQ(solve(method, 0.3, 1e-4, 4, 1).digest, solve(method, 0.3, 1e-4, 4, 3).digest)
-        << static_cast<int>(method);
+        << method.name();
 }
 
 }  // namespace

@@ -196,10 +196,7 @@ Machine made_up(Random& random, bool in_colours) {
       }
       if (farthest != 1) continue;
       machine.neighbours[a].push_back(b);
-      ties.push_back({static_cast<std::int32_t>(a), static_cast<std::int32_t>(b),
-                      apart == 1   ? 100
-                      : apart == 2 ? 10
-                                   : 1});
+      ties.push_back({SubdomainId(a), SubdomainId(b), apart == 1 ? 100 : apart == 2 ? 10 : 1});
     }
   machine.subdomain_colour = in_colours ? choose_subdomain_colours(static_cast<std::int32_t>(count), ties)
                                         : std::vector<char>(count, 0);

@@ -1,0 +1,86 @@
+#include "runtime/step/runaway.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace talus {
+
+namespace {
+
+std::string describe(const Bodies& bodies, Slot slot) {
+  if (slot < 0) return "the fastest body is on another rank";
+  const auto s = static_cast<std::size_t>(slot);
+  const Velocity& v = bodies.velocity[s];
+  const Vec3& x = bodies.x[s];
+  return fmt::format(
+      "body {}: x = ({}, {}, {}) m, radius = {} m, u = ({}, {}, {}) m/s, R omega = ({}, {}, {}) m/s",
+      static_cast<std::int64_t>(bodies.id[s]), x[0], x[1], x[2], bodies.radius[s], v.u[0], v.u[1], v.u[2],
+      v.w[0], v.w[1], v.w[2]);
+}
+
+/// Walls do not feel one another: two that face each other have run through when nothing between held them.
+void check_walls_apart(const std::vector<Wall>& walls, const StepName& step) {
+  for (const Wall& moving : walls)
+    for (const Wall& other : walls)
+      if (moving.load.drive != WallDrive::fixed && (moving.normal + other.normal).norm() < 1e-12 &&
+          (other.point - moving.point).dot(moving.normal) < 0)
+        throw RunawayError(
+            fmt::format("{}: wall '{}' has passed wall '{}', which faces it. Are there grains "
+                        "between them? Reduce the load, the velocity or the time step",
+                        step.text(), moving.name, other.name));
+}
+
+}  // namespace
+
+double pressed_area(const std::vector<Wall>& walls, std::size_t w, const StepName& step) {
+  try {
+    return face_area(walls, w);
+  } catch (const std::invalid_argument&) {
+    throw RunawayError(fmt::format(
+        "{}: the walls beside wall '{}' have passed each other, so its "
+        "pressure acts on nothing. Are there grains between them? Reduce the time step or the pressure",
+        step.text(), walls[w].name));
+  }
+}
+
+void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
+  const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
+  const MotionSums& motion = sums.motion;
+  if (result.diverged)
+    throw RunawayError(
+        fmt::format("{}: the iterations diverge, error {:.3g} after {} of them. {}", step.text(),
+                    result.error_rms, result.iterations,
+                    setup.decomposition.coupling == Coupling::schwarz && !setup.decomposition.damping
+                        ? "Undamped Schwarz does so where bodies stand in more than two subdomains: set "
+                          "decomposition.damping = true or coupling = \"nscdd\""
+                        : "Reduce the time step, or look for masses too far apart"));
+  if (std::isnan(motion.speed2_max) || !std::isfinite(motion.speed2_max) || std::isnan(result.error_rms))
+    throw RunawayError(
+        fmt::format("{}: the state is not finite; {}. Reduce the time step or look for overlapping "
+                    "grains",
+                    step.text(), describe(state.bodies, motion.fastest)));
+  check_walls_apart(state.walls, step);
+  double fastest_wall2 = 0;
+  for (const Wall& wall : state.walls)
+    fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
+  const double energy = motion.energy.translation + motion.energy.rotation;
+  // So fast part two grains whose overlap is opened within the step, and the faster the more of them stand
+  // in a row; deep ones are no supply that anybody wants.
+  constexpr double deep = 1e-2;  // of the smallest radius
+  const double opened = setup.solver.overlap_correction *
+                        std::min(sums.contacts.penetration_max, deep * sample.smallest) /
+                        parameters.time_step;
+  const double supplied =
+      motion.energy_free + wall_energy_free +
+      sample.total_mass * (fastest_wall2 + 0.5 * opened * opened * static_cast<double>(sample.bodies));
+  if (energy > 100 * supplied && energy > 0)
+    throw RunawayError(fmt::format(
+        "{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "
+        "Reduce the time step or raise solver.max_iterations; with solver.overlap_correction, begin "
+        "without deep overlaps",
+        step.text(), energy, supplied, describe(state.bodies, motion.fastest)));
+}
+
+}  // namespace talus

@@ -1,0 +1,28 @@
+#pragma once
+
+/// Steps after which there is no sense in going on.
+
+#include <stdexcept>
+#include <vector>
+
+#include "kernels/shapes/walls.hpp"
+#include "runtime/step/step_report.hpp"
+
+namespace talus {
+
+/// The state blew up: NaN, or energy that no load supplied. The message has the step, the body and its state.
+class RunawayError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Area that the pressure on wall `w` acts on [m^2], of a stage that began with a box. When it is none any
+/// more, walls have run through one another: throws RunawayError.
+double pressed_area(const std::vector<Wall>& walls, std::size_t w, const StepName& step);
+
+/// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
+/// or the kinetic energy is far above what was supplied. `wall_energy_free`: of the walls with their free
+/// velocities [J].
+void check_for_runaway(const StepOutcome& outcome, double wall_energy_free);
+
+}  // namespace talus
