@@ -63,6 +63,7 @@ struct PairSpec {
   std::string material, with;  ///< names
   std::optional<double> friction = {};
   std::optional<double> restitution = {};
+  std::optional<double> cohesion = {};  ///< [N]
 };
 
 /// A number of a PairLaw, and where a PairSpec has it.
@@ -71,7 +72,8 @@ struct PairNumber {
   double PairLaw::*held;
 };
 inline constexpr std::array pair_numbers = {PairNumber{&PairSpec::friction, &PairLaw::friction},
-                                            PairNumber{&PairSpec::restitution, &PairLaw::restitution}};
+                                            PairNumber{&PairSpec::restitution, &PairLaw::restitution},
+                                            PairNumber{&PairSpec::cohesion, &PairLaw::cohesion}};
 
 /// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said
 /// there.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "kernels/detection/materials.hpp"
+#include "kernels/detection/measures.hpp"
 
 namespace talus {
 namespace {
@@ -45,8 +46,42 @@ void add_block(std::vector<MatrixEntry>& entries, std::size_t a, std::size_t b, 
 
 }  // namespace
 
+namespace {
+
+/// Velocities without contact impulses: free ones, and what cohesion adds to them.
+struct Pulled {
+  FreeVelocity free;
+  std::vector<Vec3> wall;
+};
+
+Pulled pulled_together(const StepView& step) {
+  Pulled pulled{step.free, {step.wall_free.begin(), step.wall_free.end()}};
+  const Contacts& c = step.contacts;
+  for (std::size_t chunk = 0; chunk < step.chunks.size() && !c.cohesion.empty(); ++chunk) {
+    const auto begin = static_cast<std::size_t>(step.chunks.begin[chunk]);
+    const std::int32_t wall = step.chunks.wall[chunk];
+    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(c.count[chunk]); ++k) {
+      const Vec3 pull = c.cohesion[k] * contact_normal(c, k);
+      const auto move = [&](Slot slot, double sign) {
+        const auto body = static_cast<std::size_t>(slot);
+        Eigen::Map<Vec3>(pulled.free.u[body].data()) += sign * step.bodies[body].inv_mass * pull;
+      };
+      move(c.first[k], -1);
+      if (wall < 0)
+        move(c.second[k], 1);
+      else
+        pulled.wall[static_cast<std::size_t>(wall)] +=
+            step.walls[static_cast<std::size_t>(wall)].inv_mass() * pull;
+    }
+  }
+  return pulled;
+}
+
+}  // namespace
+
 StepProblem assemble_step(const StepView& step) {
   const Contacts& c = step.contacts;
+  const Pulled without = pulled_together(step);
   const bool turns = !step.free.w.empty();
   std::vector<std::vector<Lever>> of_body(step.bodies.size()), of_wall(step.walls.size());
   std::vector<double> q, mu;
@@ -62,15 +97,15 @@ StepProblem assemble_step(const StepView& step) {
       Vec3 v(c.bias[k], 0, 0);
       const auto meet = [&](Slot slot, double sign) {
         const auto body = static_cast<std::size_t>(slot);
-        v += sign * axes.transpose() * vector_of(step.free.u[body]);
-        if (turns) v -= turn.transpose() * vector_of(step.free.w[body]);
+        v += sign * axes.transpose() * vector_of(without.free.u[body]);
+        if (turns) v -= turn.transpose() * vector_of(without.free.w[body]);
         of_body[body].push_back({contact, sign * axes, -turn});
       };
       meet(c.first[k], 1);
       if (wall < 0) {
         meet(c.second[k], -1);
       } else {
-        v -= axes.transpose() * step.wall_free[static_cast<std::size_t>(wall)];
+        v -= axes.transpose() * without.wall[static_cast<std::size_t>(wall)];
         of_wall[static_cast<std::size_t>(wall)].push_back({contact, -axes, Mat3::Zero()});
       }
       q.insert(q.end(), {v[0], v[1], v[2]});

@@ -24,7 +24,7 @@ struct StepView {
 
 struct StepProblem {
   DelassusProblem problem;
-  std::vector<double> r;  ///< 3 per contact: the step's impulses, normal first [N s]
+  std::vector<double> r;  ///< 3 per contact: the step's impulses as the law sees them, normal first [N s]
 };
 
 /// W = H' M^-1 H, q = H' V_free + b n and mu of a step that the simulation itself solves without ever

@@ -109,7 +109,7 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
 std::size_t memory_used(const Contacts& contacts) {
   std::size_t bytes = 0;
   for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
-                             &contacts.ry, &contacts.rz, &contacts.rn, &contacts.mu})
+                             &contacts.ry, &contacts.rz, &contacts.rn, &contacts.mu, &contacts.cohesion})
     bytes += values->capacity() * sizeof(double);
   return bytes +
          (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +

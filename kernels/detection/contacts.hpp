@@ -26,8 +26,10 @@ inline std::uint32_t record_of(Slot slot) {
 struct Contacts {
   std::vector<double> nx, ny, nz;  ///< normal, unit, from the second body (or the wall) to the first
   std::vector<double> bias;        ///< b [m/s]: Signorini holds for v_n + b
-  std::vector<double> rx, ry, rz;  ///< impulse on the first body [N s]; empty without friction
-  std::vector<double> rn;          ///< normal impulse [N s]; empty with friction
+  std::vector<double> rx, ry, rz;  ///< impulse on the first body [N s], as the law sees it (law_impulse);
+                                   ///< empty without friction
+  std::vector<double> rn;          ///< normal impulse [N s], likewise; empty with friction
+  std::vector<double> cohesion;    ///< c h [N s] (kernels/sweeps/cohesion.hpp); empty where nothing has any
   std::vector<double> mu;  ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Slot> first, second;  ///< second is -1 - feature at a wall: -1 at a plane
   /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.

@@ -23,6 +23,11 @@ std::int32_t law_of_range(const Candidates& candidates, const MaterialView& mate
 
 }  // namespace
 
+const PairLaw& law_at(const PairTable& table, const Candidates& candidates, const MaterialView& materials,
+                      std::size_t k) {
+  return table.laws()[law_of(candidates, materials, k)];
+}
+
 void note_laws(const Candidates& candidates, const MaterialView& materials, Chunks& chunks) {
   for (std::size_t c = 0; c < chunks.size(); ++c)
     chunks.law[c] = law_of_range(candidates, materials, static_cast<std::size_t>(chunks.begin[c]),
@@ -36,7 +41,7 @@ void set_friction(const Candidates& candidates, const Chunks& chunks, std::size_
   const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k)
     contacts.mu[k] =
-        table.laws()[law_of(candidates, materials, static_cast<std::size_t>(contacts.candidate[k]))].friction;
+        law_at(table, candidates, materials, static_cast<std::size_t>(contacts.candidate[k])).friction;
 }
 
 }  // namespace talus

@@ -29,6 +29,10 @@ struct MaterialView {
 /// Fills Chunks::law.
 void note_laws(const Candidates& candidates, const MaterialView& materials, Chunks& chunks);
 
+/// The law of candidate k.
+const PairLaw& law_at(const PairTable& table, const Candidates& candidates, const MaterialView& materials,
+                      std::size_t k);
+
 /// Friction of contact k, of this chunk.
 inline double friction_of(const PairTable& table, const Chunks& chunks, std::size_t chunk,
                           const Contacts& contacts, std::size_t k) {

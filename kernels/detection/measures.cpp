@@ -71,7 +71,7 @@ std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& c
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const auto begin = static_cast<std::size_t>(chunks.begin[c]);
     for (std::size_t k = begin; k < begin + static_cast<std::size_t>(contacts.count[c]); ++k) {
-      if (contact_impulse(contacts, k).dot(contact_normal(contacts, k)) <= 0) continue;
+      if (!is_active(contacts, k)) continue;
       ++touching[static_cast<std::size_t>(contacts.first[k])];
       if (contacts.second[k] >= 0) ++touching[static_cast<std::size_t>(contacts.second[k])];
     }

@@ -28,16 +28,26 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
                              std::span<const Vec3> x, std::span<const double> radius,
                              std::span<const Wall> walls, const Domain& domain = {});
 
-/// Its normal, and its impulse on the first body [N s], whatever the storage.
+/// Normal of a contact. Its impulse on the first body [N s], whatever the storage: as the law sees it,
+/// shifted by cohesion; and the one that the bodies feel.
 inline Vec3 contact_normal(const Contacts& contacts, std::size_t k) {
   return {contacts.nx[k], contacts.ny[k], contacts.nz[k]};
 }
-inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
+inline Vec3 law_impulse(const Contacts& contacts, std::size_t k) {
   if (contacts.rn.empty()) return {contacts.rx[k], contacts.ry[k], contacts.rz[k]};
   return contacts.rn[k] * contact_normal(contacts, k);
 }
+inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
+  const Vec3 impulse = law_impulse(contacts, k);
+  if (contacts.cohesion.empty()) return impulse;
+  return impulse - contacts.cohesion[k] * contact_normal(contacts, k);
+}
+/// Whether it carries: r_n > 0, or r_n + c h > 0 with cohesion.
+inline bool is_active(const Contacts& contacts, std::size_t k) {
+  return law_impulse(contacts, k).dot(contact_normal(contacts, k)) > 0;
+}
 
-/// Active contacts (r_n > 0) of each grain: one entry per slot.
+/// Active contacts of each grain: one entry per slot.
 std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies);
 
 }  // namespace talus

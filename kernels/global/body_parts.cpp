@@ -57,6 +57,20 @@ PartImpulses impulses_of(const BodyParts& parts) {
   return impulse;
 }
 
+void set_free(std::span<BodyProblem> parts, const PartLink& link) {
+  PartField known;
+  for (BodyProblem& part : parts) {
+    part.known.resize(part.bodies.size());
+    known.push_back(part.known);
+  }
+  link.sum_copies(known);
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (std::size_t b = 0; b < known[p].size(); ++b) {
+      velocity_from_force(parts[p].bodies[b], known[p][b]);
+      parts[p].bodies[b].free = known[p][b];
+    }
+}
+
 PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse) {
   PartField V = parts.field();
   parts.each([&](std::size_t p) {

@@ -74,6 +74,10 @@ class BodyParts {
 using PartImpulses = std::vector<std::vector<Vec3>>;
 PartImpulses impulses_of(const BodyParts& parts);
 
+/// Adds what contacts do besides r (BodyProblem::known) to the velocities without contacts, in all parts.
+/// Collective where a part has any.
+void set_free(std::span<BodyProblem> parts, const PartLink& link);
+
 /// V = V_free + M^-1 H r.
 PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse);
 

@@ -132,7 +132,11 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     }
     contact.place = static_cast<std::int32_t>(k);
     problem.contacts.push_back(contact);
-    problem.impulse.push_back(contact_impulse(contacts, k));
+    problem.impulse.push_back(law_impulse(contacts, k));
+    if (!contacts.cohesion.empty()) {
+      problem.known.resize(problem.bodies.size());
+      add_force(problem.contacts.back(), -contacts.cohesion[k] * contact.normal, problem.known);
+    }
   });
   return problem;
 }

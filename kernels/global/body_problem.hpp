@@ -59,10 +59,12 @@ struct ContactEquation {
 struct BodyProblem {
   std::vector<BodyUnknown> bodies;
   std::vector<ContactEquation> contacts;
-  std::vector<Vec3> impulse;         ///< r on the first body [N s], one per contact
-  std::size_t grains = 0;            ///< unknowns before the first wall
-  std::int32_t subdomain = 0;        ///< of all, whose part it is
-  std::vector<char> counts;          ///< per unknown: of its copies this one counts; empty: all do
+  std::vector<Vec3> impulse;   ///< r on the first body [N s], one per contact, shifted by cohesion
+  std::vector<Twist> known;    ///< per unknown: sum over the contacts of this part of what they do to it
+                               ///< besides r [N s]; empty where that is nothing
+  std::size_t grains = 0;      ///< unknowns before the first wall
+  std::int32_t subdomain = 0;  ///< of all, whose part it is
+  std::vector<char> counts;    ///< per unknown: of its copies this one counts; empty: all do
   std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
 
   bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }

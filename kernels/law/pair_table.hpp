@@ -15,6 +15,7 @@ namespace talus {
 struct PairLaw {
   double friction = 0;     ///< Coulomb's mu >= 0
   double restitution = 0;  ///< Newton's e in [0, 1], of the normal velocity
+  double cohesion = 0;     ///< force that parts two grains that touch, c >= 0 [N]
   bool operator==(const PairLaw&) const = default;
 };
 

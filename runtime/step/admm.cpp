@@ -147,7 +147,9 @@ std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
 }
 
 std::vector<BodyProblem> Admm::gather() const {
-  return gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
+  auto parts = gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
+  if (parameters_.laws.largest(&PairLaw::cohesion) > 0) set_free(parts, *link_);
+  return parts;
 }
 
 double Admm::sweeps_needed() const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/sweeps/cohesion.hpp"
 #include "runtime/graph/clock.hpp"
 
 namespace talus {
@@ -103,11 +104,15 @@ void ChunkWork::accumulate(std::size_t c, int epoch) {
     if (at_wall(c)) loosen(c, state_.copies[c], acceleration_);
   }
   reset_to_free(owned(c), state_.free, velocity);
-  if (!at_wall(c)) return kernels_.accumulate_grains<Friction>(state_.contacts, range, velocity);
+  if (!at_wall(c)) {
+    kernels_.accumulate_grains<Friction>(state_.contacts, range, velocity);
+    return pull_together(state_.contacts, range, velocity, nullptr);
+  }
   WallCopy& copy = state_.copies[c];
   const Vec3& free = state_.wall_states[static_cast<std::size_t>(state_.chunks.wall[c])].free_velocity;
   std::copy_n(free.data(), 3, copy.velocity);
   kernels_.accumulate_wall<Friction>(state_.contacts, range, velocity, copy);
+  pull_together(state_.contacts, range, velocity, &copy);
 }
 
 template <bool Friction>
@@ -121,6 +126,7 @@ void ChunkWork::measure(std::size_t c) {
     WallCopy whole = state_.copies[c];
     whole.inv_mass = state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass();
     errors_[c] = kernels_.error_wall<Friction>(contacts, range_of(c), velocity, friction_of(c), whole, parts);
+    Eigen::Map<Vec3>(errors_[c].wall_impulse) -= sum_of_cohesion(contacts, range_of(c));
   } else {
     errors_[c] = kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
   }

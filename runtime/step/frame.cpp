@@ -57,8 +57,7 @@ std::vector<Active> active_contacts(const StepState& state) {
     const std::int32_t begin = state.chunks.begin[c];
     for (std::int32_t k = begin; k < begin + state.contacts.count[c]; ++k) {
       const auto at = static_cast<std::size_t>(k);
-      if (contact_impulse(state.contacts, at).dot(contact_normal(state.contacts, at)) > 0)
-        active.push_back({k, static_cast<std::int32_t>(c)});
+      if (is_active(state.contacts, at)) active.push_back({k, static_cast<std::int32_t>(c)});
     }
   }
   return active;

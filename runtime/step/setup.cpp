@@ -46,6 +46,8 @@ void validate_laws(const Stage& stage) {
             fmt::format("stage '{}': friction must be finite and >= 0, got {}", stage.name, law.friction));
     require(law.restitution >= 0 && law.restitution <= 1,
             fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, law.restitution));
+    require(law.cohesion >= 0 && std::isfinite(law.cohesion),
+            fmt::format("stage '{}': cohesion must be finite and >= 0 N, got {}", stage.name, law.cohesion));
   }
 }
 

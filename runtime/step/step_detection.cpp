@@ -7,6 +7,7 @@
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/narrow_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
+#include "kernels/sweeps/cohesion.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
@@ -173,6 +174,8 @@ void StepGraph::make_chunks() {
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
   note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
+    state_.contacts.cohesion.resize(state_.candidates.size());
   const double planning = graph::seconds_now();
   loop_.plan();
   if (several) sums_.times.dealing += graph::seconds_now() - planning;
@@ -214,8 +217,10 @@ void StepGraph::narrow_share(std::uint32_t share) {
                        parameters_.laws, parameters_.gravity,   settings_.overlap_correction,
                        bodies.material};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
-  for (std::size_t c = range.begin; c < range.end; ++c)
+  for (std::size_t c = range.begin; c < range.end; ++c) {
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);
+    find_cohesion(in, state_.candidates, state_.chunks, c, state_.contacts);
+  }
 }
 
 }  // namespace talus

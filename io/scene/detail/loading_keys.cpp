@@ -127,8 +127,8 @@ Section<Stage> stage_keys() {
   for (Key<Stage>& law_key : stage_law_keys()) keys.push_back(std::move(law_key));
   return {"[[stage]]",
           "Stages run one after the other. What a stage does not give is that of the scene; loads of walls "
-          "stay as the stage before left them. Where materials have names, `friction` and `restitution` are "
-          "those of all pairs.",
+          "stay as the stage before left them. Where materials have names, what a stage says of contacts "
+          "holds for all pairs.",
           std::move(keys)};
 }
 

@@ -45,7 +45,9 @@ std::vector<Key<Part>> law_keys() {
                 return laws_of(part).between(material_of_grains, material_of_walls).friction;
               }),
           key_of_all<Part>("restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
-                           &PairLaw::restitution)};
+                           &PairLaw::restitution),
+          key_of_all<Part>("cohesion", "N", not_negative,
+                           "Force that parts grains that touch one another or a wall.", &PairLaw::cohesion)};
 }
 
 Section<PairSpec> pair_section(const char* header, const char* meaning, const std::string& otherwise) {
@@ -56,6 +58,7 @@ Section<PairSpec> pair_section(const char* header, const char* meaning, const st
   add(key<PairSpec>("friction", "", not_negative, "Coulomb friction.", &PairSpec::friction));
   add(key<PairSpec>("restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
                     &PairSpec::restitution));
+  add(key<PairSpec>("cohesion", "N", not_negative, "Force that parts what touches.", &PairSpec::cohesion));
   return {header, meaning, std::move(keys)};
 }
 
@@ -66,7 +69,7 @@ Section<Scene> material_keys() {
       key<Scene>("density", "kg/m³", positive, "Mass per volume of a grain.", &Scene::density).need()};
   for (Key<Scene>& law_key : law_keys<Scene>()) keys.push_back(std::move(law_key));
   return {"[material]",
-          "What the grains are made of, where all are of one material. Friction and restitution hold in the "
+          "What the grains are made of, where all are of one material. What is said of contacts holds in the "
           "stages that do not give their own.",
           std::move(keys)};
 }

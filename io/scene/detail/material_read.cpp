@@ -99,12 +99,8 @@ void read_stage_pairs(const toml::table& table, const std::string& path, const S
       fail_at(*pair, path + ".pair", "needs several materials: write [[material]] with a name for each");
     return;
   }
-  if (const auto friction = table["friction"].value<double>()) {
-    stage.laws = scene.common.laws;
+  if (const auto friction = table["friction"].value<double>())
     stage.laws.set_all(&PairLaw::friction, *friction);
-    if (const auto restitution = table["restitution"].value<double>())
-      stage.laws.set_all(&PairLaw::restitution, *restitution);
-  }
   read_pairs(table, path + ".pair", scene_keys().stage_pair, scene, stage.laws);
 }
 

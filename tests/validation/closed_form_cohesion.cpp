@@ -1,0 +1,110 @@
+/// Cohesion: what touches holds up to a force c.
+
+#include <gtest/gtest.h>
+
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation {
+namespace {
+
+constexpr double h = 1e-3, radius = 0.1, mass = 2, weight = mass * g_earth;
+
+/// Grains that hang from a ceiling, one below the other.
+Scene hanging(int grains, double c) {
+  Scene scene(h);
+  scene.wall("ceiling", Vec3::Zero(), -Vec3::UnitZ());
+  scene.stage().gravity = Vec3(0, 0, -g_earth);
+  scene.stage().laws.set_all(&PairLaw::cohesion, c);
+  for (int k = 0; k < grains; ++k) scene.sphere({0, 0, -radius - 2 * radius * k}, radius, mass);
+  return scene;
+}
+
+TEST(Cohesion, GrainHangsFromACeilingThatHoldsItsWeightAndFallsFromAWeakerOne) {
+  Experiment held(hanging(1, 1.001 * weight));
+  held.steps(500);
+  EXPECT_NEAR(held.x()[2], -radius, 1e-12);
+  EXPECT_NEAR(held.wall_force(0)[2], weight, 1e-9 * weight) << "the ceiling pulls it up";
+  Experiment falls(hanging(1, 0.999 * weight));
+  falls.steps(2000);
+  EXPECT_LT(falls.x()[2], -2 * radius);
+  EXPECT_EQ(falls.wall_force(0)[2], 0);
+}
+
+TEST(Cohesion, TwoGrainsHoldUpToCAndPartAboveIt) {
+  for (const bool holds : {true, false}) {
+    Scene scene = hanging(2, 1e6);
+    scene.stage().laws.between(material_of_grains, material_of_grains).cohesion =
+        (holds ? 1.001 : 0.999) * weight;
+    Experiment run(std::move(scene));
+    run.steps(2000);
+    EXPECT_NEAR(run.x(0)[2], -radius, 1e-12) << "the upper one hangs from the ceiling";
+    if (holds) {
+      EXPECT_NEAR(run.x(1)[2], -3 * radius, 1e-12);
+      EXPECT_NEAR(run.wall_force(0)[2], 2 * weight, 1e-9 * weight);
+      const Frame frame = run.simulation().frame();
+      ASSERT_EQ(frame.contact_force.size(), 2u);
+      for (std::size_t k = 0; k < 2; ++k)
+        if (frame.contact_bodies[k][1] >= 0)
+          EXPECT_NEAR(frame.contact_force[k].dot(frame.contact_normal[k]), -weight, 1e-9 * weight)
+              << "tension";
+    } else {
+      EXPECT_LT(run.x(1)[2], -4 * radius);
+      EXPECT_NEAR(run.wall_force(0)[2], weight, 1e-9 * weight);
+    }
+  }
+}
+
+// The cone of r_n + c: a block on a vertical wall is held by mu c.
+TEST(Cohesion, BlockSticksToAVerticalWallByFrictionOfItsCohesion) {
+  const double mu = 0.4;
+  for (const double part : {0.99, 1.01}) {
+    Scene scene(h);
+    scene.wall("wall", Vec3::Zero(), Vec3::UnitX());
+    scene.stage().gravity = Vec3(0, 0, -g_earth);
+    scene.friction(mu);
+    scene.stage().laws.set_all(&PairLaw::cohesion, part * weight / mu);
+    scene.setup.rotation = false;
+    scene.sphere({radius, 0, 0}, radius, mass);
+    Experiment run(std::move(scene));
+    run.steps(500);
+    EXPECT_NEAR(run.u()[2], -g_earth * std::max(0.0, 1 - part) * 500 * h, 1e-10) << part;
+    EXPECT_NEAR(run.wall_force(0)[0], 0, 1e-9 * weight) << "nothing presses it";
+  }
+}
+
+// A pushed wall is pulled by what sticks to it: it and the grain follow the force as one body.
+TEST(Cohesion, PushedWallDragsTheGrainThatSticksToIt) {
+  const double force = 3, wall_mass = 1;
+  Scene scene(h);
+  Wall& wall = scene.wall("wall", Vec3::Zero(), Vec3::UnitX());
+  wall.load.drive = WallDrive::force;
+  wall.load.force = -force;
+  wall.load.mass = wall_mass;
+  scene.stage().laws.set_all(&PairLaw::cohesion, 10);
+  scene.sphere({radius, 0, 0}, radius, mass);
+  Experiment run(std::move(scene));
+  run.steps(200);
+  EXPECT_NEAR(run.u()[0], -force / (mass + wall_mass) * 200 * h, 1e-10);
+  EXPECT_NEAR(run.wall_force(0)[0], -force * mass / (mass + wall_mass), 1e-9);
+}
+
+TEST(Cohesion, ChainHangsTheSameInOneSubdomainAndInSeveralAndByEveryMethod) {
+  const int grains = 12;
+  for (const SolverMethod& method :
+       {SolverMethod::nlgs, SolverMethod::automatic, SolverMethod::admm, SolverMethod::nncg})
+    for (const int subdomains : {1, 3}) {
+      Scene scene = hanging(grains, 1.5 * grains * weight);
+      scene.setup.solver.method = method;
+      scene.setup.solver.tolerance = 1e-8;
+      scene.setup.solver.balance_tolerance = 1e-3;
+      scene.setup.decomposition.subdomains = subdomains;
+      Experiment run(std::move(scene));
+      run.steps(20);
+      EXPECT_TRUE(run.simulation().report().converged) << subdomains;
+      EXPECT_NEAR(run.wall_force(0)[2], grains * weight, 2e-3 * grains * weight) << subdomains;
+      EXPECT_NEAR(run.x(grains - 1)[2], -(2 * grains - 1) * radius, 1e-6) << subdomains;
+    }
+}
+
+}  // namespace
+}  // namespace talus::validation
