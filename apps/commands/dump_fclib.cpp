@@ -13,6 +13,10 @@
 namespace talus {
 
 void check_dump(const Setup& setup, int ranks) {
+  for (const Stage& stage : setup.stages)
+    if (stage.laws.largest(&PairLaw::rolling_resistance) > 0)
+      throw std::invalid_argument(fmt::format(
+          "--dump-fclib: stage '{}' has rolling resistance, and FCLIB has no moments", stage.name));
   if (ranks > 1)
     throw std::invalid_argument(
         fmt::format("--dump-fclib works on one rank, this run has {}; run the step on one", ranks));

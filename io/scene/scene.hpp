@@ -64,6 +64,7 @@ struct PairSpec {
   std::optional<double> friction = {};
   std::optional<double> restitution = {};
   std::optional<double> cohesion = {};  ///< [N]
+  std::optional<double> rolling_resistance = {};
 };
 
 /// A number of a PairLaw, and where a PairSpec has it.
@@ -71,9 +72,11 @@ struct PairNumber {
   std::optional<double> PairSpec::*given;
   double PairLaw::*held;
 };
-inline constexpr std::array pair_numbers = {PairNumber{&PairSpec::friction, &PairLaw::friction},
-                                            PairNumber{&PairSpec::restitution, &PairLaw::restitution},
-                                            PairNumber{&PairSpec::cohesion, &PairLaw::cohesion}};
+inline constexpr std::array pair_numbers = {
+    PairNumber{&PairSpec::friction, &PairLaw::friction},
+    PairNumber{&PairSpec::restitution, &PairLaw::restitution},
+    PairNumber{&PairSpec::cohesion, &PairLaw::cohesion},
+    PairNumber{&PairSpec::rolling_resistance, &PairLaw::rolling_resistance}};
 
 /// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said
 /// there.

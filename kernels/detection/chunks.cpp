@@ -268,8 +268,9 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
     pair = {place[index(pair.first)], place[index(pair.second)]};
     if (pair.first < pair.second) continue;
     std::swap(pair.first, pair.second);
-    if (components == 3)  // a normal part alone does not know which body comes first
-      for (std::size_t c = 0; c < 3; ++c) candidates.impulse[3 * k + c] = -candidates.impulse[3 * k + c];
+    if (components > 1)  // a normal part alone does not know which body comes first
+      for (std::size_t c = components * k; c < components * (k + 1); ++c)
+        candidates.impulse[c] = -candidates.impulse[c];
   }
   for (WallPair& pair : candidates.wall_pairs) pair.body = place[index(pair.body)];
 

@@ -25,9 +25,9 @@ struct WallPair {
 struct Candidates {
   std::vector<GrainPair> grain_pairs;
   std::vector<WallPair> wall_pairs;
-  std::vector<double> impulse;  ///< per candidate: 3 components on the first body [N s]; or 1 (along the
-                                ///< normal) without friction
-  int components = 3;           ///< 3, or 1 without friction
+  std::vector<double> impulse;  ///< per candidate: 3 components on the first body [N s], and 3 of the moment
+                                ///< of rolling resistance [N m s]; or 1 (along the normal) without friction
+  int components = 3;           ///< 3, 6 with rolling resistance, 1 without friction
 
   std::size_t size() const { return grain_pairs.size() + wall_pairs.size(); }
 };

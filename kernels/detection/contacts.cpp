@@ -25,6 +25,8 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   }
   const bool mixed = std::ranges::find(chunks.law, mixed_laws) != chunks.law.end();
   contacts.mu.resize(friction && mixed ? n : 0);
+  for (auto* values : {&contacts.mx, &contacts.my, &contacts.mz, &contacts.arm})
+    values->resize(candidates.components == 6 ? n : 0);
   contacts.rn.resize(friction ? 0 : n);
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
@@ -52,13 +54,18 @@ void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t 
             candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components * room), 0.0);
   for (std::size_t a = begin; a < end; ++a) {
     const auto k = static_cast<std::size_t>(contacts.candidate[a]);
-    if (components == 3) {
-      candidates.impulse[3 * k] = contacts.rx[a];
-      candidates.impulse[3 * k + 1] = contacts.ry[a];
-      candidates.impulse[3 * k + 2] = contacts.rz[a];
-    } else {
-      candidates.impulse[k] = contacts.rn[a];
+    double* const to = &candidates.impulse[components * k];
+    if (components == 1) {
+      *to = contacts.rn[a];
+      continue;
     }
+    to[0] = contacts.rx[a];
+    to[1] = contacts.ry[a];
+    to[2] = contacts.rz[a];
+    if (components == 3) continue;
+    to[3] = contacts.mx[a];
+    to[4] = contacts.my[a];
+    to[5] = contacts.mz[a];
   }
 }
 
@@ -68,13 +75,18 @@ void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::s
   const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
   for (std::size_t a = begin; a < end; ++a) {
     const auto k = static_cast<std::size_t>(contacts.candidate[a]);
-    if (candidates.components == 3) {
-      contacts.rx[a] = candidates.impulse[3 * k];
-      contacts.ry[a] = candidates.impulse[3 * k + 1];
-      contacts.rz[a] = candidates.impulse[3 * k + 2];
-    } else {
-      contacts.rn[a] = candidates.impulse[k];
+    const double* const from = &candidates.impulse[static_cast<std::size_t>(candidates.components) * k];
+    if (candidates.components == 1) {
+      contacts.rn[a] = *from;
+      continue;
     }
+    contacts.rx[a] = from[0];
+    contacts.ry[a] = from[1];
+    contacts.rz[a] = from[2];
+    if (candidates.components == 3) continue;
+    contacts.mx[a] = from[3];
+    contacts.my[a] = from[4];
+    contacts.mz[a] = from[5];
   }
 }
 
@@ -96,11 +108,14 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
                           pair.feature, domain)
                    .normal;
     }
-    if (components == 3)
-      for (std::size_t c = 0; c < 3; ++c)
-        converted[3 * k + c] = candidates.impulse[k] * normal[static_cast<Eigen::Index>(c)];
+    const double* const from = &candidates.impulse[static_cast<std::size_t>(candidates.components) * k];
+    double* const to = &converted[static_cast<std::size_t>(components) * k];
+    const Vec3 impulse =
+        candidates.components == 1 ? Vec3(*from * normal) : Vec3(Eigen::Map<const Vec3>(from));
+    if (components == 1)
+      *to = std::max(0.0, impulse.dot(normal));
     else
-      converted[k] = std::max(0.0, Eigen::Map<const Vec3>(&candidates.impulse[3 * k]).dot(normal));
+      Eigen::Map<Vec3>{to} = impulse;  // moments begin at 0
   }
   candidates.impulse = std::move(converted);
   candidates.components = components;
@@ -109,7 +124,8 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
 std::size_t memory_used(const Contacts& contacts) {
   std::size_t bytes = 0;
   for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
-                             &contacts.ry, &contacts.rz, &contacts.rn, &contacts.mu, &contacts.cohesion})
+                             &contacts.ry, &contacts.rz, &contacts.rn, &contacts.mu, &contacts.cohesion,
+                             &contacts.mx, &contacts.my, &contacts.mz, &contacts.arm})
     bytes += values->capacity() * sizeof(double);
   return bytes +
          (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +

@@ -30,6 +30,8 @@ struct Contacts {
                                    ///< empty without friction
   std::vector<double> rn;          ///< normal impulse [N s], likewise; empty with friction
   std::vector<double> cohesion;    ///< c h [N s] (kernels/sweeps/cohesion.hpp); empty where nothing has any
+  std::vector<double> mx, my, mz;  ///< moment of rolling resistance on the first body [N m s], and
+  std::vector<double> arm;         ///< its bound over the normal impulse [m]; empty where nothing resists
   std::vector<double> mu;  ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Slot> first, second;  ///< second is -1 - feature at a wall: -1 at a plane
   /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.

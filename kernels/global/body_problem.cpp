@@ -99,6 +99,18 @@ ContactGraph graph_of(const BodyProblemSource& source, const BodyProblemPart* pa
   return graph;
 }
 
+/// What the moment of contact k does to the bodies of the last contact of `problem`.
+void add_moment(const Contacts& contacts, std::size_t k, BodyProblem& problem) {
+  const ContactEquation& contact = problem.contacts.back();
+  const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
+  const auto turn = [&](std::int32_t body, double sign) {
+    if (body < 0 || problem.bodies[at(body)].wall) return;
+    problem.known[at(body)].w += sign / problem.bodies[at(body)].radius * moment;
+  };
+  turn(contact.first, 1);
+  turn(contact.second, -1);
+}
+
 BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part) {
   ContactGraph graph = graph_of(source, part);
   BodyProblem problem;
@@ -133,8 +145,9 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     contact.place = static_cast<std::int32_t>(k);
     problem.contacts.push_back(contact);
     problem.impulse.push_back(law_impulse(contacts, k));
+    if (!contacts.cohesion.empty() || !contacts.arm.empty()) problem.known.resize(problem.bodies.size());
+    if (!contacts.arm.empty()) add_moment(contacts, k, problem);
     if (!contacts.cohesion.empty()) {
-      problem.known.resize(problem.bodies.size());
       add_force(problem.contacts.back(), -contacts.cohesion[k] * contact.normal, problem.known);
     }
   });

@@ -13,9 +13,10 @@ namespace talus {
 
 /// The law of the contacts between two materials.
 struct PairLaw {
-  double friction = 0;     ///< Coulomb's mu >= 0
-  double restitution = 0;  ///< Newton's e in [0, 1], of the normal velocity
-  double cohesion = 0;     ///< force that parts two grains that touch, c >= 0 [N]
+  double friction = 0;            ///< Coulomb's mu >= 0
+  double restitution = 0;         ///< Newton's e in [0, 1], of the normal velocity
+  double cohesion = 0;            ///< force that parts two grains that touch, c >= 0 [N]
+  double rolling_resistance = 0;  ///< mu_r >= 0 (kernels/law/rolling_law.hpp)
   bool operator==(const PairLaw&) const = default;
 };
 

@@ -148,7 +148,7 @@ std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
 
 std::vector<BodyProblem> Admm::gather() const {
   auto parts = gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
-  if (parameters_.laws.largest(&PairLaw::cohesion) > 0) set_free(parts, *link_);
+  if (parameters_.rolls || parameters_.laws.largest(&PairLaw::cohesion) > 0) set_free(parts, *link_);
   return parts;
 }
 
@@ -168,8 +168,8 @@ double Admm::velocity_error(double enough) const {
         const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
         const double* kept =
             &state_.candidates.impulse[from * static_cast<std::size_t>(state_.candidates.components)];
-        problem.impulse[k] = state_.candidates.components == 3 ? Vec3(Eigen::Map<const Vec3>(kept))
-                                                               : Vec3(kept[0] * problem.contacts[k].normal);
+        problem.impulse[k] = state_.candidates.components > 1 ? Vec3(Eigen::Map<const Vec3>(kept))
+                                                              : Vec3(kept[0] * problem.contacts[k].normal);
       }
   return talus::velocity_error(problems, *link_, enough).relative;
 }

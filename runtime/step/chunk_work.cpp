@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "kernels/sweeps/cohesion.hpp"
+#include "kernels/sweeps/rolling.hpp"
 #include "runtime/graph/clock.hpp"
 
 namespace talus {
@@ -104,6 +105,7 @@ void ChunkWork::accumulate(std::size_t c, int epoch) {
     if (at_wall(c)) loosen(c, state_.copies[c], acceleration_);
   }
   reset_to_free(owned(c), state_.free, velocity);
+  add_moments(state_.contacts, range, state_.bodies.radius, velocity);
   if (!at_wall(c)) {
     kernels_.accumulate_grains<Friction>(state_.contacts, range, velocity);
     return pull_together(state_.contacts, range, velocity, nullptr);
@@ -130,6 +132,7 @@ void ChunkWork::measure(std::size_t c) {
   } else {
     errors_[c] = kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
   }
+  add_error_of_moments(contacts, range_of(c), state_.bodies.radius, velocity, parts, errors_[c]);
   if (keep_impulses_) store_impulses(contacts, chunks, c, state_.candidates);
 }
 
@@ -162,6 +165,7 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
   } else {
     kernels_.sweep_grains<Friction>(contacts, range, velocity, friction);
   }
+  sweep_moments(contacts, range, state_.bodies.radius, velocity);
   if (damped)
     relax<Friction>(contacts, range, before_[c], state_.decomposition.multiplicity, velocity,
                     wall ? &copy : nullptr);

@@ -19,7 +19,7 @@ struct ImpulseRecord {
   std::int64_t first;
   std::int64_t second;   ///< -1 - wall at a wall
   std::int64_t feature;  ///< of the wall's surface; 0 elsewhere
-  double r[3];           ///< on the first body; r[0] alone without friction
+  double r[6];           ///< of the candidate, as many as it has components
 };
 
 std::size_t at(std::int32_t k) {

@@ -48,6 +48,12 @@ void validate_laws(const Stage& stage) {
             fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, law.restitution));
     require(law.cohesion >= 0 && std::isfinite(law.cohesion),
             fmt::format("stage '{}': cohesion must be finite and >= 0 N, got {}", stage.name, law.cohesion));
+    require(law.rolling_resistance >= 0 && std::isfinite(law.rolling_resistance),
+            fmt::format("stage '{}': rolling_resistance must be finite and >= 0, got {}", stage.name,
+                        law.rolling_resistance));
+    require(law.rolling_resistance == 0 || law.friction > 0,
+            fmt::format("stage '{}': rolling_resistance = {} needs friction: without it nothing rolls",
+                        stage.name, law.rolling_resistance));
   }
 }
 
@@ -90,6 +96,17 @@ void validate(const Setup& setup) {
       setup.solver.method != SolverMethod::momentum || setup.decomposition.coupling != Coupling::schwarz,
       "solver.method = \"nlgs+momentum\": Schwarz adds up what all copies of a body carry on, and diverges. "
       "Take \"auto\", or another decomposition.coupling");
+  if (std::ranges::any_of(setup.stages, [](const Stage& stage) {
+        return stage.laws.largest(&PairLaw::rolling_resistance) > 0;
+      })) {
+    require(setup.solver.method != SolverMethod::momentum && setup.solver.method != SolverMethod::nncg,
+            fmt::format("solver.method = \"{}\": moments of rolling resistance cannot be carried on. Take "
+                        "\"auto\" or \"nlgs\"",
+                        setup.solver.method.name()));
+    require(setup.decomposition.coupling != Coupling::schwarz,
+            "decomposition.coupling = \"schwarz\": moments of rolling resistance are not damped. Take "
+            "\"alternating\" or \"nscdd\"");
+  }
   require(setup.solver.check_every >= 2, "solver.check_every must be >= 2");
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,

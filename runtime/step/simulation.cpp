@@ -91,6 +91,7 @@ struct Simulation::Implementation {
     parameters.laws = stage.laws;
     parameters.friction = stage.laws.largest(&PairLaw::friction) > 0;
     parameters.rotates = parameters.friction && setup.rotation;
+    parameters.rolls = parameters.rotates && stage.laws.largest(&PairLaw::rolling_resistance) > 0;
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
     if (state.candidates_valid && !state.decomposition.several()) {
       // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt
@@ -105,7 +106,7 @@ struct Simulation::Implementation {
     if (state.candidates_valid) {
       // Forces outlive the change of stage, so impulses go with the time step.
       for (double& impulse : state.candidates.impulse) impulse *= stage.time_step / last_time_step;
-      convert_impulses(state.candidates, parameters.friction ? 3 : 1, state.bodies.x, state.walls);
+      convert_impulses(state.candidates, parameters.components(), state.bodies.x, state.walls);
       state.candidates_valid = false;
     }
     stage_steps = 0;

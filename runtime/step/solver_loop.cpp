@@ -166,7 +166,8 @@ void SolverLoop::begin() {
   problem_.begin();
   pending_.reset();
   schedule_ = {};
-  method_ = methods().of(settings_.method).make({settings_, parameters_.friction, schwarz()});
+  method_ =
+      methods().of(settings_.method).make({settings_, parameters_.friction, schwarz() || parameters_.rolls});
   begin_course(method_->begin(), 0);
 }
 

@@ -24,8 +24,11 @@ struct StepParameters {
   bool friction =
       false;             ///< any friction coefficient > 0: impulses have three components and grains may turn
   bool rotates = false;  ///< friction, and grains that rotate
-  double alert = 0;      ///< [m]
-  double skin = 0;       ///< [m]
+  bool rolls = false;    ///< some contacts resist rolling, of grains that rotate
+  /// Of the impulse of a candidate (Candidates::components).
+  int components() const { return rolls ? 6 : friction ? 3 : 1; }
+  double alert = 0;  ///< [m]
+  double skin = 0;   ///< [m]
 };
 
 /// Number of a chunk of this rank, as in Chunks.

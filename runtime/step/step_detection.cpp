@@ -8,6 +8,7 @@
 #include "kernels/detection/narrow_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/sweeps/cohesion.hpp"
+#include "kernels/sweeps/rolling.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
@@ -149,7 +150,7 @@ void StepGraph::make_chunks() {
   cells_ = {};
   const bool several = state_.decomposition.several();
   Candidates fresh;
-  fresh.components = parameters_.friction ? 3 : 1;
+  fresh.components = parameters_.components();
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
   for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x,
@@ -220,6 +221,7 @@ void StepGraph::narrow_share(std::uint32_t share) {
   for (std::size_t c = range.begin; c < range.end; ++c) {
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);
     find_cohesion(in, state_.candidates, state_.chunks, c, state_.contacts);
+    find_arms(in, state_.candidates, state_.chunks, c, state_.contacts);
   }
 }
 

@@ -6,6 +6,9 @@ namespace talus::io::detail {
 
 namespace {
 
+constexpr const char* rolling_meaning =
+    "Moment that resists rolling, over the normal force times the reduced radius; needs friction.";
+
 /// The laws of a scene or a stage.
 PairTable& laws_of(Stage& stage) {
   return stage.laws;
@@ -47,7 +50,9 @@ std::vector<Key<Part>> law_keys() {
           key_of_all<Part>("restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
                            &PairLaw::restitution),
           key_of_all<Part>("cohesion", "N", not_negative,
-                           "Force that parts grains that touch one another or a wall.", &PairLaw::cohesion)};
+                           "Force that parts grains that touch one another or a wall.", &PairLaw::cohesion),
+          key_of_all<Part>("rolling_resistance", "", not_negative, rolling_meaning,
+                           &PairLaw::rolling_resistance)};
 }
 
 Section<PairSpec> pair_section(const char* header, const char* meaning, const std::string& otherwise) {
@@ -59,6 +64,7 @@ Section<PairSpec> pair_section(const char* header, const char* meaning, const st
   add(key<PairSpec>("restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
                     &PairSpec::restitution));
   add(key<PairSpec>("cohesion", "N", not_negative, "Force that parts what touches.", &PairSpec::cohesion));
+  add(key<PairSpec>("rolling_resistance", "", not_negative, rolling_meaning, &PairSpec::rolling_resistance));
   return {header, meaning, std::move(keys)};
 }
 

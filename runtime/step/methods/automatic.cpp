@@ -20,10 +20,10 @@ struct AutomaticParameters {
 class Automatic : public Method {
  public:
   explicit Automatic(const MethodContext& context)
-      : schwarz_(context.schwarz),
+      : plain_(context.plain),
         most_(most_momentum(momentum_, context.friction, context.settings.tolerance)) {}
 
-  SweepPlan begin() const override { return schwarz_ ? SweepPlan{} : SweepPlan{SweepKind::momentum, most_}; }
+  SweepPlan begin() const override { return plain_ ? SweepPlan{} : SweepPlan{SweepKind::momentum, most_}; }
 
   std::optional<SweepPlan> after_check(const SweepPlan& now, double growth) const override {
     switch (now.kind) {
@@ -65,7 +65,7 @@ class Automatic : public Method {
   AutomaticParameters parameters_;
   MomentumParameters momentum_;
   ConjugateParameters conjugate_;
-  bool schwarz_;
+  bool plain_;
   double most_;
 };
 

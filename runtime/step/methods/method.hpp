@@ -17,8 +17,9 @@ namespace talus {
 struct MethodContext {
   const SolverSettings& settings;
   bool friction = false;
-  /// Damped Schwarz is no descent: what is carried on from it need not go down.
-  bool schwarz = false;
+  /// Sweeps whose changes cannot be carried on: damped Schwarz is no descent, and moments of rolling
+  /// resistance have no history.
+  bool plain = false;
 };
 
 /// What a check of a step tells its method about the problem as a whole. Answers beyond the counts may cost

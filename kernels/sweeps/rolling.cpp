@@ -1,0 +1,114 @@
+#include "kernels/sweeps/rolling.hpp"
+
+#include <algorithm>
+
+#include "kernels/detection/materials.hpp"
+#include "kernels/detection/measures.hpp"
+#include "kernels/law/rolling_law.hpp"
+
+namespace talus {
+
+namespace {
+
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// A body as moments see it: a sphere of radius 1 that nothing turns stands in for a wall.
+struct Turning {
+  double radius = 1;          ///< [m]
+  double mobility = 0;        ///< 1/I [1/(kg m^2)]
+  Vec3 omega = Vec3::Zero();  ///< [rad/s]
+};
+Turning turning_of(std::span<const double> radius, std::span<const Velocity> velocity, Slot slot) {
+  if (slot < 0) return {};
+  const Velocity& v = velocity[index(slot)];
+  const double r = radius[index(slot)];
+  return {r, v.spin_mobility / (r * r), Eigen::Map<const Vec3>(v.w) / r};
+}
+
+/// Contact k between `a` and `b`.
+Rolling rolling_of(const Contacts& contacts, std::size_t k, const Turning& a, const Turning& b) {
+  const Vec3 n = contact_normal(contacts, k), rate = a.omega - b.omega;
+  return {rate - rate.dot(n) * n, a.mobility + b.mobility,
+          contacts.arm[k] * std::max(0.0, law_impulse(contacts, k).dot(n))};
+}
+
+Vec3 moment_of(const Contacts& contacts, std::size_t k) {
+  return {contacts.mx[k], contacts.my[k], contacts.mz[k]};
+}
+
+/// Turns a body by the impulse of a moment [N m s].
+void turn(const Vec3& moment, std::span<const double> radius, std::span<Velocity> velocity, Slot slot) {
+  if (slot < 0) return;
+  Velocity& v = velocity[index(slot)];
+  Eigen::Map<Vec3> w(v.w);
+  w += v.spin_mobility / radius[index(slot)] * moment;
+}
+
+}  // namespace
+
+void find_arms(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
+               Contacts& contacts) {
+  if (contacts.arm.empty()) return;
+  const MaterialView materials{in.material, in.walls};
+  const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
+  for (std::size_t k = begin; k < end; ++k) {
+    const double mu = law_at(in.laws, candidates, materials, index(contacts.candidate[k])).rolling_resistance;
+    const double a = in.radius[index(contacts.first[k])];
+    const double b = contacts.second[k] < 0 ? a : in.radius[index(contacts.second[k])];
+    contacts.arm[k] = mu * (contacts.second[k] < 0 ? a : a * b / (a + b));
+  }
+}
+
+void sweep_moments(Contacts& contacts, ContactRange range, std::span<const double> radius,
+                   std::span<Velocity> velocity) {
+  if (contacts.arm.empty()) return;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const Slot first = contacts.first[k], second = contacts.second[k];
+    const Rolling contact =
+        rolling_of(contacts, k, turning_of(radius, velocity, first), turning_of(radius, velocity, second));
+    if (contact.mobility == 0) continue;
+    const Vec3 before = moment_of(contacts, k), after = solve_rolling(before, contact),
+               change = after - before;
+    turn(change, radius, velocity, first);
+    turn(-change, radius, velocity, second);
+    contacts.mx[k] = after[0];
+    contacts.my[k] = after[1];
+    contacts.mz[k] = after[2];
+  }
+}
+
+void add_moments(const Contacts& contacts, ContactRange range, std::span<const double> radius,
+                 std::span<Velocity> velocity) {
+  if (contacts.arm.empty()) return;
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const Vec3 moment = moment_of(contacts, k);
+    turn(moment, radius, velocity, contacts.first[k]);
+    turn(-moment, radius, velocity, contacts.second[k]);
+  }
+}
+
+void add_error_of_moments(const Contacts& contacts, ContactRange range, std::span<const double> radius,
+                          std::span<const Velocity> velocity, Multiplicities parts, ErrorSums& sums) {
+  if (contacts.arm.empty()) return;
+  const auto whole = [&](Slot slot) {
+    Turning body = turning_of(radius, velocity, slot);
+    if (slot >= 0 && !parts.empty()) body.mobility /= parts[index(slot)];
+    return body;
+  };
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const Turning a = whole(contacts.first[k]), b = whole(contacts.second[k]);
+    const Rolling contact = rolling_of(contacts, k, a, b);
+    if (contact.mobility == 0) continue;
+    const Vec3 moment = moment_of(contacts, k);
+    const double lever = contacts.second[k] < 0 ? a.radius : std::min(a.radius, b.radius);
+    const double error = lever * error_of_rolling(moment, contact);
+    sums.residual2 += error * error;
+    sums.residual_max2 = std::max(sums.residual_max2, error * error);
+    const double carried = lever * contact.mobility * moment.norm();
+    sums.impulse2 += carried * carried;
+  }
+}
+
+}  // namespace talus

@@ -1,0 +1,116 @@
+/// Materials, cohesion and rolling resistance on several ranks: same bits as on one.
+
+#include "io/results/results.hpp"
+#include "tests/mpi/launcher.hpp"
+
+namespace talus::test {
+namespace {
+
+/// Wet and dry grains that fall into a box, and are pressed then.
+const std::string mixed_scene = R"(name = "mixed"
+time_step = 1e-3
+gravity = [0, 0, -9.81]
+allow_unconverged = true
+box = true
+[[material]]
+name = "dry"
+density = 2600
+[[material]]
+name = "wet"
+density = 1500
+[[material]]
+name = "steel"
+density = 7800
+[[pair]]
+material = "dry"
+friction = 0.3
+restitution = 0.4
+rolling_resistance = 0.05
+[[pair]]
+material = "wet"
+friction = 0.6
+cohesion = 0.05
+rolling_resistance = 0.2
+[[pair]]
+material = "wet"
+with = "dry"
+friction = 0.4
+cohesion = 0.02
+[[pair]]
+material = "dry"
+with = "steel"
+friction = 0.2
+[[sample]]
+)";
+
+std::string scene_text() {
+  std::string text = mixed_scene;
+  text.replace(text.find("[[sample]]"), 10, R"([sample]
+kind = "bodies"
+file = "bodies.csv"
+[[wall]]
+name = "z-"
+material = "steel"
+[[stage]]
+end = { steps = 60 }
+[[stage]]
+restitution = 0
+[[stage.load]]
+wall = "x+"
+drive = "pressure"
+pressure = 500
+[stage.end]
+steps = 40
+[solver]
+max_iterations = 60
+[decomposition]
+repartition_every = 7
+[output]
+every_steps = 50
+pictures = false)");
+  return text;
+}
+
+std::string grains() {
+  std::string text = "id,x,y,z,radius,material\n";
+  for (int k = 0; k < 343; ++k)
+    text += fmt::format("{},{},{},{},{},{}\n", k, 0.0201 * (k % 7) + 0.0003 * (k / 49), 0.0201 * (k / 7 % 7),
+                        0.0201 * (k / 49), 0.0095 + 0.0001 * (k % 5), k % 3 == 0 ? "wet" : "dry");
+  return text;
+}
+
+class MaterialsOnRanks : public OnRanks {
+ protected:
+  void SetUp() override {
+    write(at("bodies.csv"), grains());
+    write(at("scene.toml"), scene_text());
+  }
+};
+
+TEST_F(MaterialsOnRanks, ChangeNoBitWithRanksAndThreads) {
+  for (const int subdomains : {1, 8}) {
+    const std::string command = fmt::format("run scene.toml --set decomposition.subdomains={}", subdomains);
+    const std::string one = fmt::format("one{}", subdomains);
+    const Outcome alone = run(1, fmt::format("{} --out {} --threads 1", command, one));
+    ASSERT_EQ(alone.code, 0) << alone.messages;
+    const std::size_t last = io::frame_count(at(one) / "results.h5") - 1;
+    const Frame a = io::read_frame(at(one) / "results.h5", last);
+    ASSERT_EQ(a.material.size(), 343u);
+    for (std::size_t k = 0; k < 343; ++k) EXPECT_EQ(a.material[k], k % 3 == 0 ? 1 : 0);
+    for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {2, 2}}) {
+      if (ranks > subdomains) continue;
+      const std::string out = fmt::format("s{}r{}x{}", subdomains, ranks, threads);
+      const Outcome other = run(ranks, fmt::format("{} --out {} --threads {}", command, out, threads));
+      ASSERT_EQ(other.code, 0) << out << ": " << other.messages;
+      EXPECT_EQ(digest_of(out), digest_of(one)) << out;
+      EXPECT_EQ(file(out, "walls.csv"), file(one, "walls.csv")) << out;
+      const Frame b = io::read_frame(at(out) / "results.h5", last);
+      EXPECT_EQ(a.contact_bodies, b.contact_bodies) << out;
+      EXPECT_EQ(a.contact_force, b.contact_force) << out;
+      EXPECT_EQ(a.material, b.material) << out;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace talus::test

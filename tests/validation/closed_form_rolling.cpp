@@ -1,0 +1,99 @@
+/// Rolling resistance: a contact carries a moment of at most mu_r l r_n.
+
+#include <gtest/gtest.h>
+
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation {
+namespace {
+
+constexpr double h = 1e-3, radius = 0.1, mu = 0.9;
+
+Scene on_slope(double angle, double resistance, const Vec3& u = Vec3::Zero()) {
+  Scene scene(h);
+  scene.slope(angle);
+  scene.friction(mu);
+  scene.stage().laws.set_all(&PairLaw::rolling_resistance, resistance);
+  Velocity& ball = scene.sphere({0, 0, radius}, radius, 2, u);
+  ball.w[1] = u[0];
+  return scene;
+}
+
+// l = R at a plane: rest up to tan(angle) = mu_r l/R = mu_r.
+TEST(RollingResistance, BallOnASlopeRestsBelowTheAngleOfRollingAndRollsAboveIt) {
+  const double resistance = 0.2, limit = std::atan(resistance);
+  for (const double angle : {0.3 * limit, 0.999 * limit, 1.001 * limit, 2 * limit}) {
+    Experiment run(on_slope(angle, resistance));
+    run.steps(400);
+    const double t = 400 * h;
+    const double a = angle < limit ? 0 : g_earth * (std::sin(angle) - resistance * std::cos(angle)) / 1.4;
+    EXPECT_NEAR(run.u()[0], a * t, 1e-9) << angle;
+    EXPECT_NEAR(run.w()[1], a * t, 1e-9) << angle << ": rolls without slip";
+    EXPECT_NEAR(run.x()[0], 0.5 * a * t * t, 1e-9) << angle;
+    EXPECT_TRUE(run.simulation().report().converged);
+  }
+}
+
+TEST(RollingResistance, BallThatRollsOnAFloorSlowsDownEvenlyAndThenRests) {
+  const double resistance = 0.05, u = 0.4, a = resistance * g_earth / 1.4, stops = u / a;
+  Experiment run(on_slope(0, resistance, {u, 0, 0}));
+  const auto half = static_cast<std::int64_t>(0.5 * stops / h);
+  run.steps(half);
+  EXPECT_NEAR(run.u()[0], u - a * static_cast<double>(half) * h, 1e-9);
+  run.steps(static_cast<std::int64_t>(stops / h));
+  EXPECT_NEAR(run.u()[0], 0, 1e-10);
+  EXPECT_NEAR(run.w()[1], 0, 1e-10);
+}
+
+TEST(RollingResistance, ThatIsLargeHoldsABallWhereFrictionHoldsABlock) {
+  const double angle = 0.5;
+  Experiment held(on_slope(angle, 10));
+  held.steps(200);
+  EXPECT_NEAR(held.u()[0], 0, 1e-10);
+  Experiment slides(on_slope(1.0, 10));  // tan > mu: it slides as a block
+  slides.steps(200);
+  EXPECT_NEAR(slides.u()[0], g_earth * (std::sin(1.0) - mu * std::cos(1.0)) * 200 * h, 1e-9);
+  EXPECT_NEAR(slides.w()[1], 0, 1e-9);
+}
+
+// Two unequal grains that meet while they roll on one another: the moment is bound by the reduced radius.
+TEST(RollingResistance, MomentBetweenGrainsIsBoundByTheReducedRadius) {
+  const double r1 = 0.1, r2 = 0.3, resistance = 0.01;
+  Scene scene(h);
+  scene.friction(mu);
+  scene.stage().laws.set_all(&PairLaw::rolling_resistance, resistance);
+  Velocity& first = scene.sphere({-r1, 0, 0}, r1, 1, {1, 0, 0});
+  Velocity& second = scene.sphere({r2, 0, 0}, r2, 5, {-1, 0, 0});
+  first.w[2] = 4;
+  second.w[2] = -4;  // no slip at the contact
+  Experiment run(std::move(scene));
+  run.step();
+  const Contacts& contacts = run.simulation().state().contacts;
+  ASSERT_EQ(contacts.count[0], 1);
+  const Vec3 moment(contacts.mx[0], contacts.my[0], contacts.mz[0]);
+  const double r_n = contacts.rx[0] * contacts.nx[0] + contacts.ry[0] * contacts.ny[0];
+  EXPECT_NEAR(r_n, 2.0 / (1 + 1.0 / 5), 1e-9) << "they move on as one";
+  EXPECT_NEAR(moment.norm(), resistance * r1 * r2 / (r1 + r2) * r_n, 1e-12);
+  EXPECT_NEAR(moment[0], 0, 1e-15) << "none about the normal";
+  const double spin = contacts.first[0] == static_cast<Slot>(run.slot(0)) ? 1 : -1;
+  EXPECT_LT(spin * moment[2], 0) << "against the rolling of the first";
+}
+
+TEST(RollingResistance, OfALineOfBallsIsTheSameInOneSubdomainAndInSeveral) {
+  const double resistance = 0.1, angle = 0.3;
+  for (const int subdomains : {1, 4}) {
+    Scene scene(h);
+    scene.slope(angle);
+    scene.friction(mu);
+    scene.stage().laws.set_all(&PairLaw::rolling_resistance, resistance);
+    for (int k = 0; k < 16; ++k) scene.sphere({0, 0.2001 * k, radius}, radius, 2);
+    scene.setup.decomposition.subdomains = subdomains;
+    Experiment run(std::move(scene));
+    run.steps(200);
+    const double a = g_earth * (std::sin(angle) - resistance * std::cos(angle)) / 1.4;
+    for (int k = 0; k < 16; ++k) EXPECT_NEAR(run.u(k)[0], a * 200 * h, 1e-9) << subdomains << ' ' << k;
+  }
+}
+
+}  // namespace
+}  // namespace talus::validation
