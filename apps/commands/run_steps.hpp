@@ -32,8 +32,8 @@ struct PreparedRun {
 /// From now on SIGINT and SIGTERM end a run after the step it is in, with all its files whole.
 void stop_on_signals();
 
-/// Collective. Runs from the first file of the results to the last; rank 0 has the sample. What breaks the run
-/// off is in the summary. Throws what the constructor of io::Recorder throws.
+/// Collective. Runs from the first file of the results to the last; rank 0 has the sample. What breaks the
+/// run off is in the summary. Throws what the constructor of io::Recorder throws.
 io::Summary simulate(const PreparedRun& run, Sample sample);
 
 }  // namespace talus

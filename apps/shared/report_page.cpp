@@ -1,10 +1,30 @@
 #include "apps/shared/report_page.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "io/files/output_directory.hpp"
+#include "io/results/run_json.hpp"
+#include "io/results/version.hpp"
 
 namespace talus {
+
+std::string where_and_when() {
+  const io::Provenance provenance = io::collect_provenance();
+  return fmt::format("Talus {} ({}) on {}, {} cores for this process, {}.", io::version(),
+                     provenance.git_hash, provenance.host, provenance.cores_allowed, provenance.date_utc);
+}
+
+io::Chart empty_chart(const std::string& name, const std::string& title, const std::string& subtitle,
+                      const std::string& x_label, const std::string& y_label) {
+  return io::Chart{.name = name,
+                   .title = title,
+                   .subtitle = subtitle,
+                   .x_label = x_label,
+                   .y_label = y_label,
+                   .series = {}};
+}
 
 void add_chart(ReportPage& report, io::Chart chart, const std::string& sentence, io::HtmlTable table) {
   report.sections.push_back({chart.title, sentence, io::draw_chart(chart), std::move(table)});

@@ -22,6 +22,13 @@ struct ReportPage {
   std::vector<io::HtmlSection> sections;
 };
 
+/// "Talus 0.1 (commit) on a host, 2 cores for this process, date.": where and when a study was made.
+std::string where_and_when();
+
+/// A chart without curves.
+io::Chart empty_chart(const std::string& name, const std::string& title, const std::string& subtitle,
+                      const std::string& x_label, const std::string& y_label);
+
 /// A picture, on the page under its title with a sentence above and a table below.
 void add_chart(ReportPage& report, io::Chart chart, const std::string& sentence, io::HtmlTable table = {});
 

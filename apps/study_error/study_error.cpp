@@ -13,6 +13,8 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
+#include "apps/shared/report_page.hpp"
+#include "apps/shared/say.hpp"
 #include "apps/study_error/study_problem.hpp"
 #include "apps/study_error/study_profile.hpp"
 #include "apps/study_error/study_report.hpp"
@@ -20,8 +22,6 @@
 #include "apps/study_error/study_variants.hpp"
 #include "io/fclib/fclib.hpp"
 #include "io/files/output_directory.hpp"
-#include "io/results/run_json.hpp"
-#include "io/results/version.hpp"
 #include "runtime/step/methods/method.hpp"
 
 namespace talus {
@@ -29,10 +29,6 @@ namespace talus {
 namespace {
 
 namespace fs = std::filesystem;
-
-void say(const std::string& line) {
-  fmt::print(stderr, "talus: {}\n", line);
-}
 
 template <class T>
 std::vector<T> without_repeats(const std::vector<T>& values) {
@@ -71,12 +67,6 @@ StudyPlan plan_of(const StudyErrorOptions& options, std::uint64_t scene_seed) {
   return plan;
 }
 
-std::string where_and_when() {
-  const io::Provenance provenance = io::collect_provenance();
-  return fmt::format("Measured with Talus {} ({}) on {}, {} cores for this process, {}.", io::version(),
-                     provenance.git_hash, provenance.host, provenance.cores_allowed, provenance.date_utc);
-}
-
 /// What a run of the scene would find out late. Throws std::invalid_argument.
 void check_lengths(const io::Scene& scene, const StudyPlan& plan, const std::string& only) {
   const double last = most_steps(scene.setup.stages);
@@ -112,7 +102,7 @@ int study_scene(const StudyErrorOptions& options) {
   const io::Scene& scene = samples.front().scene;
   const std::string title = fmt::format("{}: error against run time", scene.name);
   const std::string introduction = (scene.description.empty() ? "" : scene.description + ". ") +
-                                   where_and_when() +
+                                   "Measured with " + where_and_when() +
                                    " Times are medians of three where a solve takes less than " +
                                    fmt::format("{:g} s. The tables are beside this page.", cheap_solve);
   say(fmt::format("{}: {} grains, {} ways to solve", scene.name, samples.front().bodies.size(),
@@ -160,10 +150,11 @@ int study_folder(const StudyErrorOptions& options) {
     return exit_bad_input;
   }
   const std::string introduction =
-      where_and_when() + fmt::format(
-                             " A solve may take {:g} s; times are medians of three where it takes less than "
-                             "{:g} s. The tables are beside this page.",
-                             options.max_seconds, cheap_solve);
+      "Measured with " + where_and_when() +
+      fmt::format(
+          " A solve may take {:g} s; times are medians of three where it takes less than "
+          "{:g} s. The tables are beside this page.",
+          options.max_seconds, cheap_solve);
   std::vector<ProfileRow> rows;
   const auto keep = [&] {
     ReportPage report;
@@ -172,8 +163,8 @@ int study_folder(const StudyErrorOptions& options) {
     report_profile(rows, report);
     write_report(directory, report);
   };
-  study_profile(folder, methods, descending(options.tolerances, {1e-4, 1e-8}), options.max_seconds, say, keep,
-                rows);
+  study_profile(folder, {methods, descending(options.tolerances, {1e-4, 1e-8}), options.max_seconds}, say,
+                keep, rows);
   say(fmt::format("tables, picture and report.html in {}", directory));
   std::set<std::string> solved, problems, names;
   for (const auto& [tolerance, solve] : rows) {

@@ -54,11 +54,10 @@ void check_profile(const fs::path& folder, std::span<const std::string> methods)
   io::fclib_files(folder);
 }
 
-void study_profile(const fs::path& folder, std::span<const std::string> methods,
-                   std::span<const double> tolerances, double max_seconds,
+void study_profile(const fs::path& folder, const ProfilePlan& plan,
                    const std::function<void(const std::string&)>& say, const std::function<void()>& keep,
                    std::vector<ProfileRow>& rows) {
-  const std::vector<DelassusMethod> chosen = methods_named(methods);
+  const std::vector<DelassusMethod> chosen = methods_named(plan.methods);
   const std::vector<io::FclibFile> files = io::fclib_files(folder);
   for (std::size_t k = 0; k < files.size(); ++k) {
     DelassusProblem problem;
@@ -69,8 +68,10 @@ void study_profile(const fs::path& folder, std::span<const std::string> methods,
       continue;
     }
     for (const DelassusMethod method : chosen)
-      for (const double tolerance : tolerances) {
-        const auto solve = [&] { return solve_once(problem, files[k].name, method, tolerance, max_seconds); };
+      for (const double tolerance : plan.tolerances) {
+        const auto solve = [&] {
+          return solve_once(problem, files[k].name, method, tolerance, plan.max_seconds);
+        };
         SolveRow row = solve();
         std::vector<double> seconds{row.seconds};
         while (row.seconds < cheap_solve && seconds.size() < 3) seconds.push_back(solve().seconds);

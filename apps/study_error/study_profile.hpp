@@ -23,11 +23,17 @@ std::vector<std::string> profile_methods();
 /// known.
 void check_profile(const std::filesystem::path& folder, std::span<const std::string> methods);
 
-/// Solves every FCLIB file of the folder (io::fclib_files) with every method and tolerance, in at most
-/// `max_seconds` each, and appends the rows; `keep` is called behind each file. A file that cannot be read is
+/// How FCLIB problems are solved for a performance profile.
+struct ProfilePlan {
+  std::vector<std::string> methods;  ///< of profile_methods()
+  std::vector<double> tolerances;
+  double max_seconds = 60;  ///< of one solve
+};
+
+/// Solves every FCLIB file of the folder (io::fclib_files) with every method and tolerance of the plan, and
+/// appends the rows; `keep` is called behind each file. A file that cannot be read is
 /// said and left out. Throws io::FileError when none can, std::invalid_argument when a method is not known.
-void study_profile(const std::filesystem::path& folder, std::span<const std::string> methods,
-                   std::span<const double> tolerances, double max_seconds,
+void study_profile(const std::filesystem::path& folder, const ProfilePlan& plan,
                    const std::function<void(const std::string&)>& say, const std::function<void()>& keep,
                    std::vector<ProfileRow>& rows);
 

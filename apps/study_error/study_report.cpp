@@ -92,9 +92,8 @@ io::HtmlTable times_to_tolerance(const std::vector<io::ChartSeries>& in_seconds,
   return table;
 }
 
-}  // namespace
-
-void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage& report) {
+/// residual.csv and true_error.csv.
+void add_tables(const ProblemStudy& study, ReportPage& report) {
   io::CsvTable residual(
       {"method", "subdomains", "threads", "seed", "start", "sweeps", "seconds", "error_rms"});
   for (const ResidualRow& r : study.residual)
@@ -109,35 +108,28 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage
               r.velocity_error, r.wall_force_error, r.converged);
   report.tables.emplace_back("residual.csv", residual.text());
   report.tables.emplace_back("true_error.csv", truth.text());
+}
 
-  const ProblemReference& reference = study.references.front();
-  const std::string subtitle =
-      fmt::format("step {}: {} grains, {} contacts", reference.step, reference.bodies, reference.contacts);
-  const std::string honesty = fmt::format(
-      " The reference was solved with {} to a residual of {:.1e} and a balance of {:.1e}{}; with friction "
-      "forces, and to a lesser degree velocities, are not unique, so that curves may level off above it.",
-      reference.method, reference.error_rms, reference.balance,
-      reference.converged ? ""
-                          : fmt::format(" ({:.1e} and {:.1e} were wanted)", reference.tolerance,
-                                        reference.balance_tolerance));
-  const std::string residual_label = "residual: relative error of the contact law  [1]";
-  const std::string velocity_label = "velocity error, kinetic norm, relative  [1]";
-  const std::string seconds_label = "elapsed time of the iterations  [s]", sweeps_label = "sweeps  [1]";
-  const auto by_seconds = [](const auto& r) { return std::array<double, 2>{r.seconds, r.error_rms}; };
-  const auto by_sweeps = [](const auto& r) {
-    return std::array<double, 2>{static_cast<double>(r.sweeps), r.error_rms};
-  };
-  const auto chart = [&](const char* name, const std::string& title, const std::string& x,
-                         const std::string& y) {
-    return io::Chart{
-        .name = name, .title = title, .subtitle = subtitle, .x_label = x, .y_label = y, .series = {}};
-  };
+const char* const residual_label = "residual: relative error of the contact law  [1]";
+const char* const velocity_label = "velocity error, kinetic norm, relative  [1]";
+const char* const seconds_label = "elapsed time of the iterations  [s]";
+const char* const sweeps_label = "sweeps  [1]";
+
+/// The error of the contact law, which every method can be asked for.
+void add_residual_charts(const std::vector<ResidualRow>& rows, const StudyPlan& plan,
+                         const std::string& subtitle, ReportPage& report) {
   io::Chart sweeps = solve_chart(
-      study.residual, plan, chart("residual_sweeps", "Residual against sweeps", sweeps_label, residual_label),
-      by_sweeps);
+      rows, plan,
+      empty_chart("residual_sweeps", "Residual against sweeps", subtitle, sweeps_label, residual_label),
+      [](const ResidualRow& r) {
+        return std::array<double, 2>{static_cast<double>(r.sweeps), r.error_rms};
+      });
   io::Chart seconds = solve_chart(
-      study.residual, plan,
-      chart("residual_seconds", "Residual against run time", seconds_label, residual_label), by_seconds);
+      rows, plan,
+      empty_chart("residual_seconds", "Residual against run time", subtitle, seconds_label, residual_label),
+      [](const ResidualRow& r) {
+        return std::array<double, 2>{r.seconds, r.error_rms};
+      });
   for (io::Chart* of : {&sweeps, &seconds})
     for (const double tolerance : plan.tolerances)
       of->levels.push_back({tolerance, fmt::format("tol. {:g}", tolerance)});
@@ -151,44 +143,70 @@ void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage
             "The same against the number of sweeps over all contacts: what is left of a difference when the "
             "cost of "
             "a sweep is taken out.");
-  add_chart(
-      report,
-      solve_chart(study.truth, plan,
-                  chart("velocity_seconds", "Velocity error against run time", seconds_label, velocity_label),
-                  [](const TrueErrorRow& r) {
-                    return std::array<double, 2>{r.seconds, r.velocity_error};
-                  }),
-      "How far the velocities that a solve hands back after a given time are from the reference, over "
-      "the largest of the velocities themselves, what the contacts changed in them, and what a wall's "
-      "impulse would give to all grains." +
-          honesty);
-  add_chart(
-      report,
-      solve_chart(study.truth, plan,
-                  chart("velocity_sweeps", "Velocity error against sweeps", sweeps_label, velocity_label),
-                  [](const TrueErrorRow& r) {
-                    return std::array<double, 2>{static_cast<double>(r.sweeps), r.velocity_error};
-                  }),
-      "The same against sweeps.");
-  if (std::ranges::any_of(study.truth, [](const auto& r) { return !std::isnan(r.wall_force_error); }))
-    add_chart(report,
-              solve_chart(study.truth, plan,
-                          chart("wall_forces_seconds", "Error of the wall forces against run time",
-                                seconds_label, "largest error of a wall's force, relative  [1]"),
-                          [](const TrueErrorRow& r) {
-                            return std::array<double, 2>{r.seconds, r.wall_force_error};
-                          }),
-              "What an experiment would measure: by how much the force on the worst wall differs from the "
-              "reference, over the largest of them.");
-  add_chart(report,
-            solve_chart(study.truth, plan,
-                        chart("velocity_residual", "Does the residual tell the truth?", residual_label,
-                              velocity_label),
-                        [](const TrueErrorRow& r) {
-                          return std::array<double, 2>{r.error_rms, r.velocity_error};
-                        }),
-            "Velocity error against residual, both of the same solve: where a curve lies far above the other "
-            "ones, a small residual promises too much.");
+}
+
+/// What solves of one step are compared in: where a row stands in a picture, and what is said above it.
+struct TruthPicture {
+  const char *name, *title, *x_label, *y_label;
+  double (*x)(const TrueErrorRow&);
+  double (*y)(const TrueErrorRow&);
+  std::string sentence;
+};
+
+std::vector<TruthPicture> truth_pictures(const ProblemReference& reference, bool wall_forces) {
+  const auto seconds = [](const TrueErrorRow& r) { return r.seconds; };
+  const auto sweeps = [](const TrueErrorRow& r) { return static_cast<double>(r.sweeps); };
+  const auto velocity = [](const TrueErrorRow& r) { return r.velocity_error; };
+  const std::string honesty = fmt::format(
+      " The reference was solved with {} to a residual of {:.1e} and a balance of {:.1e}{}; with friction "
+      "forces, and to a lesser degree velocities, are not unique, so that curves may level off above it.",
+      reference.method, reference.error_rms, reference.balance,
+      reference.converged ? ""
+                          : fmt::format(" ({:.1e} and {:.1e} were wanted)", reference.tolerance,
+                                        reference.balance_tolerance));
+  std::vector<TruthPicture> pictures = {
+      {"velocity_seconds", "Velocity error against run time", seconds_label, velocity_label, seconds,
+       velocity,
+       "How far the velocities that a solve hands back after a given time are from the reference, over "
+       "the largest of the velocities themselves, what the contacts changed in them, and what a wall's "
+       "impulse would give to all grains." +
+           honesty},
+      {"velocity_sweeps", "Velocity error against sweeps", sweeps_label, velocity_label, sweeps, velocity,
+       "The same against sweeps."}};
+  if (wall_forces)
+    pictures.push_back(
+        {"wall_forces_seconds", "Error of the wall forces against run time", seconds_label,
+         "largest error of a wall's force, relative  [1]", seconds,
+         [](const TrueErrorRow& r) { return r.wall_force_error; },
+         "What an experiment would measure: by how much the force on the worst wall differs from the "
+         "reference, over the largest of them."});
+  pictures.push_back(
+      {"velocity_residual", "Does the residual tell the truth?", residual_label, velocity_label,
+       [](const TrueErrorRow& r) { return r.error_rms; }, velocity,
+       "Velocity error against residual, both of the same solve: where a curve lies far above the other "
+       "ones, a small residual promises too much."});
+  return pictures;
+}
+
+}  // namespace
+
+void report_problem(const ProblemStudy& study, const StudyPlan& plan, ReportPage& report) {
+  add_tables(study, report);
+  const ProblemReference& reference = study.references.front();
+  const std::string subtitle =
+      fmt::format("step {}: {} grains, {} contacts", reference.step, reference.bodies, reference.contacts);
+  add_residual_charts(study.residual, plan, subtitle, report);
+  const bool wall_forces =
+      std::ranges::any_of(study.truth, [](const auto& r) { return !std::isnan(r.wall_force_error); });
+  for (const TruthPicture& picture : truth_pictures(reference, wall_forces))
+    add_chart(
+        report,
+        solve_chart(study.truth, plan,
+                    empty_chart(picture.name, picture.title, subtitle, picture.x_label, picture.y_label),
+                    [&](const TrueErrorRow& r) {
+                      return std::array<double, 2>{picture.x(r), picture.y(r)};
+                    }),
+        picture.sentence);
 }
 
 void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& report) {
@@ -205,12 +223,7 @@ void report_runs(const RunStudy& study, const StudyPlan& plan, ReportPage& repor
   const auto chart = [&](const char* name, const char* title, const char* y_label, double RunRow::*value) {
     std::vector<Named<RunRow>> named;
     for (const RunRow& row : study.rows) named.push_back({row});
-    io::Chart out{.name = name,
-                  .title = title,
-                  .subtitle = subtitle,
-                  .x_label = "elapsed time of all steps  [s]",
-                  .y_label = y_label,
-                  .series = {}};
+    io::Chart out = empty_chart(name, title, subtitle, "elapsed time of all steps  [s]", y_label);
     out.series = series_of(
         named,
         [&](const Named<RunRow>& row) {

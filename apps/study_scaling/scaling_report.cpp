@@ -5,16 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <regex>
 #include <string_view>
 
 #include "apps/shared/child_process.hpp"
 #include "io/files/csv_table.hpp"
 #include "io/files/output_directory.hpp"
-#include "io/results/run_json.hpp"
-#include "io/results/version.hpp"
-#include "io/scene/scene_error.hpp"
 
 namespace talus {
 
@@ -78,12 +74,7 @@ void add_curves(const std::vector<ScalingRow>& rows, ScalingKind kind, X x, Y y,
 }
 
 io::Chart chart_of(const char* name, const std::string& title, const std::string& x, const std::string& y) {
-  return io::Chart{.name = name,
-                   .title = title,
-                   .subtitle = "dashed: predicted, nothing of it was measured",
-                   .x_label = x,
-                   .y_label = y,
-                   .series = {}};
+  return empty_chart(name, title, "dashed: predicted, nothing of it was measured", x, y);
 }
 
 double cores(const ScalingRow& row) {
@@ -133,27 +124,25 @@ bool any_of_kind(const std::vector<ScalingRow>& rows, ScalingKind kind) {
 }
 
 std::string introduction_of(const ScalingReport& report) {
-  const io::Provenance provenance = io::collect_provenance();
   std::string text = report.description.empty() ? "" : report.description + ". ";
-  text += fmt::format("Talus {} ({}) on {}, {} cores for this process, {}. Means over steps {} to {}. ",
-                      io::version(), provenance.git_hash, provenance.host, provenance.cores_allowed,
-                      provenance.date_utc, report.first, report.last);
+  text +=
+      fmt::format("{} Means over steps {} to {}. ", where_and_when(), report.plan.first, report.plan.last);
   text +=
       "Measured: medians of runs that took turns, their range in brackets. Predicted: a run on one rank and "
       "thread with as many subdomains was recorded, and its tasks were played on the machine; nothing of it "
       "was measured there. Networks:";
-  for (const ScalingNetwork& network : report.networks)
+  for (const ScalingNetwork& network : report.plan.networks)
     text += fmt::format(" {}: {}.", network.name, network.description);
-  if (report.typical) text += " Tasks that took over three times their median were given the median.";
+  if (report.plan.typical) text += " Tasks that took over three times their median were given the median.";
   text +=
-      report.own_caches
+      report.plan.own_caches
           ? " Before a subdomain's tasks were timed its data were read into the cache, as they are in that "
             "of a core that has no other subdomain; 1 x 1 is as it ran."
           : " Caches are those of the recording, where one core has all subdomains.";
-  if (report.quantile > 0)
+  if (report.plan.quantile > 0)
     text +=
         fmt::format(" Tasks were given the {:g} quantile of their times in the step: the machine was busy.",
-                    report.quantile);
+                    report.plan.quantile);
   const auto missed = std::ranges::count_if(report.rows, [](const ScalingRow& r) { return r.missed > 0; });
   if (missed > 0)
     text += fmt::format(
@@ -180,7 +169,7 @@ void add_strong(const ScalingReport& report, ReportPage& page) {
   io::Chart speedup = chart_of("speedup", "Strong scaling: speedup", "cores", "speedup  [1]");
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.speedup; }, speedup);
-  add_other_curves(report.beside, false, speedup);
+  add_other_curves(report.plan.beside, false, speedup);
   add_chart(page, std::move(speedup), "Time of a step on one core over that on more, for the same sample.",
             efficiency_table(rows, ScalingKind::strong));
   io::Chart efficiency =
@@ -189,7 +178,7 @@ void add_strong(const ScalingReport& report, ReportPage& page) {
   io::Chart iterations = efficiency, sweeps = efficiency;
   add_curves(
       rows, ScalingKind::strong, cores, [](const ScalingRow& r) { return r.efficiency; }, efficiency);
-  add_other_curves(report.beside, true, efficiency);
+  add_other_curves(report.plan.beside, true, efficiency);
   add_chart(page, std::move(efficiency),
             "The same per core. It is the product of the two factors in the pictures below.");
   iterations.levels = sweeps.levels = {{1, "ideal"}};
@@ -222,13 +211,13 @@ std::vector<OtherSpeedup> ideal(const std::vector<ScalingRow>& rows) {
 ReportPage page_of(ScalingReport report) {
   ReportPage page;
   const std::vector<OtherSpeedup> best = ideal(report.rows);
-  report.beside.insert(report.beside.end(), best.begin(), best.end());
+  report.plan.beside.insert(report.plan.beside.end(), best.begin(), best.end());
   page.title = fmt::format("{}: scaling", report.name);
   page.introduction = introduction_of(report);
   const std::vector<ScalingRow>& rows = report.rows;
   page.tables.emplace_back("strong_scaling.csv", table_of(rows, ScalingKind::strong));
   io::CsvTable others({"name", "cores", "speedup", "efficiency"});
-  for (const OtherSpeedup& other : report.beside)
+  for (const OtherSpeedup& other : report.plan.beside)
     others.row(other.name, other.cores, other.speedup, other.speedup / other.cores);
   page.tables.emplace_back("beside.csv", others.text());
   add_strong(report, page);
@@ -268,37 +257,6 @@ bool is_numbered(const std::string& name) {
 }
 
 }  // namespace
-
-std::vector<OtherSpeedup> read_speedups(const std::string& path) {
-  std::ifstream in(path);
-  if (!in) throw io::SceneError(path, 0, "", "cannot open the table of speedups");
-  std::vector<OtherSpeedup> all;
-  int number = 0;
-  bool header = false;
-  for (std::string line; std::getline(in, line);) {
-    ++number;
-    if (line.empty() || line.front() == '#') continue;
-    if (!header) {
-      if (line != "name,cores,speedup")
-        throw io::SceneError(path, number, "", "the first line must be name,cores,speedup");
-      header = true;
-      continue;
-    }
-    const std::size_t last = line.rfind(','), first = last == std::string::npos || last == 0
-                                                          ? std::string::npos
-                                                          : line.rfind(',', last - 1);
-    try {
-      if (first == std::string::npos) throw std::invalid_argument(line);
-      const OtherSpeedup other{line.substr(0, first), std::stod(line.substr(first + 1, last - first - 1)),
-                               std::stod(line.substr(last + 1))};
-      if (!(other.cores > 0) || !(other.speedup > 0)) throw std::invalid_argument(line);
-      all.push_back(other);
-    } catch (const std::logic_error&) {
-      throw io::SceneError(path, number, "", fmt::format("'{}' is not name,cores,speedup", line));
-    }
-  }
-  return all;
-}
 
 bool is_study_scaling_name(const std::string& name) {
   constexpr std::array<std::string_view, 4> tables{"strong_scaling.csv", "weak_scaling.csv", "hybrid.csv",

@@ -2,25 +2,15 @@
 
 /// What a scaling study leaves beside its scenes and traces.
 
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "apps/shared/report_page.hpp"
-#include "apps/study_scaling/scaling_predict.hpp"
+#include "apps/study_scaling/scaling_plan.hpp"
+#include "apps/study_scaling/scaling_runs.hpp"
 
 namespace talus {
-
-/// A speedup from elsewhere, drawn beside the study's own.
-struct OtherSpeedup {
-  std::string name;  ///< those of one name are a curve
-  double cores = 1, speedup = 1;
-};
-
-/// Reads lines "name,cores,speedup" under a header of these words; lines with '#' are skipped. Throws
-/// io::SceneError with file and line.
-std::vector<OtherSpeedup> read_speedups(const std::string& path);
 
 /// The same study by hand.
 struct ScalingCommands {
@@ -33,13 +23,8 @@ ScalingCommands scaling_commands(const ScalingLauncher& launcher, const std::vec
                                  int repeat);
 
 struct ScalingReport {
-  std::string name, description;
-  std::vector<ScalingNetwork> networks;
-  std::vector<OtherSpeedup> beside;
-  std::int64_t first = 1, last = 1;
-  int record = 1;
-  bool own_caches = false, typical = false;
-  double quantile = 0;
+  std::string name, description;  ///< of the scene
+  ScalingPlan plan;
   ScalingCommands commands;
   std::vector<ScalingRow> rows;  ///< related
 };
