@@ -19,6 +19,22 @@ void line(const char* what, bool in, const std::string& why) {
   fmt::print("  {:<24}{:<5}{}\n", what, in ? "in" : "out", why);
 }
 
+/// What contacts do that most scenes do not ask for.
+void print_laws(const Simulation& simulation) {
+  const StepState& state = simulation.state();
+  const auto mixed = std::ranges::count(state.chunks.law, mixed_laws);
+  line("friction per contact", mixed > 0 && !state.contacts.mu.empty(),
+       mixed > 0 ? fmt::format("{} of {} chunks mix pairs of materials", mixed, state.chunks.size())
+                 : "every chunk is of one pair of materials");
+  const PairTable& laws = simulation.parameters().laws;
+  const double cohesion = laws.largest(&PairLaw::cohesion),
+               resistance = laws.largest(&PairLaw::rolling_resistance);
+  line("cohesion", cohesion > 0, fmt::format("c = {:g} N at most", cohesion));
+  line("rolling resistance", simulation.parameters().rolls,
+       resistance > 0 ? fmt::format("mu_r = {:g} at most: moments, and sweeps as they are", resistance)
+                      : "no moments at contacts");
+}
+
 void print_needs(const Simulation& simulation, const io::Scene& scene, int threads) {
   const StepParameters& parameters = simulation.parameters();
   const StepState& state = simulation.state();
@@ -31,7 +47,7 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
                            : "no friction: one impulse component per contact, no tangential work");
   const bool turning = parameters.friction && scene.setup.rotation;
   line("rotation in the sweeps", turning,
-       turning               ? "tangential impulses subdomain_colour the grains"
+       turning               ? "tangential impulses turn the grains"
        : parameters.friction ? "rotation = false"
                              : "nothing turns grains without friction");
   line("free angular velocities", !state.free.w.empty(),
@@ -47,6 +63,7 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   const double restitution = parameters.laws.largest(&PairLaw::restitution);
   line("restitution", restitution > 0, fmt::format("e = {:g}", restitution));
+  print_laws(simulation);
   line("moving walls", driven + pressed > 0,
        fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
   line("gluing of wall copies", pressed > 0,

@@ -47,13 +47,14 @@ void MotionSums::add(const MotionSums& other) {
 }
 
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free, Multiplicities multiplicity, Multiplicities parts) {
+                  const FreeVelocity& free, const CopyShares& copies) {
   MotionSums sums;
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Velocity& v = velocity[s];
     const Vec3 u(v.u[0], v.u[1], v.u[2]), u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
     x[s] += 0.5 * time_step * u;
-    const double share = multiplicity.empty() ? 1 : static_cast<double>(parts[s]) / multiplicity[s];
+    const double share =
+        copies.multiplicity.empty() ? 1 : static_cast<double>(copies.parts[s]) / copies.multiplicity[s];
     const double mass = share / v.inv_mass, u2 = u.squaredNorm();
     const Vec3 gained = mass * (u - u_free);
     sums.energy.translation += 0.5 * mass * u2;

@@ -42,11 +42,15 @@ struct MotionSums {
   void add(const MotionSums& other);
 };
 
-/// Second half: x += h/2 u, with the sums. A copy adds M/m_i to the sums over bodies. Where the mass of a
-/// copy is M/parts with parts other than m_i, `multiplicity` and `parts` tell both numbers; elsewhere both
-/// are empty.
+/// Where the mass of a copy is M/parts with parts other than the multiplicity m_i, both numbers; elsewhere
+/// both are empty.
+struct CopyShares {
+  Multiplicities multiplicity = {}, parts = {};
+};
+
+/// Second half: x += h/2 u, with the sums. A copy adds M/m_i to the sums over bodies.
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free, Multiplicities multiplicity = {}, Multiplicities parts = {});
+                  const FreeVelocity& free, const CopyShares& copies = {});
 
 /// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
 void rotate(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,

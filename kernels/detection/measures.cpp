@@ -23,8 +23,8 @@ void ContactSums::add(const ContactSums& other) {
 }
 
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
-                             std::span<const Vec3> x, std::span<const double> radius,
-                             std::span<const Wall> walls, const Domain& domain) {
+                             const Poses& poses) {
+  const auto& [x, radius, walls, domain] = poses;
   ContactSums sums;
   sums.passed = contacts.passed[chunk];
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);

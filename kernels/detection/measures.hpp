@@ -22,11 +22,18 @@ struct ContactSums {
   void add(const ContactSums& other);
 };
 
+/// Where bodies and walls are.
+struct Poses {
+  std::span<const Vec3> x;         ///< per slot [m]
+  std::span<const double> radius;  ///< per slot [m]
+  std::span<const Wall> walls;
+  [[no_unique_address]] Domain domain = {};
+};
+
 /// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the
 /// nearest point of the plane or surface to the centre.
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
-                             std::span<const Vec3> x, std::span<const double> radius,
-                             std::span<const Wall> walls, const Domain& domain = {});
+                             const Poses& poses);
 
 /// Normal of a contact. Its impulse on the first body [N s], whatever the storage: as the law sees it,
 /// shifted by cohesion; and the one that the bodies feel.

@@ -17,19 +17,26 @@ double need_of(const Bodies& bodies, std::size_t s, const Margins& margins) {
 
 constexpr double rounding = 1e-12;
 
-/// Body s with the skin_escapes, which need `widest` at most.
-void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, std::size_t s,
-             const Margins& margins, double widest, char& left, std::vector<Encounter>& needed) {
+/// Escapes near some bodies.
+struct NearEscapes {
+  std::span<const Escape* const> all;
+  double widest;  ///< what they need at most [m]
+};
+
+/// Body s with the escapes. True when it is one of them.
+bool compare(const NearEscapes& escapes, const Bodies& bodies, std::size_t s, const Margins& margins,
+             std::vector<Encounter>& needed) {
+  bool left = false;
   using Map = Eigen::Map<const Vec3>;
   const Vec3& x = bodies.x[s];
-  const double most = std::max(margins.reach_then[s], widest);
-  for (const Escape* escape : skin_escapes) {
+  const double most = std::max(margins.reach_then[s], escapes.widest);
+  for (const Escape* escape : escapes.all) {
     const Vec3 d = margins.domain.separation(x, Vec3(Map(escape->x)));
     const double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], near = escape->need + most;
     if (d2 >= near * near) continue;
     const auto id = static_cast<std::int64_t>(bodies.id[s]);
     if (id == escape->id) {
-      left = 1;
+      left = true;
       continue;
     }
     const double distance = std::sqrt(d2), gap = distance - escape->radius - bodies.radius[s];
@@ -39,6 +46,7 @@ void compare(std::span<const Escape* const> skin_escapes, const Bodies& bodies, 
     if (!stays_apart(gap - rounding * distance, v_n, margins.time_step, margins.alert))
       needed.push_back({std::min(id, escape->id), std::max(id, escape->id)});
   }
+  return left;
 }
 
 /// Appends the features of wall w, which is no plane, that a grain may touch.
@@ -81,7 +89,7 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
   std::vector<char> left(bodies.size(), 0);
   std::vector<const Escape*> near;
   constexpr std::size_t block =
-      64;  // in Morton order, side by side: most skin_escapes are far from all of them
+      64;  // in Morton order, side by side: most escapes are far from all of them
   for (std::size_t begin = 0; begin < bodies.size(); begin += block) {
     const std::size_t end = std::min(begin + block, bodies.size());
     const auto x = std::span(bodies.x).subspan(begin, end - begin);
@@ -99,7 +107,8 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
       const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = escape.need + most;
       if (!(d2 * (1 - rounding) >= reached * reached)) near.push_back(&escape);
     }
-    for (std::size_t s = begin; s < end; ++s) compare(near, bodies, s, margins, widest, left[s], needed);
+    for (std::size_t s = begin; s < end; ++s)
+      if (compare({near, widest}, bodies, s, margins, needed)) left[s] = 1;
   }
   for (const Escape& escape : skin_escapes)
     for (std::size_t w = 0; w < margins.walls.size(); ++w) {

@@ -52,7 +52,7 @@ void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& mar
                        std::vector<Escape>& skin_escapes);
 
 /// Appends to `needed` the contacts of a escape with a grain here or a wall, and to `known` the candidates
-/// here of the skin_escapes. Over all ranks, which are to have the same skin_escapes, the candidates hold if
+/// here of the escapes. Over all ranks, which are to have the same escapes, the candidates hold if
 /// all_known(needed, known). `skin_escapes` are in order of id, each once; cheap where slots that follow one
 /// another are near in space.
 void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bodies,

@@ -35,6 +35,8 @@ class PairTable {
     const std::size_t low = std::min(a, b), high = std::max(a, b);
     return high * (high + 1) / 2 + low;
   }
+  /// Whether a material is one of those of the table.
+  bool knows(Material material) const { return number(material, material) < laws_.size(); }
   PairLaw& between(Material a, Material b) { return laws_[number(a, b)]; }
   const PairLaw& between(Material a, Material b) const { return laws_[number(a, b)]; }
   std::span<PairLaw> laws() { return laws_; }

@@ -11,10 +11,10 @@ namespace talus {
 template <class Value>
 void fetch_lines(std::span<const Value> values) {
   constexpr std::size_t line = 64;
-  const auto bytes = std::as_bytes(values);
+  const auto* const bytes = reinterpret_cast<const unsigned char*>(values.data());
   const auto read = [&](std::size_t k) { __atomic_load_n(&bytes[k], __ATOMIC_RELAXED); };
-  for (std::size_t k = 0; k < bytes.size(); k += line) read(k);
-  if (!bytes.empty()) read(bytes.size() - 1);  // where the first does not begin a line
+  for (std::size_t k = 0; k < values.size_bytes(); k += line) read(k);
+  if (!values.empty()) read(values.size_bytes() - 1);  // where the first does not begin a line
 }
 
 }  // namespace talus

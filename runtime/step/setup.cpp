@@ -74,6 +74,10 @@ void validate(const Setup& setup) {
         fmt::format("stage '{}': time_step must be finite and > 0 s, got {}", stage.name, stage.time_step));
     require(stage.gravity.allFinite(), fmt::format("stage '{}': gravity must be finite [m/s^2]", stage.name));
     validate_laws(stage);
+    for (const Wall& wall : setup.walls)
+      require(stage.laws.knows(wall.material),
+              fmt::format("stage '{}': its laws do not have material {} of wall '{}'", stage.name,
+                          wall.material, wall.name));
     require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
     require(

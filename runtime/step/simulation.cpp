@@ -1,7 +1,10 @@
 #include "runtime/step/simulation.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "kernels/detection/domain.hpp"
 #include "runtime/graph/clock.hpp"
@@ -49,9 +52,20 @@ struct Simulation::Implementation {
     lengths_at_start = from.lengths_of_box;
   }
 
+  /// Of the materials that bodies have.
+  static void demand_laws(const Setup& setup, const Bodies& bodies) {
+    for (const Stage& stage : setup.stages)
+      for (const Material material : bodies.material)
+        if (!stage.laws.knows(material))
+          throw std::invalid_argument(
+              fmt::format("stage '{}': its laws do not have material {}, of which there are bodies",
+                          stage.name, material));
+  }
+
   static StepState start(const Setup& setup, Bodies bodies, const graph::Communicator& ranks) {
     validate(setup);
     validate(bodies);
+    demand_laws(setup, bodies);
     StepState state;
     state.decomposition = make_decomposition(setup.decomposition, ranks);
     state.bodies = std::move(bodies);

@@ -110,8 +110,7 @@ void StepGraph::finish_share(std::uint32_t share) {
   const Decomposition& all = state_.decomposition;
   const bool uneven = decomposition_.coupling != Coupling::nscdd;
   motion_[share] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
-                          uneven ? Multiplicities(all.multiplicity) : Multiplicities(),
-                          uneven ? Multiplicities(all.parts) : Multiplicities());
+                          uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{});
   if (!bodies.orientation.empty())
     rotate(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
 }
@@ -142,8 +141,8 @@ void StepGraph::measure_share(std::uint32_t share) {
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
-    contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c, state_.bodies.x,
-                                        state_.bodies.radius, state_.walls);
+    contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c,
+                                        {state_.bodies.x, state_.bodies.radius, state_.walls});
   }
 }
 

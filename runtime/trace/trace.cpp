@@ -40,7 +40,7 @@ void check(const Plan& plan, int ranks) {
     ++count[plan.group[node]][plan.role[node]];
     if (plan.place[node] > most_turn)
       refuse(
-          fmt::format("{}: subdomain {} has subdomain_colour {}", where, plan.group[node], plan.place[node]));
+          fmt::format("{}: subdomain {} has subdomain colour {}", where, plan.group[node], plan.place[node]));
   }
   for (const auto& [group, of] : count) {
     const auto has = [&of = of](Role role) { return of[static_cast<std::size_t>(role)]; };

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
 #include <vector>
 
 #include "tests/validation/experiment.hpp"
@@ -91,6 +92,16 @@ TEST(Materials, ThatDifferInNameOnlyChangeNoBit) {
     return run.simulation().digest();
   };
   EXPECT_EQ(digest(false), digest(true));
+}
+
+TEST(Materials, ThatTheLawsOfAStageDoNotHaveAreRefused) {
+  Scene of_body(1e-3), of_wall(1e-3);
+  of_body.sphere({0, 0, 1}, 0.1, 1);
+  of_body.bodies.material = {2};
+  EXPECT_THROW(Experiment{std::move(of_body)}, std::invalid_argument);
+  of_wall.sphere({0, 0, 1}, 0.1, 1);
+  of_wall.wall("floor", Vec3::Zero(), Vec3::UnitZ()).material = 2;
+  EXPECT_THROW(Experiment{std::move(of_wall)}, std::invalid_argument);
 }
 
 }  // namespace

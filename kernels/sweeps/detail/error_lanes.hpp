@@ -6,7 +6,7 @@
 
 #include "kernels/law/contact_law.hpp"
 #include "kernels/sweeps/detail/advance_lanes.hpp"
-#include "kernels/sweeps/detail/sweep_lanes.hpp"
+#include "kernels/sweeps/detail/wall_lanes.hpp"
 
 namespace talus {
 namespace {

@@ -22,8 +22,8 @@ test::Sample touched_sample(bool friction) {
 ContactSums all_of(const test::Sample& sample) {
   ContactSums sums;
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
-    sums.add(measure_contacts(sample.contacts, sample.chunks, c, sample.bodies.x, sample.bodies.radius,
-                              sample.walls));
+    sums.add(measure_contacts(sample.contacts, sample.chunks, c,
+                              {sample.bodies.x, sample.bodies.radius, sample.walls}));
   return sums;
 }
 

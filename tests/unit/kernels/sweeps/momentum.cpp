@@ -191,8 +191,7 @@ TEST(Methods, AutoTakesMomentum) {
 
 TEST(Methods, GiveTheSameBitsOnAnyNumberOfThreads) {
   for (SolverMethod method : {SolverMethod::nlgs, SolverMethod::momentum, SolverMethod::nncg})
-    EXPECT_EQ(solve(method, 0.3, 1e-4, 4, 1).digest, solve(method, 0.3, 1e-4, 4, 3).digest)
-        << method.name();
+    EXPECT_EQ(solve(method, 0.3, 1e-4, 4, 1).digest, solve(method, 0.3, 1e-4, 4, 3).digest) << method.name();
 }
 
 }  // namespace

@@ -41,7 +41,8 @@ struct Swept {
 
 /// Sweeps with momentum over all chunks, bodies among them.
 template <bool Friction, class Kernels>
-Swept sweep(const test::Sample& sample, const Kernels& kernels, double mu, double wall_inv_mass, int sweeps) {
+Swept sweep(const test::Sample& sample, const Kernels& kernels, ChunkFriction mu, double wall_inv_mass,
+            int sweeps) {
   const SweepKernels of_bodies(InstructionSet::portable);
   const std::size_t bodies = sample.bodies.size();
   const std::vector<Slot> slots = all_slots(bodies);
@@ -80,10 +81,13 @@ bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 template <bool Friction>
-void expect_reference_bits(int target, double wall_inv_mass, double mu) {
+void expect_reference_bits(int target, double wall_inv_mass, ChunkFriction mu) {
   SCOPED_TRACE(testing::Message() << "chunks of " << target << ", walls " << wall_inv_mass << ", friction "
-                                  << Friction << ", mu " << mu);
-  const test::Sample sample = test::dense_sample(6, 11, Friction, true, target);
+                                  << Friction << ", mu " << mu.mu << (mu.own ? " of each" : ""));
+  test::Sample sample = test::dense_sample(6, 11, Friction, true, target);
+  if (mu.own)
+    for (std::size_t k = 0; k < sample.contacts.nx.size(); ++k)
+      sample.contacts.mu.push_back(0.1 * static_cast<double>(k % 7));
   for (const InstructionSet set : test::sets_to_test()) {
     SCOPED_TRACE(name_of(set));
     const Swept expected = sweep<Friction>(sample, test::ReferenceSweeps{}, mu, wall_inv_mass, 5);
@@ -106,6 +110,7 @@ TEST(SingleSweeps, GiveTheBitsOfThePlainReferenceOnEveryInstructionSet) {
   for (const int target : {1, 5, 16, 37, 384})
     for (const double wall_inv_mass : {0.0, 1e-3}) {
       for (const double mu : {0.3, 0.0}) expect_reference_bits<true>(target, wall_inv_mass, mu);
+      expect_reference_bits<true>(target, wall_inv_mass, ChunkFriction::of_each_contact());
       expect_reference_bits<false>(target, wall_inv_mass, 0);
     }
 }

@@ -151,7 +151,7 @@ TEST_F(TraceFile, NoticesATurnThatNoSubdomainHas) {
   const auto publish = std::ranges::find(plan.role, static_cast<std::uint8_t>(Role::publish));
   plan.place[static_cast<std::size_t>(publish - plan.role.begin())] = 128;
   io::write_trace(path_, trace);
-  EXPECT_NE(complaint().find("subdomain_colour 128"), std::string::npos) << complaint();
+  EXPECT_NE(complaint().find("subdomain colour 128"), std::string::npos) << complaint();
 }
 
 /// Two threads; what is recorded comes in parts of steps 1, 2 and so on, as of a run that was killed.
