@@ -88,8 +88,7 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
   for (const Escape& escape : skin_escapes) widest = std::max(widest, escape.need);
   std::vector<char> left(bodies.size(), 0);
   std::vector<const Escape*> near;
-  constexpr std::size_t block =
-      64;  // in Morton order, side by side: most escapes are far from all of them
+  constexpr std::size_t block = 64;  // in Morton order, side by side: most escapes are far from all of them
   for (std::size_t begin = 0; begin < bodies.size(); begin += block) {
     const std::size_t end = std::min(begin + block, bodies.size());
     const auto x = std::span(bodies.x).subspan(begin, end - begin);
