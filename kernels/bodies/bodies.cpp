@@ -31,6 +31,7 @@ void add_sphere(Bodies& bodies, BodyId id, const Vec3& centre, double radius, do
   bodies.radius.push_back(radius);
   bodies.velocity.push_back(rest);
   if (!bodies.orientation.empty()) bodies.orientation.push_back({1, 0, 0, 0});
+  if (!bodies.shape.empty()) bodies.shape.push_back(0);
 }
 
 void reserve(Bodies& bodies, std::size_t count, bool orientation) {
@@ -65,6 +66,7 @@ void reorder(Bodies& bodies, std::span<const Slot> order) {
   permute(bodies.velocity, order);
   permute(bodies.orientation, order);
   permute(bodies.material, order);
+  permute(bodies.shape, order);
 }
 
 std::vector<Slot> morton_order(const Bodies& bodies) {
@@ -96,7 +98,8 @@ void validate(const Bodies& bodies) {
   const std::size_t n = bodies.size();
   if (bodies.x.size() != n || bodies.radius.size() != n || bodies.velocity.size() != n ||
       (!bodies.orientation.empty() && bodies.orientation.size() != n) ||
-      (!bodies.material.empty() && bodies.material.size() != n))
+      (!bodies.material.empty() && bodies.material.size() != n) ||
+      (!bodies.shape.empty() && (bodies.shape.size() != n || bodies.orientation.size() != n)))
     throw std::invalid_argument("the arrays of the bodies differ in length");
   for (std::size_t k = 0; k < n; ++k) {
     const Velocity& v = bodies.velocity[k];
@@ -118,7 +121,8 @@ void validate(const Bodies& bodies) {
 std::size_t memory_used(const Bodies& bodies) {
   return bodies.id.capacity() * sizeof(BodyId) + bodies.x.capacity() * sizeof(Vec3) +
          bodies.radius.capacity() * sizeof(double) + bodies.velocity.capacity() * sizeof(Velocity) +
-         bodies.orientation.capacity() * sizeof(std::array<double, 4>);
+         bodies.orientation.capacity() * sizeof(std::array<double, 4>) +
+         bodies.material.capacity() * sizeof(Material) + bodies.shape.capacity() * sizeof(ShapeNumber);
 }
 
 std::uint64_t digest(const Bodies& bodies, std::span<const char> counts) {

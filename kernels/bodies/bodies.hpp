@@ -14,6 +14,9 @@ namespace talus {
 /// A sphere of radius R turns as w = R omega [m/s], so that no radius and no tangent frame is needed at a
 /// contact (docs/theory.md, "Spheres"): with n pointing to it from the other body, the surface at the contact
 /// point moves with u - w x n; the other body's with u + w x n.
+/// A clump, whose inertia is a tensor I, turns as w = S omega with S = (I/J)^1/2 [m] about its present axes,
+/// where J = I_mean/R^2 stands in for I/R^2. So its energy is 1/2 J w^2 as that of a sphere, and all that
+/// only adds, averages or weighs velocities need not know what a body is.
 template <class Number>
 struct alignas(8 * sizeof(Number)) VelocityOf {
   Number u[3]{};           ///< velocity of the centre [m/s]
@@ -25,15 +28,17 @@ using Velocity = VelocityOf<double>;
 using SingleVelocity = VelocityOf<float>;  ///< mobilities in other units: single_precision.hpp
 static_assert(sizeof(Velocity) == 64 && sizeof(SingleVelocity) == 32);
 
-/// The spheres of this process, one entry per slot. All arrays have the same length, except `orientation`,
-/// which is empty unless the scene asks for orientations, and `material`, unless it names materials.
+/// The bodies of this process, one entry per slot. All arrays have the same length, except `orientation`,
+/// which is empty unless the scene asks for orientations or has clumps, `material`, unless it names
+/// materials, and `shape`, unless it has clumps.
 struct Bodies {
   std::vector<BodyId> id;
   std::vector<Vec3> x;                             ///< centre [m]
-  std::vector<double> radius;                      ///< [m]
+  std::vector<double> radius;                      ///< [m]; of a clump: that of Clump
   std::vector<Velocity> velocity;                  ///< V, end of the last step or iterate of this one
   std::vector<std::array<double, 4>> orientation;  ///< unit quaternion (w, x, y, z) or empty
   std::vector<Material> material;                  ///< empty: all are material_of_grains
+  std::vector<ShapeNumber> shape;                  ///< empty: all are spheres
 
   std::size_t size() const { return id.size(); }
   double mass(std::size_t slot) const {

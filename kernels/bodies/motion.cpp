@@ -80,22 +80,26 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> 
   return sums;
 }
 
-void rotate(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
-            std::span<const double> radius, double time_step) {
-  for (std::size_t s = range.begin; s < range.end; ++s) {
-    const double* w = velocity[s].w;
-    const double speed = std::sqrt(square(velocity[s].w));
-    if (speed == 0) continue;
-    const double half = 0.5 * time_step * speed / radius[s];
-    const double c = std::cos(half), k = std::sin(half) / speed;
-    const double x = k * w[0], y = k * w[1], z = k * w[2];
-    const auto [qw, qx, qy, qz] = orientation[s];
-    std::array<double, 4> q = {c * qw - x * qx - y * qy - z * qz, c * qx + x * qw + y * qz - z * qy,
-                               c * qy + y * qw + z * qx - x * qz, c * qz + z * qw + x * qy - y * qx};
-    const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    for (double& component : q) component /= norm;
-    orientation[s] = q;
-  }
+std::array<double, 4> turned(const std::array<double, 4>& q, const double* w, double radius,
+                             double time_step) {
+  const double speed = std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  if (speed == 0) return q;
+  const double half = 0.5 * time_step * speed / radius;
+  const double c = std::cos(half), k = std::sin(half) / speed;
+  const double x = k * w[0], y = k * w[1], z = k * w[2];
+  const auto [qw, qx, qy, qz] = q;
+  std::array<double, 4> p = {c * qw - x * qx - y * qy - z * qz, c * qx + x * qw + y * qz - z * qy,
+                             c * qy + y * qw + z * qx - x * qz, c * qz + z * qw + x * qy - y * qx};
+  const double norm = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+  for (double& component : p) component /= norm;
+  return p;
+}
+
+void rotate(SlotRange range, Bodies& bodies, double time_step) {
+  for (std::size_t s = range.begin; s < range.end; ++s)
+    if (bodies.shape.empty() || bodies.shape[s] == 0)
+      bodies.orientation[s] =
+          turned(bodies.orientation[s], bodies.velocity[s].w, bodies.radius[s], time_step);
 }
 
 double contact_margin(double speed, double time_step, double alert) {

@@ -52,9 +52,12 @@ struct CopyShares {
 MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
                   const FreeVelocity& free, const CopyShares& copies = {});
 
-/// Turns orientations by omega = w/R over `time_step`: exact for constant omega.
-void rotate(SlotRange range, std::span<std::array<double, 4>> orientation, std::span<const Velocity> velocity,
-            std::span<const double> radius, double time_step);
+/// The unit quaternion q turned by omega = w/R over `time_step`: exact for constant omega. w [m/s] of 3.
+std::array<double, 4> turned(const std::array<double, 4>& q, const double* w, double radius,
+                             double time_step);
+
+/// Turns the orientations of spheres so; bodies with a `shape` other than 0 are left alone (turn_clumps).
+void rotate(SlotRange range, Bodies& bodies, double time_step);
 
 /// max(alert/2, h |u|): a pair becomes a contact when its gap is below the alert distance or closes within a
 /// step. To this a grain's reach adds its radius, half the skin, which it may have used up before the

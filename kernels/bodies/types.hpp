@@ -9,6 +9,7 @@
 namespace talus {
 
 using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
 
 /// Identity of a grain for the whole run, on every rank; survives sorting, migration and restart.
 enum class BodyId : std::int64_t {};
@@ -29,5 +30,9 @@ inline constexpr std::size_t most_materials = 255;
 
 /// The materials of a scene that names none: its grains, and its walls.
 inline constexpr Material material_of_grains = 0, material_of_walls = 1;
+
+/// Shape of a body: 0 is the sphere, k the k-th clump of the setup (kernels/shapes/clump.hpp).
+using ShapeNumber = std::uint8_t;
+inline constexpr std::size_t most_clumps = 255;
 
 }  // namespace talus

@@ -27,6 +27,7 @@ void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
       chunks.wall.push_back(group.wall);
       chunks.subdomain.push_back(group.subdomain);
       chunks.side.push_back(group.side);
+      chunks.kind.push_back(group.wall < 0 ? ChunkKind::spheres : ChunkKind::spheres_wall);
       chunks.law.push_back(static_cast<std::int32_t>(
           PairTable::number(material_of_grains, group.wall < 0 ? material_of_grains : material_of_walls)));
     }
@@ -201,6 +202,22 @@ bool before(const GrainPair& a, const GrainPair& b) {
   return a.first != b.first ? a.first < b.first : a.second < b.second;
 }
 
+/// Pairs of bodies with those of their balls that may touch.
+struct BallPair {
+  GrainPair pair;
+  std::uint16_t balls;
+};
+bool before(const BallPair& a, const BallPair& b) {
+  return a.pair == b.pair ? a.balls < b.balls : before(a.pair, b.pair);
+}
+std::vector<BallPair> with_balls(const Candidates& candidates) {
+  std::vector<BallPair> pairs;
+  for (std::size_t k = 0; k < candidates.grain_pairs.size(); ++k)
+    pairs.push_back(
+        {candidates.grain_pairs[k], candidates.balls.empty() ? std::uint16_t{0} : candidates.balls[k]});
+  return pairs;
+}
+
 }  // namespace
 
 std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates, std::span<const char> glued,
@@ -250,8 +267,11 @@ void match_impulses(const Candidates& old, Candidates& fresh) {
     std::copy_n(old.impulse.begin() + static_cast<std::ptrdiff_t>(from * components), components,
                 fresh.impulse.begin() + static_cast<std::ptrdiff_t>(to * components));
   };
-  merge_walk(
-      old.grain_pairs, fresh.grain_pairs, [](const auto& a, const auto& b) { return before(a, b); }, carry);
+  const auto less = [](const auto& a, const auto& b) { return before(a, b); };
+  if (fresh.balls.empty() && old.balls.empty())
+    merge_walk(old.grain_pairs, fresh.grain_pairs, less, carry);
+  else
+    merge_walk(with_balls(old), with_balls(fresh), less, carry);
   const std::vector<PlacedPair> from = without_layers(old.wall_pairs), to = without_layers(fresh.wall_pairs);
   merge_walk(
       from, to, [](const auto& a, const auto& b) { return before(a.pair, b.pair); },
@@ -268,6 +288,9 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
     pair = {place[index(pair.first)], place[index(pair.second)]};
     if (pair.first < pair.second) continue;
     std::swap(pair.first, pair.second);
+    if (!candidates.balls.empty())
+      candidates.balls[k] =
+          static_cast<std::uint16_t>(candidates.balls[k] % 256 * 256 + candidates.balls[k] / 256);
     if (components > 1)  // a normal part alone does not know which body comes first
       for (std::size_t c = components * k; c < components * (k + 1); ++c)
         candidates.impulse[c] = -candidates.impulse[c];
@@ -286,7 +309,9 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
     std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin[body]),
               order.begin() + static_cast<std::ptrdiff_t>(begin[body + 1]),
               [&](std::size_t a, std::size_t b) {
-                return candidates.grain_pairs[a].second < candidates.grain_pairs[b].second;
+                const Slot one = candidates.grain_pairs[a].second, other = candidates.grain_pairs[b].second;
+                if (candidates.balls.empty() || one != other) return one < other;
+                return candidates.balls[a] < candidates.balls[b];
               });
   std::ranges::transform(layered_order(candidates.wall_pairs), split,
                          [grains](std::size_t k) { return grains + k; });
@@ -296,9 +321,10 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
   sorted.wall_pairs.reserve(candidates.wall_pairs.size());
   sorted.impulse.reserve(candidates.impulse.size());
   for (std::size_t k : order) {
-    if (k < grains)
+    if (k < grains) {
       sorted.grain_pairs.push_back(candidates.grain_pairs[k]);
-    else
+      if (!candidates.balls.empty()) sorted.balls.push_back(candidates.balls[k]);
+    } else
       sorted.wall_pairs.push_back(candidates.wall_pairs[k - grains]);
     for (std::size_t c = 0; c < components; ++c)
       sorted.impulse.push_back(candidates.impulse[components * k + c]);
@@ -307,7 +333,7 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
 }
 
 std::size_t memory_used(const Candidates& candidates) {
-  return candidates.grain_pairs.capacity() * sizeof(GrainPair) +
+  return candidates.grain_pairs.capacity() * sizeof(GrainPair) + candidates.balls.capacity() * 2 +
          candidates.wall_pairs.capacity() * sizeof(WallPair) + candidates.impulse.capacity() * sizeof(double);
 }
 
@@ -317,7 +343,8 @@ std::size_t memory_used(const Chunks& chunks) {
           chunks.bodies.capacity() + chunks.owned_begin.capacity() + chunks.owned.capacity() +
           chunks.untouched.capacity() + chunks.conflict_begin.capacity() + chunks.conflicts.capacity()) *
              4 +
-         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.side.capacity();
+         (chunks.local.capacity() + chunks.order.capacity()) * 2 + chunks.side.capacity() +
+         chunks.kind.capacity();
 }
 
 }  // namespace talus

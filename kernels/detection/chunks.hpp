@@ -25,6 +25,9 @@ struct WallPair {
 struct Candidates {
   std::vector<GrainPair> grain_pairs;
   std::vector<WallPair> wall_pairs;
+  std::vector<std::uint16_t> balls;  ///< per grain pair: number of a ball of the first x 256 + that of one of
+                                     ///< the second; then pairs are sorted by (first, second, balls). Empty
+                                     ///< where no body is a clump (split_into_balls)
   std::vector<double> impulse;  ///< per candidate: 3 components on the first body [N s], and 3 of the moment
                                 ///< of rolling resistance [N m s]; or 1 (along the normal) without friction
   int components = 3;           ///< 3, 6 with rolling resistance, 1 without friction
@@ -61,6 +64,14 @@ inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 /// The candidates of a chunk are of several pairs of materials.
 inline constexpr std::int32_t mixed_laws = -1;
 
+/// What the candidates of a chunk are, and with it how they are swept. Spheres in a chunk of blocks are
+/// blocks, too.
+enum class ChunkKind : std::uint8_t {
+  spheres,       ///< between spheres
+  spheres_wall,  ///< spheres at one wall
+  blocks,        ///< a clump is among the bodies (note_kinds): at one wall, or none
+};
+
 /// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
 /// neither grains and walls nor two walls. Those of a side have colours above those of the sides before it.
 /// Two chunks conflict when they share a grain, and then differ in colour: the sweep's result depends on
@@ -71,6 +82,7 @@ struct Chunks {
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
   std::vector<std::int32_t> subdomain;  ///< per chunk: that of its group
   std::vector<ChunkSide> side;          ///< per chunk: that of its group
+  std::vector<ChunkKind> kind;          ///< per chunk
   std::vector<std::int32_t> law;     ///< per chunk: number of the law of all its candidates (PairTable), or
                                      ///< mixed_laws (note_laws)
   std::vector<std::int32_t> colour;  ///< per chunk

@@ -39,6 +39,9 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
     contacts.first_record[k] = record_of(contacts.first[k]);
     contacts.second_record[k] = record_of(contacts.second[k]);
   }
+  const bool blocks = std::ranges::find(chunks.kind, ChunkKind::blocks) != chunks.kind.end();
+  contacts.levers.resize(blocks ? n : 0);
+  contacts.balls.resize(contacts.levers.size());
   contacts.group.resize(n);
   contacts.count.assign(chunks.size(), 0);
   contacts.passed.assign(chunks.size(), 0);
@@ -132,7 +135,8 @@ std::size_t memory_used(const Contacts& contacts) {
           contacts.second_record.capacity() + contacts.candidate.capacity() + contacts.count.capacity() +
           contacts.passed.capacity()) *
              4 +
-         contacts.group.capacity();
+         contacts.group.capacity() + contacts.levers.capacity() * sizeof(Levers) +
+         contacts.balls.capacity() * 2;
 }
 
 }  // namespace talus

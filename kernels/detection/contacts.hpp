@@ -19,6 +19,12 @@ inline std::uint32_t record_of(Slot slot) {
   return numbers * static_cast<std::uint32_t>(slot);
 }
 
+/// How the surface of each body moves at a contact of blocks: with u + lever w, of VelocityOf. The second is
+/// void at a wall.
+struct Levers {
+  Mat3 first = Mat3::Zero(), second = Mat3::Zero();
+};
+
 /// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
 /// chunks.begin[c] + count[c]), in groups of at most 16, most of them full. No grain stands twice in a
 /// group, so that a group can be swept at once. Behind them, between grains, stand the candidates that are
@@ -32,8 +38,10 @@ struct Contacts {
   std::vector<double> cohesion;    ///< c h [N s] (kernels/sweeps/cohesion.hpp); empty where nothing has any
   std::vector<double> mx, my, mz;  ///< moment of rolling resistance on the first body [N m s], and
   std::vector<double> arm;         ///< its bound over the normal impulse [m]; empty where nothing resists
-  std::vector<double> mu;  ///< friction of each contact; empty where no chunk mixes pairs of materials
-  std::vector<Slot> first, second;  ///< second is -1 - feature at a wall: -1 at a plane
+  std::vector<double> mu;      ///< friction of each contact; empty where no chunk mixes pairs of materials
+  std::vector<Levers> levers;  ///< of contacts in chunks of blocks; empty where no body is a clump
+  std::vector<std::uint16_t> balls;  ///< likewise: Candidates::balls
+  std::vector<Slot> first, second;   ///< second is -1 - feature at a wall: -1 at a plane
   /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.
   std::vector<std::uint32_t> first_record, second_record;
   std::vector<std::int32_t> candidate;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/detection/touch.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 
 namespace talus {
@@ -24,7 +25,7 @@ void ContactSums::add(const ContactSums& other) {
 
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              const Poses& poses) {
-  const auto& [x, radius, walls, domain] = poses;
+  const auto& [x, radius, walls, clumps, domain] = poses;
   ContactSums sums;
   sums.passed = contacts.passed[chunk];
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
@@ -40,7 +41,18 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
     for (Eigen::Index c = 0; c < 9; ++c) moment[c] += r[c % 3] * branch[c / 3];
     normal_impulse += r.dot(contact_normal(contacts, k));
   };
-  if (chunks.wall[chunk] >= 0) {
+  if (chunks.kind[chunk] == ChunkKind::blocks) {
+    const std::int32_t w = chunks.wall[chunk];
+    const Wall* const wall = w < 0 ? nullptr : &walls[static_cast<std::size_t>(w)];
+    for (std::size_t k = begin; k < end; ++k) {
+      const Touch touch = touch_of(poses, contacts, k, wall);
+      const Vec3& centre = x[static_cast<std::size_t>(contacts.first[k])];
+      add(k,
+          wall != nullptr ? domain.separation(centre, touch.point)
+                          : domain.separation(centre, x[static_cast<std::size_t>(contacts.second[k])]),
+          touch.gap);
+    }
+  } else if (chunks.wall[chunk] >= 0) {
     const Wall& wall = walls[static_cast<std::size_t>(chunks.wall[chunk])];
     for (std::size_t k = begin; k < end; ++k) {
       const auto i = static_cast<std::size_t>(contacts.first[k]);

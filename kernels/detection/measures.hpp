@@ -6,6 +6,7 @@
 
 #include "kernels/detection/contacts.hpp"
 #include "kernels/detection/domain.hpp"
+#include "kernels/shapes/clump.hpp"
 
 namespace talus {
 
@@ -27,11 +28,13 @@ struct Poses {
   std::span<const Vec3> x;         ///< per slot [m]
   std::span<const double> radius;  ///< per slot [m]
   std::span<const Wall> walls;
+  ClumpView clumps = {};
   [[no_unique_address]] Domain domain = {};
 };
 
 /// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the
-/// nearest point of the plane or surface to the centre.
+/// nearest point of the plane or surface to the centre; of a block from the point of contact to its centre of
+/// mass.
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              const Poses& poses);
 

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "kernels/detection/detail/block_phase.hpp"
 #include "kernels/detection/detail/contact_groups.hpp"
 #include "kernels/detection/detail/gap_kernels.hpp"
+#include "kernels/detection/detail/passing.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/law/gap_law.hpp"
 #include "kernels/simd/contact_view.hpp"
@@ -28,28 +30,12 @@ Pairing meet(const PairView& pairs, std::size_t k) {
           Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
 }
 
-/// Whether two bodies came so far on their way `way` here that they may have passed.
-bool came_far(const Vec3& way, double small) {
-  return !(way.squaredNorm() < 0.25 * small * small);
-}
-
-/// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
-/// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
-/// From the middle of one step to that of the next it moves by h V-, V- being what the first has ended with.
-bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
-  if (!came_far(way, small)) return false;
-  const Vec3 start = d - way;
-  const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
-  const double overlap = touching - (start + nearest * way).norm();
-  return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
-}
-
 std::int32_t count_passed(const PairView& pairs, double time_step) {
   std::int32_t through = 0;
   for (std::size_t k = 0; k < pairs.count; ++k) {
     const Pairing pair = meet(pairs, k);
-    through += passed(pair.d, time_step * pair.v, pair.radius_i + pair.radius_j,
-                      std::min(pair.radius_i, pair.radius_j));
+    through += detail::passed(pair.d, time_step * pair.v, pair.radius_i + pair.radius_j,
+                              std::min(pair.radius_i, pair.radius_j));
   }
   return through;
 }
@@ -108,16 +94,6 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
   if (!detail::repair_groups(places)) detail::deal_groups(places);
 }
 
-/// A chunk at a wall has its contacts up to `end`. Each grain stands in it once, so that any contacts may
-/// share a group.
-void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Contacts& contacts) {
-  const std::size_t begin = index(chunks.begin[chunk]);
-  contacts.count[chunk] = static_cast<std::int32_t>(end - begin);
-  std::uint8_t* size = contacts.group.data() + begin;
-  for (std::size_t k = begin; k < end; k += group_size)
-    *size++ = static_cast<std::uint8_t>(std::min(group_size, end - k));
-}
-
 /// Restitution of a grain at a wall.
 double restitution_at(const ChunkPhase& phase, const WallPair& pair) {
   return phase.in.laws.laws()[materials_of(phase.in).law(pair)].restitution;
@@ -150,13 +126,13 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     contacts.candidate[at++] = static_cast<std::int32_t>(k);
   }
   contacts.passed[chunk] = through;
-  close_groups(chunks, chunk, at, contacts);
+  detail::close_groups(chunks, chunk, at, contacts);
 }
 
 /// True when a body that has come by `way` to `x` was deep in a surface on it: such a step is too long, and a
 /// thin surface may be behind the body by now.
 bool passed_surface(const Surface& surface, const Vec3& x, const Vec3& way, double radius) {
-  if (!came_far(way, radius)) return false;
+  if (!detail::came_far(way, radius)) return false;
   std::vector<SurfacePoint> points;
   constexpr double most = 256;  // looks: a body that came further is told by its energy
   const double looks = std::ceil(std::min(most, 4 * way.norm() / radius));
@@ -195,7 +171,7 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     contacts.candidate[at++] = static_cast<std::int32_t>(k);
   }
   contacts.passed[chunk] = through;
-  close_groups(chunks, chunk, at, contacts);
+  detail::close_groups(chunks, chunk, at, contacts);
 }
 
 }  // namespace
@@ -210,7 +186,9 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
       candidates,
       chunks,
       chunk};
-  if (chunks.wall[chunk] < 0)
+  if (chunks.kind[chunk] == ChunkKind::blocks)
+    detail::narrow_blocks(in, phase.rule, candidates, chunks, chunk, contacts);
+  else if (chunks.wall[chunk] < 0)
     narrow_grains(phase, set, contacts);
   else if (in.walls[index(chunks.wall[chunk])].surface() == nullptr)
     narrow_wall(phase, contacts);

@@ -5,6 +5,7 @@
 #include "kernels/detection/contacts.hpp"
 #include "kernels/detection/domain.hpp"
 #include "kernels/law/pair_table.hpp"
+#include "kernels/shapes/clump.hpp"
 #include "kernels/simd/instruction_set.hpp"
 
 namespace talus {
@@ -22,6 +23,7 @@ struct NarrowPhase {
   Vec3 gravity;                             ///< [m/s^2]
   double overlap_correction = 0;            ///< in [0, 1]
   std::span<const Material> material = {};  ///< of the bodies; empty: material_of_grains
+  ClumpView clumps = {};
   [[no_unique_address]] Domain domain = {};
 };
 

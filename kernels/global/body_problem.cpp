@@ -143,6 +143,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
       contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
     }
     contact.place = static_cast<std::int32_t>(k);
+    if (source.chunks.kind[c] == ChunkKind::blocks) contact.levers = &contacts.levers[k];
     problem.contacts.push_back(contact);
     problem.impulse.push_back(law_impulse(contacts, k));
     if (!contacts.cohesion.empty() || !contacts.arm.empty()) problem.known.resize(problem.bodies.size());

@@ -43,15 +43,16 @@ struct BodyUnknown {
 };
 
 /// One contact: v = u_first - u_second + n x (w_first + w_second) - drive, the second missing at a driven
-/// wall.
+/// wall. With levers v = u_first - u_second + B_first w_first - B_second w_second - drive.
 struct ContactEquation {
   Vec3 normal;  ///< unit, to the first body
   Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
   double mu = 0;
-  std::int32_t first = -1;   ///< unknown
-  std::int32_t second = -1;  ///< unknown; -1 at a driven wall
-  std::int32_t place = -1;   ///< in `Contacts`
-  double drive = 0;          ///< speed of the driven wall [m/s]; 0 between bodies
+  std::int32_t first = -1;         ///< unknown
+  std::int32_t second = -1;        ///< unknown; -1 at a driven wall
+  std::int32_t place = -1;         ///< in `Contacts`
+  double drive = 0;                ///< speed of the driven wall [m/s]; 0 between bodies
+  const Levers* levers = nullptr;  ///< of a contact of blocks, in `Contacts`
 };
 
 /// The whole problem, or the part of it that one subdomain holds: its contacts and the bodies that stand in
@@ -129,13 +130,21 @@ void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse);
 
 /// v - offset: the relative velocity at a contact before drives and bias. `c` is a ContactEquation, or has
-/// its normal, first and second.
+/// its normal, first and second, of spheres.
 template <class Contact>
-Vec3 relative_velocity(const Contact& c, std::span<const Twist> V) {
+Vec3 relative_velocity_of_spheres(const Contact& c, std::span<const Twist> V) {
   const Twist& a = V[static_cast<std::size_t>(c.first)];
   if (c.second < 0) return a.u + c.normal.cross(a.w);
   const Twist& b = V[static_cast<std::size_t>(c.second)];
   return a.u - b.u + c.normal.cross(a.w + b.w);
+}
+inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
+  if (c.levers == nullptr) return relative_velocity_of_spheres(c, V);
+  const Twist& a = V[static_cast<std::size_t>(c.first)];
+  const Vec3 v = a.u + c.levers->first * a.w;
+  if (c.second < 0) return v;
+  const Twist& b = V[static_cast<std::size_t>(c.second)];
+  return v - b.u - c.levers->second * b.w;
 }
 
 /// What counts of a vector at a contact: without friction its normal part.
@@ -154,7 +163,7 @@ inline double kinetic2(const BodyUnknown& body, const Vec3& u, const Vec3& w) {
 
 /// F += H r for one contact. Of a wall only the part along its axis is meant: see `restrict_to_freedoms`.
 template <class Contact>
-void add_force(const Contact& c, const Vec3& r, std::span<Twist> F) {
+void add_force_of_spheres(const Contact& c, const Vec3& r, std::span<Twist> F) {
   Twist& a = F[static_cast<std::size_t>(c.first)];
   const Vec3 turn = c.normal.cross(r);
   a.u += r;
@@ -163,6 +172,16 @@ void add_force(const Contact& c, const Vec3& r, std::span<Twist> F) {
   Twist& b = F[static_cast<std::size_t>(c.second)];
   b.u -= r;
   b.w -= turn;
+}
+inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
+  if (c.levers == nullptr) return add_force_of_spheres(c, r, F);
+  Twist& a = F[static_cast<std::size_t>(c.first)];
+  a.u += r;
+  a.w += c.levers->first.transpose() * r;
+  if (c.second < 0) return;
+  Twist& b = F[static_cast<std::size_t>(c.second)];
+  b.u -= r;
+  b.w -= c.levers->second.transpose() * r;
 }
 
 /// Drops what cannot move a body: of walls all but the part along the axis, of bodies that do not turn w.

@@ -16,9 +16,11 @@ Eigen::Matrix3d cross_matrix(const Vec3& n) {
   return N;
 }
 
-/// rho H_i H_i^T of one contact, m = +-n.
-void add_own_block(const Vec3& m, double rho, bool slick, Eigen::Matrix<double, 6, 6>& block) {
-  if (slick) {
+}  // namespace
+
+/// rho H_i H_i^T of one contact of spheres, m = +-n.
+void BodySystem::add_own_block(const Vec3& m, double rho, std::int32_t kind, Matrix6& block) {
+  if (kind == slick) {
     block.topLeftCorner<3, 3>() += rho * m * m.transpose();
     return;
   }
@@ -29,23 +31,51 @@ void add_own_block(const Vec3& m, double rho, bool slick, Eigen::Matrix<double, 
   block.bottomRightCorner<3, 3>() -= rho * N * N;
 }
 
-}  // namespace
+/// The same of blocks, for both bodies.
+void BodySystem::add_block_of_blocks(const ContactEquation& contact, double rho) {
+  const auto add = [&](std::int32_t body, const Mat3& lever) {
+    Eigen::Matrix<double, 3, 6> motion;
+    motion << Mat3::Identity(), lever;
+    if (contact.mu > 0)
+      diagonal_[at(body)] += rho * motion.transpose() * motion;
+    else
+      diagonal_[at(body)] +=
+          rho * (motion.transpose() * contact.normal) * (contact.normal.transpose() * motion);
+  };
+  add(contact.first, contact.levers->first);
+  if (contact.second >= 0) add(contact.second, contact.levers->second);
+}
 
 /// f less the row's part from the other body.
-inline void BodySystem::take(const Edge& edge, std::span<const Twist> x, Twist& f) {
+inline void BodySystem::take(const Edge& edge, std::span<const Twist> x, Twist& f) const {
+  if (edge.kind >= 0) return take_from_block(edge, x, f);
   const Twist& other = x[at(edge.other)];
   Vec3 v = edge.m.cross(other.w) - other.u;
-  if (edge.slick) v = edge.m.dot(v) * edge.m;
+  if (edge.kind == slick) v = edge.m.dot(v) * edge.m;
   v *= -edge.rho;
   f.u += v;
   f.w -= edge.m.cross(v);
 }
 
+void BodySystem::take_from_block(const Edge& edge, std::span<const Twist> x, Twist& f) const {
+  const ContactEquation& contact = problem_.contacts[at(edge.kind / 2)];
+  const bool is_first = edge.kind % 2 == 0;
+  const Mat3& own = is_first ? contact.levers->first : contact.levers->second;
+  const Mat3& others = is_first ? contact.levers->second : contact.levers->first;
+  const Twist& other = x[at(edge.other)];
+  Vec3 v = -other.u - others * other.w;
+  if (contact.mu == 0) v = edge.m.dot(v) * edge.m;
+  v *= -edge.rho;
+  f.u += v;
+  f.w += own.transpose() * v;
+}
+
 void BodySystem::take_ties(std::span<const Twist> x, std::span<Twist> f) const {
   for (const std::uint32_t tie : ties_) {
     const Link& link = links_[tie];
-    take({link.normal, link.rho, link.second, link.slick}, x, f[at(link.first)]);
-    take({-link.normal, link.rho, link.first, link.slick}, x, f[at(link.second)]);
+    const std::int32_t back = link.kind < 0 ? link.kind : link.kind + 1;
+    take({link.normal, link.rho, link.second, link.kind}, x, f[at(link.first)]);
+    take({-link.normal, link.rho, link.first, back}, x, f[at(link.second)]);
   }
 }
 
@@ -65,10 +95,16 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
     const auto link = static_cast<std::uint32_t>(k);
-    links_.push_back({c.normal, rho[k], c.first, c.second, c.mu == 0});
-    add_own_block(c.normal, rho[k], c.mu == 0, diagonal_[at(c.first)]);
+    const std::int32_t kind = c.levers != nullptr ? static_cast<std::int32_t>(2 * k)
+                              : c.mu == 0         ? slick
+                                                  : rough;
+    links_.push_back({c.normal, rho[k], c.first, c.second, kind});
+    if (c.levers != nullptr)
+      add_block_of_blocks(c, rho[k]);
+    else
+      add_own_block(c.normal, rho[k], kind, diagonal_[at(c.first)]);
     if (c.second < 0) continue;
-    add_own_block(-c.normal, rho[k], c.mu == 0, diagonal_[at(c.second)]);
+    if (c.levers == nullptr) add_own_block(-c.normal, rho[k], kind, diagonal_[at(c.second)]);
     if (row(c.first) && row(c.second)) {
       ++begin_[at(c.first) + 1];
       ++begin_[at(c.second) + 1];
@@ -82,10 +118,11 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
   std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
   for (const bool lower : {true, false}) {
     for (const Link& link : links_) {
-      const auto [n, weight, first, second, slick] = link;
+      const auto [n, weight, first, second, kind] = link;
+      const std::int32_t back = kind < 0 ? kind : kind + 1;
       if (second < 0 || !row(first) || !row(second)) continue;
-      if ((second < first) == lower) edges_[next[at(first)]++] = {n, weight, second, slick};
-      if ((first < second) == lower) edges_[next[at(second)]++] = {-n, weight, first, slick};
+      if ((second < first) == lower) edges_[next[at(first)]++] = {n, weight, second, kind};
+      if ((first < second) == lower) edges_[next[at(second)]++] = {-n, weight, first, back};
     }
     if (lower) middle_ = next;
   }
@@ -135,9 +172,14 @@ void BodySystem::restrict_all(std::span<Twist> f) const {
 void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
   for (std::size_t b = 0; b < size(); ++b) y[b] = {inertia_[b].mass * x[b].u, inertia_[b].spin_mass * x[b].w};
   for (const Link& link : links_) {
-    Vec3 v = relative_velocity(link, x);
-    if (link.slick) v = link.normal.dot(v) * link.normal;
-    add_force(link, link.rho * v, y);
+    if (link.kind >= 0) {
+      const ContactEquation& contact = problem_.contacts[at(link.kind / 2)];
+      add_force(contact, link.rho * constrained(contact, relative_velocity(contact, x)), y);
+      continue;
+    }
+    Vec3 v = relative_velocity_of_spheres(link, x);
+    if (link.kind == slick) v = link.normal.dot(v) * link.normal;
+    add_force_of_spheres(link, link.rho * v, y);
   }
   restrict_all(y);
 }

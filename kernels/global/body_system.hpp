@@ -23,7 +23,8 @@ namespace talus {
 ///
 /// With m = +-n pointing to the body of the row, seen from there the relative velocity is
 /// v = (u_i - u_j) + m x (w_i + w_j), and the row gains rho (v, -m x v). Where a contact has no friction only
-/// (m.v) m counts.
+/// (m.v) m counts. A contact of blocks has v = (u_i - u_j) + B_i w_i - B_j w_j and the row gains
+/// rho (v, B_i^T v): its levers are read from the problem.
 class BodySystem {
  public:
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -57,24 +58,28 @@ class BodySystem {
   std::size_t size() const { return inverse_.size(); }
 
  private:
+  static constexpr std::int32_t rough = -1, slick = -2;  ///< of spheres; slick: normal part only
   /// What the product needs of a contact.
   struct Link {
     Vec3 normal;
     double rho;
     std::int32_t first, second;  ///< unknowns; second -1 at a driven wall
-    bool slick;                  ///< normal part only
+    std::int32_t kind;           ///< rough, slick, or of blocks and then 2 x the contact
   };
   /// A contact as a body of its own sees it.
   struct Edge {
     Vec3 m;
     double rho;
     std::int32_t other;  ///< unknown
-    bool slick;          ///< normal part only
+    std::int32_t kind;   ///< as in Link; of blocks 2 x the contact, and 1 more for its second body
   };
   struct Inertia {
     double mass, spin_mass;  ///< [kg]; 0 where the body counts elsewhere
   };
-  static void take(const Edge& edge, std::span<const Twist> x, Twist& f);
+  void take(const Edge& edge, std::span<const Twist> x, Twist& f) const;
+  void take_from_block(const Edge& edge, std::span<const Twist> x, Twist& f) const;
+  static void add_own_block(const Vec3& m, double rho, std::int32_t kind, Matrix6& block);
+  void add_block_of_blocks(const ContactEquation& contact, double rho);
   void take_ties(std::span<const Twist> x, std::span<Twist> f) const;
   void restrict_all(std::span<Twist> f) const;
 

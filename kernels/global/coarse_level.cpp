@@ -230,10 +230,11 @@ class CoarseLevel::BlockMap {
   std::vector<Block> blocks_;       ///< per key
 };
 
-/// Relative velocity at a contact of normal n as a function of the motion of the group of body `index`, which
-/// stands first (sign 1) or second (-1) in it.
-CoarseLevel::ContactMotion CoarseLevel::contact_motion(std::size_t p, std::int32_t index, double sign,
-                                                       const Vec3& n) const {
+/// What the motion of the group of a contact's first or second body adds to the relative velocity.
+CoarseLevel::ContactMotion CoarseLevel::contact_motion(std::size_t p, const ContactEquation& c,
+                                                       bool is_first) const {
+  const std::int32_t index = is_first ? c.first : c.second;
+  const double sign = is_first ? 1 : -1;
   const BodyUnknown& body = parts_[p].bodies[at(index)];
   ContactMotion motion = ContactMotion::Zero();
   if (body.wall) {
@@ -243,7 +244,10 @@ CoarseLevel::ContactMotion CoarseLevel::contact_motion(std::size_t p, std::int32
   const Member& member = members_[p][at(index)];
   motion.leftCols<3>() = sign * Eigen::Matrix3d::Identity();
   motion.rightCols<3>() = sign * rotation(member.arm);
-  if (body.spin_mass > 0) motion.rightCols<3>() -= body.radius * rotation(n);  // n x (R Omega)
+  if (body.spin_mass > 0 && c.levers != nullptr)
+    motion.rightCols<3>() += sign * body.radius * (is_first ? c.levers->first : c.levers->second);
+  else if (body.spin_mass > 0)
+    motion.rightCols<3>() -= body.radius * rotation(c.normal);  // n x (R Omega)
   motion.rightCols<3>() /= member.length;
   return motion;
 }
@@ -257,9 +261,9 @@ std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<
     const Eigen::Matrix3d weight = c.mu > 0 ? Eigen::Matrix3d(rho[k] * Eigen::Matrix3d::Identity())
                                             : Eigen::Matrix3d(rho[k] * c.normal * c.normal.transpose());
     const std::int64_t one = block.group_of(c.first), other = c.second < 0 ? one : block.group_of(c.second);
-    ContactMotion a = contact_motion(p, c.first, 1, c.normal);
+    ContactMotion a = contact_motion(p, c, true);
     if (c.second >= 0) {
-      const ContactMotion b = contact_motion(p, c.second, -1, c.normal);
+      const ContactMotion b = contact_motion(p, c, false);
       if (one == other) {
         a += b;
       } else {

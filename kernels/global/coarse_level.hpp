@@ -58,7 +58,7 @@ class CoarseLevel {
   using ContactMotion = Eigen::Matrix<double, 3, 6>;
   void join(std::span<const std::vector<char>> touched, int target);
   void list_groups();
-  ContactMotion contact_motion(std::size_t part, std::int32_t index, double sign, const Vec3& n) const;
+  ContactMotion contact_motion(std::size_t part, const ContactEquation& c, bool is_first) const;
   std::vector<Block> blocks_of(std::size_t part, std::span<const double> rho) const;
   void factorise(std::span<const std::vector<double>> rho);
   Eigen::Index first(std::int64_t group) const {

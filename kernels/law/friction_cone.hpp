@@ -17,8 +17,6 @@
 
 namespace talus {
 
-using Mat3 = Eigen::Matrix3d;
-
 /// Orthogonal projection on K_mu. mu >= 0 and finite, without an upper limit.
 Vec3 project_on_cone(const Vec3& z, double mu);
 /// The same in space, on the cone about the unit vector n.

@@ -4,6 +4,7 @@
 
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
+#include "kernels/detection/touch.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 
 namespace talus {
@@ -20,6 +21,11 @@ struct Opening {
 
 Opening opening_of(const NarrowPhase& in, const Chunks& chunks, std::size_t chunk, const Contacts& contacts,
                    std::size_t k) {
+  if (chunks.kind[chunk] == ChunkKind::blocks) {
+    const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[index(chunks.wall[chunk])];
+    const Touch touch = touch_of({in.x, in.radius, in.walls, in.clumps, in.domain}, contacts, k, wall);
+    return {touch.gap, touch.radius};
+  }
   const std::size_t i = index(contacts.first[k]);
   const double radius = in.radius[i];
   if (chunks.wall[chunk] >= 0) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/sweeps/blocks.hpp"
 #include "kernels/sweeps/cohesion.hpp"
 #include "kernels/sweeps/rolling.hpp"
 #include "runtime/graph/clock.hpp"
@@ -107,12 +108,14 @@ void ChunkWork::accumulate(std::size_t c, int epoch) {
   reset_to_free(owned(c), state_.free, velocity);
   add_moments(state_.contacts, range, state_.bodies.radius, velocity);
   if (!at_wall(c)) {
+    if (blocks(c)) return accumulate_blocks(state_.contacts, range, velocity, nullptr);
     kernels_.accumulate_grains<Friction>(state_.contacts, range, velocity);
     return pull_together(state_.contacts, range, velocity, nullptr);
   }
   WallCopy& copy = state_.copies[c];
   const Vec3& free = state_.wall_states[static_cast<std::size_t>(state_.chunks.wall[c])].free_velocity;
   std::copy_n(free.data(), 3, copy.velocity);
+  if (blocks(c)) return accumulate_blocks(state_.contacts, range, velocity, &copy);
   kernels_.accumulate_wall<Friction>(state_.contacts, range, velocity, copy);
   pull_together(state_.contacts, range, velocity, &copy);
 }
@@ -127,8 +130,12 @@ void ChunkWork::measure(std::size_t c) {
   if (at_wall(c)) {
     WallCopy whole = state_.copies[c];
     whole.inv_mass = state_.walls[static_cast<std::size_t>(chunks.wall[c])].inv_mass();
-    errors_[c] = kernels_.error_wall<Friction>(contacts, range_of(c), velocity, friction_of(c), whole, parts);
+    errors_[c] = blocks(c) ? error_blocks(contacts, range_of(c), velocity, friction_of(c), &whole, parts)
+                           : kernels_.error_wall<Friction>(contacts, range_of(c), velocity, friction_of(c),
+                                                           whole, parts);
     Eigen::Map<Vec3>(errors_[c].wall_impulse) -= sum_of_cohesion(contacts, range_of(c));
+  } else if (blocks(c)) {
+    errors_[c] = error_blocks(contacts, range_of(c), velocity, friction_of(c), nullptr, parts);
   } else {
     errors_[c] = kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
   }
@@ -148,7 +155,9 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
   change_precision(c, epoch);
   if (course.plan.kind != SweepKind::plain) carry_on(c, epoch);
   if (damped) copy_impulses<Friction>(contacts, range, before_[c]);
-  if (course.plan.kind == SweepKind::momentum) {
+  if (blocks(c)) {
+    sweep_blocks(contacts, range, velocity, friction, wall ? &copy : nullptr);
+  } else if (course.plan.kind == SweepKind::momentum) {
     const int sweep = schedule_.sweep(epoch);
     const SweepMomentum momentum{courses_.beta(sweep), courses_.omega(sweep), acceleration_.steps};
     SingleState& single = state_.single;

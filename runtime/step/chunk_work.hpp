@@ -64,6 +64,7 @@ class ChunkWork {
   std::span<const Slot> owned(std::size_t c) const;
   ChunkFriction friction_of(std::size_t c) const;
   bool at_wall(std::size_t c) const { return state_.chunks.wall[c] >= 0; }
+  bool blocks(std::size_t c) const { return state_.chunks.kind[c] == ChunkKind::blocks; }
 
   StepState& state_;
   const StepParameters& parameters_;

@@ -113,21 +113,24 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
   return bodies;
 }
 
-SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks) {
+SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks,
+                          std::span<const Clump> clumps) {
   const auto volume_of = [](double radius) { return sphere_mass(radius, 1); };
+  const ClumpView shapes{own.shape, own.orientation, clumps};
   // The largest of each is wanted first; of the smallest radius the negative. The last two are flags.
   std::array<double, 5> most{0, -std::numeric_limits<double>::infinity(), 0,
                              own.orientation.empty() ? 0.0 : 1.0, own.material.empty() ? 0.0 : 1.0};
   for (std::size_t k = 0; k < own.size(); ++k) {
     most[0] = std::max(most[0], own.radius[k]);
-    most[1] = std::max(most[1], -own.radius[k]);
+    most[1] = std::max(most[1], shapes.is_clump(k) ? -own.radius[k] * shapes.of(k).smallest : -own.radius[k]);
     most[2] = std::max(most[2], own.mass(k));
   }
   ranks.max(most);
   ExactSum diameter(2 * most[0]), volume(volume_of(most[0])), mass(most[2]);
   for (std::size_t k = 0; k < own.size(); ++k) {
     diameter.add(2 * own.radius[k]);
-    volume.add(volume_of(own.radius[k]));
+    volume.add(shapes.is_clump(k) ? std::pow(own.radius[k], 3) * shapes.of(k).volume
+                                  : volume_of(own.radius[k]));
     mass.add(own.mass(k));
   }
   std::int64_t bodies[1] = {static_cast<std::int64_t>(own.size())};

@@ -20,7 +20,7 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
 /// Of the bodies of all ranks.
 struct SampleSize {
   std::int64_t bodies = 0;
-  double smallest = 0;       ///< radius [m]
+  double smallest = 0;       ///< radius of a sphere, or of a ball of a clump [m]
   double mean_diameter = 0;  ///< [m]
   double total_mass = 0;     ///< [kg]
   double volume = 0;         ///< of the solid [m^3]
@@ -29,6 +29,7 @@ struct SampleSize {
 };
 
 /// Collective; the same bits however the bodies are dealt to the ranks, and in whatever order they stand.
-SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks);
+SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks,
+                          std::span<const Clump> clumps = {});
 
 }  // namespace talus

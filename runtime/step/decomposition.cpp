@@ -24,7 +24,7 @@ struct BodyRecord {
   double u[3], w[3];
   double inv_mass, spin_mobility;
   double orientation[4];
-  std::int64_t material;
+  std::int32_t material, shape;
 };
 
 std::size_t at(std::int32_t k) {
@@ -45,6 +45,7 @@ BodyRecord record_of(const Decomposition& decomposition, const Bodies& bodies, s
   record.spin_mobility = v.spin_mobility;
   if (!bodies.orientation.empty()) std::copy_n(bodies.orientation[s].data(), 4, record.orientation);
   if (!bodies.material.empty()) record.material = bodies.material[s];
+  if (!bodies.shape.empty()) record.shape = bodies.shape[s];
   return record;
 }
 
@@ -294,6 +295,11 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
         around.bodies.material, [&](std::size_t s) { return bodies.material[s]; },
         [](const BodyRecord& record) { return static_cast<Material>(record.material); });
   release(bodies.material);
+  if (decomposition.shapes)
+    take(
+        around.bodies.shape, [&](std::size_t s) { return bodies.shape[s]; },
+        [](const BodyRecord& record) { return static_cast<ShapeNumber>(record.shape); });
+  release(bodies.shape);
   take(
       around.reach, [&](std::size_t s) { return reach[s]; },
       [](const BodyRecord& record) { return record.reach; });

@@ -45,6 +45,7 @@ struct Decomposition {
   Per<SubdomainPlace, SubdomainInterface> interfaces;  ///< bodies[k] stands in slot_begin + k. Empty likewise
   bool orientation = false;       ///< bodies have orientations, also where there is no body
   bool materials = false;         ///< likewise materials
+  bool shapes = false;            ///< likewise shapes
   std::int64_t migrants = 0;      ///< bodies that came to a subdomain where they did not stand, all ranks
   double imbalance = 0;           ///< candidates of the fullest subdomain over the mean, less 1
   Per<SubdomainId, double> cost;  ///< of a candidate, the mean being 1; empty: all equal

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <tuple>
 
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -18,7 +19,7 @@ namespace {
 struct ImpulseRecord {
   std::int64_t first;
   std::int64_t second;   ///< -1 - wall at a wall
-  std::int64_t feature;  ///< of the wall's surface; 0 elsewhere
+  std::int64_t feature;  ///< of the wall; between bodies Candidates::balls, or 0
   double r[6];           ///< of the candidate, as many as it has components
 };
 
@@ -45,6 +46,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
   old.grain_pairs.reserve(grains);
   old.impulse.reserve(components * candidates.size());
   std::vector<double> at_walls;
+  const bool clumps = decomposition.shapes;
   const auto push = [components](std::vector<double>& impulse, const double* r) {
     for (std::size_t c = 0; c < components; ++c) impulse.push_back(r[c]);
   };
@@ -64,6 +66,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
         old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)], at_wall.feature});
       else
         old.grain_pairs.push_back({around.of_slot[at(pair.first)], around.of_slot[at(pair.second)]});
+      if (clumps && !wall) old.balls.push_back(candidates.balls[k]);
       push(wall ? at_walls : old.impulse, r);
       continue;
     }
@@ -71,7 +74,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     record.first = static_cast<std::int64_t>(bodies.id[at(wall ? at_wall.body : pair.first)]);
     record.second =
         wall ? -1 - std::int64_t{at_wall.wall} : static_cast<std::int64_t>(bodies.id[at(pair.second)]);
-    record.feature = at_wall.feature;
+    record.feature = clumps && !wall ? candidates.balls[k] : at_wall.feature;
     std::copy_n(r, components, record.r);
     to[at(rank)].push_back(record);
   }
@@ -85,6 +88,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
                                   static_cast<std::int32_t>(record.feature)});
       else
         old.grain_pairs.push_back({first, around.find(record.second)});
+      if (clumps && !wall) old.balls.push_back(static_cast<std::uint16_t>(record.feature));
       push(wall ? at_walls : old.impulse, record.r);
     }
   old.impulse.insert(old.impulse.end(), at_walls.begin(), at_walls.end());
@@ -177,16 +181,19 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     ImpulseRecord record{};
     record.first = static_cast<std::int64_t>(around.bodies.id[at(pair.body)]);
     record.second = -1 - std::int64_t{pair.wall};
+    record.feature = pair.feature;
     std::copy_n(&found.impulse[components * k], components, record.r);
     to[at(rank)].push_back(record);
   }
   for (const auto& part : ranks.exchange_records(std::move(to)))
     for (const ImpulseRecord& record : part) {
-      const WallPair pair{static_cast<std::int32_t>(-1 - record.second), around.find(record.first)};
-      const auto place = std::ranges::lower_bound(found.wall_pairs, std::pair{pair.wall, pair.body}, {},
-                                                  [](const WallPair& other) {
-                                                    return std::pair{other.wall, other.body};
-                                                  });
+      const WallPair pair{static_cast<std::int32_t>(-1 - record.second), around.find(record.first),
+                          static_cast<std::int32_t>(record.feature)};
+      // Walls of finite mass are planes, where the layer of a pair is its feature: the ball of a clump.
+      const auto order = [](const WallPair& other) {
+        return std::tuple{other.wall, other.feature, other.body};
+      };
+      const auto place = std::ranges::lower_bound(found.wall_pairs, order(pair), {}, order);
       const auto k = grains + static_cast<std::size_t>(place - found.wall_pairs.begin());
       std::copy_n(record.r, components, &found.impulse[components * k]);
     }
@@ -209,6 +216,7 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
   const auto components = static_cast<std::size_t>(found.components);
   cut.impulse.reserve(components * own.candidate.size());
   cut.grain_pairs.reserve(own.begin[2 * decomposition.here.size()]);
+  cut.balls.reserve(found.balls.empty() ? 0 : own.begin[2 * decomposition.here.size()]);
   std::vector<CandidateGroup> groups;
   for (std::size_t group = 0; group + 1 < own.begin.size(); ++group) {
     const auto begin = static_cast<std::int32_t>(own.begin[group]);
@@ -241,6 +249,7 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
             {slot[at(found.grain_pairs[k].first)], slot[at(found.grain_pairs[k].second)]});
       else
         push_at_wall(found.wall_pairs[k - found.grain_pairs.size()], place);
+      if (wall < 0 && !found.balls.empty()) cut.balls.push_back(found.balls[k]);
       for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
     }
   }

@@ -5,7 +5,9 @@
 
 #include "kernels/bodies/permute.hpp"
 #include "kernels/bodies/release.hpp"
+#include "kernels/detection/touch.hpp"
 #include "kernels/detection/wall_pairs.hpp"
+#include "kernels/shapes/clump_motion.hpp"
 #include "runtime/step/state.hpp"
 
 namespace talus {
@@ -34,13 +36,16 @@ Vec3 vector_of(const double* from) {
 /// Rows on the way at a time, of one sender to all.
 constexpr std::size_t piece = 8192;
 
-BodyRow body_row(const Bodies& bodies, std::size_t s) {
+BodyRow body_row(const StepState& state, std::size_t s) {
+  const Bodies& bodies = state.bodies;
   BodyRow row{};
   row.id = static_cast<std::int64_t>(bodies.id[s]);
   copy3(bodies.x[s], row.x);
   row.radius = bodies.radius[s];
   std::copy_n(bodies.velocity[s].u, 3, row.u);
   for (std::size_t k = 0; k < 3; ++k) row.omega[k] = bodies.velocity[s].w[k] / bodies.radius[s];
+  if (const ClumpView clumps = clumps_of(state); clumps.is_clump(s))
+    copy3(turning_of(clumps, s, bodies.radius[s]) * vector_of(bodies.velocity[s].w), row.omega);
   if (!bodies.orientation.empty()) std::copy_n(bodies.orientation[s].data(), 4, row.orientation);
   if (!bodies.material.empty()) row.material = bodies.material[s];
   return row;
@@ -63,6 +68,27 @@ std::vector<Active> active_contacts(const StepState& state) {
   return active;
 }
 
+/// Where a contact stands, and how wide it is open [m].
+struct Place {
+  Vec3 point;
+  double gap;
+};
+Place place_of_sphere(const StepState& state, std::size_t k, const Wall* wall) {
+  const Bodies& bodies = state.bodies;
+  const auto i = static_cast<std::size_t>(state.contacts.first[k]);
+  const Slot second = state.contacts.second[k];
+  const auto j = static_cast<std::size_t>(std::max(second, 0));
+  const double gap =
+      second >= 0 ? Domain{}.separation(bodies.x[i], bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
+                  : wall_point(*wall, bodies.x[i], -1 - second, Domain{}).distance - bodies.radius[i];
+  return {bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * contact_normal(state.contacts, k), gap};
+}
+Place place_of_block(const StepState& state, std::size_t k, const Wall* wall) {
+  const Touch touch =
+      touch_of({state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)}, state.contacts, k, wall);
+  return {touch.point, touch.gap};
+}
+
 ContactRow contact_row(const StepState& state, const Active& active, double time_step) {
   const Bodies& bodies = state.bodies;
   const auto k = static_cast<std::size_t>(active.contact);
@@ -70,19 +96,18 @@ ContactRow contact_row(const StepState& state, const Active& active, double time
   const auto i = static_cast<std::size_t>(state.contacts.first[k]);
   const Slot second = state.contacts.second[k];
   const auto j = static_cast<std::size_t>(std::max(second, 0));
-  const auto wall =
-      static_cast<std::size_t>(std::max(state.chunks.wall[static_cast<std::size_t>(active.chunk)], 0));
-  const double gap =
-      second >= 0
-          ? Domain{}.separation(bodies.x[i], bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
-          : wall_point(state.walls[wall], bodies.x[i], -1 - second, Domain{}).distance - bodies.radius[i];
+  const auto c = static_cast<std::size_t>(active.chunk);
+  const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
+  const Place place = state.chunks.kind[c] == ChunkKind::blocks
+                          ? place_of_block(state, k, second < 0 ? &state.walls[wall] : nullptr)
+                          : place_of_sphere(state, k, state.walls.empty() ? nullptr : &state.walls[wall]);
   ContactRow row;
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
   row.bodies[1] =
       second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
   copy3(normal, row.normal);
-  copy3(bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * normal, row.point);
-  row.gap = gap;
+  copy3(place.point, row.point);
+  row.gap = place.gap;
   copy3(impulse / time_step, row.force);
   return row;
 }
@@ -151,7 +176,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   const std::vector<std::int64_t> first = splitters(std::move(ids), ranks);
   const bool orientation = state.decomposition.orientation;
   deal_rows(
-      counted.size(), first, ranks, [&](std::size_t k) { return body_row(state.bodies, counted[k]); },
+      counted.size(), first, ranks, [&](std::size_t k) { return body_row(state, counted[k]); },
       [](const BodyRow& row) { return row.id; },
       [&](const BodyRow& row) {
         frame.id.push_back(row.id);

@@ -57,6 +57,29 @@ void validate_laws(const Stage& stage) {
   }
 }
 
+bool rolls(const Setup& setup) {
+  return std::ranges::any_of(
+      setup.stages, [](const Stage& stage) { return stage.laws.largest(&PairLaw::rolling_resistance) > 0; });
+}
+
+/// Where `what` cannot be carried on from sweep to sweep, nor damped.
+void demand_plain_sweeps(const Setup& setup, const std::string& what) {
+  require(setup.solver.method != SolverMethod::momentum && setup.solver.method != SolverMethod::nncg,
+          fmt::format("solver.method = \"{}\": {} cannot be carried on. Take \"auto\" or \"nlgs\"",
+                      setup.solver.method.name(), what));
+  require(setup.decomposition.coupling != Coupling::schwarz,
+          fmt::format("decomposition.coupling = \"schwarz\": {} are not damped. Take \"alternating\" or "
+                      "\"nscdd\"",
+                      what));
+}
+
+void validate_clumps(const Setup& setup) {
+  require(setup.clumps.size() <= most_clumps,
+          fmt::format("{} shapes of clumps, of at most {}", setup.clumps.size(), most_clumps));
+  require(!rolls(setup), "rolling_resistance: clumps have none; their shape resists");
+  demand_plain_sweeps(setup, "contacts of clumps");
+}
+
 }  // namespace
 
 void validate(const Setup& setup) {
@@ -100,17 +123,8 @@ void validate(const Setup& setup) {
       setup.solver.method != SolverMethod::momentum || setup.decomposition.coupling != Coupling::schwarz,
       "solver.method = \"nlgs+momentum\": Schwarz adds up what all copies of a body carry on, and diverges. "
       "Take \"auto\", or another decomposition.coupling");
-  if (std::ranges::any_of(setup.stages, [](const Stage& stage) {
-        return stage.laws.largest(&PairLaw::rolling_resistance) > 0;
-      })) {
-    require(setup.solver.method != SolverMethod::momentum && setup.solver.method != SolverMethod::nncg,
-            fmt::format("solver.method = \"{}\": moments of rolling resistance cannot be carried on. Take "
-                        "\"auto\" or \"nlgs\"",
-                        setup.solver.method.name()));
-    require(setup.decomposition.coupling != Coupling::schwarz,
-            "decomposition.coupling = \"schwarz\": moments of rolling resistance are not damped. Take "
-            "\"alternating\" or \"nscdd\"");
-  }
+  if (rolls(setup)) demand_plain_sweeps(setup, "moments of rolling resistance");
+  if (!setup.clumps.empty()) validate_clumps(setup);
   require(setup.solver.check_every >= 2, "solver.check_every must be >= 2");
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,

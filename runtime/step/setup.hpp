@@ -13,6 +13,7 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/law/pair_table.hpp"
 #include "kernels/registry.hpp"
+#include "kernels/shapes/clump.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
@@ -148,6 +149,7 @@ struct DecompositionSettings {
 /// A simulation, apart from its grains.
 struct Setup {
   std::vector<Wall> walls;
+  std::vector<Clump> clumps;  ///< shapes of bodies that are no spheres (Bodies::shape)
   std::vector<Stage> stages;
   DetectionSettings detection;
   SolverSettings solver;

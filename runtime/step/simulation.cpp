@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "kernels/detection/domain.hpp"
+#include "kernels/shapes/clump_motion.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
@@ -29,10 +30,11 @@ struct Simulation::Implementation {
       : setup(std::move(given)),
         ranks(ranks_),
         state(start(setup, std::move(bodies), ranks_)),
-        size(measure_sample(state.bodies, ranks_)),
+        size(measure_sample(state.bodies, ranks_, setup.clumps)),
         graph(state, parameters, setup, size.bodies, executor, ranks_) {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
+    state.decomposition.shapes = !setup.clumps.empty();
     const double unit = size.bodies > 0 ? size.smallest : 1;
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
@@ -65,6 +67,7 @@ struct Simulation::Implementation {
   static StepState start(const Setup& setup, Bodies bodies, const graph::Communicator& ranks) {
     validate(setup);
     validate(bodies);
+    validate_shapes(bodies, setup.clumps);
     demand_laws(setup, bodies);
     StepState state;
     state.decomposition = make_decomposition(setup.decomposition, ranks);
@@ -79,9 +82,13 @@ struct Simulation::Implementation {
         v.spin_mobility = 0;
         std::fill(std::begin(v.w), std::end(v.w), 0.0);
       }
-    if (setup.orientation && state.bodies.orientation.empty())
+    // Alike on all ranks, whoever has a clump.
+    if (!setup.clumps.empty() && state.bodies.shape.empty())
+      state.bodies.shape.assign(state.bodies.size(), 0);
+    if ((setup.orientation || !setup.clumps.empty()) && state.bodies.orientation.empty())
       state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});
     state.walls = setup.walls;
+    state.clumps = setup.clumps;
     state.wall_states.resize(state.walls.size());
     state.free.u.resize(state.bodies.size());
     return state;
@@ -103,7 +110,8 @@ struct Simulation::Implementation {
     parameters.time_step = stage.time_step;
     parameters.gravity = stage.gravity;
     parameters.laws = stage.laws;
-    parameters.friction = stage.laws.largest(&PairLaw::friction) > 0;
+    parameters.clumps = !setup.clumps.empty();
+    parameters.friction = parameters.clumps || stage.laws.largest(&PairLaw::friction) > 0;
     parameters.rotates = parameters.friction && setup.rotation;
     parameters.rolls = parameters.rotates && stage.laws.largest(&PairLaw::rolling_resistance) > 0;
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);

@@ -167,7 +167,9 @@ void SolverLoop::begin() {
   pending_.reset();
   schedule_ = {};
   method_ =
-      methods().of(settings_.method).make({settings_, parameters_.friction, schwarz() || parameters_.rolls});
+      methods()
+          .of(settings_.method)
+          .make({settings_, parameters_.friction, schwarz() || parameters_.rolls || parameters_.clumps});
   begin_course(method_->begin(), 0);
 }
 

@@ -21,10 +21,11 @@ struct StepParameters {
   double time_step = 0;  ///< h [s]
   Vec3 gravity = Vec3::Zero();
   PairTable laws;
-  bool friction =
-      false;             ///< any friction coefficient > 0: impulses have three components and grains may turn
+  /// Any friction coefficient > 0, or clumps: impulses have three components and bodies may turn.
+  bool friction = false;
   bool rotates = false;  ///< friction, and grains that rotate
   bool rolls = false;    ///< some contacts resist rolling, of grains that rotate
+  bool clumps = false;   ///< there are bodies that may be clumps
   /// Of the impulse of a candidate (Candidates::components).
   int components() const { return rolls ? 6 : friction ? 3 : 1; }
   double alert = 0;  ///< [m]
@@ -45,7 +46,8 @@ struct WallState {
 
 /// All that a step reads and writes. Sizes: n bodies, c candidates, k chunks.
 struct StepState {
-  Bodies bodies;  ///< n
+  Bodies bodies;              ///< n
+  std::vector<Clump> clumps;  ///< of the setup
   std::vector<Wall> walls;
   std::vector<WallState> wall_states;  ///< like walls
   FreeVelocity free;                   ///< n, or empty parts
@@ -60,6 +62,14 @@ struct StepState {
   std::vector<WallCopy> copies;   ///< k; used by chunks at walls
   bool candidates_valid = false;  ///< false: the next step begins with a broad phase
 };
+
+/// The shapes of the bodies here.
+inline ClumpView clumps_of(const StepState& state, const Bodies& bodies) {
+  return {bodies.shape, bodies.orientation, state.clumps};
+}
+inline ClumpView clumps_of(const StepState& state) {
+  return clumps_of(state, state.bodies);
+}
 
 std::size_t memory_used(const StepState& state);
 

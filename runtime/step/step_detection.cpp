@@ -4,9 +4,11 @@
 #include <cmath>
 
 #include "kernels/bodies/release.hpp"
+#include "kernels/detection/ball_pairs.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/narrow_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
+#include "kernels/shapes/clump_motion.hpp"
 #include "kernels/sweeps/cohesion.hpp"
 #include "kernels/sweeps/rolling.hpp"
 #include "runtime/graph/clock.hpp"
@@ -28,8 +30,10 @@ void StepGraph::predict_share(std::uint32_t share) {
   const SlotRange range = slots(share);
   const double h = parameters_.time_step;
   predict(range, bodies.x, bodies.velocity, h);
+  if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * h);
+  // What clumps spin with belongs to their axes, so that these come before the free velocity.
+  turn_clumps(range, bodies, state_.clumps, 0.5 * h);
   free_velocities(range, bodies.velocity, h, parameters_.gravity, state_.free);
-  if (!bodies.orientation.empty()) rotate(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * h);
   left_[share].clear();
   if (state_.candidates_valid)
     find_skin_escapes(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[share]);
@@ -155,6 +159,7 @@ void StepGraph::make_chunks() {
   for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x,
                                      several ? around_.reach : state_.reach_then, state_.walls, wall_margin_);
+  split_into_balls(clumps_of(state_, several ? around_.bodies : state_.bodies), fresh);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
   std::vector<CandidateGroup> groups;
@@ -173,6 +178,7 @@ void StepGraph::make_chunks() {
     groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(all, all));
   }
   state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
+  note_kinds(clumps_of(state_), state_.chunks);
   note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
   if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
@@ -216,7 +222,7 @@ void StepGraph::narrow_share(std::uint32_t share) {
   const NarrowPhase in{bodies.x,         bodies.radius,         bodies.velocity,
                        state_.walls,     parameters_.time_step, parameters_.alert,
                        parameters_.laws, parameters_.gravity,   settings_.overlap_correction,
-                       bodies.material};
+                       bodies.material,  clumps_of(state_)};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);

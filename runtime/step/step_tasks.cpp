@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "kernels/shapes/clump_motion.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/trace/order.hpp"
@@ -111,8 +112,8 @@ void StepGraph::finish_share(std::uint32_t share) {
   const bool uneven = decomposition_.coupling != Coupling::nscdd;
   motion_[share] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
                           uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{});
-  if (!bodies.orientation.empty())
-    rotate(range, bodies.orientation, bodies.velocity, bodies.radius, 0.5 * parameters_.time_step);
+  if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * parameters_.time_step);
+  turn_clumps(range, bodies, state_.clumps, 0.5 * parameters_.time_step);
 }
 
 void StepGraph::finish_walls() {
@@ -141,8 +142,9 @@ void StepGraph::measure_share(std::uint32_t share) {
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
-    contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c,
-                                        {state_.bodies.x, state_.bodies.radius, state_.walls});
+    contact_sums_[c] =
+        measure_contacts(state_.contacts, state_.chunks, c,
+                         {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)});
   }
 }
 

@@ -79,6 +79,7 @@ Bodies make_copies(Decomposition& decomposition, Bodies& around) {
   copy(around.velocity, copies.velocity);
   if (decomposition.orientation) copy(around.orientation, copies.orientation);
   if (decomposition.materials) copy(around.material, copies.material);
+  if (decomposition.shapes) copy(around.shape, copies.shape);
   decomposition.whole.clear();
   decomposition.whole.reserve(copies.size());
   for (std::size_t s = 0; s < copies.size(); ++s) {

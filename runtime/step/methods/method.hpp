@@ -18,7 +18,7 @@ struct MethodContext {
   const SolverSettings& settings;
   bool friction = false;
   /// Sweeps whose changes cannot be carried on: damped Schwarz is no descent, and moments of rolling
-  /// resistance have no history.
+  /// resistance and contacts of clumps have no history.
   bool plain = false;
 };
 

@@ -1,0 +1,133 @@
+#include "kernels/detection/detail/block_phase.hpp"
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "kernels/detection/detail/passing.hpp"
+#include "kernels/detection/materials.hpp"
+#include "kernels/detection/touch.hpp"
+#include "kernels/shapes/clump_motion.hpp"
+#include "kernels/simd/contact_view.hpp"
+
+namespace talus::detail {
+
+namespace {
+
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// B of a body whose surface at `arm` from its centre of mass moves with u + omega x arm = u + B w.
+Mat3 lever_of(const NarrowPhase& in, Slot slot, const Vec3& arm) {
+  Mat3 lever;
+  const Mat3 turning = turning_of(in.clumps, index(slot), in.radius[index(slot)]);
+  for (Eigen::Index c = 0; c < 3; ++c) lever.col(c) = turning.col(c).cross(arm);
+  return lever;
+}
+
+Vec3 velocity_at(const NarrowPhase& in, Slot slot, const Mat3& lever) {
+  const Velocity& v = in.velocity[index(slot)];
+  return Eigen::Map<const Vec3>(v.u) + lever * Eigen::Map<const Vec3>(v.w);
+}
+
+/// What is known of a candidate before its law is asked.
+struct Meeting {
+  Touch touch;
+  Levers levers;
+  Vec3 v = Vec3::Zero();     ///< of the first body's surface from the other's, as the step begins [m/s]
+  Vec3 fall = Vec3::Zero();  ///< what is added to it without contacts [m/s]
+  Slot first = 0, second = 0;
+  BallNumbers balls = 0;
+  bool passed = false;
+};
+
+Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, BallNumbers balls) {
+  Meeting meeting{
+      touch_bodies(poses, pair.first, pair.second, balls), {}, {}, {}, pair.first, pair.second, balls};
+  const Touch& touch = meeting.touch;
+  // From one centre of mass to the same point: angular momentum is kept across a gap, too.
+  const Vec3 between = in.domain.separation(in.x[index(pair.first)], in.x[index(pair.second)]);
+  const Vec3 arm = touch.point - in.x[index(pair.first)];
+  meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between)};
+  meeting.v =
+      velocity_at(in, pair.first, meeting.levers.first) - velocity_at(in, pair.second, meeting.levers.second);
+  meeting.passed =
+      passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap, touch.radius);
+  return meeting;
+}
+
+Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
+  const Wall& wall = in.walls[index(pair.wall)];
+  Meeting meeting{touch_wall(poses, wall, pair.body, pair.feature), {}, {}, {}, pair.body, -1 - pair.feature};
+  const Touch& touch = meeting.touch;
+  meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[index(pair.body)]);
+  meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity;
+  meeting.fall = in.time_step * in.gravity - wall.gain;
+  // The wall in place of a body as large as the ball, whose surface it is.
+  const double way = in.time_step * touch.normal.dot(meeting.v);
+  meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.radius;
+  return meeting;
+}
+
+/// Whether a surface has, for this ball and in this step, the feature that the candidate is of: near an edge
+/// another one counts (kernels/shapes/surface.hpp).
+bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
+  const Surface* surface = in.walls[index(pair.wall)].surface();
+  if (surface == nullptr) return true;
+  const auto balls = static_cast<std::int32_t>(in.clumps.balls(index(pair.body)));
+  const Vec3 centre = meeting.touch.point - meeting.touch.arm;
+  std::vector<SurfacePoint> points;
+  surface->collide(centre, meeting.touch.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(),
+                   points);
+  return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
+}
+
+void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t at, Contacts& contacts) {
+  const bool wall = meeting.second < 0;
+  contacts.nx[at] = meeting.touch.normal[0];
+  contacts.ny[at] = meeting.touch.normal[1];
+  contacts.nz[at] = meeting.touch.normal[2];
+  contacts.bias[at] = bias;
+  contacts.levers[at] = meeting.levers;
+  contacts.balls[at] = meeting.balls;
+  contacts.first[at] = meeting.first;
+  contacts.second[at] = meeting.second;
+  contacts.first_record[at] = record_of(meeting.first);
+  if (!wall) contacts.second_record[at] = record_of(meeting.second);
+  contacts.candidate[at] = static_cast<std::int32_t>(candidate);
+}
+
+}  // namespace
+
+void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Contacts& contacts) {
+  const std::size_t begin = index(chunks.begin[chunk]);
+  contacts.count[chunk] = static_cast<std::int32_t>(end - begin);
+  std::uint8_t* size = contacts.group.data() + begin;
+  for (std::size_t k = begin; k < end; k += group_size)
+    *size++ = static_cast<std::uint8_t>(std::min(group_size, end - k));
+}
+
+void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
+                   const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
+  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
+  const Poses poses{in.x, in.radius, in.walls, in.clumps, in.domain};
+  const MaterialView materials{in.material, in.walls};
+  std::int32_t through = 0;
+  std::size_t at = begin;
+  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+    const bool wall = k >= grains;
+    const Meeting meeting = wall ? meet(in, poses, candidates.wall_pairs[k - grains])
+                                 : meet(in, poses, candidates.grain_pairs[k], candidates.balls[k]);
+    if (wall && !has_feature(in, candidates.wall_pairs[k - grains], meeting)) continue;
+    through += meeting.passed ? 1 : 0;
+    const double v_n = meeting.touch.normal.dot(meeting.v);
+    const GapResult<double> found =
+        solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall),
+                  law_at(in.laws, candidates, materials, k).restitution);
+    if (!found.absent) write(meeting, found.bias, k, at++, contacts);
+  }
+  contacts.passed[chunk] = through;
+  close_groups(chunks, chunk, at, contacts);
+}
+
+}  // namespace talus::detail

@@ -1,0 +1,27 @@
+#pragma once
+
+/// When a time step was too long for two bodies.
+
+#include <algorithm>
+
+#include "kernels/bodies/types.hpp"
+
+namespace talus::detail {
+
+/// Whether two bodies came so far on their way `way` here that they may have passed.
+inline bool came_far(const Vec3& way, double small) {
+  return !(way.squaredNorm() < 0.25 * small * small);
+}
+
+/// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
+/// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
+/// From the middle of one step to that of the next it moves by h V-, V- being what the first has ended with.
+inline bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
+  if (!came_far(way, small)) return false;
+  const Vec3 start = d - way;
+  const double nearest = std::clamp(-start.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  const double overlap = touching - (start + nearest * way).norm();
+  return overlap - std::max(0.0, touching - start.norm()) > 0.5 * small;
+}
+
+}  // namespace talus::detail

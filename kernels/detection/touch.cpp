@@ -1,0 +1,50 @@
+#include "kernels/detection/touch.hpp"
+
+#include <algorithm>
+
+#include "kernels/detection/wall_pairs.hpp"
+
+namespace talus {
+
+namespace {
+
+Ball ball_at(const Poses& poses, Slot slot, std::size_t number) {
+  const auto s = static_cast<std::size_t>(slot);
+  return ball_of(poses.clumps, s, number, poses.x[s], poses.radius[s]);
+}
+
+}  // namespace
+
+Touch touch_bodies(const Poses& poses, Slot first, Slot second, BallNumbers numbers) {
+  const Ball a = ball_at(poses, first, numbers / 256), b = ball_at(poses, second, numbers % 256);
+  Touch touch;
+  touch.separation = poses.domain.separation(a.centre, b.centre);
+  const double distance = touch.separation.norm();
+  if (distance > 0) touch.normal = touch.separation / distance;
+  touch.gap = distance - a.radius - b.radius;
+  touch.radius = std::min(a.radius, b.radius);
+  touch.arm = -(a.radius + 0.5 * touch.gap) * touch.normal;
+  touch.point = a.centre + touch.arm;
+  return touch;
+}
+
+Touch touch_wall(const Poses& poses, const Wall& wall, Slot body, std::int32_t feature) {
+  const auto balls = static_cast<std::int32_t>(poses.clumps.balls(static_cast<std::size_t>(body)));
+  const Ball ball = ball_at(poses, body, static_cast<std::size_t>(feature % balls));
+  const SurfacePoint at = wall_point(wall, ball.centre, feature / balls, poses.domain);
+  Touch touch;
+  touch.normal = at.normal;
+  touch.gap = at.distance - ball.radius;
+  touch.radius = ball.radius;
+  touch.arm = -ball.radius * at.normal;
+  touch.point = ball.centre + touch.arm;
+  touch.separation = at.distance * at.normal;
+  return touch;
+}
+
+Touch touch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall) {
+  return wall != nullptr ? touch_wall(poses, *wall, contacts.first[k], -1 - contacts.second[k])
+                         : touch_bodies(poses, contacts.first[k], contacts.second[k], contacts.balls[k]);
+}
+
+}  // namespace talus

@@ -1,0 +1,357 @@
+/// Rigid dumbbells and other clumps: what a body with a tensor of inertia does, by closed forms.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <random>
+
+#include "kernels/shapes/clump_motion.hpp"
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation {
+namespace {
+
+constexpr double h = 1e-3;
+
+/// Of a dumbbell: two balls of 0.1 m, touching, of 1 kg each, along x.
+constexpr double r = 0.1, ball_mass = 1, length = 0.2, mass = 2;
+constexpr double along = 2 * 0.4 * ball_mass * r * r, across = along + 2 * ball_mass * 0.25 * length * length;
+
+double density() {
+  return ball_mass / (4.0 / 3.0 * pi * r * r * r);
+}
+
+/// A scene of dumbbells, balls and boxes.
+struct ClumpScene : Scene {
+  std::array<double, 4> axes{1, 0, 0, 0};
+  double radius = 0;
+
+  explicit ClumpScene(double time_step = h) : Scene(time_step) {
+    const Ball balls[] = {{{-0.5 * length, 0, 0}, r}, {{0.5 * length, 0, 0}, r}};
+    const PlacedClump placed = make_clump(balls);
+    axes = placed.orientation;
+    radius = placed.radius;
+    setup.clumps.push_back(placed.clump);
+  }
+  /// Turned by `turn` from its place along x.
+  void dumbbell(const Vec3& centre, const Eigen::Quaterniond& turn = Eigen::Quaterniond::Identity(),
+                const Vec3& u = Vec3::Zero(), const Vec3& omega = Vec3::Zero()) {
+    const Eigen::Quaterniond q = turn * Eigen::Quaterniond(axes[0], axes[1], axes[2], axes[3]);
+    add_clump(bodies, setup.clumps, BodyId{static_cast<std::int64_t>(bodies.size())},
+              {1, centre, {q.w(), q.x(), q.y(), q.z()}, radius, density(), u, omega});
+  }
+};
+
+Eigen::Quaterniond about(const Vec3& axis, double angle) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis));
+}
+
+Vec3 omega_of(const Experiment& run, std::int64_t id) {
+  const StepState& state = run.simulation().state();
+  const std::size_t s = run.slot(id);
+  return turning_of(clumps_of(state), s, state.bodies.radius[s]) *
+         Eigen::Map<const Vec3>(state.bodies.velocity[s].w);
+}
+
+/// From mass, shape and orientation alone.
+Vec3 spin_of(const Experiment& run, std::int64_t id) {
+  const StepState& state = run.simulation().state();
+  const std::size_t s = run.slot(id);
+  const Bodies& bodies = state.bodies;
+  const double R = bodies.radius[s];
+  const std::array<double, 4>& q = bodies.orientation[s];
+  const Mat3 Q = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  const Vec3 inertia = bodies.shape[s] == 0 ? Vec3(Vec3::Constant(0.4))
+                                            : state.clumps[bodies.shape[s] - std::size_t{1}].inertia;
+  return bodies.mass(s) * R * R * (Q * inertia.asDiagonal() * Q.transpose() * omega_of(run, id));
+}
+
+Vec3 angular_momentum(const Experiment& run) {
+  Vec3 sum = Vec3::Zero();
+  for (std::int64_t id = 0; id < run.simulation().bodies(); ++id)
+    sum += run.simulation().state().bodies.mass(run.slot(id)) * run.x(id).cross(run.u(id)) + spin_of(run, id);
+  return sum;
+}
+
+Vec3 momentum(const Experiment& run) {
+  Vec3 sum = Vec3::Zero();
+  for (std::int64_t id = 0; id < run.simulation().bodies(); ++id)
+    sum += run.simulation().state().bodies.mass(run.slot(id)) * run.u(id);
+  return sum;
+}
+
+TEST(Clumps, HaveMassAndInertiaOfTheirBalls) {
+  const Ball balls[] = {{{2, 1, 1}, 0.1}, {{2, 1.2, 1}, 0.1}};
+  const PlacedClump placed = make_clump(balls);
+  EXPECT_LT((placed.centre - Vec3(2, 1.1, 1)).norm(), 1e-14);
+  EXPECT_NEAR(placed.radius, 0.2, 1e-14);
+  EXPECT_NEAR(placed.clump.inertia[0] * mass * 0.04, along, 1e-14);
+  EXPECT_NEAR(placed.clump.inertia[1] * mass * 0.04, across, 1e-14);
+  EXPECT_NEAR(placed.clump.inertia[2] * mass * 0.04, across, 1e-14);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Ball& ball = placed.clump.balls[k];
+    const Mat3 Q = rotation_of(placed.orientation);
+    EXPECT_LT((placed.centre + placed.radius * (Q * ball.centre) - balls[k].centre).norm(), 1e-14);
+    EXPECT_NEAR(placed.radius * ball.radius, 0.1, 1e-14);
+  }
+  EXPECT_THROW(make_clump({}), std::invalid_argument);
+  const Ball nonsense[] = {{{0, 0, 0}, -1}};
+  EXPECT_THROW(make_clump(nonsense), std::invalid_argument);
+}
+
+/// Largest change of energy of a clump of three unequal moments that turns freely for two seconds, about an axis
+/// near the unstable one. Its angular momentum stays.
+double drift_of_energy(double time_step) {
+  ClumpScene scene(time_step);
+  const Ball balls[] = {{{0, 0, 0}, 0.1}, {{0.25, 0, 0}, 0.08}, {{0, 0.17, 0}, 0.07}};
+  const PlacedClump placed = make_clump(balls);
+  scene.setup.clumps = {placed.clump};
+  const Vec3 omega = rotation_of(placed.orientation) * Vec3(1, 12, 1);
+  add_clump(scene.bodies, scene.setup.clumps, BodyId{0},
+            {1, Vec3::Zero(), placed.orientation, placed.radius, 1000, Vec3(0.1, 0, 0), omega});
+  Experiment run(scene);
+  run.steps(1);
+  const Vec3 spin = spin_of(run, 0);
+  const double energy = run.kinetic_energy();
+  double drift = 0;
+  Vec3 turned = Vec3::Zero();
+  while (run.time() < 2) {
+    run.step();
+    drift = std::max(drift, std::abs(run.kinetic_energy() / energy - 1));
+    EXPECT_LT((spin_of(run, 0) - spin).norm(), 1e-11 * spin.norm());
+    turned = turned.cwiseMax((omega_of(run, 0) - omega).cwiseAbs());
+  }
+  EXPECT_GT(turned.norm(), 8) << "it must tumble, or nothing was tested";
+  return drift;
+}
+
+TEST(Clumps, TumbleWithTheirAngularMomentumAndOfSecondOrderInEnergy) {
+  const double coarse = drift_of_energy(2e-3), fine = drift_of_energy(1e-3);
+  EXPECT_LT(coarse, 1e-2);
+  EXPECT_GT(coarse / fine, 3.5);
+}
+
+TEST(Clumps, AreHitAtOneEndAndTurn) {
+  for (const double e : {0.0, 0.5, 1.0}) {
+    ClumpScene scene;
+    scene.stage().laws.set_all(&PairLaw::restitution, e);
+    scene.dumbbell(Vec3::Zero(), about(Vec3(1, 1, 0).normalized(), 0));
+    const double v = 2;
+    scene.sphere({0.5 * length, 0, -0.2205}, r, 0.5, {0, 0, v});
+    Experiment run(scene);
+    run.steps(40);
+    // Without a rebound they stay together while the end turns: only until then is there a closed form.
+    const double close = e > 0 ? 1e-9 : 1e-3;
+    const double s = 0.5 * length, w = 1 / 0.5 + 1 / mass + s * s / across, impulse = (1 + e) * v / w;
+    EXPECT_NEAR(run.u(1)[2], v - impulse / 0.5, close) << e;
+    EXPECT_NEAR(run.u(0)[2], impulse / mass, close) << e;
+    EXPECT_NEAR(omega_of(run, 0)[1], -s * impulse / across, 3 * close) << e;
+    EXPECT_LT(momentum(run)[2] - 0.5 * v, 1e-12);
+  }
+}
+
+TEST(Clumps, LieOnAFloorWithTheirWeight) {
+  for (const double mu : {0.0, 0.5}) {
+    ClumpScene scene;
+    scene.friction(mu);
+    scene.slope(0);
+    scene.dumbbell({0, 0, r}, about(Vec3::UnitZ(), 0.7));
+    Experiment run(scene);
+    run.steps(100);
+    EXPECT_NEAR(run.wall_force(0)[2], mass * g_earth, 1e-9);
+    EXPECT_LT(run.u().norm() + omega_of(run, 0).norm() * r, 1e-11);
+    EXPECT_NEAR(run.x()[2], r, 1e-12);
+  }
+}
+
+/// The floor pushes s beside the centre of mass: m a_z = N - m g with a_z + alpha s = 0 at the contact.
+TEST(Clumps, FallOverOnASmoothFloor) {
+  ClumpScene scene;
+  scene.slope(0);
+  const double angle = 0.8, s = 0.5 * length * std::cos(angle);
+  scene.dumbbell({0, 0, r + 0.5 * length * std::sin(angle)}, about(Vec3::UnitY(), angle));
+  Experiment run(scene);
+  run.step();
+  const double pushed = mass * g_earth / (1 + mass * s * s / across);
+  EXPECT_NEAR(run.wall_force(0)[2], pushed, 1e-9 * pushed);
+  EXPECT_NEAR(run.u()[2], h * (pushed / mass - g_earth), 1e-12);
+  EXPECT_NEAR(run.u().head<2>().norm(), 0, 1e-14);
+  EXPECT_NEAR(std::abs(omega_of(run, 0)[1]), h * pushed * s / across, 1e-9);
+}
+
+/// Across the slope it rolls as a whole, with the inertia about its axis; along it, it slides or stays.
+TEST(Clumps, RollDownASlopeAcrossAndStayOnItAlong) {
+  const double angle = 0.3;
+  for (const bool lies_along : {false, true}) {
+    ClumpScene scene;
+    scene.friction(0.8);
+    scene.slope(angle);
+    scene.dumbbell({0, 0, r}, about(Vec3::UnitZ(), lies_along ? 0 : pi / 2));
+    Experiment run(scene);
+    run.steps(200);
+    const double rolling = g_earth * std::sin(angle) / (1 + along / (mass * r * r)) * run.time();
+    EXPECT_NEAR(run.u()[0], lies_along ? 0 : rolling, 1e-6 * rolling);
+    EXPECT_NEAR(omega_of(run, 0)[1] * r, run.u()[0], 1e-6 * rolling);
+  }
+}
+
+/// Clumps of one ball are spheres, by another kernel. Its arms reach to the middle of a gap, where those of
+/// spheres have their radius.
+TEST(Clumps, OfOneBallMoveAsSpheresDo) {
+  const auto heap = [](bool clumps) {
+    Scene scene(h);
+    scene.friction(0.4);
+    scene.slope(0.1);
+    scene.wall("end", {0.8, 0, 0}, -Vec3::UnitX());
+    const Ball one[] = {{Vec3::Zero(), r}};
+    if (clumps) scene.setup.clumps.push_back(make_clump(one).clump);
+    for (int k = 0; k < 4; ++k) {
+      const Vec3 centre(0.25 + 0.21 * (k % 3) + 0.1 * (k / 3), 0, r + 0.185 * (k / 3));
+      if (clumps)
+        add_clump(scene.bodies, scene.setup.clumps, BodyId{k},
+                  {1, centre, {1, 0, 0, 0}, r, density(), {0.3, 0, -0.1}, {0, 0, 1}});
+      else
+        scene.sphere(centre, r, ball_mass, {0.3, 0, -0.1}).w[2] = r;
+    }
+    return scene;
+  };
+  Experiment spheres(heap(false)), clumps(heap(true));
+  for (int k = 0; k < 300; ++k) {
+    spheres.step();
+    clumps.step();
+  }
+  for (std::int64_t id = 0; id < 4; ++id) {
+    EXPECT_LT((spheres.u(id) - clumps.u(id)).norm(), 1e-4) << id;
+    EXPECT_LT((spheres.w(id) - clumps.w(id)).norm(), 1e-4) << id;
+    EXPECT_LT((spheres.x(id) - clumps.x(id)).norm(), 1e-5) << id;
+  }
+}
+
+/// `side`^3 dumbbells, every other one a ball instead, turned and thrown at random.
+ClumpScene cloud(int side, double e, double mu, double spacing = 0.42) {
+  ClumpScene scene;
+  scene.stage().laws.set_all(&PairLaw::restitution, e);
+  scene.friction(mu);
+  scene.setup.solver.tolerance = 1e-9;
+  scene.setup.solver.balance_tolerance = 1e-2;
+  std::mt19937_64 random(11);
+  const auto any = [&] { return 2 * static_cast<double>(random() >> 11) * 0x1p-53 - 1; };
+  for (int k = 0; k < side * side * side; ++k) {
+    const Vec3 centre = spacing * (Vec3(k % side, k / side % side, k / side / side) + Vec3::Constant(0.5));
+    const Eigen::Quaterniond q = Eigen::Quaterniond(any(), any(), any(), any()).normalized();
+    const Vec3 u = Vec3(any(), any(), any()) - (centre - Vec3::Constant(0.5 * spacing * side)),
+               omega(5 * any(), 5 * any(), 5 * any());
+    if (k % 2 == 0)
+      scene.dumbbell(centre, q, u, omega);
+    else
+      scene.sphere(centre, 0.15, 3, u);
+  }
+  return scene;
+}
+
+void add_box(Scene& scene, double edge) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 n = Vec3::Unit(axis);
+    scene.wall("low" + std::to_string(axis), Vec3::Zero(), n);
+    scene.wall("high" + std::to_string(axis), edge * n, -n);
+  }
+}
+
+TEST(Clumps, KeepMomentumAndAngularMomentumAmongThemselves) {
+  for (const double mu : {0.0, 0.5}) {
+    Experiment run(cloud(3, 0.3, mu));
+    run.step();
+    const Vec3 p = momentum(run), L = angular_momentum(run);
+    std::int64_t contacts = 0;
+    for (int k = 0; k < 300; ++k) contacts += run.step().active;
+    EXPECT_GT(contacts, 30);
+    EXPECT_LT((momentum(run) - p).norm(), 1e-11);
+    EXPECT_LT((angular_momentum(run) - L).norm(), 1e-11);
+  }
+}
+
+TEST(Clumps, NeverGainEnergyInABox) {
+  for (const double mu : {0.0, 0.4}) {
+    ClumpScene scene = cloud(3, 0, mu);
+    add_box(scene, 3 * 0.42);
+    Experiment run(scene);
+    double energy = run.kinetic_energy();
+    const double first = energy;
+    for (int k = 0; k < 300; ++k) {
+      run.step();
+      // A free turn keeps the energy to second order in the step, contacts never add any.
+      EXPECT_LE(run.kinetic_energy(), energy + 1e-6 * first) << mu << " step " << k;
+      energy = run.kinetic_energy();
+    }
+    EXPECT_LT(energy, 0.5 * first);
+  }
+}
+
+TEST(Clumps, RestInAHeapOnTheirWeight) {
+  ClumpScene scene = cloud(4, 0, 0.4);
+  add_box(scene, 4 * 0.42);
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.setup.solver.tolerance = 1e-6;
+  Experiment run(scene);
+  std::int64_t missed = 0;
+  for (int k = 0; k < 2500; ++k) missed += run.step().converged ? 0 : 1;
+  EXPECT_EQ(missed, 0);
+  double weight = 0;
+  for (std::size_t s = 0; s < 64; ++s) weight += run.simulation().state().bodies.mass(s) * g_earth;
+  double carried = 0;
+  for (std::size_t wall = 0; wall < 6; ++wall) carried += run.wall_force(wall)[2];
+  EXPECT_NEAR(carried, weight, 1e-3 * weight);
+  EXPECT_LT(run.kinetic_energy(), 1e-6 * weight * r);
+}
+
+/// What a scene does must not depend on how it is cut.
+TEST(Clumps, MoveTheSameInSubdomains) {
+  const auto scene_of = [](int subdomains, Coupling coupling) {
+    ClumpScene scene = cloud(3, 0, 0);
+    add_box(scene, 3 * 0.42);
+    scene.setup.walls[5].load.drive = WallDrive::force;
+    scene.setup.walls[5].load.force = 100;
+    scene.setup.walls[5].load.mass = 5;
+    scene.setup.decomposition.subdomains = subdomains;
+    scene.setup.decomposition.coupling = coupling;
+    scene.setup.decomposition.repartition_every = 3;
+    return scene;
+  };
+  Experiment whole(scene_of(1, Coupling::nscdd));
+  for (const Coupling coupling : {Coupling::nscdd, Coupling::alternating}) {
+    Experiment reference(scene_of(1, coupling)), cut(scene_of(4, coupling)),
+        threads(scene_of(4, coupling), 2);
+    for (int k = 0; k < 60; ++k) {
+      reference.step();
+      cut.step();
+      threads.step();
+    }
+    EXPECT_EQ(cut.simulation().digest(), threads.simulation().digest());
+    const StepState& state = cut.simulation().state();
+    EXPECT_GT(state.bodies.size(), 27u) << "nobody stands in two subdomains";
+    for (std::int64_t id = 0; id < 27; ++id)
+      EXPECT_LT((reference.u(id) - cut.u(id)).norm() + (reference.w(id) - cut.w(id)).norm(), 1e-5) << id;
+  }
+}
+
+TEST(Clumps, MoveTheSameByAdmm) {
+  const auto scene_of = [](SolverMethod method, double mu) {
+    ClumpScene scene = cloud(2, 0, mu);
+    add_box(scene, 0.84);
+    scene.stage().gravity = {0, 0, -g_earth};
+    scene.setup.solver.method = method;
+    return scene;
+  };
+  for (const double mu : {0.0, 0.3}) {
+    Experiment sweeps(scene_of(SolverMethod::nlgs, mu)), admm(scene_of(SolverMethod::admm, mu));
+    for (int k = 0; k < 50; ++k) {
+      sweeps.step();
+      admm.step();
+    }
+    for (std::int64_t id = 0; id < 8; ++id)
+      EXPECT_LT((sweeps.u(id) - admm.u(id)).norm() + (sweeps.w(id) - admm.w(id)).norm(), 1e-4) << id;
+  }
+}
+
+}  // namespace
+}  // namespace talus::validation
