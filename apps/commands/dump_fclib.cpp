@@ -17,6 +17,8 @@ void check_dump(const Setup& setup, int ranks) {
     if (stage.laws.largest(&PairLaw::rolling_resistance) > 0)
       throw std::invalid_argument(fmt::format(
           "--dump-fclib: stage '{}' has rolling resistance, and FCLIB has no moments", stage.name));
+  if (!setup.clumps.empty())
+    throw std::invalid_argument("--dump-fclib knows spheres only; set sample.shape to \"sphere\"");
   if (ranks > 1)
     throw std::invalid_argument(
         fmt::format("--dump-fclib works on one rank, this run has {}; run the step on one", ranks));

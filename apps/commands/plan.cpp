@@ -33,6 +33,11 @@ void print_laws(const Simulation& simulation) {
   line("rolling resistance", simulation.parameters().rolls,
        resistance > 0 ? fmt::format("mu_r = {:g} at most: moments, and sweeps as they are", resistance)
                       : "no moments at contacts");
+  const auto blocks = std::ranges::count(state.chunks.kind, ChunkKind::blocks);
+  line("3x3 contact problems", blocks > 0,
+       blocks > 0 ? fmt::format("{} of {} chunks have clumps: levers, and sweeps as they are", blocks,
+                                state.chunks.size())
+                  : "spheres: the problem of a contact is diagonal");
 }
 
 void print_needs(const Simulation& simulation, const io::Scene& scene, int threads) {
@@ -54,6 +59,7 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
        state.free.w.empty() ? "no grain turns" : "24 bytes per grain");
   line("orientations", !state.bodies.orientation.empty(),
        state.bodies.orientation.empty() ? "spheres need none; not asked for"
+       : parameters.clumps              ? "clumps have them: 32 bytes per grain"
                                         : "asked for: 32 bytes per grain");
   const bool single = !state.single.velocity.empty();
   line("sweeps in double", !single,

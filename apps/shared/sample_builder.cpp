@@ -32,6 +32,8 @@ Sample make_sample(const io::Scene& scene) {
   Sample sample;
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;
+  if (!scene.setup.clumps.empty()) sample.shape = mass_of(1, scene.setup.clumps.front());
+  sample.seed = scene.setup.seed;
   sample.radius = draw_radii(spec.radii, static_cast<std::size_t>(spec.grains()), scene.setup.seed);
   sample.x = spec.kind == io::SampleSpec::Kind::lattice ? lattice_sites(spec, sample.radius)
                                                         : deposit(sample.radius, spec.base[0], spec.base[1]);

@@ -71,6 +71,7 @@ class SceneReader {
     const toml::table& table = table_at(root_, "sample");
     read_table(table, "sample", keys_.sample, {}, sample);
     read_material(table, "sample", scene_, material_of_grains);
+    if (const ClumpMaker clump = body_shapes().of(sample.shape).make) scene_.setup.clumps.push_back(clump());
     const bool on_base = sample.count > 0 && sample.base[0] > 0;
     const bool by_cells = sample.cells[0] > 0;
     if (sample.kind == SampleSpec::Kind::deposition && !on_base)

@@ -14,6 +14,7 @@
 #include "io/scene/scene_error.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/size_distribution.hpp"
+#include "kernels/shapes/body_shapes.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::io {
@@ -32,6 +33,7 @@ struct SampleSpec {
       base{};  ///< [m] the sample stands on [0, base[0]] x [0, base[1]]; 0 for a lattice given by `cells`
   std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given by `count` and `base`
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
+  BodyShape shape = BodyShape::sphere;  ///< of the grains; their radius is that of Clump
   SizeDistribution radii;
   std::string file;      ///< absolute path
   std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names

@@ -29,16 +29,44 @@ std::array<double, 2> uniform_pair(std::uint64_t seed, std::uint64_t index, std:
 // Streams of one seed: radii and displacements must not be correlated.
 constexpr std::uint32_t radius_draw = 0;
 constexpr std::uint32_t jitter_draw = 1;
+constexpr std::uint32_t turn_draw = 3;  // and as many more as it takes
 
 }  // namespace
 
 double mass(const Sample& sample, std::size_t k) {
-  return sphere_mass(sample.radius[k], sample.density_of(k));
+  if (sample.shape.number == 0) return sphere_mass(sample.radius[k], sample.density_of(k));
+  const double R = sample.radius[k];
+  return sample.density_of(k) * sample.shape.volume * R * R * R;
+}
+
+std::array<double, 4> draw_orientation(std::uint64_t seed, std::uint64_t k) {
+  std::uint32_t draw = turn_draw;
+  struct Point {
+    double x, y, square;
+  };
+  const auto in_disc = [&] {
+    for (;;) {
+      const auto [a, b] = uniform_pair(seed, k, draw++);
+      const double x = 2 * a - 1, y = 2 * b - 1, square = x * x + y * y;
+      if (square < 1 && square > 0) return Point{x, y, square};
+    }
+  };
+  const Point one = in_disc(), other = in_disc();
+  const double scale = std::sqrt((1 - one.square) / other.square);
+  return {one.x, one.y, scale * other.x, scale * other.y};
 }
 
 void append(const Sample& sample, Bodies& bodies) {
   for (std::size_t k = 0; k < sample.size(); ++k) {
-    add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density_of(k), sample.rotates);
+    if (sample.shape.number != 0)
+      add_unturning(bodies, sample.id_of(k),
+                    {sample.shape.number, sample.x[k],
+                     draw_orientation(sample.seed, static_cast<std::uint64_t>(sample.id_of(k))),
+                     sample.radius[k], sample.density_of(k)},
+                    sample.shape, sample.rotates);
+    else
+      add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density_of(k),
+                 sample.rotates);
     if (!sample.material.empty()) bodies.material.push_back(sample.material[k]);
     if (sample.velocity.empty()) continue;
     const auto first = sample.velocity[k].begin();

@@ -14,6 +14,7 @@
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/bodies/types.hpp"
 #include "kernels/samples/size_distribution.hpp"
+#include "kernels/shapes/clump_motion.hpp"
 
 namespace talus {
 
@@ -29,6 +30,8 @@ struct Sample {
   std::vector<Material> material;               ///< of each grain; empty: material_of_grains
   std::vector<double> material_density;         ///< per material [kg/m^3]; read where `material` is not empty
   bool rotates = true;                          ///< false: spin mobility and R omega are 0
+  ClumpMass shape;                              ///< of all grains; clumps are at rest, and turned at random
+  std::uint64_t seed = 1;                       ///< of those turns
 
   std::size_t size() const { return x.size(); }
   double density_of(std::size_t k) const {
@@ -39,6 +42,10 @@ struct Sample {
 
 /// Mass of grain k [kg].
 double mass(const Sample& sample, std::size_t k);
+
+/// A unit quaternion (w, x, y, z), evenly distributed over all turns (Marsaglia 1972, "Choosing a point from
+/// the surface of a sphere"): of grain k.
+std::array<double, 4> draw_orientation(std::uint64_t seed, std::uint64_t k);
 
 /// Appends the grains of the sample, in order.
 void append(const Sample& sample, Bodies& bodies);

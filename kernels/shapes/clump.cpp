@@ -69,12 +69,6 @@ PlacedClump make_clump(std::span<const Ball> balls) {
   return placed;
 }
 
-PlacedClump make_dumbbell(double distance) {
-  if (!(distance > 0)) throw std::invalid_argument("the balls of a dumbbell need a distance > 0");
-  const Ball balls[] = {{{-0.5 * distance, 0, 0}, 1}, {{0.5 * distance, 0, 0}, 1}};
-  return make_clump(balls);
-}
-
 Mat3 rotation_of(const std::array<double, 4>& q) {
   return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
 }

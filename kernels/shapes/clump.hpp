@@ -42,9 +42,6 @@ struct PlacedClump {
 /// when there is no ball, more than most_balls, or one whose centre or radius makes no sense.
 PlacedClump make_clump(std::span<const Ball> balls);
 
-/// Two equal balls of radius 1 whose centres are `distance` > 0 apart along x.
-PlacedClump make_dumbbell(double distance);
-
 /// How the bodies of a process are shaped and turned.
 struct ClumpView {
   std::span<const ShapeNumber> shape = {};                  ///< per slot; empty: all are spheres

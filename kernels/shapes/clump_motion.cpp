@@ -19,24 +19,29 @@ Mat3 with_axes(const Mat3& axes, const Vec3& values) {
 
 }  // namespace
 
-void add_clump(Bodies& bodies, std::span<const Clump> clumps, BodyId id, const ClumpBody& body,
-               bool rotates) {
-  const Clump& clump = clumps[body.number - std::size_t{1}];
+void add_unturning(Bodies& bodies, BodyId id, const ClumpBody& body, const ClumpMass& of, bool rotates) {
   if (bodies.shape.empty()) bodies.shape.assign(bodies.size(), 0);
   if (bodies.orientation.empty()) bodies.orientation.assign(bodies.size(), {1, 0, 0, 0});
-  const double R = body.radius, mass = body.density * clump.volume * R * R * R;
+  const double R = body.radius, mass = body.density * of.volume * R * R * R;
   Velocity v;
   v.inv_mass = 1 / mass;
-  v.spin_mobility = rotates ? 1 / (mass * clump.mean_inertia()) : 0;
+  v.spin_mobility = rotates ? 1 / (mass * of.inertia) : 0;
   Eigen::Map<Vec3>(v.u) = body.u;
-  if (rotates)
-    Eigen::Map<Vec3>(v.w) = with_axes(rotation_of(body.orientation), spin_lengths(clump, R)) * body.omega;
   bodies.id.push_back(id);
   bodies.x.push_back(body.centre);
   bodies.radius.push_back(R);
   bodies.velocity.push_back(v);
   bodies.orientation.push_back(body.orientation);
-  bodies.shape.push_back(body.number);
+  bodies.shape.push_back(of.number);
+}
+
+void add_clump(Bodies& bodies, std::span<const Clump> clumps, BodyId id, const ClumpBody& body,
+               bool rotates) {
+  const Clump& clump = clumps[body.number - std::size_t{1}];
+  add_unturning(bodies, id, body, mass_of(body.number, clump), rotates);
+  if (rotates)
+    Eigen::Map<Vec3>(bodies.velocity.back().w) =
+        with_axes(rotation_of(body.orientation), spin_lengths(clump, body.radius)) * body.omega;
 }
 
 Mat3 turning_of(const ClumpView& view, std::size_t slot, double radius) {

@@ -21,6 +21,20 @@ struct ClumpBody {
   Vec3 omega = Vec3::Zero();                      ///< [rad/s]
 };
 
+/// What the mass of a clump follows from, without its balls.
+struct ClumpMass {
+  ShapeNumber number = 0;  ///< 0: a sphere
+  double volume = 0;       ///< over R^3
+  double inertia = 0;      ///< mean principal moment over m R^2
+};
+inline ClumpMass mass_of(ShapeNumber number, const Clump& clump) {
+  return {number, clump.volume, clump.mean_inertia()};
+}
+
+/// Appends a clump that moves with u and does not turn; `omega` is not read. Else as add_clump.
+void add_unturning(Bodies& bodies, BodyId id, const ClumpBody& body, const ClumpMass& mass,
+                   bool rotates = true);
+
 /// Appends a clump; bodies that were there become spheres with orientations, unless they were told apart
 /// before. With `rotates` false its spin mobility is 0.
 void add_clump(Bodies& bodies, std::span<const Clump> clumps, BodyId id, const ClumpBody& body,

@@ -99,8 +99,8 @@ TEST(Clumps, HaveMassAndInertiaOfTheirBalls) {
   EXPECT_THROW(make_clump(nonsense), std::invalid_argument);
 }
 
-/// Largest change of energy of a clump of three unequal moments that turns freely for two seconds, about an axis
-/// near the unstable one. Its angular momentum stays.
+/// Largest change of energy of a clump of three unequal moments that turns freely for two seconds, about an
+/// axis near the unstable one. Its angular momentum stays.
 double drift_of_energy(double time_step) {
   ClumpScene scene(time_step);
   const Ball balls[] = {{{0, 0, 0}, 0.1}, {{0.25, 0, 0}, 0.08}, {{0, 0.17, 0}, 0.07}};
@@ -287,21 +287,26 @@ TEST(Clumps, NeverGainEnergyInABox) {
   }
 }
 
-TEST(Clumps, RestInAHeapOnTheirWeight) {
-  ClumpScene scene = cloud(4, 0, 0.4);
-  add_box(scene, 4 * 0.42);
+TEST(Clumps, FallIntoAHeapByTheForcesOfItsWalls) {
+  ClumpScene scene = cloud(3, 0, 0.4);
+  add_box(scene, 3 * 0.42);
   scene.stage().gravity = {0, 0, -g_earth};
-  scene.setup.solver.tolerance = 1e-6;
+  scene.setup.solver.tolerance = 1e-4;
   Experiment run(scene);
-  std::int64_t missed = 0;
-  for (int k = 0; k < 2500; ++k) missed += run.step().converged ? 0 : 1;
-  EXPECT_EQ(missed, 0);
-  double weight = 0;
-  for (std::size_t s = 0; s < 64; ++s) weight += run.simulation().state().bodies.mass(s) * g_earth;
-  double carried = 0;
-  for (std::size_t wall = 0; wall < 6; ++wall) carried += run.wall_force(wall)[2];
-  EXPECT_NEAR(carried, weight, 1e-3 * weight);
-  EXPECT_LT(run.kinetic_energy(), 1e-6 * weight * r);
+  double all = 0;
+  for (std::size_t s = 0; s < 27; ++s) all += run.simulation().state().bodies.mass(s);
+  Vec3 before = momentum(run);
+  double deepest = 0;
+  for (int k = 0; k < 700; ++k) {
+    deepest = std::max(deepest, run.step().penetration_max);
+    Vec3 force = all * run.simulation().stage().gravity;
+    for (std::size_t wall = 0; wall < 6; ++wall) force += run.wall_force(wall);
+    const Vec3 now = momentum(run);
+    EXPECT_LT((now - before - h * force).norm(), 1e-10 * all) << k;
+    before = now;
+  }
+  EXPECT_GT(run.simulation().report().active, 40) << "no heap";
+  EXPECT_LT(deepest, 0.02);
 }
 
 /// What a scene does must not depend on how it is cut.

@@ -103,6 +103,7 @@ Section<SampleSpec> sample_keys() {
           key<SampleSpec>("spacing", "", at_least_one, "Distance of the centres over the largest diameter.",
                           &SampleSpec::spacing)
               .only("kind = lattice", lattice),
+          choice<SampleSpec>("shape", body_shapes(), &SampleSpec::shape).only(not_bodies, made),
           choice<SampleSpec>(
               "radius_distribution", {"constant", "uniform", "uniform_volume"},
               "`uniform`: every radius is as likely; `uniform_volume`: every class of radii holds "
@@ -110,7 +111,9 @@ Section<SampleSpec> sample_keys() {
               [](auto& s) -> auto& { return s.radii.kind; })
               .only(not_bodies, made),
           key<SampleSpec>(
-              "radius", "m", positive, "Radius of all grains.", [](auto& s) -> auto& { return s.radii.max; })
+              "radius", "m", positive,
+              "Radius of all grains: of the smallest sphere about its centre of mass that holds one.",
+              [](auto& s) -> auto& { return s.radii.max; })
               .only("radius_distribution = constant", one_size)
               .need(),
           key<SampleSpec>(

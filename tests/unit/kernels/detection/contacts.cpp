@@ -30,7 +30,8 @@ TEST(Contacts, AreTheCandidatesNearerThanTheAlertDistance) {
   for (std::size_t c = 0; c < sample.chunks.size(); ++c)
     for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k)
       found.insert(sample.contacts.candidate[k]);
-  const auto& [grain_pairs, wall_pairs, impulse, components] = sample.candidates;
+  const std::vector<GrainPair>& grain_pairs = sample.candidates.grain_pairs;
+  const std::vector<WallPair>& wall_pairs = sample.candidates.wall_pairs;
   for (std::size_t k = 0; k < sample.candidates.size(); ++k) {
     double gap;
     if (k < grain_pairs.size()) {
