@@ -27,11 +27,11 @@ radius_max = 0.03
 end = { steps = 120 }
 [[stage]]
 restitution = 0
+end = { steps = 30 }
 [[stage.load]]
 wall = "x+"
 drive = "pressure"
 pressure = 2000
-end = { steps = 30 }
 [solver]
 max_iterations = 60
 [decomposition]
@@ -50,9 +50,9 @@ class ClumpsOnRanks : public OnRanks {
 TEST_F(ClumpsOnRanks, ChangeNoBitWithRanksAndThreads) {
   for (const std::string coupling : {"alternating", "nscdd"}) {
     const std::string set = " --set decomposition.coupling=" + coupling;
-    ASSERT_EQ(run(1, "run scene.toml --force --threads 1 --out one" + set).exit_code, 0);
-    ASSERT_EQ(run(2, "run scene.toml --force --threads 2 --out two" + set).exit_code, 0);
-    ASSERT_EQ(run(3, "run scene.toml --force --threads 1 --out three" + set).exit_code, 0);
+    ASSERT_EQ(run(1, "run scene.toml --force --threads 1 --out one" + set).code, 0);
+    ASSERT_EQ(run(2, "run scene.toml --force --threads 2 --out two" + set).code, 0);
+    ASSERT_EQ(run(3, "run scene.toml --force --threads 1 --out three" + set).code, 0);
     EXPECT_EQ(digest_of("one"), digest_of("two"));
     EXPECT_EQ(digest_of("one"), digest_of("three"));
     EXPECT_EQ(file("one", "walls.csv"), file("three", "walls.csv"));
@@ -62,8 +62,8 @@ TEST_F(ClumpsOnRanks, ChangeNoBitWithRanksAndThreads) {
 TEST_F(ClumpsOnRanks, AreRefusedWhereTheyWouldBeTakenForSpheres) {
   const auto refused = [&](const std::string& set, const std::string& why) {
     const Outcome outcome = run(1, "run scene.toml --out refused --set " + set);
-    EXPECT_NE(outcome.exit_code, 0) << set;
-    EXPECT_NE(outcome.text.find(why), std::string::npos) << outcome.text;
+    EXPECT_NE(outcome.code, 0) << set;
+    EXPECT_NE(outcome.messages.find(why), std::string::npos) << outcome.messages;
   };
   refused("solver.method=nncg", "contacts of clumps cannot be carried on");
   refused("decomposition.coupling=schwarz", "contacts of clumps are not damped");
