@@ -5,7 +5,7 @@ namespace talus {
 extern const ShapeEntry rectangle_shape, disc_shape, cylinder_shape, cone_shape, mesh_shape;
 
 namespace {
-/// A shape is picked by its row; its column is the sphere, the only shape of a body.
+/// A shape is picked by its row; its column is the sphere: clumps touch by their balls.
 constexpr const ShapeEntry* table[] = {
     &rectangle_shape, &disc_shape, &cylinder_shape, &cone_shape, &mesh_shape,
 };
