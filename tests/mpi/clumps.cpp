@@ -67,7 +67,7 @@ TEST_F(ClumpsOnRanks, AreRefusedWhereTheyWouldBeTakenForSpheres) {
   };
   refused("solver.method=nncg", "contacts of clumps cannot be carried on");
   refused("decomposition.coupling=schwarz", "contacts of clumps are not damped");
-  refused("material.rolling_resistance=0.1", "clumps have none");
+  refused("material.rolling_resistance=0.1 --set material.wall_friction=0.3", "clumps have none");
   refused("sample.shape=cube", "cube");
 }
 
