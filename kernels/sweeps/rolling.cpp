@@ -54,7 +54,8 @@ void find_arms(const NarrowPhase& in, const Candidates& candidates, const Chunks
   const MaterialView materials{in.material, in.walls};
   const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k) {
-    const double mu = law_at(in.laws, candidates, materials, index(contacts.candidate[k])).rolling_resistance;
+    const PairLaw& law = law_at(in.laws, candidates, materials, index(contacts.candidate[k]));
+    const double mu = law.friction > 0 ? law.rolling_resistance : 0;  // smooth contacts do not roll
     const double a = in.radius[index(contacts.first[k])];
     const double b = contacts.second[k] < 0 ? a : in.radius[index(contacts.second[k])];
     contacts.arm[k] = mu * (contacts.second[k] < 0 ? a : a * b / (a + b));

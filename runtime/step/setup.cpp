@@ -51,10 +51,12 @@ void validate_laws(const Stage& stage) {
     require(law.rolling_resistance >= 0 && std::isfinite(law.rolling_resistance),
             fmt::format("stage '{}': rolling_resistance must be finite and >= 0, got {}", stage.name,
                         law.rolling_resistance));
-    require(law.rolling_resistance == 0 || law.friction > 0,
-            fmt::format("stage '{}': rolling_resistance = {} needs friction: without it nothing rolls",
-                        stage.name, law.rolling_resistance));
   }
+  // Of all pairs: walls among themselves have no friction, and never meet.
+  const double resistance = stage.laws.largest(&PairLaw::rolling_resistance);
+  require(resistance == 0 || stage.laws.largest(&PairLaw::friction) > 0,
+          fmt::format("stage '{}': rolling_resistance = {} needs friction: without it nothing rolls",
+                      stage.name, resistance));
 }
 
 bool rolls(const Setup& setup) {

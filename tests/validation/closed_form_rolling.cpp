@@ -56,6 +56,18 @@ TEST(RollingResistance, ThatIsLargeHoldsABallWhereFrictionHoldsABlock) {
   EXPECT_NEAR(slides.w()[1], 0, 1e-9);
 }
 
+// [material] sets the resistance of all pairs, walls among themselves too, which have no friction.
+TEST(RollingResistance, IsOfPairsWithFrictionAndASmoothContactHasNone) {
+  Scene scene = on_slope(0, 0.3, {1, 0, 0});
+  scene.friction(0);
+  EXPECT_THROW(Experiment{scene}, std::invalid_argument);
+  scene.stage().laws.between(material_of_walls, material_of_walls).friction = mu;  // of nothing that meets
+  Experiment run(scene);
+  run.steps(50);
+  EXPECT_NEAR(run.u()[0], 1, 1e-12);
+  EXPECT_NEAR(run.w()[1], 1, 1e-12) << "it spins on";
+}
+
 // Two unequal grains that meet while they roll on one another: the moment is bound by the reduced radius.
 TEST(RollingResistance, MomentBetweenGrainsIsBoundByTheReducedRadius) {
   const double r1 = 0.1, r2 = 0.3, resistance = 0.01;
