@@ -80,6 +80,14 @@ Vec3 momentum(const Experiment& run) {
   return sum;
 }
 
+void add_box(Scene& scene, double edge) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3 n = Vec3::Unit(axis);
+    scene.wall("low" + std::to_string(axis), Vec3::Zero(), n);
+    scene.wall("high" + std::to_string(axis), edge * n, -n);
+  }
+}
+
 TEST(Clumps, HaveMassAndInertiaOfTheirBalls) {
   const Ball balls[] = {{{2, 1, 1}, 0.1}, {{2, 1.2, 1}, 0.1}};
   const PlacedClump placed = make_clump(balls);
@@ -162,6 +170,56 @@ TEST(Clumps, LieOnAFloorWithTheirWeight) {
     EXPECT_LT(run.u().norm() + omega_of(run, 0).norm() * r, 1e-11);
     EXPECT_NEAR(run.x()[2], r, 1e-12);
   }
+}
+
+/// Two balls hold up to 2 c.
+TEST(Clumps, HangOnACeilingByCohesionOfTheirBalls) {
+  const double weight = mass * g_earth;
+  for (const double cohesion : {0.49 * weight, 0.51 * weight}) {
+    ClumpScene scene;
+    scene.stage().laws.set_all(&PairLaw::cohesion, cohesion);
+    scene.stage().gravity = {0, 0, -g_earth};
+    scene.wall("ceiling", {0, 0, 1}, -Vec3::UnitZ());
+    scene.dumbbell({0, 0, 1 - r}, about(Vec3::UnitZ(), 0.4));
+    Experiment run(scene);
+    run.steps(100);
+    const bool holds = 2 * cohesion > weight;
+    if (holds) {
+      EXPECT_NEAR(run.wall_force(0)[2], weight, 1e-9 * weight);
+      EXPECT_NEAR(run.x()[2], 1 - r, 1e-9);
+    } else {
+      EXPECT_LT(run.x()[2], 1 - r - 0.01);
+    }
+  }
+}
+
+/// A dumbbell held between two walls: its stress is what the walls give, and its frame says how it turns.
+TEST(Clumps, AreMeasuredByTheirBalls) {
+  ClumpScene scene;
+  scene.dumbbell({0.2, 0.1, 0.1}, about(Vec3::UnitX(), 0.3));
+  add_box(scene, 0.4);
+  scene.setup.walls[1].load.drive = WallDrive::force;
+  scene.setup.walls[1].load.force = 50;
+  scene.setup.walls[1].load.mass = 1;
+  Experiment run(scene);
+  run.steps(5);
+  const Simulation& simulation = run.simulation();
+  EXPECT_NEAR(run.wall_force(0)[0], 50, 1e-9);
+  const Mat3 stress = simulation.sums().contacts.moment / h;
+  EXPECT_NEAR(stress(0, 0), 50 * 0.4, 1e-8) << "force times the length between the walls";
+  EXPECT_LT(simulation.sums().contacts.penetration_max, 1e-12);
+  const Frame frame = simulation.frame(true);
+  for (const Vec3& point : frame.contact_point)
+    if (point[0] < 0.2) {
+      EXPECT_NEAR(point[0], 0, 1e-12);
+    }
+
+  ClumpScene turning;
+  const Vec3 omega(0, 2, 1);
+  turning.dumbbell(Vec3::Zero(), Eigen::Quaterniond::Identity(), Vec3::Zero(), omega);
+  Experiment free(turning);
+  free.step();
+  EXPECT_LT((free.simulation().frame(false).omega[0] - omega).norm(), 1e-2);
 }
 
 /// The floor pushes s beside the centre of mass: m a_z = N - m g with a_z + alpha s = 0 at the contact.
@@ -247,14 +305,6 @@ ClumpScene cloud(int side, double e, double mu, double spacing = 0.42) {
       scene.sphere(centre, 0.15, 3, u);
   }
   return scene;
-}
-
-void add_box(Scene& scene, double edge) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const Vec3 n = Vec3::Unit(axis);
-    scene.wall("low" + std::to_string(axis), Vec3::Zero(), n);
-    scene.wall("high" + std::to_string(axis), edge * n, -n);
-  }
 }
 
 TEST(Clumps, KeepMomentumAndAngularMomentumAmongThemselves) {
