@@ -99,6 +99,24 @@ TEST(Blocks, OneSweepSolvesAContactWhateverItsLevers) {
   EXPECT_GT(carried, 500);
 }
 
+/// A copy carries a part of its body's mass; errors are those of the whole.
+TEST(Blocks, JudgeCopiesByTheMassOfTheirBodies) {
+  std::mt19937_64 random(13);
+  for (int k = 0; k < 50; ++k) {
+    OneContact one(random);
+    one.contacts.rx[0] = 0.3;
+    const ErrorSums whole = error_blocks(one.contacts, {0, 1}, one.velocity, 0.5, nullptr);
+    const std::vector<std::uint16_t> parts{2, 5};
+    for (std::size_t b = 0; b < 2; ++b) {
+      one.velocity[b].inv_mass *= parts[b];
+      one.velocity[b].spin_mobility *= parts[b];
+    }
+    const ErrorSums copies = error_blocks(one.contacts, {0, 1}, one.velocity, 0.5, nullptr, parts);
+    EXPECT_NEAR(copies.impulse2, whole.impulse2, 1e-12 * whole.impulse2);
+    EXPECT_NEAR(copies.residual2, whole.residual2, 1e-12 * whole.residual2);
+  }
+}
+
 TEST(Blocks, SeeAnImpulseThatIsWrong) {
   std::mt19937_64 random(5);
   for (int k = 0; k < 300; ++k) {
