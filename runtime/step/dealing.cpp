@@ -139,7 +139,7 @@ SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks,
   ExactSum diameter(2 * most[0]), volume(volume_of(most[0])), mass(most[2]);
   for (std::size_t k = 0; k < own.size(); ++k) {
     diameter.add(2 * own.radius[k]);
-    volume.add(shapes.is_clump(k) ? std::pow(own.radius[k], 3) * shapes.of(k).volume
+    volume.add(shapes.is_clump(k) ? own.radius[k] * own.radius[k] * own.radius[k] * shapes.of(k).volume
                                   : volume_of(own.radius[k]));
     mass.add(own.mass(k));
   }

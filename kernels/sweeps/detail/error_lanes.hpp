@@ -92,7 +92,8 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
     m.w_nn = m.w_nn + of.wall_inv_mass;
     sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(c, 0, only, n);
   }
-  const Approach<V> contact = approach_of<Friction>(c, 0, only, m);
+  // Not approach_of: errors do not ask for w_tt, and with it the spins would be gathered, too.
+  const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.bias, 0, only), m.w_nn, V{}};
   if constexpr (Friction)
     add_error(
         error_of_law(load_impulse<true, V>(c, 0, only, n), contact, rule.friction.template of<V>(c, 0, only)),
