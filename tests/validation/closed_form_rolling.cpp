@@ -74,10 +74,8 @@ TEST(RollingResistance, MomentBetweenGrainsIsBoundByTheReducedRadius) {
   Scene scene(h);
   scene.friction(mu);
   scene.stage().laws.set_all(&PairLaw::rolling_resistance, resistance);
-  Velocity& first = scene.sphere({-r1, 0, 0}, r1, 1, {1, 0, 0});
-  Velocity& second = scene.sphere({r2, 0, 0}, r2, 5, {-1, 0, 0});
-  first.w[2] = 4;
-  second.w[2] = -4;  // no slip at the contact
+  scene.sphere({-r1, 0, 0}, r1, 1, {1, 0, 0}).w[2] = 4;
+  scene.sphere({r2, 0, 0}, r2, 5, {-1, 0, 0}).w[2] = -4;  // no slip at the contact
   Experiment run(std::move(scene));
   run.step();
   const Contacts& contacts = run.simulation().state().contacts;
