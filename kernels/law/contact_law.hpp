@@ -97,14 +97,14 @@ template <class V, class Mu>
   const Space<V> v_hat = add_scaled(fused(V{} + mu, root(v_t2), v_n), n, v_t);
   const Space<V> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
   const V r_n = fused_dot(r, n);
-  return {fused_dot(miss, miss), fused_dot(p, p), (r_n > 0) | (v_n < 0) ? fused(v_n, v_n, v_t2) : V{}, r_n};
+  return {fused_dot(miss, miss), fused_dot(p, p), ((r_n > 0) | (v_n < 0)) ? fused(v_n, v_n, v_t2) : V{}, r_n};
 }
 
 /// The same without friction; `closing` is v_n + b [m/s].
 template <class V>
 [[gnu::always_inline]] inline LawError<V> error_of_law(V r_n, V closing, V w_nn) {
   const V p = w_nn * r_n, miss = p - positive_part(p - closing);
-  return {miss * miss, p * p, (r_n > 0) | (closing < 0) ? closing * closing : V{}, r_n};
+  return {miss * miss, p * p, ((r_n > 0) | (closing < 0)) ? closing * closing : V{}, r_n};
 }
 
 }  // namespace

@@ -181,6 +181,7 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     ImpulseRecord record{};
     record.first = static_cast<std::int64_t>(around.bodies.id[at(pair.body)]);
     record.second = -1 - std::int64_t{pair.wall};
+    record.feature = pair.feature;
     std::copy_n(&found.impulse[components * k], components, record.r);
     to[at(rank)].push_back(record);
   }

@@ -1,7 +1,6 @@
 /// What goes through one rank: up the tree of ranks to the root of the gluing, and back.
 
 #include <algorithm>
-#include <ranges>
 
 #include "runtime/step/detail/gluing_parts.hpp"
 
@@ -28,8 +27,8 @@ void Gluing::send_up() {
 
 /// The last to be told comes first: it has least below it.
 void Gluing::await_children() {
-  for (const auto& link : root_->links | std::views::reverse)
-    await(*link->receiver, root_->waited, ranks_.trace(), link->in_name);
+  for (auto link = root_->links.rbegin(); link != root_->links.rend(); ++link)
+    await(*(*link)->receiver, root_->waited, ranks_.trace(), (*link)->in_name);
 }
 
 void Gluing::collect(Mode mode) {

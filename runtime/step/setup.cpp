@@ -111,8 +111,8 @@ void validate(const Setup& setup) {
             "stage '{}': end.time = {} s is not more than half a time step of {} s: no step would be made",
             stage.name, stage.end.time.value_or(0), stage.time_step));
     for (const auto& [name, load] : stage.loads) {
-      const auto wall =
-          std::find_if(setup.walls.begin(), setup.walls.end(), [&](const Wall& w) { return w.name == name; });
+      const auto wall = std::find_if(setup.walls.begin(), setup.walls.end(),
+                                     [&name = name](const Wall& w) { return w.name == name; });
       require(wall != setup.walls.end(), fmt::format("stage '{}': no wall is named '{}'", stage.name, name));
       validate_load(fmt::format("stage '{}', wall '{}'", stage.name, name), *wall, load);
     }
