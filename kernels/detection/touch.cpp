@@ -22,9 +22,9 @@ Touch touch_bodies(const Poses& poses, Slot first, Slot second, BallNumbers numb
   const double distance = touch.separation.norm();
   if (distance > 0) touch.normal = touch.separation / distance;
   touch.gap = distance - a.radius - b.radius;
-  touch.radius = std::min(a.radius, b.radius);
-  touch.arm = -(a.radius + 0.5 * touch.gap) * touch.normal;
-  touch.point = a.centre + touch.arm;
+  touch.ball = a;
+  touch.smaller_radius = std::min(a.radius, b.radius);
+  touch.point = a.centre - (a.radius + 0.5 * touch.gap) * touch.normal;
   return touch;
 }
 
@@ -35,16 +35,17 @@ Touch touch_wall(const Poses& poses, const Wall& wall, Slot body, std::int32_t f
   Touch touch;
   touch.normal = at.normal;
   touch.gap = at.distance - ball.radius;
-  touch.radius = ball.radius;
-  touch.arm = -ball.radius * at.normal;
-  touch.point = ball.centre + touch.arm;
+  touch.ball = ball;
+  touch.smaller_radius = ball.radius;
+  touch.point = ball.centre - ball.radius * at.normal;
   touch.separation = at.distance * at.normal;
   return touch;
 }
 
 Touch touch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall) {
-  return wall != nullptr ? touch_wall(poses, *wall, contacts.first[k], -1 - contacts.second[k])
-                         : touch_bodies(poses, contacts.first[k], contacts.second[k], contacts.balls[k]);
+  if (wall != nullptr) return touch_wall(poses, *wall, contacts.first[k], -1 - contacts.second[k]);
+  const BallNumbers numbers = contacts.balls.empty() ? BallNumbers{0} : contacts.balls[k];
+  return touch_bodies(poses, contacts.first[k], contacts.second[k], numbers);
 }
 
 }  // namespace talus

@@ -1,7 +1,7 @@
 #pragma once
 
-/// How two bodies, or a body and a wall, touch through given balls (kernels/shapes/clump.hpp): what contacts
-/// of blocks are measured by. A sphere is its only ball.
+/// How two bodies, or a body and a wall, touch through given balls (kernels/shapes/clump.hpp), where no time
+/// is lost by asking each contact what it is. A sphere is its only ball.
 
 #include <span>
 
@@ -19,10 +19,10 @@ inline BallNumbers ball_numbers(std::size_t first, std::size_t second) {
 
 struct Touch {
   Vec3 normal = Vec3::UnitZ();     ///< unit, to the first body
-  Vec3 point = Vec3::Zero();       ///< halfway across the gap; at a wall on the ball [m]
+  Ball ball;                       ///< of the first body [m]
   double gap = 0;                  ///< [m]
-  double radius = 0;               ///< of the smaller ball [m]
-  Vec3 arm = Vec3::Zero();         ///< from the centre of the first ball to `point` [m]
+  double smaller_radius = 0;       ///< of both balls [m]
+  Vec3 point = Vec3::Zero();       ///< halfway across the gap; at a wall on the ball [m]
   Vec3 separation = Vec3::Zero();  ///< of the balls' centres; at a wall of the ball's from the wall [m]
 };
 
@@ -32,7 +32,7 @@ Touch touch_bodies(const Poses& poses, Slot first, Slot second, BallNumbers numb
 /// A body at a wall. The feature of a clump is that of the surface x its balls + the ball.
 Touch touch_wall(const Poses& poses, const Wall& wall, Slot body, std::int32_t feature);
 
-/// Contact k of a chunk of blocks at `wall`, or between bodies where that is null.
+/// Contact k, of spheres or blocks, at `wall`, or between bodies where that is null.
 Touch touch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall);
 
 }  // namespace talus

@@ -56,17 +56,17 @@ std::array<double, 4> draw_orientation(std::uint64_t seed, std::uint64_t k) {
   return {one.x, one.y, scale * other.x, scale * other.y};
 }
 
+void add_grain(Bodies& bodies, const Grain& grain, const GrainKind& kind) {
+  const auto& [id, x, radius, density] = grain;
+  if (kind.shape.number == 0) return add_sphere(bodies, id, x, radius, density, kind.rotates);
+  const std::array<double, 4> turn = draw_orientation(kind.seed, static_cast<std::uint64_t>(id));
+  add_unturning(bodies, id, {x, turn, radius, density}, kind.shape, kind.rotates);
+}
+
 void append(const Sample& sample, Bodies& bodies) {
   for (std::size_t k = 0; k < sample.size(); ++k) {
-    if (sample.shape.number != 0)
-      add_unturning(bodies, sample.id_of(k),
-                    {sample.shape.number, sample.x[k],
-                     draw_orientation(sample.seed, static_cast<std::uint64_t>(sample.id_of(k))),
-                     sample.radius[k], sample.density_of(k)},
-                    sample.shape, sample.rotates);
-    else
-      add_sphere(bodies, sample.id_of(k), sample.x[k], sample.radius[k], sample.density_of(k),
-                 sample.rotates);
+    add_grain(bodies, {sample.id_of(k), sample.x[k], sample.radius[k], sample.density_of(k)},
+              {sample.shape, sample.seed, sample.rotates});
     if (!sample.material.empty()) bodies.material.push_back(sample.material[k]);
     if (sample.velocity.empty()) continue;
     const auto first = sample.velocity[k].begin();

@@ -47,6 +47,21 @@ double mass(const Sample& sample, std::size_t k);
 /// the surface of a sphere"): of grain k.
 std::array<double, 4> draw_orientation(std::uint64_t seed, std::uint64_t k);
 
+/// A grain at rest on its way into the bodies.
+struct Grain {
+  BodyId id{};
+  Vec3 x = Vec3::Zero();  ///< [m]
+  double radius = 0;      ///< [m]
+  double density = 0;     ///< [kg/m^3]
+};
+/// How the grains of a sample become bodies.
+struct GrainKind {
+  ClumpMass shape;
+  std::uint64_t seed = 1;
+  bool rotates = true;
+};
+void add_grain(Bodies& bodies, const Grain& grain, const GrainKind& kind);
+
 /// Appends the grains of the sample, in order.
 void append(const Sample& sample, Bodies& bodies);
 

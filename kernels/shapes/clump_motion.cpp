@@ -35,10 +35,10 @@ void add_unturning(Bodies& bodies, BodyId id, const ClumpBody& body, const Clump
   bodies.shape.push_back(of.number);
 }
 
-void add_clump(Bodies& bodies, std::span<const Clump> clumps, BodyId id, const ClumpBody& body,
-               bool rotates) {
-  const Clump& clump = clumps[body.number - std::size_t{1}];
-  add_unturning(bodies, id, body, mass_of(body.number, clump), rotates);
+void add_clump(Bodies& bodies, std::span<const Clump> clumps, ShapeNumber number, BodyId id,
+               const ClumpBody& body, bool rotates) {
+  const Clump& clump = clumps[number - std::size_t{1}];
+  add_unturning(bodies, id, body, mass_of(number, clump), rotates);
   if (rotates)
     Eigen::Map<Vec3>(bodies.velocity.back().w) =
         with_axes(rotation_of(body.orientation), spin_lengths(clump, body.radius)) * body.omega;

@@ -10,9 +10,8 @@
 
 namespace talus {
 
-/// A clump on its way into the bodies: of shape `number` >= 1, `clumps[number - 1]`.
+/// A clump on its way into the bodies.
 struct ClumpBody {
-  ShapeNumber number = 1;
   Vec3 centre = Vec3::Zero();                     ///< of mass [m]
   std::array<double, 4> orientation{1, 0, 0, 0};  ///< of its principal frame
   double radius = 0;                              ///< R [m] > 0
@@ -36,9 +35,9 @@ void add_unturning(Bodies& bodies, BodyId id, const ClumpBody& body, const Clump
                    bool rotates = true);
 
 /// Appends a clump; bodies that were there become spheres with orientations, unless they were told apart
-/// before. With `rotates` false its spin mobility is 0.
-void add_clump(Bodies& bodies, std::span<const Clump> clumps, BodyId id, const ClumpBody& body,
-               bool rotates = true);
+/// before. `number` >= 1 means `clumps[number - 1]`. With `rotates` false its spin mobility is 0.
+void add_clump(Bodies& bodies, std::span<const Clump> clumps, ShapeNumber number, BodyId id,
+               const ClumpBody& body, bool rotates = true);
 
 /// omega = turning w, where w is what a body's record holds (VelocityOf) [1/m]: S^-1, or 1/R for a sphere.
 Mat3 turning_of(const ClumpView& view, std::size_t slot, double radius);

@@ -5,7 +5,6 @@
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
 #include "kernels/detection/touch.hpp"
-#include "kernels/detection/wall_pairs.hpp"
 
 namespace talus {
 
@@ -15,29 +14,6 @@ std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-struct Opening {
-  double gap, smaller_radius;  ///< [m]
-};
-
-Opening opening_of(const NarrowPhase& in, const Chunks& chunks, std::size_t chunk, const Contacts& contacts,
-                   std::size_t k) {
-  if (chunks.kind[chunk] == ChunkKind::blocks) {
-    const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[index(chunks.wall[chunk])];
-    const Touch touch = touch_of({in.x, in.radius, in.walls, in.clumps, in.domain}, contacts, k, wall);
-    return {touch.gap, touch.radius};
-  }
-  const std::size_t i = index(contacts.first[k]);
-  const double radius = in.radius[i];
-  if (chunks.wall[chunk] >= 0) {
-    const SurfacePoint point =
-        wall_point(in.walls[index(chunks.wall[chunk])], in.x[i], -1 - contacts.second[k], in.domain);
-    return {point.distance - radius, radius};
-  }
-  const std::size_t j = index(contacts.second[k]);
-  return {in.domain.separation(in.x[i], in.x[j]).norm() - radius - in.radius[j],
-          std::min(radius, in.radius[j])};
-}
-
 }  // namespace
 
 void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
@@ -45,11 +21,13 @@ void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Ch
   if (contacts.cohesion.empty()) return;
   constexpr CohesionRule rule;
   const MaterialView materials{in.material, in.walls};
+  const Poses poses{in.x, in.radius, in.walls, in.clumps, in.domain};
+  const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[index(chunks.wall[chunk])];
   const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k) {
     const double c = law_at(in.laws, candidates, materials, index(contacts.candidate[k])).cohesion;
-    const Opening opening = opening_of(in, chunks, chunk, contacts, k);
-    contacts.cohesion[k] = opening.gap <= rule.reach * opening.smaller_radius ? c * in.time_step : 0;
+    const Touch touch = touch_of(poses, contacts, k, wall);
+    contacts.cohesion[k] = touch.gap <= rule.reach * touch.smaller_radius ? c * in.time_step : 0;
   }
 }
 

@@ -38,24 +38,17 @@ GrainRecord record_of(const Sample& sample, std::size_t k) {
 /// What is said of a sample once.
 struct SampleKind {
   std::int64_t grains;
-  bool rotates, materials;
-  ClumpMass shape;
-  std::uint64_t seed;
+  bool materials;
+  GrainKind grain;
 };
 
 void add(const GrainRecord& record, const SampleKind& kind, Bodies& bodies) {
-  const Vec3 centre(record.x[0], record.x[1], record.x[2]);
-  if (kind.shape.number != 0)
-    add_unturning(
-        bodies, BodyId{record.id},
-        {kind.shape.number, centre, draw_orientation(kind.seed, static_cast<std::uint64_t>(record.id)),
-         record.radius, record.density},
-        kind.shape, kind.rotates);
-  else
-    add_sphere(bodies, BodyId{record.id}, centre, record.radius, record.density, kind.rotates);
+  add_grain(bodies,
+            {BodyId{record.id}, {record.x[0], record.x[1], record.x[2]}, record.radius, record.density},
+            kind.grain);
   if (kind.materials) bodies.material.push_back(static_cast<Material>(record.material));
   std::copy_n(record.velocity, 3, bodies.velocity.back().u);
-  if (kind.rotates) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
+  if (kind.grain.rotates) std::copy_n(record.velocity + 3, 3, bodies.velocity.back().w);
 }
 
 /// Rank of each grain: that of the subdomain its centre is in.
@@ -105,8 +98,9 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
     append(sample, bodies);
     return bodies;
   }
-  const SampleKind own{static_cast<std::int64_t>(sample.size()), sample.rotates, !sample.material.empty(),
-                       sample.shape, sample.seed};
+  const SampleKind own{static_cast<std::int64_t>(sample.size()),
+                       !sample.material.empty(),
+                       {sample.shape, sample.seed, sample.rotates}};
   const SampleKind all = ranks.gather_records(std::span<const SampleKind>(&own, 1)).front();
   const std::vector<std::int32_t> rank = receivers(sample, settings, ranks);
   std::vector<std::int64_t> count(static_cast<std::size_t>(ranks.ranks()), 0);

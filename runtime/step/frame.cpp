@@ -6,7 +6,6 @@
 #include "kernels/bodies/permute.hpp"
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/touch.hpp"
-#include "kernels/detection/wall_pairs.hpp"
 #include "kernels/shapes/clump_motion.hpp"
 #include "runtime/step/state.hpp"
 
@@ -68,27 +67,6 @@ std::vector<Active> active_contacts(const StepState& state) {
   return active;
 }
 
-/// Where a contact stands, and how wide it is open [m].
-struct Place {
-  Vec3 point;
-  double gap;
-};
-Place place_of_sphere(const StepState& state, std::size_t k, const Wall* wall) {
-  const Bodies& bodies = state.bodies;
-  const auto i = static_cast<std::size_t>(state.contacts.first[k]);
-  const Slot second = state.contacts.second[k];
-  const auto j = static_cast<std::size_t>(std::max(second, 0));
-  const double gap =
-      second >= 0 ? Domain{}.separation(bodies.x[i], bodies.x[j]).norm() - bodies.radius[i] - bodies.radius[j]
-                  : wall_point(*wall, bodies.x[i], -1 - second, Domain{}).distance - bodies.radius[i];
-  return {bodies.x[i] - (bodies.radius[i] + 0.5 * gap) * contact_normal(state.contacts, k), gap};
-}
-Place place_of_block(const StepState& state, std::size_t k, const Wall* wall) {
-  const Touch touch =
-      touch_of({state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)}, state.contacts, k, wall);
-  return {touch.point, touch.gap};
-}
-
 ContactRow contact_row(const StepState& state, const Active& active, double time_step) {
   const Bodies& bodies = state.bodies;
   const auto k = static_cast<std::size_t>(active.contact);
@@ -96,18 +74,16 @@ ContactRow contact_row(const StepState& state, const Active& active, double time
   const auto i = static_cast<std::size_t>(state.contacts.first[k]);
   const Slot second = state.contacts.second[k];
   const auto j = static_cast<std::size_t>(std::max(second, 0));
-  const auto c = static_cast<std::size_t>(active.chunk);
-  const auto wall = static_cast<std::size_t>(std::max(state.chunks.wall[c], 0));
-  const Place place = state.chunks.kind[c] == ChunkKind::blocks
-                          ? place_of_block(state, k, second < 0 ? &state.walls[wall] : nullptr)
-                          : place_of_sphere(state, k, state.walls.empty() ? nullptr : &state.walls[wall]);
+  const std::int32_t wall = state.chunks.wall[static_cast<std::size_t>(active.chunk)];
+  const Touch touch = touch_of({bodies.x, bodies.radius, state.walls, clumps_of(state)}, state.contacts, k,
+                               wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)]);
   ContactRow row;
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
   row.bodies[1] =
       second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
   copy3(normal, row.normal);
-  copy3(place.point, row.point);
-  row.gap = place.gap;
+  copy3(touch.ball.centre - (touch.ball.radius + 0.5 * touch.gap) * normal, row.point);
+  row.gap = touch.gap;
   copy3(impulse / time_step, row.force);
   return row;
 }

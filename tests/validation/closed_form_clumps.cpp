@@ -37,8 +37,8 @@ struct ClumpScene : Scene {
   void dumbbell(const Vec3& centre, const Eigen::Quaterniond& turn = Eigen::Quaterniond::Identity(),
                 const Vec3& u = Vec3::Zero(), const Vec3& omega = Vec3::Zero()) {
     const Eigen::Quaterniond q = turn * Eigen::Quaterniond(axes[0], axes[1], axes[2], axes[3]);
-    add_clump(bodies, setup.clumps, BodyId{static_cast<std::int64_t>(bodies.size())},
-              {1, centre, {q.w(), q.x(), q.y(), q.z()}, radius, density(), u, omega});
+    add_clump(bodies, setup.clumps, 1, BodyId{static_cast<std::int64_t>(bodies.size())},
+              {centre, {q.w(), q.x(), q.y(), q.z()}, radius, density(), u, omega});
   }
 };
 
@@ -115,8 +115,8 @@ double drift_of_energy(double time_step) {
   const PlacedClump placed = make_clump(balls);
   scene.setup.clumps = {placed.clump};
   const Vec3 omega = rotation_of(placed.orientation) * Vec3(1, 12, 1);
-  add_clump(scene.bodies, scene.setup.clumps, BodyId{0},
-            {1, Vec3::Zero(), placed.orientation, placed.radius, 1000, Vec3(0.1, 0, 0), omega});
+  add_clump(scene.bodies, scene.setup.clumps, 1, BodyId{0},
+            {Vec3::Zero(), placed.orientation, placed.radius, 1000, Vec3(0.1, 0, 0), omega});
   Experiment run(scene);
   run.steps(1);
   const Vec3 spin = spin_of(run, 0);
@@ -154,7 +154,7 @@ TEST(Clumps, AreHitAtOneEndAndTurn) {
     EXPECT_NEAR(run.u(1)[2], v - impulse / 0.5, close) << e;
     EXPECT_NEAR(run.u(0)[2], impulse / mass, close) << e;
     EXPECT_NEAR(omega_of(run, 0)[1], -s * impulse / across, 3 * close) << e;
-    EXPECT_LT(momentum(run)[2] - 0.5 * v, 1e-12);
+    EXPECT_NEAR(momentum(run)[2], 0.5 * v, 1e-12);
   }
 }
 
@@ -266,8 +266,8 @@ TEST(Clumps, OfOneBallMoveAsSpheresDo) {
     for (int k = 0; k < 4; ++k) {
       const Vec3 centre(0.25 + 0.21 * (k % 3) + 0.1 * (k / 3), 0, r + 0.185 * (k / 3));
       if (clumps)
-        add_clump(scene.bodies, scene.setup.clumps, BodyId{k},
-                  {1, centre, {1, 0, 0, 0}, r, density(), {0.3, 0, -0.1}, {0, 0, 1}});
+        add_clump(scene.bodies, scene.setup.clumps, 1, BodyId{k},
+                  {centre, {1, 0, 0, 0}, r, density(), {0.3, 0, -0.1}, {0, 0, 1}});
       else
         scene.sphere(centre, r, ball_mass, {0.3, 0, -0.1}).w[2] = r;
     }
@@ -372,7 +372,6 @@ TEST(Clumps, MoveTheSameInSubdomains) {
     scene.setup.decomposition.repartition_every = 3;
     return scene;
   };
-  Experiment whole(scene_of(1, Coupling::nscdd));
   for (const Coupling coupling : {Coupling::nscdd, Coupling::alternating}) {
     Experiment reference(scene_of(1, coupling)), cut(scene_of(4, coupling)),
         threads(scene_of(4, coupling), 2);

@@ -51,8 +51,8 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
   meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between)};
   meeting.v =
       velocity_at(in, pair.first, meeting.levers.first) - velocity_at(in, pair.second, meeting.levers.second);
-  meeting.passed =
-      passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap, touch.radius);
+  meeting.passed = passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap,
+                          touch.smaller_radius);
   return meeting;
 }
 
@@ -65,7 +65,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   meeting.fall = in.time_step * in.gravity - wall.gain;
   // The wall in place of a body as large as the ball, whose surface it is.
   const double way = in.time_step * touch.normal.dot(meeting.v);
-  meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.radius;
+  meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.smaller_radius;
   return meeting;
 }
 
@@ -75,9 +75,9 @@ bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& mee
   const Surface* surface = in.walls[index(pair.wall)].surface();
   if (surface == nullptr) return true;
   const auto balls = static_cast<std::int32_t>(in.clumps.balls(index(pair.body)));
-  const Vec3 centre = meeting.touch.point - meeting.touch.arm;
   std::vector<SurfacePoint> points;
-  surface->collide(centre, meeting.touch.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(),
+  surface->collide(meeting.touch.ball.centre,
+                   meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(),
                    points);
   return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
 }
