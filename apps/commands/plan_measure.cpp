@@ -21,7 +21,6 @@ namespace {
 constexpr int sweeps_measured = 400, sweeps_between_checks = 50;
 constexpr double friction_put_in = 0.35;
 constexpr int subdomains_put_in = 8;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 struct Cost {
   double ns = 0;     ///< of a sweep, per contact

@@ -110,7 +110,7 @@ void validate(const Machine& machine, const Trace& trace) {
   for (const auto& [kind, speed] : machine.speed_of) {
     demand_positive(speed, ("speed of " + kind).c_str());
     if (std::none_of(trace.kinds.begin(), trace.kinds.end(),
-                     [&](const KindInfo& info) { return info.name == kind; }))
+                     [&kind = kind](const KindInfo& info) { return info.name == kind; }))
       refuse(fmt::format("speed of '{}': no task is called that (talus trace show lists them)", kind));
   }
   demand_positive(machine.contacts, "contacts scale");

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <queue>
-#include <ranges>
 #include <tuple>
 
 namespace talus::trace {
@@ -78,7 +77,8 @@ std::unordered_map<const Record*, const Record*> sends_of(const Trace& trace) {
   std::ranges::sort(messages, {}, in_time);
   std::unordered_map<const Record*, const Record*> sends;
   std::queue<const Record*> waits;
-  for (const Record* const record : std::views::reverse(messages)) {
+  for (auto last = messages.rbegin(); last != messages.rend(); ++last) {
+    const Record* const record = *last;
     if (!waits.empty() && name(waits.front()) != name(record)) waits = {};
     if (record->kind() == kind_receive) {
       waits.push(record);
