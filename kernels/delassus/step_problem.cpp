@@ -110,8 +110,7 @@ StepProblem assemble_step(const StepView& step) {
       }
       q.insert(q.end(), {v[0], v[1], v[2]});
       mu.push_back(friction_of(step.laws, step.chunks, chunk, c, k));
-      const Vec3 r =
-          c.rn.empty() ? Vec3(axes.transpose() * Vec3(c.rx[k], c.ry[k], c.rz[k])) : Vec3(c.rn[k], 0, 0);
+      const Vec3 r = axes.transpose() * law_impulse(c, k);
       result.r.insert(result.r.end(), {r[0], r[1], r[2]});
     }
   }

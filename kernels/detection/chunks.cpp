@@ -260,13 +260,9 @@ Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target) 
 }
 
 void match_impulses(const Candidates& old, Candidates& fresh) {
-  const auto components = static_cast<std::size_t>(fresh.components);
-  fresh.impulse.assign(fresh.size() * components, 0.0);
-  if (old.components != fresh.components) return;
-  const auto carry = [&](std::size_t from, std::size_t to) {
-    std::copy_n(old.impulse.begin() + static_cast<std::ptrdiff_t>(from * components), components,
-                fresh.impulse.begin() + static_cast<std::ptrdiff_t>(to * components));
-  };
+  fresh.impulse.assign_zeros(fresh.size());
+  if (old.impulse.kind() != fresh.impulse.kind()) return;
+  const auto carry = [&](std::size_t from, std::size_t to) { fresh.impulse.set(to, old.impulse.row(from)); };
   const auto less = [](const auto& a, const auto& b) { return before(a, b); };
   if (fresh.balls.empty() && old.balls.empty())
     merge_walk(old.grain_pairs, fresh.grain_pairs, less, carry);
@@ -281,7 +277,6 @@ void match_impulses(const Candidates& old, Candidates& fresh) {
 }
 
 void renumber(Candidates& candidates, std::span<const Slot> place) {
-  const auto components = static_cast<std::size_t>(candidates.components);
   const std::size_t grains = candidates.grain_pairs.size();
   for (std::size_t k = 0; k < grains; ++k) {
     GrainPair& pair = candidates.grain_pairs[k];
@@ -291,9 +286,7 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
     if (!candidates.balls.empty())
       candidates.balls[k] =
           static_cast<std::uint16_t>(candidates.balls[k] % 256 * 256 + candidates.balls[k] / 256);
-    if (components > 1)  // a normal part alone does not know which body comes first
-      for (std::size_t c = components * k; c < components * (k + 1); ++c)
-        candidates.impulse[c] = -candidates.impulse[c];
+    candidates.impulse.swap_bodies(k);
   }
   for (WallPair& pair : candidates.wall_pairs) pair.body = place[index(pair.body)];
 
@@ -316,7 +309,7 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
   std::ranges::transform(layered_order(candidates.wall_pairs), split,
                          [grains](std::size_t k) { return grains + k; });
   Candidates sorted;
-  sorted.components = candidates.components;
+  sorted.impulse = KeptImpulses(candidates.impulse.kind());
   sorted.grain_pairs.reserve(grains);
   sorted.wall_pairs.reserve(candidates.wall_pairs.size());
   sorted.impulse.reserve(candidates.impulse.size());
@@ -326,15 +319,14 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
       if (!candidates.balls.empty()) sorted.balls.push_back(candidates.balls[k]);
     } else
       sorted.wall_pairs.push_back(candidates.wall_pairs[k - grains]);
-    for (std::size_t c = 0; c < components; ++c)
-      sorted.impulse.push_back(candidates.impulse[components * k + c]);
+    sorted.impulse.push_back(candidates.impulse.row(k));
   }
   candidates = std::move(sorted);
 }
 
 std::size_t memory_used(const Candidates& candidates) {
   return candidates.grain_pairs.capacity() * sizeof(GrainPair) + candidates.balls.capacity() * 2 +
-         candidates.wall_pairs.capacity() * sizeof(WallPair) + candidates.impulse.capacity() * sizeof(double);
+         candidates.wall_pairs.capacity() * sizeof(WallPair) + candidates.impulse.bytes();
 }
 
 std::size_t memory_used(const Chunks& chunks) {

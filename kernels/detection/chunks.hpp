@@ -7,6 +7,7 @@
 
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/kept_impulses.hpp"
 
 namespace talus {
 
@@ -28,9 +29,7 @@ struct Candidates {
   std::vector<std::uint16_t> balls;  ///< per grain pair: number of a ball of the first x 256 + that of one of
                                      ///< the second; then pairs are sorted by (first, second, balls). Empty
                                      ///< where no body is a clump (split_into_balls)
-  std::vector<double> impulse;  ///< per candidate: 3 components on the first body [N s], and 3 of the moment
-                                ///< of rolling resistance [N m s]; or 1 (along the normal) without friction
-  int components = 3;           ///< 3, 6 with rolling resistance, 1 without friction
+  KeptImpulses impulse;              ///< per candidate; its kind is that of the stage
 
   std::size_t size() const { return grain_pairs.size() + wall_pairs.size(); }
 };

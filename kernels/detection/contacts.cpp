@@ -26,7 +26,7 @@ void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& ch
   const bool mixed = std::ranges::find(chunks.law, mixed_laws) != chunks.law.end();
   contacts.mu.resize(friction && mixed ? n : 0);
   for (auto* values : {&contacts.mx, &contacts.my, &contacts.mz, &contacts.arm})
-    values->resize(candidates.components == 6 ? n : 0);
+    values->resize(candidates.impulse.kind() == ImpulseKind::rolling ? n : 0);
   contacts.rn.resize(friction ? 0 : n);
   if (friction) contacts.rn.shrink_to_fit();
   for (auto* values : {&contacts.first, &contacts.second}) values->resize(n);
@@ -52,20 +52,19 @@ void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t 
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]),
              room = static_cast<std::size_t>(chunks.begin[chunk + 1]);
   const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
-  const auto components = static_cast<std::size_t>(candidates.components);
-  std::fill(candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components * begin),
-            candidates.impulse.begin() + static_cast<std::ptrdiff_t>(components * room), 0.0);
+  std::ranges::fill(candidates.impulse.values(begin, room), 0.0);
+  const ImpulseKind kind = candidates.impulse.kind();
   for (std::size_t a = begin; a < end; ++a) {
     const auto k = static_cast<std::size_t>(contacts.candidate[a]);
-    double* const to = &candidates.impulse[components * k];
-    if (components == 1) {
-      *to = contacts.rn[a];
+    const std::span<double> to = candidates.impulse.row(k);
+    if (kind == ImpulseKind::normal) {
+      to[0] = contacts.rn[a];
       continue;
     }
     to[0] = contacts.rx[a];
     to[1] = contacts.ry[a];
     to[2] = contacts.rz[a];
-    if (components == 3) continue;
+    if (kind == ImpulseKind::force) continue;
     to[3] = contacts.mx[a];
     to[4] = contacts.my[a];
     to[5] = contacts.mz[a];
@@ -76,28 +75,30 @@ void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::s
                       Contacts& contacts) {
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
   const auto end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  const ImpulseKind kind = candidates.impulse.kind();
   for (std::size_t a = begin; a < end; ++a) {
     const auto k = static_cast<std::size_t>(contacts.candidate[a]);
-    const double* const from = &candidates.impulse[static_cast<std::size_t>(candidates.components) * k];
-    if (candidates.components == 1) {
-      contacts.rn[a] = *from;
+    const std::span<const double> from = candidates.impulse.row(k);
+    if (kind == ImpulseKind::normal) {
+      contacts.rn[a] = from[0];
       continue;
     }
     contacts.rx[a] = from[0];
     contacts.ry[a] = from[1];
     contacts.rz[a] = from[2];
-    if (candidates.components == 3) continue;
+    if (kind == ImpulseKind::force) continue;
     contacts.mx[a] = from[3];
     contacts.my[a] = from[4];
     contacts.mz[a] = from[5];
   }
 }
 
-void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
+void convert_impulses(Candidates& candidates, ImpulseKind kind, std::span<const Vec3> x,
                       std::span<const Wall> walls, const Domain& domain) {
-  if (components == candidates.components) return;
+  if (kind == candidates.impulse.kind()) return;
   const std::size_t grains = candidates.grain_pairs.size();
-  std::vector<double> converted(candidates.size() * static_cast<std::size_t>(components));
+  KeptImpulses converted(kind);
+  converted.assign_zeros(candidates.size());
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     Vec3 normal;
     if (k < grains) {
@@ -111,17 +112,14 @@ void convert_impulses(Candidates& candidates, int components, std::span<const Ve
                           pair.feature, domain)
                    .normal;
     }
-    const double* const from = &candidates.impulse[static_cast<std::size_t>(candidates.components) * k];
-    double* const to = &converted[static_cast<std::size_t>(components) * k];
-    const Vec3 impulse =
-        candidates.components == 1 ? Vec3(*from * normal) : Vec3(Eigen::Map<const Vec3>(from));
-    if (components == 1)
-      *to = std::max(0.0, impulse.dot(normal));
+    const Vec3 impulse = candidates.impulse.force(k, normal);
+    const std::span<double> to = converted.row(k);
+    if (kind == ImpulseKind::normal)
+      to[0] = std::max(0.0, impulse.dot(normal));
     else
-      Eigen::Map<Vec3>{to} = impulse;  // moments begin at 0
+      std::copy_n(impulse.data(), 3, to.begin());  // moments begin at 0
   }
   candidates.impulse = std::move(converted);
-  candidates.components = components;
 }
 
 std::size_t memory_used(const Contacts& contacts) {

@@ -73,10 +73,10 @@ void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t 
 void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
                       Contacts& contacts);
 
-/// Gives the impulses `components` (3 or 1) when a stage brings friction or drops it: normal parts become
+/// Turns the impulses into those of `kind` when a stage brings friction or drops it: normal parts become
 /// vectors along today's normals, and vectors their normal parts, so that forces outlive the change. x [m] of
 /// all grains.
-void convert_impulses(Candidates& candidates, int components, std::span<const Vec3> x,
+void convert_impulses(Candidates& candidates, ImpulseKind kind, std::span<const Vec3> x,
                       std::span<const Wall> walls, const Domain& domain = {});
 
 std::size_t memory_used(const Contacts& contacts);

@@ -47,6 +47,15 @@ inline Vec3 law_impulse(const Contacts& contacts, std::size_t k) {
   if (contacts.rn.empty()) return {contacts.rx[k], contacts.ry[k], contacts.rz[k]};
   return contacts.rn[k] * contact_normal(contacts, k);
 }
+inline void set_law_impulse(Contacts& contacts, std::size_t k, const Vec3& impulse) {
+  if (contacts.rn.empty()) {
+    contacts.rx[k] = impulse[0];
+    contacts.ry[k] = impulse[1];
+    contacts.rz[k] = impulse[2];
+  } else {
+    contacts.rn[k] = impulse.dot(contact_normal(contacts, k));
+  }
+}
 inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
   const Vec3 impulse = law_impulse(contacts, k);
   if (contacts.cohesion.empty()) return impulse;

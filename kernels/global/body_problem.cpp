@@ -184,17 +184,8 @@ BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPar
 }
 
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts) {
-  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    const std::size_t place = at(problem.contacts[k].place);
-    const Vec3& r = problem.impulse[k];
-    if (contacts.rn.empty()) {
-      contacts.rx[place] = r[0];
-      contacts.ry[place] = r[1];
-      contacts.rz[place] = r[2];
-    } else {
-      contacts.rn[place] = r.dot(problem.contacts[k].normal);
-    }
-  }
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k)
+    set_law_impulse(contacts, at(problem.contacts[k].place), problem.impulse[k]);
 }
 
 std::vector<Twist> velocities_of(const BodyProblem& problem, std::span<const Vec3> impulse) {

@@ -95,9 +95,7 @@ void sweep_blocks(Contacts& contacts, ContactRange range, std::span<Velocity> ve
     const LocalBlock block = local_block(frame * W * frame.transpose(), friction_at(contacts, k, friction));
     const Vec3 after = frame.transpose() * solve_local(block, frame * (v - W * before), frame * before).r;
     push(contacts, k, after - before, velocity, wall);
-    contacts.rx[k] = after[0];
-    contacts.ry[k] = after[1];
-    contacts.rz[k] = after[2];
+    set_law_impulse(contacts, k, after);
   }
 }
 

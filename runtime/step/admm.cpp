@@ -166,10 +166,7 @@ double Admm::velocity_error(double enough) const {
       for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
         const auto place = static_cast<std::size_t>(problem.contacts[k].place);
         const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
-        const double* kept =
-            &state_.candidates.impulse[from * static_cast<std::size_t>(state_.candidates.components)];
-        problem.impulse[k] = state_.candidates.components > 1 ? Vec3(Eigen::Map<const Vec3>(kept))
-                                                              : Vec3(kept[0] * problem.contacts[k].normal);
+        problem.impulse[k] = state_.candidates.impulse.force(from, problem.contacts[k].normal);
       }
   return talus::velocity_error(problems, *link_, enough).relative;
 }

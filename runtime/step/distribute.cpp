@@ -20,7 +20,7 @@ struct ImpulseRecord {
   std::int64_t first;
   std::int64_t second;   ///< -1 - wall at a wall
   std::int64_t feature;  ///< of the wall; between bodies Candidates::balls, or 0
-  double r[6];           ///< of the candidate, as many as it has components
+  double r[static_cast<std::size_t>(ImpulseKind::rolling)];  ///< a row of KeptImpulses
 };
 
 std::size_t at(std::int32_t k) {
@@ -39,21 +39,17 @@ Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3>
 /// another rank go there; `candidates` are let go of.
 Candidates collect_impulses(const Decomposition& decomposition, const graph::Communicator& ranks,
                             const Surroundings& around, const Bodies& bodies, Candidates candidates) {
-  const auto components = static_cast<std::size_t>(candidates.components);
   const std::size_t grains = candidates.grain_pairs.size();
   Candidates old;
-  old.components = candidates.components;
   old.grain_pairs.reserve(grains);
-  old.impulse.reserve(components * candidates.size());
-  std::vector<double> at_walls;
+  old.impulse = KeptImpulses(candidates.impulse.kind());
+  old.impulse.reserve(candidates.size());
+  KeptImpulses at_walls(candidates.impulse.kind());
   const bool clumps = decomposition.shapes;
-  const auto push = [components](std::vector<double>& impulse, const double* r) {
-    for (std::size_t c = 0; c < components; ++c) impulse.push_back(r[c]);
-  };
   std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
   for (std::size_t k = 0; k < candidates.size(); ++k) {
-    const double* r = &candidates.impulse[components * k];
-    if (std::all_of(r, r + components, [](double value) { return value == 0; })) continue;
+    const std::span<const double> r = std::as_const(candidates.impulse).row(k);
+    if (std::ranges::all_of(r, [](double value) { return value == 0; })) continue;
     const bool wall = k >= grains;
     const GrainPair pair = wall ? GrainPair{} : candidates.grain_pairs[k];
     const WallPair at_wall = wall ? candidates.wall_pairs[k - grains] : WallPair{};
@@ -67,7 +63,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
       else
         old.grain_pairs.push_back({around.of_slot[at(pair.first)], around.of_slot[at(pair.second)]});
       if (clumps && !wall) old.balls.push_back(candidates.balls[k]);
-      push(wall ? at_walls : old.impulse, r);
+      (wall ? at_walls : old.impulse).push_back(r);
       continue;
     }
     ImpulseRecord record{};
@@ -75,7 +71,7 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     record.second =
         wall ? -1 - std::int64_t{at_wall.wall} : static_cast<std::int64_t>(bodies.id[at(pair.second)]);
     record.feature = clumps && !wall ? candidates.balls[k] : at_wall.feature;
-    std::copy_n(r, components, record.r);
+    std::ranges::copy(r, record.r);
     to[at(rank)].push_back(record);
   }
   candidates = {};
@@ -89,9 +85,9 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
       else
         old.grain_pairs.push_back({first, around.find(record.second)});
       if (clumps && !wall) old.balls.push_back(static_cast<std::uint16_t>(record.feature));
-      push(wall ? at_walls : old.impulse, record.r);
+      (wall ? at_walls : old.impulse).push_back(record.r);
     }
-  old.impulse.insert(old.impulse.end(), at_walls.begin(), at_walls.end());
+  old.impulse.append(at_walls);
   std::vector<Slot> same(around.bodies.size());
   std::iota(same.begin(), same.end(), 0);
   renumber(old, same);
@@ -165,7 +161,6 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
                         std::vector<SubdomainId>& subdomain) {
   Candidates& found = among.candidates;
   const std::size_t grains = found.grain_pairs.size();
-  const auto components = static_cast<std::size_t>(found.components);
   std::vector<std::vector<ImpulseRecord>> to(static_cast<std::size_t>(ranks.ranks()));
   for (std::size_t k = grains; k < found.size(); ++k) {
     const WallPair& pair = found.wall_pairs[k - grains];
@@ -182,7 +177,7 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     record.first = static_cast<std::int64_t>(around.bodies.id[at(pair.body)]);
     record.second = -1 - std::int64_t{pair.wall};
     record.feature = pair.feature;
-    std::copy_n(&found.impulse[components * k], components, record.r);
+    std::ranges::copy(found.impulse.row(k), record.r);
     to[at(rank)].push_back(record);
   }
   for (const auto& part : ranks.exchange_records(std::move(to)))
@@ -195,7 +190,7 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
       };
       const auto place = std::ranges::lower_bound(found.wall_pairs, order(pair), {}, order);
       const auto k = grains + static_cast<std::size_t>(place - found.wall_pairs.begin());
-      std::copy_n(record.r, components, &found.impulse[components * k]);
+      found.impulse.set(k, record.r);
     }
 }
 
@@ -213,8 +208,8 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
                                        Candidates& cut) {
   // Of the bodies of the subdomain at hand.
   std::vector<Slot> slot(bodies);
-  const auto components = static_cast<std::size_t>(found.components);
-  cut.impulse.reserve(components * own.candidate.size());
+  cut.impulse = KeptImpulses(found.impulse.kind());
+  cut.impulse.reserve(own.candidate.size());
   cut.grain_pairs.reserve(own.begin[2 * decomposition.here.size()]);
   cut.balls.reserve(found.balls.empty() ? 0 : own.begin[2 * decomposition.here.size()]);
   std::vector<CandidateGroup> groups;
@@ -250,7 +245,7 @@ std::vector<CandidateGroup> cut_groups(const Decomposition& decomposition, const
       else
         push_at_wall(found.wall_pairs[k - found.grain_pairs.size()], place);
       if (wall < 0 && !found.balls.empty()) cut.balls.push_back(found.balls[k]);
-      for (std::size_t c = 0; c < components; ++c) cut.impulse.push_back(found.impulse[components * k + c]);
+      cut.impulse.push_back(found.impulse.row(k));
     }
   }
   return groups;
@@ -301,7 +296,6 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   const std::int64_t all = std::accumulate(load.begin(), load.end(), std::int64_t{0});
 
   Candidates cut;
-  cut.components = found.components;
   const std::vector<CandidateGroup> groups =
       cut_groups(decomposition, found, own, {load, all, among.glued}, around.bodies.size(), cut);
   own = {};

@@ -127,8 +127,8 @@ struct Simulation::Implementation {
     }
     if (state.candidates_valid) {
       // Forces outlive the change of stage, so impulses go with the time step.
-      for (double& impulse : state.candidates.impulse) impulse *= stage.time_step / last_time_step;
-      convert_impulses(state.candidates, parameters.components(), state.bodies.x, state.walls);
+      for (double& value : state.candidates.impulse.values()) value *= stage.time_step / last_time_step;
+      convert_impulses(state.candidates, parameters.impulses(), state.bodies.x, state.walls);
       state.candidates_valid = false;
     }
     stage_steps = 0;

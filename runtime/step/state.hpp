@@ -26,8 +26,9 @@ struct StepParameters {
   bool rotates = false;  ///< friction, and grains that rotate
   bool rolls = false;    ///< some contacts resist rolling, of grains that rotate
   bool clumps = false;   ///< there are bodies that may be clumps
-  /// Of the impulse of a candidate (Candidates::components).
-  int components() const { return rolls ? 6 : friction ? 3 : 1; }
+  ImpulseKind impulses() const {
+    return rolls ? ImpulseKind::rolling : friction ? ImpulseKind::force : ImpulseKind::normal;
+  }
   double alert = 0;  ///< [m]
   double skin = 0;   ///< [m]
 };

@@ -154,7 +154,7 @@ void StepGraph::make_chunks() {
   cells_ = {};
   const bool several = state_.decomposition.several();
   Candidates fresh;
-  fresh.components = parameters_.components();
+  fresh.impulse = KeptImpulses(parameters_.impulses());
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
   for (auto& part : pairs_) release(part);
   fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x,
@@ -211,13 +211,10 @@ void StepGraph::renew_slots() {
 void StepGraph::narrow_share(std::uint32_t share) {
   const Bodies& bodies = state_.bodies;
   if (!settings_.warm_start) {
-    const auto components = static_cast<std::size_t>(state_.candidates.components);
     const SlotRange own = range_of_share(state_.chunks.size(), share);
-    std::fill(state_.candidates.impulse.begin() +
-                  static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.begin],
-              state_.candidates.impulse.begin() +
-                  static_cast<std::ptrdiff_t>(components) * state_.chunks.begin[own.end],
-              0.0);
+    const auto begin = static_cast<std::size_t>(state_.chunks.begin[own.begin]),
+               end = static_cast<std::size_t>(state_.chunks.begin[own.end]);
+    std::ranges::fill(state_.candidates.impulse.values(begin, end), 0.0);
   }
   const NarrowPhase in{bodies.x,         bodies.radius,         bodies.velocity,
                        state_.walls,     parameters_.time_step, parameters_.alert,

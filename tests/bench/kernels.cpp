@@ -63,9 +63,9 @@ Sample make_sample(const bench::Packing& packing, std::size_t grains, bool frict
   std::vector<std::vector<GrainPair>> parts(1);
   find_pairs(grid, 0, grid.cells.size(), parts[0]);
   Candidates& candidates = sample.candidates;
-  candidates.components = friction ? 3 : 1;
+  candidates.impulse = KeptImpulses(friction ? ImpulseKind::force : ImpulseKind::normal);
   candidates.grain_pairs = sort_pairs(parts, bodies.size());
-  candidates.impulse.assign(candidates.size() * (friction ? 3 : 1), 0.0);
+  candidates.impulse.assign_zeros(candidates.size());
   const auto all = static_cast<std::int64_t>(candidates.size());
   sample.chunks = cut_chunks(candidates, bodies.size(), chunk_target(all, all));
   allocate(sample.contacts, candidates, sample.chunks, friction);

@@ -112,13 +112,13 @@ inline Candidates find_candidates(const Bodies& bodies, const std::vector<Wall>&
   std::vector<std::vector<GrainPair>> parts(1);
   find_pairs(grid, 0, grid.cells.size(), parts[0]);
   Candidates candidates;
-  candidates.components = friction ? 3 : 1;
+  candidates.impulse = KeptImpulses(friction ? ImpulseKind::force : ImpulseKind::normal);
   candidates.grain_pairs = sort_pairs(parts, bodies.size());
   for (std::size_t w = 0; w < walls.size(); ++w)
     for (std::size_t s = 0; s < bodies.size(); ++s)
       if (walls[w].normal.dot(bodies.x[s] - walls[w].point) < reach[s] + margin)
         candidates.wall_pairs.push_back({static_cast<std::int32_t>(w), static_cast<Slot>(s)});
-  candidates.impulse.assign(candidates.size() * static_cast<std::size_t>(candidates.components), 0.0);
+  candidates.impulse.assign_zeros(candidates.size());
   return candidates;
 }
 
@@ -138,7 +138,8 @@ struct Sample {
 
 /// Narrow phase over all chunks with h = 1 ms and the given alert distance; biases as IQS gives them.
 inline void find_contacts(Sample& sample, double alert, InstructionSet set = InstructionSet::automatic) {
-  allocate(sample.contacts, sample.candidates, sample.chunks, sample.candidates.components == 3);
+  allocate(sample.contacts, sample.candidates, sample.chunks,
+           sample.candidates.impulse.kind() == ImpulseKind::force);
   const NarrowPhase in{
       sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, alert, {},
       Vec3::Zero()};

@@ -57,7 +57,7 @@ TEST(BallPairs, KeepTheirImpulsesWhereBodiesAreFoundAnewOrSorted) {
   Candidates old = FourBodies::pairs();
   split_into_balls(bodies.view(), old);
   for (std::size_t k = 0; k < old.size(); ++k)
-    for (int c = 0; c < 3; ++c) old.impulse.push_back(static_cast<double>(10 * k + 1) + c);
+    old.impulse.push_back(std::vector<double>(3, static_cast<double>(10 * k + 1)));
   Candidates fresh = FourBodies::pairs();
   std::erase(fresh.grain_pairs, GrainPair{0, 2});
   split_into_balls(bodies.view(), fresh);
@@ -71,13 +71,13 @@ TEST(BallPairs, KeepTheirImpulsesWhereBodiesAreFoundAnewOrSorted) {
     } else {
       sent.wall_pairs.push_back(old.wall_pairs[k - old.grain_pairs.size()]);
     }
-    for (std::size_t c = 3 * k; c < 3 * (k + 1); ++c) sent.impulse.push_back(old.impulse[c]);
+    sent.impulse.push_back(old.impulse.row(k));
   }
   match_impulses(sent, fresh);
   for (std::size_t k = 0; k < fresh.grain_pairs.size(); ++k) {
     std::size_t was = 0;
     while (!(old.grain_pairs[was] == fresh.grain_pairs[k]) || old.balls[was] != fresh.balls[k]) ++was;
-    EXPECT_EQ(fresh.impulse[3 * k], was % 3 == 1 ? 0 : old.impulse[3 * was]) << k;
+    EXPECT_EQ(fresh.impulse.row(k)[0], was % 3 == 1 ? 0 : old.impulse.row(was)[0]) << k;
   }
 
   // Bodies 2 and 3 change places: the dumbbell comes first, its ball is that of the first body now.
@@ -98,7 +98,7 @@ TEST(BallPairs, KeepTheirImpulsesWhereBodiesAreFoundAnewOrSorted) {
     while (!(sorted.grain_pairs[now] == GrainPair{a, b}) || sorted.balls[now] != ball_numbers(one, other)) {
       ASSERT_LT(++now, sorted.grain_pairs.size()) << "lost: pair " << k;
     }
-    EXPECT_EQ(sorted.impulse[3 * now], sign * old.impulse[3 * k]);
+    EXPECT_EQ(sorted.impulse.row(now)[0], sign * old.impulse.row(k)[0]);
     const bool same_bodies = now > 0 && sorted.grain_pairs[now] == sorted.grain_pairs[now - 1];
     EXPECT_TRUE(!same_bodies || sorted.balls[now - 1] < sorted.balls[now]) << "not sorted";
   }

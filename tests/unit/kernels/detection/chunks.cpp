@@ -171,13 +171,13 @@ TEST(Chunks, LateOnesComeBehindTheInsideAndResetNoBodyThatIsTaken) {
 Candidates some_of(const Candidates& all, double share, std::uint64_t seed) {
   Random random(seed);
   Candidates some;
-  some.components = all.components;
+  some.impulse = KeptImpulses(all.impulse.kind());
   for (const GrainPair& pair : all.grain_pairs)
     if (uniform(random, 0, 1) < share) some.grain_pairs.push_back(pair);
   for (const WallPair& pair : all.wall_pairs)
     if (uniform(random, 0, 1) < share) some.wall_pairs.push_back(pair);
-  for (std::size_t k = 0; k < some.size() * static_cast<std::size_t>(some.components); ++k)
-    some.impulse.push_back(uniform(random, -1, 1));
+  some.impulse.assign_zeros(some.size());
+  for (double& value : some.impulse.values()) value = uniform(random, -1, 1);
   return some;
 }
 
@@ -187,14 +187,13 @@ using Key = std::pair<std::int64_t, std::int64_t>;
 /// Impulses by pair; a wall is a negative number.
 std::map<Key, Impulse> impulses_by_pair(const Candidates& candidates) {
   std::map<Key, Impulse> map;
-  const auto components = candidates.components;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     const std::size_t grains = candidates.grain_pairs.size();
     const Key key =
         k < grains ? Key{candidates.grain_pairs[k].first, candidates.grain_pairs[k].second}
                    : Key{-1 - candidates.wall_pairs[k - grains].wall, candidates.wall_pairs[k - grains].body};
-    const auto from = candidates.impulse.begin() + static_cast<std::ptrdiff_t>(k) * components;
-    map[key] = Impulse(from, from + components);
+    const auto row = candidates.impulse.row(k);
+    map[key] = Impulse(row.begin(), row.end());
   }
   return map;
 }
@@ -224,7 +223,8 @@ TEST(MatchImpulses, StartsFromZeroWhenFrictionIsSwitched) {
   const Candidates old = some_of(test::find_candidates(bodies, {}, 0.1, false), 1, 1);
   Candidates fresh = test::find_candidates(bodies, {}, 0.1, true);
   match_impulses(old, fresh);
-  EXPECT_EQ(fresh.impulse, std::vector<double>(3 * fresh.size(), 0.0));
+  EXPECT_EQ(fresh.impulse.size(), fresh.size());
+  EXPECT_TRUE(std::ranges::all_of(fresh.impulse.values(), [](double value) { return value == 0; }));
 }
 
 TEST(Renumber, KeepsTheImpulseThatEachBodyFeels) {

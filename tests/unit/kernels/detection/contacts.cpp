@@ -18,7 +18,7 @@ using test::uniform;
 
 void set_random_impulses(Candidates& candidates, std::uint64_t seed) {
   Random random(seed);
-  for (double& r : candidates.impulse) r = uniform(random, -1, 1);
+  for (double& r : candidates.impulse.values()) r = uniform(random, -1, 1);
 }
 
 TEST(Contacts, AreTheCandidatesNearerThanTheAlertDistance) {
@@ -79,7 +79,7 @@ TEST(Contacts, OfOneLargeGrainAreAllKeptThoughNoBatchFits) {
     add_sphere(sample.bodies, BodyId{k}, 10.01 * direction, 0.01, 1000);
     sample.candidates.grain_pairs.push_back({0, static_cast<Slot>(k)});
   }
-  sample.candidates.impulse.assign(3 * sample.candidates.size(), 0.0);
+  sample.candidates.impulse.assign_zeros(sample.candidates.size());
   sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
   test::find_contacts(sample, 0.001);
   ASSERT_EQ(sample.chunks.size(), 1u);
@@ -109,7 +109,7 @@ TEST(Contacts, OfCoincidentCentresPointUp) {
   Sample sample;
   for (int k = 0; k < 2; ++k) add_sphere(sample.bodies, BodyId{k}, Vec3(1, 2, 3), 0.5, 1000);
   sample.candidates.grain_pairs = {{0, 1}};
-  sample.candidates.impulse.assign(3, 0.0);
+  sample.candidates.impulse.assign_zeros(1);
   sample.chunks = cut_chunks(sample.candidates, 2, 10);
   test::find_contacts(sample, 0.01);
   ASSERT_EQ(sample.contacts.count[0], 1);
@@ -140,7 +140,7 @@ TEST(WarmStart, ComesBackUnchangedFromTheContacts) {
     Sample sample = test::dense_sample(6, 9, friction, true, 60);
     set_random_impulses(sample.candidates, 5);
     test::find_contacts(sample, 0.03);
-    const std::vector<double> before = sample.candidates.impulse;
+    const KeptImpulses before = sample.candidates.impulse;
     std::set<std::int32_t> contacts;
     for (std::size_t c = 0; c < sample.chunks.size(); ++c) {
       for (std::size_t k = sample.range(c).begin; k < sample.range(c).end; ++k)
@@ -148,10 +148,10 @@ TEST(WarmStart, ComesBackUnchangedFromTheContacts) {
       store_impulses(sample.contacts, sample.chunks, c, sample.candidates);
     }
     EXPECT_LT(contacts.size(), sample.candidates.size());
-    const auto components = static_cast<std::size_t>(sample.candidates.components);
     for (std::size_t k = 0; k < before.size(); ++k) {
-      const bool contact = contacts.count(static_cast<std::int32_t>(k / components)) > 0;
-      EXPECT_EQ(sample.candidates.impulse[k], contact ? before[k] : 0.0);
+      const bool contact = contacts.count(static_cast<std::int32_t>(k)) > 0;
+      for (std::size_t c = 0; c < before.row(k).size(); ++c)
+        EXPECT_EQ(sample.candidates.impulse.row(k)[c], contact ? before.row(k)[c] : 0.0);
     }
   }
 }
@@ -177,8 +177,8 @@ double bias_of(const Approach& approach, bool at_wall) {
     add_sphere(sample.bodies, BodyId{1}, Vec3(0, 0, -1), 1, 1000);
     sample.candidates.grain_pairs = {{0, 1}};
   }
-  sample.candidates.components = 1;
-  sample.candidates.impulse.assign(1, 0.0);
+  sample.candidates.impulse = KeptImpulses(ImpulseKind::normal);
+  sample.candidates.impulse.assign_zeros(1);
   sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 10);
   allocate(sample.contacts, sample.candidates, sample.chunks, false);
   const NarrowPhase in{sample.bodies.x,

@@ -14,7 +14,7 @@ namespace {
 test::Sample touched_sample(bool friction) {
   test::Sample sample = test::dense_sample(5, 21, friction, true, 60);
   test::Random random(4);
-  for (double& r : sample.candidates.impulse) r = test::uniform(random, -100, 300);
+  for (double& r : sample.candidates.impulse.values()) r = test::uniform(random, -100, 300);
   test::find_contacts(sample, 0.06);
   return sample;
 }

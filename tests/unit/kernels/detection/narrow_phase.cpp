@@ -70,7 +70,7 @@ void expect_scalar_contacts(const Sample& sample, const NarrowPhase& in) {
 Sample fresh_sample(bool friction, int target, std::uint64_t seed) {
   Sample sample = test::dense_sample(6, seed, friction, true, target);
   Random random(seed);
-  for (double& r : sample.candidates.impulse) r = uniform(random, -1, 1);
+  for (double& r : sample.candidates.impulse.values()) r = uniform(random, -1, 1);
   allocate(sample.contacts, sample.candidates, sample.chunks, friction);
   return sample;
 }
@@ -142,7 +142,7 @@ TEST(NarrowPhase, RepairsTheGroupsOfFewContactsThatCameOrWent) {
       const double part = step % 6 == 0 ? 0.5 : 0.02, way = step % 6 == 0 ? 0.05 : 0.01;
       for (Vec3& x : sample.bodies.x)
         if (uniform(random, 0, 1) < part) x += test::uniform_vector(random, -way, way);
-      for (double& r : sample.candidates.impulse) r = uniform(random, -1, 1);
+      for (double& r : sample.candidates.impulse.values()) r = uniform(random, -1, 1);
       other.bodies.x = sample.bodies.x;
       other.candidates.impulse = sample.candidates.impulse;
       const Contacts before = sample.contacts;
@@ -179,7 +179,7 @@ TEST(NarrowPhase, RepairsGroupsOfOne) {
     add_sphere(sample.bodies, BodyId{k}, 10.01 * Vec3(std::cos(turn), std::sin(turn), 0), 0.01, 1000);
     sample.candidates.grain_pairs.push_back({0, static_cast<Slot>(k)});
   }
-  sample.candidates.impulse.assign(3 * sample.candidates.size(), 0.0);
+  sample.candidates.impulse.assign_zeros(sample.candidates.size());
   sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 384);
   test::find_contacts(sample, 0.001);
   const InstructionSet best = best_instruction_set();

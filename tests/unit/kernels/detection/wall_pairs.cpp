@@ -24,8 +24,7 @@ Candidates shuffled_pairs(unsigned seed) {
         if (random() % 2 == 0) candidates.wall_pairs.push_back({wall, body, feature});
   std::ranges::shuffle(candidates.wall_pairs, random);
   for (const WallPair& pair : candidates.wall_pairs)
-    for (const int value : {100 * pair.wall + pair.body, pair.feature, 1})
-      candidates.impulse.push_back(value);
+    candidates.impulse.push_back(std::vector<double>{100.0 * pair.wall + pair.body, 1.0 * pair.feature, 1});
   return candidates;
 }
 
@@ -67,8 +66,8 @@ TEST(WallPairs, ImpulsesFollowTheirFeaturesWhateverTheLayers) {
     const WallPair& pair = fresh.wall_pairs[k];
     const bool known = std::ranges::find(old.wall_pairs, pair) != old.wall_pairs.end();
     kept += known;
-    EXPECT_EQ(fresh.impulse[3 * k], known ? 100 * pair.wall + pair.body : 0);
-    EXPECT_EQ(fresh.impulse[3 * k + 1], known ? pair.feature : 0);
+    EXPECT_EQ(fresh.impulse.row(k)[0], known ? 100 * pair.wall + pair.body : 0);
+    EXPECT_EQ(fresh.impulse.row(k)[1], known ? pair.feature : 0);
   }
   EXPECT_GT(kept, 5u);
   EXPECT_LT(kept, fresh.wall_pairs.size());

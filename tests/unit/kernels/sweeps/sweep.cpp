@@ -225,7 +225,7 @@ TEST(Sweep, ConservesAngularMomentumOfTouchingSpheres) {
             [](const GrainPair& a, const GrainPair& b) {
               return std::pair(a.first, a.second) < std::pair(b.first, b.second);
             });
-  sample.candidates.impulse.assign(3 * sample.candidates.size(), 0.0);
+  sample.candidates.impulse.assign_zeros(sample.candidates.size());
   sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 50);
   test::find_contacts(sample, 0.01);
   const Momentum before = momentum(sample.bodies);

@@ -117,7 +117,7 @@ void expect_reference_bits(const Sample& sample, const Plan& plan) {
 
 void start_from_random_impulses(Sample& sample, std::uint64_t seed) {
   Random random(seed);
-  for (double& r : sample.candidates.impulse) r = uniform(random, 0, 300);
+  for (double& r : sample.candidates.impulse.values()) r = uniform(random, 0, 300);
   test::find_contacts(sample, 0.06);
 }
 
