@@ -105,5 +105,28 @@ TEST(RollingResistance, OfALineOfBallsIsTheSameInOneSubdomainAndInSeveral) {
   }
 }
 
+TEST(RollingResistance, SlowsAndHoldsBallsByEveryMethodThatTakesMoments) {
+  const double resistance = 0.2, limit = std::atan(resistance);
+  for (const SolverMethod& method : {SolverMethod::automatic, SolverMethod::nlgs, SolverMethod::admm})
+    for (const double angle : {0.8 * limit, 1.5 * limit}) {
+      Scene scene = on_slope(angle, resistance);
+      scene.setup.solver.method = method;
+      scene.setup.solver.tolerance = 1e-9;
+      Experiment run(std::move(scene));
+      run.steps(100);
+      const double a = angle < limit ? 0 : g_earth * (std::sin(angle) - resistance * std::cos(angle)) / 1.4;
+      EXPECT_NEAR(run.u()[0], a * 100 * h, 1e-7) << method.name() << ' ' << angle;
+      EXPECT_TRUE(run.simulation().report().converged) << method.name() << ' ' << angle;
+    }
+}
+
+TEST(RollingResistance, IsRefusedByMethodsThatCarryImpulsesOn) {
+  for (const SolverMethod& method : {SolverMethod::momentum, SolverMethod::nncg}) {
+    Scene scene = on_slope(0.1, 0.2);
+    scene.setup.solver.method = method;
+    EXPECT_THROW(Experiment run(std::move(scene)), std::invalid_argument) << method.name();
+  }
+}
+
 }  // namespace
 }  // namespace talus::validation
