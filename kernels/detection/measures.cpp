@@ -30,6 +30,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
   sums.passed = contacts.passed[chunk];
   const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
   const std::size_t end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  const bool cohesive = !contacts.cohesion.empty();
   double penetration = 0, moment[9] = {}, normal_impulse = 0;  // apart, so that they stay in registers
   const auto add = [&](std::size_t k, const Vec3& branch, double gap) {
     // Without a jump: nobody can predict which contacts overlap.
@@ -37,7 +38,7 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
     sums.overlapping += gap < 0 ? 1 : 0;
     penetration += overlap;
     sums.penetration_max = std::max(sums.penetration_max, overlap);
-    const Vec3 r = contact_impulse(contacts, k);
+    const Vec3 r = cohesive ? contact_impulse(contacts, k) : law_impulse(contacts, k);
     for (Eigen::Index c = 0; c < 9; ++c) moment[c] += r[c % 3] * branch[c / 3];
     normal_impulse += r.dot(contact_normal(contacts, k));
   };
