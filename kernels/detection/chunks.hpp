@@ -118,7 +118,7 @@ std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates
                                                     int target);
 
 /// Carries impulses from `old` to `fresh` where the same pair stands in both; others start from 0. Both are
-/// sorted; the slots must mean the same bodies. Impulses are carried between equal `components` only: with
+/// sorted; the slots must mean the same bodies. Impulses are carried between equal kinds only: with
 /// friction they are vectors in space, without it normal parts.
 void match_impulses(const Candidates& old, Candidates& fresh);
 

@@ -13,9 +13,8 @@ namespace talus {
 /// samples ask it, so that another kind of space is one more type with these functions, and no change
 /// elsewhere.
 ///
-///   separation(a, b)   from b to a along the shortest way [m]. In a walled domain the plain difference; in a
-///   periodic
-///                      one that of the nearest images.
+///   separation(a, b)   from b to a along the shortest way [m]: the plain difference in a walled domain, that
+///                      of the nearest images in a periodic one
 ///   midpoint(a, b)     halfway along that way [m]
 ///   wrap(x)            the image of x that is stored [m]; x itself where there are no images
 ///   lengths(walls)     extent along x, y, z [m]; 0 along an axis that nothing bounds

@@ -51,10 +51,10 @@ struct Margins {
 void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& margins,
                        std::vector<Escape>& skin_escapes);
 
-/// Appends to `needed` the contacts of a escape with a grain here or a wall, and to `known` the candidates
-/// here of the escapes. Over all ranks, which are to have the same escapes, the candidates hold if
-/// all_known(needed, known). `skin_escapes` are in order of id, each once; cheap where slots that follow one
-/// another are near in space.
+/// Appends to `needed` the contacts of an escaped grain with a grain here or a wall, and to `known` the
+/// candidates here of escaped grains. Over all ranks, which are to have the same escapes, the candidates hold
+/// if all_known(needed, known). `skin_escapes` are in order of id, each once; cheap where slots that follow
+/// one another are near in space.
 void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bodies,
                           const Candidates& candidates, const Margins& margins,
                           std::vector<Encounter>& needed, std::vector<Encounter>& known);

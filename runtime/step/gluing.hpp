@@ -43,8 +43,7 @@ struct JumpSums {
 /// Alternating, subdomains have colours (partition/subdomain_colours.hpp). One whose subdomain colour is not
 /// the first begins its boundary with
 ///
-///   take[e]      copies of bodies that stand in subdomains of earlier subdomain colours, too, get the mean
-///   of the
+///   take[e]      copies of bodies that stand in subdomains of earlier colours, too, get the mean of the
 ///                latest of those
 ///
 /// Contacts at glued walls that it has wait for nobody (distribute.cpp). In the end all copies of a body get
