@@ -44,7 +44,7 @@ class KeptImpulses {
 
   void reserve(std::size_t rows) { values_.reserve(rows * length()); }
   void assign_zeros(std::size_t rows) { values_.assign(rows * length(), 0.0); }
-  /// `of` must be of this kind: its first row's length of numbers.
+  /// `of` is a row of this kind, or longer: what lies behind is not read.
   void push_back(std::span<const double> of);
   void set(std::size_t k, std::span<const double> of);
   /// All rows of others of this kind, behind these.
