@@ -143,6 +143,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
       contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
     }
     contact.place = static_cast<std::int32_t>(k);
+    contact.wall = w;
     if (source.chunks.kind[c] == ChunkKind::blocks) contact.levers = &contacts.levers[k];
     problem.contacts.push_back(contact);
     problem.impulse.push_back(law_impulse(contacts, k));
@@ -181,6 +182,17 @@ BodyProblem gather_problem(const BodyProblemSource& source) {
 
 BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part) {
   return gather(source, &part);
+}
+
+void keep_contacts(BodyProblem& problem, std::span<const char> taken) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    if (taken[at(problem.contacts[k].first)] == 0) continue;
+    problem.contacts[kept] = problem.contacts[k];
+    problem.impulse[kept++] = problem.impulse[k];
+  }
+  problem.contacts.resize(kept);
+  problem.impulse.resize(kept);
 }
 
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts) {

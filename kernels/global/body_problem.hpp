@@ -51,6 +51,7 @@ struct ContactEquation {
   std::int32_t first = -1;         ///< unknown
   std::int32_t second = -1;        ///< unknown; -1 at a driven wall
   std::int32_t place = -1;         ///< in `Contacts`
+  std::int32_t wall = -1;          ///< number of the wall; -1 between bodies
   double drive = 0;                ///< speed of the driven wall [m/s]; 0 between bodies
   const Levers* levers = nullptr;  ///< of a contact of blocks, in `Contacts`
 };
@@ -122,6 +123,9 @@ BodyProblem gather_problem(const BodyProblemSource& source);
 
 /// The same for one subdomain. The walls count in the first of all.
 BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part);
+
+/// Drops the contacts whose first body is not `taken`, an entry per unknown.
+void keep_contacts(BodyProblem& problem, std::span<const char> taken);
 
 /// Writes the impulses back.
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts);

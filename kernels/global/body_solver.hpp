@@ -29,6 +29,10 @@ class BodySolver {
   /// Iterates until z.A z has fallen by the factor `tolerance` squared. Returns the number of iterations.
   int solve(const PartField& f, PartField& V, double tolerance, int max_iterations);
 
+  /// f - A V of the last call, and that preconditioned: an estimate of the error of V.
+  const PartField& residual() const { return residual_; }
+  const PartField& preconditioned() const { return z_; }
+
  private:
   void multiply(const PartField& x, PartField& y) const;
   void precondition();

@@ -60,11 +60,16 @@ int aggregate_target(std::size_t bodies) {
 
 Aggregates grow_aggregates(const BodyProblem& problem, std::span<const char> touched, int target) {
   const Adjacency graph = grain_neighbours(problem);
+  // Passes over the blocks solve a grain that touches driven walls only: it needs no aggregate.
+  std::vector<char> tied(problem.bodies.size(), 0);
+  for (const ContactEquation& c : problem.contacts)
+    if (c.second >= 0) tied[at(c.first)] = tied[at(c.second)] = 1;
+  for (const std::int32_t b : problem.shared) tied[at(b)] = 1;
   Aggregates result;
   result.of_body.assign(problem.bodies.size(), -1);
   std::vector<std::int32_t> members;
   for (std::size_t seed = 0; seed < problem.grains; ++seed) {
-    if (!touched[seed] || !problem.counted(seed) || result.of_body[seed] >= 0) continue;
+    if (!touched[seed] || !tied[seed] || !problem.counted(seed) || result.of_body[seed] >= 0) continue;
     const std::int32_t own = result.count;
     members.assign(1, static_cast<std::int32_t>(seed));
     result.of_body[seed] = own;

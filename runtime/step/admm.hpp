@@ -32,9 +32,22 @@ class Admm {
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
 
-  /// Relative error of the velocities that the impulses of the last check give, with several ranks those that
-  /// the candidates keep (kernels/global/balance.hpp); what is below `enough` is not told apart.
-  double velocity_error(double enough) const;
+  /// Finds the clusters of the step's contacts. Those of at most `most_direct` bodies are small.
+  void find_clusters(int most_direct);
+  bool small_clusters() const { return small_; }  ///< there are some, in any part
+  bool large_clusters() const { return large_; }
+
+  /// Relative error of what the impulses of the last check give, with several ranks those that the candidates
+  /// keep; what is below `enough` is not told apart. `farthest`: largest coordinate [m], which rounding goes by. In small clusters of velocities and forces
+  /// (kernels/global/step_error.hpp); the Newton step that it was found with is kept for `correct`. In large
+  /// ones of velocities (balance.hpp).
+  double small_error(double enough, double farthest);
+  double large_error(double enough) const;
+
+  /// Replaces the impulses of `state.contacts` in small clusters by those of the last small_error and its Newton
+  /// step, put on the cones, and returns true; but where they are further from the law then, returns false and
+  /// leaves them. Velocities are left to be made afresh.
+  bool correct();
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
@@ -47,6 +60,8 @@ class Admm {
   template <class Gathered, class Gather>
   std::vector<Gathered> gather_parts(const Gather& gather) const;
   std::vector<BodyProblem> gather() const;
+  /// The contacts of small, or of large clusters, with the impulses of the last check.
+  std::vector<BodyProblem> checked(bool small) const;
 
   StepState& state_;
   const StepParameters& parameters_;
@@ -55,6 +70,10 @@ class Admm {
   graph::Crew crew_;
   mutable trace::Meetings rounds_;  ///< since the last span began
   std::unique_ptr<PartLink> link_;
+  std::vector<std::vector<char>> in_small_;  ///< per part and unknown
+  bool small_ = false, large_ = false;
+  std::vector<BodyProblem> problems_;  ///< of the last small_error
+  PartImpulses change_;                ///< found there [N s]
 };
 
 }  // namespace talus

@@ -15,7 +15,7 @@ void Certificate::begin(Scales scales) {
   result_ = {};
   history_.clear();
   wall_impulses_.clear();
-  velocity_check_ = {};
+  small_check_ = velocity_check_ = {};
 }
 
 /// The error and the drift of the wall forces, and where they stand in the history.
@@ -96,41 +96,56 @@ double Certificate::drift() const {
 }
 
 bool Certificate::checks_velocities(WholeProblem& whole) const {
-  if (result_.stiff_calls > 0) return true;
-  if (result_.contacts <= thresholds_.tiny) return result_.contacts > 0;
-  return whole.sweeps_needed() >= thresholds_.velocity_check_cost &&
-         whole.plain_sweeps_needed() >= stiff_for(result_.contacts);
+  if (!whole.large_clusters()) return false;
+  return result_.stiff_calls > 0 || (whole.sweeps_needed() >= thresholds_.velocity_check_cost &&
+                                     whole.plain_sweeps_needed() >= stiff_for(result_.contacts));
+}
+
+/// The last answer where nothing can have changed it, a guess from the residual where that is too large, else a
+/// new one.
+double Certificate::repeated(VelocityCheck& then, const std::function<double(double)>& ask) {
+  const double tolerance = settings_.balance_tolerance;
+  const int done = result_.iterations;
+  // From a residual of 0 nothing is inferred.
+  const double guess = then.error_rms > 0 ? then.error * result_.error_rms / then.error_rms : then.error;
+  const bool due = done >= settings_.max_iterations || !(guess > tolerance) ||
+                   done > thresholds_.velocity_check_growth * then.at;
+  if (then.at < 0 || (then.at != done && due))
+    then = {done, result_.error_rms, ask(thresholds_.velocity_resolution * tolerance)};
+  return then.at == done ? then.error : guess;
 }
 
 bool Certificate::balanced(WholeProblem& whole) {
   const double tolerance = settings_.balance_tolerance;
-  const int done = result_.iterations;
-  result_.unbalance = result_.drift;
-  if (!checks_velocities(whole)) {
-    if (result_.drift > 0 && result_.drift <= tolerance)
-      result_.unbalance = unbalance(result_.drift, done, whole.sweeps_needed());
-    return result_.unbalance <= tolerance;
-  }
-  const bool last = done >= settings_.max_iterations;
-  if (!last && result_.stiff_calls > 0 && done - started_at() < thresholds_.settling) {
+  result_.unbalance = 0;
+  if (result_.contacts == 0) return true;
+  const bool last = result_.iterations >= settings_.max_iterations;
+  const int since = result_.iterations - started_at();
+  if (!last && ((result_.corrections > 0 && since < thresholds_.settling_newton) ||
+                (result_.stiff_calls > 0 && since < thresholds_.settling))) {
     result_.unbalance = std::numeric_limits<double>::infinity();
     return false;
   }
-  // From a residual of 0 nothing is inferred.
-  VelocityCheck& then = velocity_check_;
-  const double guess = then.error_rms > 0 ? then.error * result_.error_rms / then.error_rms : then.error;
-  const bool due = last || !(guess > tolerance) || done > thresholds_.velocity_check_growth * then.at;
-  if (then.at < 0 || (then.at != done && due))
-    then = {done, result_.error_rms, whole.velocity_error(thresholds_.velocity_resolution * tolerance)};
-  result_.unbalance = then.at == done ? then.error : guess;
+  if (whole.small_clusters())
+    result_.unbalance = repeated(small_check_, [&](double enough) { return whole.small_error(enough); });
+  if (!(result_.unbalance <= tolerance) && !last) return false;
+  if (whole.large_clusters()) result_.unbalance = larger(result_.unbalance, large_unbalance(whole));
   return result_.unbalance <= tolerance;
+}
+
+double Certificate::large_unbalance(WholeProblem& whole) {
+  if (checks_velocities(whole))
+    return repeated(velocity_check_, [&](double enough) { return whole.large_error(enough); });
+  if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
+    return unbalance(result_.drift, result_.iterations, whole.sweeps_needed());
+  return result_.drift;
 }
 
 void Certificate::solved_by_admm(const BodyAdmmResult& result) {
   result_.stiff = result;
   ++result_.stiff_calls;
   history_.start_anew();
-  velocity_check_ = {};
+  small_check_ = velocity_check_ = {};
 }
 
 void Certificate::forgive() {

@@ -5,6 +5,7 @@
 /// forces carry what they must, which no contact can see alone (0012-stiff.md, 0014-velocity-error.md).
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "kernels/global/admm.hpp"
@@ -24,6 +25,7 @@ struct IterationResult {
   double unbalance = 0;  ///< estimate of the relative error of the forces: Certificate::balanced
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
+  int corrections = 0;  ///< Newton steps taken
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;   ///< the error grows without bound
@@ -45,14 +47,16 @@ struct CertificateThresholds {
   /// 1. Where a few sweeps follow warm impulses in a pile, up to six times as much is still to come (`talus
   /// study stability`, time-step-pile).
   double first_drift = 4;
-  /// Velocities are checked in problems of at most so many contacts, >= 0, whatever they need.
-  std::int64_t tiny = 64;
+  /// Clusters of at most so many bodies are checked by a direct solve in every step, >= 0.
+  int most_direct = 200;
   /// In larger ones, where at least so many sweeps are needed, > 0: about what a velocity check costs.
   double velocity_check_cost = 100;
   /// And at least so many plain sweeps per contact, >= 0: that is stiff for a problem of its size.
   double stiff_per_contact = 0.1;
   /// Behind ADMM sweeps still mend much: no velocity check before so many, >= 0.
   int settling = 50;
+  /// Behind a Newton step none before so many.
+  int settling_newton = 10;
   /// A velocity check tells nothing apart below this part of the tolerance on the balance, in (0, 1).
   double velocity_resolution = 0.2;
   /// It is repeated when the sweeps done have grown by this factor, > 1, if the residual has not fallen far
@@ -69,9 +73,14 @@ class WholeProblem {
   virtual double plain_sweeps_needed() = 0;
   /// How many plain sweeps one of the present sweeps is worth.
   virtual double speed() const = 0;
-  /// Relative error of the velocities that the impulses of the last check give (kernels/global/balance.hpp);
-  /// what is below `enough` is not told apart.
-  virtual double velocity_error(double enough) = 0;
+  /// There are clusters of contacts small enough for a direct solve; others.
+  virtual bool small_clusters() = 0;
+  virtual bool large_clusters() = 0;
+  /// Relative error of what the impulses of the last check give; what is below `enough` is not told apart. Of the
+  /// worst small cluster, in velocities and forces (kernels/global/step_error.hpp); of the large ones, in
+  /// velocities (balance.hpp).
+  virtual double small_error(double enough) = 0;
+  virtual double large_error(double enough) = 0;
 
   double sweeps_needed() { return plain_sweeps_needed() / speed(); }
 };
@@ -123,6 +132,18 @@ class Certificate {
     return thresholds_.stiff_per_contact * static_cast<double>(contacts);
   }
 
+  /// The last check has a Newton step to offer that its impulses need.
+  bool correctable() const {
+    return small_check_.at == result_.iterations && small_check_.error > settings_.balance_tolerance;
+  }
+  /// It was taken.
+  void corrected() {
+    ++result_.corrections;
+    history_.start_anew();
+    small_check_ = velocity_check_ = {};
+  }
+  int most_direct() const { return thresholds_.most_direct; }
+
   /// The impulses of the last check were replaced by those of ADMM.
   void solved_by_admm(const BodyAdmmResult& result);
   /// Sweeps become plain: what those before have made worse is not held against them.
@@ -135,7 +156,7 @@ class Certificate {
   /// Per wall, at the last check [N s].
   const std::vector<Vec3>& wall_impulses() const { return wall_impulses_.back(); }
   /// Sweeps done when those that count began: ADMM is a new start.
-  int started_at() const { return result_.stiff_calls == 0 ? 0 : history_[history_.start()].iterations; }
+  int started_at() const { return result_.stiff_calls + result_.corrections == 0 ? 0 : history_[history_.start()].iterations; }
 
  private:
   void measure(const CheckSums& sums);
@@ -158,7 +179,9 @@ class Certificate {
     int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
     double error_rms = 0, error = 0;
   };
-  VelocityCheck velocity_check_;
+  VelocityCheck velocity_check_, small_check_;
+  double repeated(VelocityCheck& check, const std::function<double(double)>& ask);
+  double large_unbalance(WholeProblem& whole);
 };
 
 /// Whether a step whose iterations ended so is to be believed. `momentum_defect`: what the sample gained

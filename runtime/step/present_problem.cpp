@@ -2,27 +2,35 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace talus {
 
 void PresentProblem::plan(const graph::Communicator& ranks) {
   struct Row {
-    double least, most, candidates;
+    double least, most, candidates, farthest;
   };
-  Row own{std::numeric_limits<double>::infinity(), 0, static_cast<double>(state_.candidates.size())};
+  Row own{std::numeric_limits<double>::infinity(), 0, static_cast<double>(state_.candidates.size()), 0};
   for (const Velocity& v : state_.bodies.velocity) {
     own.least = std::min(own.least, v.inv_mass);
     own.most = std::max(own.most, v.inv_mass);
   }
-  Row all{own.least, own.most, 0};
+  for (const Vec3& x : state_.bodies.x) own.farthest = std::max(own.farthest, x.lpNorm<Eigen::Infinity>());
+  Row all{own.least, own.most, 0, 0};
   for (const Row& row : ranks.gather_records(std::span<const Row>(&own, 1))) {
     all.least = std::min(all.least, row.least);
     all.most = std::max(all.most, row.most);
     all.candidates += row.candidates;
+    all.farthest = std::max(all.farthest, row.farthest);
   }
   stiffness_.renew(all.most / all.least);
+  farthest_ = all.farthest;
   candidates_ = all.candidates;
   largest_inv_mass_ = all.most;
+}
+
+void PresentProblem::find_clusters() {
+  if (!std::exchange(clusters_known_, true)) admm_.find_clusters(certificate_.most_direct());
 }
 
 double PresentProblem::plain_sweeps_needed() {

@@ -11,18 +11,30 @@ namespace talus {
 class PresentProblem final : public WholeProblem {
  public:
   /// Keeps references.
-  PresentProblem(const StepState& state, const Admm& admm, const Courses& courses,
+  PresentProblem(const StepState& state, Admm& admm, const Courses& courses,
                  const Certificate& certificate)
       : state_(state), admm_(admm), courses_(courses), certificate_(certificate) {}
 
   /// Collective, where candidates were found anew.
   void plan(const graph::Communicator& ranks);
   /// Of each step.
-  void begin() { stiffness_.begin_step(); }
+  void begin() {
+    stiffness_.begin_step();
+    clusters_known_ = false;
+  }
 
   double plain_sweeps_needed() override;
   double speed() const override { return speed_of(courses_.now().plan); }
-  double velocity_error(double enough) override { return admm_.velocity_error(enough); }
+  bool small_clusters() override {
+    find_clusters();
+    return admm_.small_clusters();
+  }
+  bool large_clusters() override {
+    find_clusters();
+    return admm_.large_clusters();
+  }
+  double small_error(double enough) override { return admm_.small_error(enough, farthest_); }
+  double large_error(double enough) override { return admm_.large_error(enough); }
 
   bool grains_alike() const { return stiffness_.grains_alike(); }
   double candidates() const { return candidates_; }  ///< of all ranks
@@ -30,12 +42,16 @@ class PresentProblem final : public WholeProblem {
   double largest_inv_mass() const { return largest_inv_mass_; }
 
  private:
+  void find_clusters();
+
   const StepState& state_;
-  const Admm& admm_;
+  Admm& admm_;
   const Courses& courses_;
   const Certificate& certificate_;
   StiffnessMemory stiffness_;
+  bool clusters_known_ = false;  ///< of this step
   double candidates_ = 0;
+  double farthest_ = 0;  ///< largest coordinate of a body [m]
   double largest_inv_mass_ = 0;
 };
 

@@ -372,6 +372,7 @@ bool SolverLoop::judge() {
 }
 
 bool SolverLoop::ask_admm() {
+  if (certificate_.correctable() && settings_.method == SolverMethod::automatic && admm_.correct()) return true;
   StepView view(certificate_, problem_);
   return method_->calls_admm(view);
 }
@@ -380,6 +381,9 @@ bool SolverLoop::ask_admm() {
 void SolverLoop::call_admm(int epoch) {
   if (ranks_.ranks() > 1) work_.restore();
   gluing_.forget_jumps();
+  if (certificate_.correctable() && settings_.method == SolverMethod::automatic) {
+    certificate_.corrected();
+  } else
   certificate_.solved_by_admm(admm_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
   // What the last sweeps changed says nothing of where ADMM has gone.
   begin_course(method_->after_admm(courses_.now().plan), schedule_.checked());

@@ -1,0 +1,231 @@
+#include "kernels/global/clusters.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "kernels/bodies/larger.hpp"
+
+namespace talus {
+
+namespace {
+
+std::size_t at(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// Disjoint sets of 0 .. n - 1, each named by its lowest member.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
+
+  std::int32_t find(std::int32_t k) {
+    while (parent_[at(k)] != k) {
+      parent_[at(k)] = parent_[at(parent_[at(k)])];
+      k = parent_[at(k)];
+    }
+    return k;
+  }
+  void join(std::int32_t a, std::int32_t b) {
+    a = find(a);
+    b = find(b);
+    parent_[at(std::max(a, b))] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::int32_t> parent_;
+};
+
+/// The clusters of one part, numbered by their lowest bodies. Shared bodies may have their contacts elsewhere:
+/// each is in a cluster.
+std::pair<std::vector<std::int32_t>, std::int32_t> clusters_within(const ContactGraph& graph) {
+  DisjointSets sets(graph.mass.size());
+  std::vector<char> touched(graph.mass.size(), 0);
+  for (const auto& [first, second] : graph.pairs) {
+    touched[at(first)] = 1;
+    if (second < 0) continue;
+    touched[at(second)] = 1;
+    sets.join(first, second);
+  }
+  for (const std::int32_t b : graph.shared) touched[at(b)] = 1;
+  std::vector<std::int32_t> number(graph.mass.size(), -1);
+  std::int32_t count = 0;
+  for (std::size_t b = 0; b < number.size(); ++b) {
+    if (!touched[b]) continue;
+    std::int32_t& first = number[at(sets.find(static_cast<std::int32_t>(b)))];
+    if (first < 0) first = count++;
+    number[b] = first;
+  }
+  return {std::move(number), count};
+}
+
+/// Rows of different lengths: padded with `filler` to the longest of all parts.
+std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,
+                                  double filler) {
+  const std::vector<double> lengths = rows_of(link, rows.size(), 1, [&](std::size_t p, std::span<double> row) {
+    row[0] = static_cast<double>(rows[p].size());
+  });
+  const auto most = static_cast<std::size_t>(*std::max_element(lengths.begin(), lengths.end()));
+  if (most == 0) return {};
+  return rows_of(link, rows.size(), most, [&](std::size_t p, std::span<double> row) {
+    std::fill(row.begin(), row.end(), filler);
+    std::copy(rows[p].begin(), rows[p].end(), row.begin());
+  });
+}
+
+/// Bodies per cluster, each once.
+void count_bodies(std::span<const ContactGraph> parts, const PartLink& link, Clusters& clusters) {
+  clusters.bodies.resize(parts.size());
+  const auto several = at(clusters.several);
+  link.each(parts.size(), [&](std::size_t p) {
+    clusters.bodies[p].assign(at(clusters.count[p]), 0);
+    for (std::size_t b = 0; b < clusters.of_body[p].size(); ++b)
+      if (clusters.of_body[p][b] >= 0 && parts[p].counted(b)) ++clusters.bodies[p][at(clusters.of_body[p][b])];
+  });
+  if (several == 0) return;
+  const std::vector<double> sums =
+      total_of(link, parts.size(), several, [&](std::size_t p, std::span<double> row) {
+        for (std::size_t c = 0; c < clusters.bodies[p].size(); ++c)
+          if (const std::int32_t number = clusters.spanning[p][c]; number >= 0)
+            row[at(number)] += clusters.bodies[p][c];
+      });
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (std::size_t c = 0; c < clusters.bodies[p].size(); ++c)
+      if (const std::int32_t number = clusters.spanning[p][c]; number >= 0)
+        clusters.bodies[p][c] = static_cast<std::int32_t>(sums[at(number)]);
+}
+
+/// Which clusters of the parts are one, through bodies that they share: numbers them.
+void join_clusters(std::span<const ContactGraph> parts, const PartLink& link, Clusters& clusters) {
+  // Names of clusters that are unlike in all parts: the subdomain, then the number there. The body that counts
+  // tells its copies the name of its own.
+  PartField name(parts.size());
+  link.each(parts.size(), [&](std::size_t p) {
+    name[p].resize(parts[p].mass.size());
+    for (const std::int32_t b : parts[p].shared)
+      if (parts[p].counted(at(b)))
+        name[p][at(b)].u = Vec3(parts[p].subdomain + 1, clusters.of_body[p][at(b)], 0);
+  });
+  link.sum_copies(name);
+  std::vector<std::vector<double>> pairs(parts.size());
+  link.each(parts.size(), [&](std::size_t p) {
+    std::vector<std::array<std::int32_t, 3>> met;  // subdomain, cluster there, cluster here
+    for (const std::int32_t b : parts[p].shared)
+      if (!parts[p].counted(at(b)) && name[p][at(b)].u[0] > 0)
+        met.push_back({static_cast<std::int32_t>(name[p][at(b)].u[0]) - 1,
+                       static_cast<std::int32_t>(name[p][at(b)].u[1]), clusters.of_body[p][at(b)]});
+    std::sort(met.begin(), met.end());
+    met.erase(std::unique(met.begin(), met.end()), met.end());
+    for (const auto& [subdomain, there, here] : met)
+      pairs[p].insert(pairs[p].end(), {static_cast<double>(subdomain), static_cast<double>(there),
+                                       static_cast<double>(parts[p].subdomain), static_cast<double>(here)});
+  });
+  const std::vector<double> all = gather_padded(link, pairs, -1);
+  using Name = std::pair<std::int32_t, std::int32_t>;  // subdomain, cluster
+  std::vector<std::pair<Name, Name>> joined;
+  std::vector<Name> names;
+  for (std::size_t k = 0; k + 3 < all.size(); k += 4) {
+    if (all[k] < 0) continue;
+    const Name a{static_cast<std::int32_t>(all[k]), static_cast<std::int32_t>(all[k + 1])},
+        b{static_cast<std::int32_t>(all[k + 2]), static_cast<std::int32_t>(all[k + 3])};
+    joined.emplace_back(a, b);
+    names.insert(names.end(), {a, b});
+  }
+  std::sort(names.begin(), names.end());
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  const auto place = [&](const Name& n) {
+    return static_cast<std::int32_t>(std::lower_bound(names.begin(), names.end(), n) - names.begin());
+  };
+  DisjointSets sets(names.size());
+  for (const auto& [a, b] : joined) sets.join(place(a), place(b));
+  std::vector<std::int32_t> number(names.size(), -1);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const auto own = static_cast<std::int32_t>(k);
+    number[k] = sets.find(own) == own ? clusters.several++ : number[at(sets.find(own))];
+  }
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if (names[k].first == parts[p].subdomain) clusters.spanning[p][at(names[k].second)] = number[k];
+}
+
+}  // namespace
+
+Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link) {
+  Clusters clusters;
+  clusters.of_body.resize(parts.size());
+  clusters.count.resize(parts.size());
+  clusters.spanning.resize(parts.size());
+  link.each(parts.size(), [&](std::size_t p) {
+    std::tie(clusters.of_body[p], clusters.count[p]) = clusters_within(parts[p]);
+    clusters.spanning[p].assign(at(clusters.count[p]), -1);
+  });
+  // A part that is all there is has no counts (body_problem.hpp).
+  if (!parts[0].counts.empty()) join_clusters(parts, link, clusters);
+  count_bodies(parts, link, clusters);
+  return clusters;
+}
+
+std::int32_t largest_cluster(const Clusters& clusters, const PartLink& link) {
+  const std::vector<double> rows =
+      rows_of(link, clusters.bodies.size(), 1, [&](std::size_t p, std::span<double> row) {
+        for (const std::int32_t bodies : clusters.bodies[p]) row[0] = std::max<double>(row[0], bodies);
+      });
+  return static_cast<std::int32_t>(*std::max_element(rows.begin(), rows.end()));
+}
+
+std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least, std::int32_t most) {
+  std::vector<std::vector<char>> in(clusters.of_body.size());
+  for (std::size_t p = 0; p < in.size(); ++p)
+    for (const std::int32_t c : clusters.of_body[p])
+      in[p].push_back(c >= 0 && clusters.bodies[p][at(c)] >= least && clusters.bodies[p][at(c)] <= most ? 1 : 0);
+  return in;
+}
+
+ClusterRows rows_of_clusters(const BodyParts& parts, const Clusters& clusters, std::size_t sums,
+                             std::size_t maxima,
+                             const std::function<void(std::size_t, ClusterRows&)>& fill) {
+  ClusterRows result{sums, maxima, std::vector<std::vector<double>>(parts.size())};
+  const std::size_t width = result.width(), row = at(clusters.several) * width;
+  parts.each([&](std::size_t p) {
+    result.rows[p].assign(at(clusters.count[p]) * width, 0.0);
+    fill(p, result);
+  });
+  if (clusters.several == 0) return result;
+  const std::vector<double> shares = parts.rows(row, [&](std::size_t p, std::span<double> own) {
+    for (std::int32_t c = 0; c < clusters.count[p]; ++c) {
+      const std::int32_t number = clusters.spanning[p][at(c)];
+      if (number < 0) continue;
+      // Two clusters of a part may be one through others.
+      for (std::size_t k = 0; k < width; ++k) {
+        double& sum = own[at(number) * width + k];
+        sum = k < sums ? sum + result.of(p, c)[k] : larger(sum, result.of(p, c)[k]);
+      }
+    }
+  });
+  std::vector<double> total(row, 0.0);
+  for (std::size_t k = 0; k < shares.size(); ++k) {
+    double& sum = total[k % row];
+    sum = k % width < sums ? sum + shares[k] : larger(sum, shares[k]);
+  }
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    for (std::int32_t c = 0; c < clusters.count[p]; ++c)
+      if (const std::int32_t number = clusters.spanning[p][at(c)]; number >= 0)
+        std::copy_n(total.begin() + static_cast<std::ptrdiff_t>(at(number) * width), width,
+                    result.of(p, c).begin());
+  return result;
+}
+
+double largest_of_clusters(const BodyParts& parts, const Clusters& clusters,
+                           const std::function<double(std::size_t, std::int32_t)>& value) {
+  const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
+    for (std::int32_t c = 0; c < clusters.count[p]; ++c) row[0] = larger(row[0], value(p, c));
+  });
+  double most = 0;
+  for (const double row : rows) most = larger(most, row);
+  return most;
+}
+
+}  // namespace talus
