@@ -20,18 +20,19 @@ struct ReferenceLimits {
   double residual = 1e-10;  ///< of the law at a contact, relative: below it the answer counts as found
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
   int proximal_steps = 12;  ///< smooth: each begins from the impulses of the last one
-  std::int64_t contact_solves = 20'000'000;  ///< friction: about as many contacts may be swept
+  int newton_steps = 30;    ///< friction: of one attempt
+  std::int64_t contact_solves = 2'000'000;  ///< friction: contacts that may be swept in all attempts
 };
 
 /// An answer and how well it is known.
 struct Reference {
   bool found = false;
-  std::string why;         ///< where it was not found
-  std::vector<Vec3> r;     ///< impulses of the problem's contacts [N s]
-  Motion motion;           ///< under them
-  double residual = 0;     ///< natural map of the law, largest over the largest impulse or speed change
-  double uncertainty = 0;  ///< what the answer may still be off by, relative: a bound without friction,
-                           ///< with friction what the last decades of convergence have changed
+  std::string why = {};      ///< where it was not found
+  std::vector<Vec3> r = {};  ///< impulses of the problem's contacts [N s]
+  Motion motion = {};        ///< under them
+  double residual = 0;       ///< natural map of the law, largest over the largest impulse or speed change
+  double uncertainty = 0;    ///< what the answer may still be off by, relative: a bound without friction,
+                             ///< with friction the next step of Newton's method
 };
 
 /// `run`: the impulses that the run found, from which the search begins.
@@ -42,7 +43,7 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
 /// pivoting (Portugal, Judice and Vicente 1994) in 80-bit arithmetic.
 Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, const ReferenceLimits& limits);
 
-/// With friction: projected Gauss-Seidel with Anderson's acceleration.
+/// With friction: projected Gauss-Seidel with Anderson's acceleration, and Newton's method from where it got.
 Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,
                            const ReferenceLimits& limits);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 
+#include "apps/study_certificate/friction_newton.hpp"
 #include "apps/study_certificate/reference.hpp"
 
 namespace talus::audit {
@@ -50,19 +51,6 @@ class Sweeps {
   void sweep(Vector& r, bool backwards) {
     const std::size_t count = contacts();
     for (std::size_t k = 0; k < count; ++k) solve(backwards ? count - 1 - k : k, r);
-  }
-
-  /// Largest natural map r - P(r - v/W) under r, over the largest impulse or speed change asked for.
-  double residual(const Vector& r) {
-    begin(r);
-    double worst = 0, unit = 0;
-    for (std::size_t c = 0; c < contacts(); ++c) {
-      const Vec3 now = at(r, c), v = relative_velocity(problem_.contacts[c], motion_);
-      const double closing = -(v.dot(problem_.contacts[c].normal) + problem_.contacts[c].bias);
-      worst = std::max(worst, (now - answer(c, now, v)).norm());
-      unit = std::max({unit, now.norm(), closing / mobility_[c].normal});
-    }
-    return unit > 0 ? worst / unit : 0;
   }
 
  private:
@@ -150,10 +138,39 @@ class Anderson {
   Vector last_f_, last_g_;
 };
 
+/// Passes before the extrapolation begins: they find out which contacts carry.
+constexpr std::int64_t plain_passes = 20;
+
 /// Largest difference of impulses over the largest impulse.
 double difference(const Vector& a, const Vector& b) {
   const double size = b.size() > 0 ? b.cwiseAbs().maxCoeff() : 0;
   return size > 0 ? (a - b).cwiseAbs().maxCoeff() / size : 0;
+}
+
+/// Sweeps with extrapolation, until one changes impulses by no more than `enough`, or `most` are done; r in
+/// and out. Returns what the best of them changed.
+double accelerate(Sweeps& sweeps, Vector& r, std::int64_t most, double enough) {
+  Anderson anderson;
+  Vector x = r;
+  double least = INFINITY;
+  bool lost = false;
+  for (std::int64_t pass = 0; pass < most && least > enough; ++pass) {
+    Vector g = x;
+    sweeps.begin(x);
+    sweeps.sweep(g, false);
+    sweeps.sweep(g, true);
+    const double change = difference(g, x);
+    if (change < least) least = change, r = g;
+    if (!lost && change > 10 * least) {  // the extrapolation has left its ground
+      anderson.forget();
+      x = r;
+      lost = true;
+      continue;
+    }
+    lost = false;
+    x = pass < plain_passes ? g : anderson.next(x, g);
+  }
+  return least;
 }
 
 }  // namespace
@@ -161,42 +178,38 @@ double difference(const Vector& a, const Vector& b) {
 Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,
                            const ReferenceLimits& limits) {
   Reference reference;
+  reference.r.assign(run.begin(), run.end());
+  reference.residual = reference.uncertainty = 1;
   Sweeps sweeps(problem);
+  const FrictionNewton newton(problem);
   const std::size_t contacts = sweeps.contacts();
-  Vector x(static_cast<Eigen::Index>(3 * contacts)), half;
-  for (std::size_t c = 0; c < contacts; ++c) at(x, c) = run[c];
-  Anderson anderson;
-  Vector best = x;
-  double least = INFINITY;
-  const std::int64_t most = limits.contact_solves / static_cast<std::int64_t>(2 * contacts + 1);
-  for (std::int64_t pass = 0; pass < most; ++pass) {
-    Vector g = x;
-    sweeps.begin(x);
-    sweeps.sweep(g, false);
-    sweeps.sweep(g, true);
-    const double change = difference(g, x);
-    if (half.size() == 0 && change <= 1e3 * limits.residual) half = g;
-    if (change < least) least = change, best = g;
-    if (change <= limits.residual) break;
-    if (change > 10 * least && pass > 0) {  // the extrapolation has left its ground
-      anderson.forget();
-      x = best;
-      least = INFINITY;
-      continue;
-    }
-    x = pass < 20 ? g : anderson.next(x, g);  // sweeps first: they know which contacts carry
+  Vector r(static_cast<Eigen::Index>(3 * contacts));
+  for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
+  // Newton's method ends quickly where it begins with the right contacts sliding, sticking and open; sweeps
+  // find those. Each time that it falls short they get four times as many.
+  std::int64_t left = limits.contact_solves / static_cast<std::int64_t>(2 * contacts + 1);
+  for (std::int64_t passes = plain_passes; left > 0; passes *= 4) {
+    accelerate(sweeps, r, std::min(left, passes), limits.residual);
+    left -= passes;
+    std::vector<Vec3> impulses(contacts);
+    for (std::size_t c = 0; c < contacts; ++c) impulses[c] = at(r, c);
+    double moved = 1;
+    const double residual = newton.improve(impulses, limits.newton_steps, moved);
+    if (residual >= reference.residual) continue;
+    reference.residual = residual;
+    reference.uncertainty = moved;
+    reference.r = impulses;
+    reference.found = residual <= limits.residual;
+    if (reference.found) break;
   }
-  reference.residual = sweeps.residual(best);
-  reference.uncertainty = half.size() > 0 ? difference(half, best) : 1;
-  for (std::size_t c = 0; c < contacts; ++c) reference.r.push_back(at(best, c));
   reference.motion = motion_under(problem, reference.r);
-  reference.found = least <= limits.residual;
-  if (!reference.found) reference.why = "the sweeps do not converge";
+  if (!reference.found) reference.why = "neither sweeps nor Newton's method find the answer";
   return reference;
 }
 
 Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
                           const ReferenceLimits& limits) {
+  if (problem.contacts.empty()) return {.found = true, .motion = problem.free};
   return problem.smooth() ? solve_smooth(problem, run, limits) : solve_frictional(problem, run, limits);
 }
 

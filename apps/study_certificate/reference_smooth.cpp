@@ -95,6 +95,9 @@ class Pivots {
 
  private:
   static constexpr int patience_at_first = 5;
+  /// Rounding, over the largest impulse: of impulses between redundant contacts, where only the shift
+  /// decides, and of speeds. What is beyond it carries or closes for good.
+  static constexpr Real pull = 1e-11L, close = 1e-16L;
 
   static void flip(std::vector<char>& carry, Eigen::Index c) {
     char& is = carry[static_cast<std::size_t>(c)];
@@ -134,10 +137,10 @@ class Pivots {
   /// Contacts that carry and pull, and contacts that do not carry and close.
   Rows misplaced(const std::vector<char>& carry, const Vector& s) const {
     const Vector y = W_ * s + q_;
-    const Real slack = 1e-17L * std::max(s.cwiseAbs().maxCoeff(), q_.cwiseAbs().maxCoeff());
+    const Real size = std::max(s.cwiseAbs().maxCoeff(), q_.cwiseAbs().maxCoeff());
     Rows wrong;
     for (Eigen::Index c = 0; c < q_.size(); ++c)
-      if (carry[static_cast<std::size_t>(c)] ? s[c] < -slack : y[c] < -slack) wrong.push_back(c);
+      if (carry[static_cast<std::size_t>(c)] ? s[c] < -pull * size : y[c] < -close * size) wrong.push_back(c);
     return wrong;
   }
 
@@ -170,10 +173,10 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
     const Vector q = dual.q - shift * s;
     if (!Pivots(dual.W, q, limits.pivots).solve(carry, next)) {
       reference.why = "the pivots do not end";
-      return reference;
+      break;
     }
     moved = (next - s).cwiseAbs().maxCoeff();
-    s = next;
+    s = next.cwiseMax(Real{0});
     size = s.cwiseAbs().maxCoeff();
     if (moved <= 1e-13L * size) break;
   }
@@ -195,8 +198,8 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
                           problem.contacts[k].normal);
   }
   reference.motion = motion_under(problem, reference.r);
-  reference.found = reference.residual <= limits.residual;
-  if (!reference.found) reference.why = "the law is not met";
+  reference.found = reference.why.empty() && reference.residual <= limits.residual;
+  if (!reference.found && reference.why.empty()) reference.why = "the law is not met";
   return reference;
 }
 

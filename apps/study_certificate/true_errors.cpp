@@ -15,6 +15,7 @@ struct Floors {
   double exchange = 1e-2;  ///< of the momentum exchanged: least wall impulse
   double contact = 1e-3;   ///< likewise: least contact impulse
   double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
+  double cluster = 1e-9;   ///< of a cluster's momentum, likewise: grains that graze one another
 };
 constexpr Floors floors;
 
@@ -63,7 +64,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
   std::size_t count = 0;
   const std::vector<std::size_t> cluster = clusters_of(problem, count);
   struct Sums {
-    double wrong = 0, exchanged = 0, mass = 0, wall_impulse = 0;
+    double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0;
   };
   std::vector<Sums> sums(count);
   std::vector<char> seen(momentum.wrong.size(), 0);
@@ -76,7 +77,9 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
       seen[body] = 1;
       own.wrong += momentum.wrong[body];
       own.exchanged += momentum.exchanged[body];
-      own.mass += body < grains ? problem.mass[body] : 0;
+      if (body >= grains) return;
+      own.mass += problem.mass[body];
+      own.momentum += problem.mass[body] * problem.free.u[body].norm();
     };
     add(contact.first);
     if (!contact.at_wall())
@@ -88,8 +91,9 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
   double worst = 0;
   const double weight = problem.time_step * problem.gravity.norm();
   for (const Sums& own : sums) {
-    const double unit = std::max({own.exchanged, floors.walls * own.wall_impulse,
-                                  own.mass * problem.drive_speed, floors.load * own.mass * weight, 1e-300});
+    const double unit =
+        std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * problem.drive_speed,
+                  floors.load * own.mass * weight, floors.cluster * own.momentum, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;
