@@ -10,14 +10,15 @@ namespace talus::audit {
 
 namespace {
 
-/// Added to the diagonal (1) of W in a step: more where the step would lead astray (Levenberg, Marquardt).
-constexpr double least_shift = 1e-9, most_shift = 1;
-/// A step has to leave no more than this part of the residual.
-constexpr double progress = 0.95;
-/// A residual below which a step that does not help ends the search.
-constexpr double found = 1e-11;
-/// Of W s + q, relative: no step makes less of it.
-constexpr double rounding = 1e-15;
+/// Added to the diagonal (1) of W: the first one, and its limits. It is made smaller where steps are slow,
+/// and larger where they lead astray.
+constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
+/// Of Newton's steps around one centre.
+constexpr int inner_steps = 12, halvings = 4;
+/// Part of the law's residual to which a problem around a centre is solved.
+constexpr double inner_part = 1e-2;
+/// Least momentum exchanged, kinetic norm, over the largest impulse.
+constexpr double floor_of_exchange = 1e-2;
 
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
@@ -99,8 +100,8 @@ std::vector<Vec3> FrictionNewton::unscaled(const Vector& s) const {
   return r;
 }
 
-FrictionNewton::Vector FrictionNewton::law(const Vector& s) const {
-  const Vector z = s - (W_ * s + q_);
+FrictionNewton::Vector FrictionNewton::law(const Vector& s, const Vector& centre, double shift) const {
+  const Vector z = s - (W_ * s + q_ + shift * (s - centre));
   Vector F = s;
   for (std::size_t c = 0; c < frame_.size(); ++c) {
     const Eigen::Index k = row_of(c);
@@ -113,10 +114,10 @@ FrictionNewton::Vector FrictionNewton::law(const Vector& s) const {
   return F;
 }
 
-double FrictionNewton::residual(const Vector& s, const Vector& F) const {
-  double unit = s.cwiseAbs().maxCoeff();
-  for (std::size_t c = 0; c < frame_.size(); ++c) unit = std::max(unit, -q_[row_of(c)]);
-  return unit > 0 ? F.cwiseAbs().maxCoeff() / unit : 0;
+double FrictionNewton::unit(const Vector& s) const {
+  double size = std::max(1e-300, s.cwiseAbs().maxCoeff());
+  for (std::size_t c = 0; c < frame_.size(); ++c) size = std::max(size, -q_[row_of(c)]);
+  return size;
 }
 
 /// P' of contact c at z; 0 where it is open.
@@ -135,8 +136,9 @@ void FrictionNewton::derivative(const Vector& z, std::size_t c, Eigen::Matrix3d&
   }
 }
 
-bool FrictionNewton::step(const Vector& s, const Vector& F, double shift, Vector& ds) const {
-  const Vector z = s - (W_ * s + q_);
+bool FrictionNewton::step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const {
+  const auto& [centre, shift] = near;
+  const Vector z = s - (W_ * s + q_ + shift * (s - centre));
   const auto size = s.size();
   // Open contacts lose their impulses, which leaves a system of those that carry.
   std::vector<Eigen::Index> place(static_cast<std::size_t>(size), -1);
@@ -177,30 +179,50 @@ bool FrictionNewton::step(const Vector& s, const Vector& F, double shift, Vector
   return true;
 }
 
-double FrictionNewton::improve(std::vector<Vec3>& r, int most_steps, double& moved) const {
-  Vector s = scaled(r), F = law(s), ds;
-  double now = residual(s, F), shift = least_shift;
-  moved = 1;
-  for (int k = 0; k < most_steps && shift <= most_shift; ++k) {
-    if (step(s, F, shift, ds)) {
-      const double size = s.cwiseAbs().maxCoeff();
-      if (shift == least_shift) moved = size > 0 ? ds.cwiseAbs().maxCoeff() / size : 0;
-      if (now <= rounding) break;
-      const Vector there = s + ds, F_there = law(there);
-      const double after = residual(there, F_there);
-      if (after <= progress * now) {
-        s = there;
-        F = F_there;
-        now = after;
-        shift = std::max(least_shift, shift / 10);
-        continue;
-      }
-      if (now <= found) break;  // what is left is rounding
+bool FrictionNewton::solve_near(const Vector& centre, double shift, double enough, Vector& s) const {
+  Vector ds, F = law(s, centre, shift);
+  double now = F.norm();
+  for (int k = 0; k < inner_steps && now > enough; ++k) {
+    if (!step(s, F, {centre, shift}, ds)) return false;
+    double part = 1, after = 0;
+    Vector there;
+    for (int halving = 0; halving <= halvings; ++halving, part /= 2) {
+      there = s + part * ds;
+      F = law(there, centre, shift);
+      after = F.norm();
+      if (after <= (1 - part / 10) * now) break;
     }
-    shift *= 100;
+    if (after > now) return false;
+    s = there;
+    now = after;
+  }
+  return now <= enough;
+}
+
+NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int most) const {
+  Vector s = scaled(r);
+  const double size = unit(s);
+  NewtonResult result;
+  result.residual = law(s, s, 0).cwiseAbs().maxCoeff() / size;
+  double shift = first_shift;
+  for (int k = 0; k < most && result.residual > enough && shift <= most_shift; ++k) {
+    const Vector centre = s;
+    if (!solve_near(centre, shift, inner_part * law(s, s, 0).norm(), s)) {
+      s = centre;
+      shift *= 10;
+      continue;
+    }
+    const double after = law(s, s, 0).cwiseAbs().maxCoeff() / size;
+    if (after > 0.1 * result.residual) shift = std::max(least_shift, shift / 10);
+    result.residual = after;
+  }
+  Vector ds;
+  if (step(s, law(s, s, 0), {s, least_shift}, ds)) {
+    const double exchanged = std::sqrt(std::max(0.0, s.dot(W_ * s)));
+    result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds))) / std::max(exchanged, floor_of_exchange * size);
   }
   r = unscaled(s);
-  return now;
+  return result;
 }
 
 }  // namespace talus::audit

@@ -19,9 +19,8 @@ namespace talus::audit {
 struct ReferenceLimits {
   double residual = 1e-10;  ///< of the law at a contact, relative: below it the answer counts as found
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
-  int proximal_steps = 12;  ///< smooth: each begins from the impulses of the last one
-  int newton_steps = 30;    ///< friction: of one attempt
-  std::int64_t contact_solves = 2'000'000;  ///< friction: contacts that may be swept in all attempts
+  int proximal_steps = 30;  ///< each begins from the impulses of the last one
+  std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
 };
 
 /// An answer and how well it is known.
@@ -30,9 +29,10 @@ struct Reference {
   std::string why = {};      ///< where it was not found
   std::vector<Vec3> r = {};  ///< impulses of the problem's contacts [N s]
   Motion motion = {};        ///< under them
-  double residual = 0;       ///< natural map of the law, largest over the largest impulse or speed change
-  double uncertainty = 0;    ///< what the answer may still be off by, relative: a bound without friction,
-                             ///< with friction the next step of Newton's method
+  double residual = 0;       ///< of the law (natural map), the largest, over the run's largest impulse or the
+                             ///< largest speed of approach
+  double uncertainty = 0;    ///< of the velocities, kinetic norm, over what the contacts change: a bound
+                           ///< without friction, with friction the next step of Newton's method
 };
 
 /// `run`: the impulses that the run found, from which the search begins.

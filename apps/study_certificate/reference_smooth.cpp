@@ -17,9 +17,16 @@ using Matrix = Eigen::SparseMatrix<Real>;
 using Vector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 using Rows = std::vector<Eigen::Index>;
 
-/// Part of W's diagonal that is added in a proximal step. It decides among redundant contacts, and is undone
-/// by the next step elsewhere: what eigenvalue l of W (diagonal 1) still misses shrinks by shift/(shift + l).
-constexpr Real shift = 1e-12L;
+/// Part of W's diagonal that is added in a proximal step: the first one, and the least. It decides among
+/// redundant contacts, and is undone by the next step elsewhere: what eigenvalue l of W (diagonal 1) still
+/// misses shrinks by shift/(shift + l). It falls until the law is met, and no further, so that redundant
+/// contacts between fixed walls, whose gaps rounding has made, are not pumped up.
+constexpr Real first_shift = 1e-5L, least_shift = 1e-13L;
+
+/// The law is met to this part of the residual that is enough: it comes at no cost.
+constexpr Real sharpness = 1e-4L;
+/// Least momentum exchanged, kinetic norm, over the largest impulse.
+constexpr Real floor_of_exchange = 1e-2L;
 
 /// The dual problem, in impulses times sqrt(W_cc): y = W s + q, s >= 0, y >= 0, s.y = 0, diagonal of W 1.
 struct Dual {
@@ -70,8 +77,8 @@ Dual dual_of(const StepProblem& problem) {
 /// Solves y = (W + shift) s + q, s >= 0 only on the rows of `carry`, y >= 0 elsewhere.
 class Pivots {
  public:
-  Pivots(const Matrix& W, const Vector& q, int most)
-      : W_(W), q_(q), most_(most), place_(Rows(static_cast<std::size_t>(q.size()), -1)) {}
+  Pivots(const Matrix& W, const Vector& q, Real shift, int most)
+      : W_(W), q_(q), shift_(shift), most_(most), place_(Rows(static_cast<std::size_t>(q.size()), -1)) {}
 
   /// `carry` in: a guess; out: the contacts that carry. False when the pivots do not end.
   bool solve(std::vector<char>& carry, Vector& s) {
@@ -121,7 +128,7 @@ class Pivots {
       right[k] = -q_[c];
       for (Matrix::InnerIterator at(W_, c); at; ++at) {
         const Eigen::Index row = place_[static_cast<std::size_t>(at.row())];
-        if (row >= k) entries.emplace_back(row, k, at.value() + (row == k ? shift : 0));
+        if (row >= k) entries.emplace_back(row, k, at.value() + (row == k ? shift_ : 0));
       }
     }
     Matrix block(size, size);
@@ -146,13 +153,40 @@ class Pivots {
 
   const Matrix& W_;
   const Vector& q_;
+  Real shift_;
   int most_;
   Rows place_, rows_;
 };
 
-/// Kinetic norm of what the impulses change.
-Real kinetic(const Matrix& W, const Vector& s) {
-  return std::sqrt(std::max<Real>(0, s.dot(W * s)));
+/// How well impulses meet the law.
+struct Met {
+  Real residual = 0;  ///< natural map, the largest
+  Real gap = 0;  ///< sum s |y|: |V - V*|^2 in the kinetic norm, where s stands for s* at contacts that close
+};
+Met met_by(const Dual& dual, const Vector& s) {
+  const Vector y = dual.W * s + dual.q;
+  Met met;
+  for (Eigen::Index c = 0; c < s.size(); ++c) {
+    met.residual = std::max(met.residual, std::abs(s[c] - std::max<Real>(0, s[c] - y[c])));
+    met.gap += std::abs(s[c] * y[c]);
+  }
+  return met;
+}
+
+/// Proximal steps from s, in and out, until the law is met to `enough`. False when pivots do not end.
+bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough, Vector& s) {
+  std::vector<char> carry;
+  for (const Real value : s) carry.push_back(value > 0);
+  Vector next;
+  Real shift = first_shift, residual = met_by(dual, s).residual;
+  for (int step = 0; step < limits.proximal_steps && residual > enough; ++step) {
+    const Vector q = dual.q - shift * s;
+    if (!Pivots(dual.W, q, shift, limits.pivots).solve(carry, next)) return false;
+    s = next.cwiseMax(Real{0});
+    residual = met_by(dual, s).residual;
+    shift = std::max(least_shift, shift / 100);
+  }
+  return true;
 }
 
 }  // namespace
@@ -161,45 +195,25 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
   Reference reference;
   const Dual dual = dual_of(problem);
   const Eigen::Index count = dual.q.size();
-  Vector s(count), next;
+  Vector s(count);
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto k = static_cast<std::size_t>(c);
     s[c] = std::max(0.0, run[k].dot(problem.contacts[k].normal)) / dual.scale[c];
   }
-  std::vector<char> carry(static_cast<std::size_t>(count));
-  for (Eigen::Index c = 0; c < count; ++c) carry[static_cast<std::size_t>(c)] = s[c] > 0;
-  Real moved = 0, size = 0;
-  for (int step = 0; step < limits.proximal_steps; ++step) {
-    const Vector q = dual.q - shift * s;
-    if (!Pivots(dual.W, q, limits.pivots).solve(carry, next)) {
-      reference.why = "the pivots do not end";
-      break;
-    }
-    moved = (next - s).cwiseAbs().maxCoeff();
-    s = next.cwiseMax(Real{0});
-    size = s.cwiseAbs().maxCoeff();
-    if (moved <= 1e-13L * size) break;
-  }
-  const Vector y = dual.W * s + dual.q;
-  const Real unit = std::max(size, (-dual.q).maxCoeff());
-  Real worst = 0, gap = 0;
-  for (Eigen::Index c = 0; c < count; ++c) {
-    worst = std::max(worst, std::abs(s[c] - std::max<Real>(0, s[c] - y[c])));
-    gap += std::abs(s[c] * y[c]);
-  }
-  // |V - V*|^2 <= sum r |v_n + b| in the kinetic norm, where r stands for r* at contacts that close.
-  const Real exchange = kinetic(dual.W, s);
-  reference.residual = unit > 0 ? static_cast<double>(worst / unit) : 0;
+  const Real unit = std::max({s.maxCoeff(), (-dual.q).maxCoeff(), Real{1e-300L}});
+  const bool ended = find_impulses(dual, limits, sharpness * limits.residual * unit, s);
+  const Met met = met_by(dual, s);
+  const Real exchange = std::sqrt(std::max<Real>(0, s.dot(dual.W * s)));
+  reference.residual = static_cast<double>(met.residual / unit);
   reference.uncertainty = static_cast<double>(
-      std::max(exchange > 0 ? std::sqrt(gap) / exchange : 0, size > 0 ? moved / size : 0));
+      std::sqrt(met.gap) / std::max(exchange, floor_of_exchange * s.maxCoeff() + Real{1e-300L}));
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto k = static_cast<std::size_t>(c);
-    reference.r.push_back(static_cast<double>(std::max<Real>(0, s[c]) * dual.scale[c]) *
-                          problem.contacts[k].normal);
+    reference.r.push_back(static_cast<double>(s[c] * dual.scale[c]) * problem.contacts[k].normal);
   }
   reference.motion = motion_under(problem, reference.r);
-  reference.found = reference.why.empty() && reference.residual <= limits.residual;
-  if (!reference.found && reference.why.empty()) reference.why = "the law is not met";
+  reference.found = ended && reference.residual <= limits.residual;
+  if (!reference.found) reference.why = ended ? "the law is not met" : "the pivots do not end";
   return reference;
 }
 
