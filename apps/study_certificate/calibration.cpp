@@ -85,7 +85,10 @@ std::vector<CalibrationRow> calibrate(std::span<const StepOfScene> steps) {
     for (const Measure& measure : all_measures)
       rows.push_back(row_of(steps, tolerance, all_families, measure));
     for (const std::string& family : families)
-      for (const Measure& measure : all_measures) rows.push_back(row_of(steps, tolerance, family, measure));
+      for (const Measure& measure : all_measures) {
+        CalibrationRow row = row_of(steps, tolerance, family, measure);
+        if (row.steps > 0) rows.push_back(std::move(row));
+      }
   }
   return rows;
 }

@@ -46,7 +46,7 @@ void add_body(Triplets& entries, std::size_t c, Eigen::Index column, const Eigen
 
 }  // namespace
 
-FrictionNewton::FrictionNewton(const StepProblem& problem) {
+FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
   const std::size_t contacts = problem.contacts.size(), grains = problem.mass.size();
   Triplets entries;
   scale_.resize(row_of(contacts));
@@ -79,6 +79,7 @@ FrictionNewton::FrictionNewton(const StepProblem& problem) {
         frame.transpose() * (relative_velocity(contact, problem.free)) + Vec3(contact.bias, 0, 0);
     friction_.push_back(contact.friction * std::sqrt(tangential / normal));
     frame_.push_back(frame);
+    least_unit_ = std::max(least_unit_, speeds * speed_of_bodies(problem, contact) / std::sqrt(normal));
   }
   q_ = q_.cwiseProduct(scale_).eval();
   Matrix H(row_of(contacts), static_cast<Eigen::Index>(6 * grains + problem.wall_normal.size()));
@@ -115,7 +116,7 @@ FrictionNewton::Vector FrictionNewton::law(const Vector& s, const Vector& centre
 }
 
 double FrictionNewton::unit(const Vector& s) const {
-  double size = std::max(1e-300, s.cwiseAbs().maxCoeff());
+  double size = std::max(least_unit_, s.cwiseAbs().maxCoeff());
   for (std::size_t c = 0; c < frame_.size(); ++c) size = std::max(size, -q_[row_of(c)]);
   return size;
 }

@@ -30,7 +30,8 @@ struct NewtonResult {
 /// the beginning.
 class FrictionNewton {
  public:
-  explicit FrictionNewton(const StepProblem& problem);
+  /// `speeds`: least unit of residuals over the speeds of bodies (ReferenceLimits).
+  FrictionNewton(const StepProblem& problem, double speeds);
 
   /// Proximal steps from r, in and out, until the residual is `enough`, at most `most`.
   NewtonResult improve(std::vector<Vec3>& r, double enough, int most) const;
@@ -56,6 +57,7 @@ class FrictionNewton {
   std::vector<Eigen::Matrix3d> frame_;  ///< columns normal and two tangents, of each contact
   std::vector<double> friction_;        ///< in scaled coordinates
   Vector scale_, q_;                    ///< 3 per contact
+  double least_unit_ = 1e-300;
   Matrix W_;
 };
 

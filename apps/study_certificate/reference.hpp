@@ -18,6 +18,7 @@ namespace talus::audit {
 
 struct ReferenceLimits {
   double residual = 1e-10;  ///< of the law at a contact, relative: below it the answer counts as found
+  double speeds = 1e-5;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
   int proximal_steps = 30;  ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
@@ -32,10 +33,14 @@ struct Reference {
   double residual = 0;       ///< of the law (natural map), the largest, over the run's largest impulse or the
                              ///< largest speed of approach
   double uncertainty = 0;    ///< of the velocities, kinetic norm, over what the contacts change: a bound
-                           ///< without friction, with friction the next step of Newton's method
+                             ///< without friction, with friction the next step of Newton's method
 };
 
-/// `run`: the impulses that the run found, from which the search begins.
+/// Number of the cluster of each contact: contacts that share a grain or a pushed wall are of one. `count`:
+/// how many there are.
+std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count);
+
+/// Cluster by cluster. `run`: the impulses that the run found, from which the search begins.
 Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
                           const ReferenceLimits& limits = {});
 

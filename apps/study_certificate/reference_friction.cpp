@@ -184,7 +184,7 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.r.assign(run.begin(), run.end());
   reference.residual = reference.uncertainty = 1;
   Sweeps sweeps(problem);
-  const FrictionNewton newton(problem);
+  const FrictionNewton newton(problem, limits.speeds);
   const std::size_t contacts = sweeps.contacts();
   Vector r(static_cast<Eigen::Index>(3 * contacts));
   for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
@@ -207,12 +207,6 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.motion = motion_under(problem, reference.r);
   if (!reference.found) reference.why = "neither sweeps nor Newton's method find the answer";
   return reference;
-}
-
-Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
-                          const ReferenceLimits& limits) {
-  if (problem.contacts.empty()) return {.found = true, .motion = problem.free};
-  return problem.smooth() ? solve_smooth(problem, run, limits) : solve_frictional(problem, run, limits);
 }
 
 }  // namespace talus::audit

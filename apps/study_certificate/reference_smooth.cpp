@@ -200,7 +200,10 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
     const auto k = static_cast<std::size_t>(c);
     s[c] = std::max(0.0, run[k].dot(problem.contacts[k].normal)) / dual.scale[c];
   }
-  const Real unit = std::max({s.maxCoeff(), (-dual.q).maxCoeff(), Real{1e-300L}});
+  Real unit = std::max({s.maxCoeff(), (-dual.q).maxCoeff(), Real{1e-300L}});
+  for (Eigen::Index c = 0; c < count; ++c)
+    unit = std::max<Real>(unit, limits.speeds * dual.scale[c] *
+                                    speed_of_bodies(problem, problem.contacts[static_cast<std::size_t>(c)]));
   const bool ended = find_impulses(dual, limits, sharpness * limits.residual * unit, s);
   const Met met = met_by(dual, s);
   const Real exchange = std::sqrt(std::max<Real>(0, s.dot(dual.W * s)));

@@ -199,6 +199,12 @@ Vec3 relative_velocity(const StepContact& contact, const Motion& motion) {
   return motion.u[i] - motion.u[j] - (motion.w[i] + motion.w[j]).cross(contact.normal);
 }
 
+double speed_of_bodies(const StepProblem& problem, const StepContact& contact) {
+  const Motion& free = problem.free;
+  const Vec3& other = contact.at_wall() ? free.walls[contact.wall()] : free.u[contact.other()];
+  return free.u[contact.first].norm() + other.norm();
+}
+
 RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
   std::map<std::array<std::int64_t, 2>, std::pair<Vec3, bool>> found;
   for (std::size_t k = 0; k < after.contact_bodies.size(); ++k) {

@@ -68,6 +68,9 @@ Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses);
 /// Relative velocity of a contact, u_1 - u_2 - (w_1 + w_2) x n [m/s].
 Vec3 relative_velocity(const StepContact& contact, const Motion& motion);
 
+/// Speed of both bodies without contacts [m/s], of which the relative velocity is a difference.
+double speed_of_bodies(const StepProblem& problem, const StepContact& contact);
+
 /// The impulses [N s] that the run found, in the order of the problem's contacts; `unknown`: contacts with a
 /// force that the problem does not have.
 struct RunImpulses {

@@ -19,11 +19,6 @@ struct Floors {
 };
 constexpr Floors floors;
 
-std::size_t root_of(std::vector<std::size_t>& parent, std::size_t k) {
-  while (parent[k] != k) k = parent[k] = parent[parent[k]];
-  return k;
-}
-
 /// Velocities of pushed walls at the end of the step, as the run says.
 Vec3 wall_velocity(const StepProblem& problem, const Frame& after, std::size_t w) {
   return after.walls[w].velocity * problem.wall_normal[w];
@@ -100,25 +95,6 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
 }
 
 }  // namespace
-
-std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count) {
-  const std::size_t grains = problem.mass.size(), bodies = grains + problem.wall_normal.size();
-  std::vector<std::size_t> parent(bodies);
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  for (const StepContact& contact : problem.contacts) {
-    if (contact.at_wall() && problem.wall_inv_mass[contact.wall()] == 0) continue;
-    const std::size_t other = contact.at_wall() ? grains + contact.wall() : contact.other();
-    parent[root_of(parent, other)] = root_of(parent, contact.first);
-  }
-  std::vector<std::size_t> number(bodies, bodies), cluster;
-  count = 0;
-  for (const StepContact& contact : problem.contacts) {
-    std::size_t& own = number[root_of(parent, contact.first)];
-    if (own == bodies) own = count++;
-    cluster.push_back(own);
-  }
-  return cluster;
-}
 
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   TrueErrors errors;

@@ -28,10 +28,6 @@ struct StepEnd {
 
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end);
 
-/// Number of the cluster of each contact: contacts that share a grain or a pushed wall are of one. `count`:
-/// how many there are.
-std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& count);
-
 /// Largest difference between the velocities that the run ended with and those that its impulses give, over
 /// the largest speed: rounding, unless the run's contacts are not those of the problem.
 double disagreement(const StepProblem& problem, const StepEnd& end);
