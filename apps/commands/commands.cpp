@@ -14,7 +14,8 @@ std::vector<Command> commands() {
       replay_entry(),
       {.name = "study",
        .sentence = "measure how well and how fast scenes are solved",
-       .subcommands = {study_error_entry(), study_scaling_entry(), study_stability_entry()}},
+       .subcommands = {study_error_entry(), study_scaling_entry(), study_stability_entry(),
+                       study_certificate_entry()}},
       scene_reference_entry(),
   };
 }

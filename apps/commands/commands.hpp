@@ -20,6 +20,7 @@ Command replay_entry();
 Command study_error_entry();
 Command study_scaling_entry();
 Command study_stability_entry();
+Command study_certificate_entry();
 Command scene_reference_entry();
 
 }  // namespace talus

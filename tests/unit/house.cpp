@@ -49,7 +49,10 @@ const std::vector<Room>& rooms() {
       {"apps/study_error", {"apps/shared"}},
       {"apps/study_scaling", {"apps/shared"}},
       {"apps/study_stability", {"apps/shared"}},
-      {"apps/commands", {"apps/shared", "apps/study_error", "apps/study_scaling", "apps/study_stability"}},
+      {"apps/study_certificate", {"apps/shared"}},
+      {"apps/commands",
+       {"apps/shared", "apps/study_error", "apps/study_scaling", "apps/study_stability",
+        "apps/study_certificate"}},
   };
   return all;
 }

@@ -1,0 +1,107 @@
+#include "apps/study_certificate/audited_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+
+#include "runtime/step/simulation.hpp"
+
+namespace talus::audit {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Rounding of velocities that sweeps, copies and files leave, over the largest speed.
+constexpr double rounding = 1e-7;
+
+/// A reference has to be known to this part of what the step claims.
+constexpr double sharpness = 0.1;
+
+/// What a step begins from.
+struct Start {
+  Frame before;
+  std::vector<Wall> walls;
+  Stage stage;
+};
+
+Start start_of(const Simulation& simulation) {
+  return {simulation.frame(false), simulation.state().walls, simulation.stage()};
+}
+
+void judge(const StepProblem& problem, const Start& start, const Frame& after, const ReferenceLimits& limits,
+           AuditedStep& step) {
+  step.contacts = static_cast<std::int64_t>(problem.contacts.size());
+  step.smooth = problem.smooth();
+  std::size_t clusters = 0;
+  clusters_of(problem, clusters);
+  step.clusters = static_cast<std::int64_t>(clusters);
+  const RunImpulses run = impulses_of(problem, after);
+  const StepEnd end{after, run.r};
+  const double apart = disagreement(problem, end);
+  if (run.unknown > 0 || apart > rounding) {
+    step.judged = Judged::other_problem;
+    step.why =
+        fmt::format("{} contacts unknown to the audit, velocities apart by {:.1e}", run.unknown, apart);
+    return;
+  }
+  const Reference reference = solve_reference(problem, run.r, limits);
+  step.residual = reference.residual;
+  step.uncertainty = reference.uncertainty;
+  step.errors = true_errors(problem, reference, end);
+  step.errors.energy = energy_gain(problem, start.before, after);
+  const bool sharp = reference.uncertainty <= sharpness * step.claimed;
+  step.judged = reference.found && sharp ? Judged::yes : Judged::no_reference;
+  if (!reference.found)
+    step.why = reference.why;
+  else if (!sharp)
+    step.why = fmt::format("known to {:.1e} only", reference.uncertainty);
+}
+
+}  // namespace
+
+AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
+                     const std::function<void(const AuditedStep&)>& progress) {
+  AuditedRun run;
+  try {
+    const SolverSettings& solver = scene.setup.solver;
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(scene.setup, bodies, executor);
+    while (!simulation.finished() && static_cast<std::int64_t>(run.steps.size()) < plan.steps) {
+      const Start start = start_of(simulation);
+      const auto run_start = Clock::now();
+      const StepReport& report = simulation.step();
+      AuditedStep step;
+      step.run_seconds = seconds_since(run_start);
+      step.step = report.step;
+      step.certified = report.converged;
+      step.error_rms = report.error_rms;
+      step.balance = report.balance;
+      step.iterations = report.iterations;
+      step.claimed = std::max({report.error_rms, report.balance, solver.tolerance});
+      step.asked = std::max(solver.tolerance, solver.balance_tolerance);
+      const auto audit_start = Clock::now();
+      const Frame after = simulation.frame();
+      std::vector<double> loads;
+      for (const WallState& wall : simulation.state().wall_states) loads.push_back(wall.applied);
+      const StepProblem problem =
+          rebuild_step({start.before, start.walls, loads, start.stage, bodies, scene.setup});
+      judge(problem, start, after, plan.limits, step);
+      step.audit_seconds = seconds_since(audit_start);
+      run.steps.push_back(std::move(step));
+      if (progress) progress(run.steps.back());
+      simulation.begin_next_stage();
+    }
+  } catch (const std::exception& error) {
+    run.ended = error.what();
+  }
+  return run;
+}
+
+}  // namespace talus::audit

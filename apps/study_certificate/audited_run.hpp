@@ -1,0 +1,54 @@
+#pragma once
+
+/// Runs a scene in this process and holds every step against its exact answer.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/study_certificate/true_errors.hpp"
+#include "io/scene/scene.hpp"
+
+namespace talus::audit {
+
+/// What came of the search for a step's exact answer.
+enum class Judged {
+  yes,            ///< found: the errors are those of the step
+  no_reference,   ///< not found, or not to a tenth of what the step claims
+  other_problem,  ///< the run has contacts that the audit does not, or other velocities than its impulses
+                  ///< give
+};
+
+/// One step.
+struct AuditedStep {
+  std::int64_t step = 0;  ///< from 1
+  std::int64_t contacts = 0, clusters = 0;
+  bool smooth = true;
+  bool certified = false;
+  double error_rms = 0, balance = 0;
+  double claimed = 0;  ///< the largest of error_rms, balance and the tolerance
+  double asked = 0;    ///< the larger of tolerance and balance_tolerance
+  int iterations = 0;
+  Judged judged = Judged::no_reference;
+  std::string why;  ///< where it is not judged
+  TrueErrors errors;
+  double residual = 0, uncertainty = 0;  ///< of the reference
+  double run_seconds = 0, audit_seconds = 0;
+};
+
+struct AuditedRun {
+  std::vector<AuditedStep> steps;
+  std::string ended;  ///< "" when all steps were done; else the error that ended the run
+};
+
+struct AuditPlan {
+  std::int64_t steps = 20;  ///< at most, of the scene's stages
+  ReferenceLimits limits;
+};
+
+/// `scene` with walls placed, `bodies` its grains before the first step. `progress` is called behind every
+/// step. Throws nothing: what the simulation throws is AuditedRun::ended.
+AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPlan& plan,
+                     const std::function<void(const AuditedStep&)>& progress = {});
+
+}  // namespace talus::audit

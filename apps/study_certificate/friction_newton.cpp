@@ -1,0 +1,229 @@
+#include "apps/study_certificate/friction_newton.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/SparseLU>
+
+#include <algorithm>
+#include <cmath>
+
+namespace talus::audit {
+
+namespace {
+
+/// Added to the diagonal (1) of W: the first one, and its limits. It is made smaller where steps are slow,
+/// and larger where they lead astray.
+constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
+/// Of Newton's steps around one centre.
+constexpr int inner_steps = 12, halvings = 4;
+/// Part of the law's residual to which a problem around a centre is solved.
+constexpr double inner_part = 1e-2;
+/// Least momentum exchanged, kinetic norm, over the largest impulse.
+constexpr double floor_of_exchange = 1e-2;
+
+using Triplets = std::vector<Eigen::Triplet<double>>;
+
+Eigen::Index row_of(std::size_t c) {
+  return 3 * static_cast<Eigen::Index>(c);
+}
+
+Eigen::Matrix3d frame_of(const Vec3& n) {
+  Eigen::Index least = 0;
+  n.cwiseAbs().minCoeff(&least);
+  Eigen::Matrix3d frame;
+  frame.col(0) = n;
+  frame.col(1) = n.cross(Vec3(Vec3::Unit(least))).normalized();
+  frame.col(2) = n.cross(Vec3(frame.col(1)));
+  return frame;
+}
+
+/// Entries of the scaled map from momenta to relative velocities of contact c: a block of a body that moves
+/// or turns.
+void add_body(Triplets& entries, std::size_t c, Eigen::Index column, const Eigen::Matrix3d& block) {
+  for (Eigen::Index i = 0; i < 3; ++i)
+    for (Eigen::Index j = 0; j < 3; ++j)
+      if (block(i, j) != 0) entries.emplace_back(row_of(c) + i, column + j, block(i, j));
+}
+
+}  // namespace
+
+FrictionNewton::FrictionNewton(const StepProblem& problem, double speeds) {
+  const std::size_t contacts = problem.contacts.size(), grains = problem.mass.size();
+  Triplets entries;
+  scale_.resize(row_of(contacts));
+  q_.resize(row_of(contacts));
+  for (std::size_t c = 0; c < contacts; ++c) {
+    const StepContact& contact = problem.contacts[c];
+    const Eigen::Matrix3d frame = frame_of(contact.normal);
+    double normal = 0, tangential = 0;
+    const auto add_grain = [&](std::size_t k, double sign) {
+      normal += 1 / problem.mass[k];
+      tangential += 1 / problem.mass[k] + problem.spin_mobility[k];
+      const auto column = 6 * static_cast<Eigen::Index>(k);
+      Eigen::Matrix3d cross;  // v = ... - w x n = n x w
+      const Vec3& n = contact.normal;
+      cross << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
+      add_body(entries, c, column, sign * std::sqrt(1 / problem.mass[k]) * frame.transpose());
+      add_body(entries, c, column + 3, std::sqrt(problem.spin_mobility[k]) * frame.transpose() * cross);
+    };
+    add_grain(contact.first, 1);
+    if (!contact.at_wall()) {
+      add_grain(contact.other(), -1);
+    } else if (const double inv_mass = problem.wall_inv_mass[contact.wall()]; inv_mass > 0) {
+      normal += inv_mass;
+      entries.emplace_back(row_of(c), static_cast<Eigen::Index>(6 * grains + contact.wall()),
+                           -std::sqrt(inv_mass));
+    }
+    scale_.segment<3>(row_of(c)) << 1 / std::sqrt(normal), 1 / std::sqrt(tangential),
+        1 / std::sqrt(tangential);
+    q_.segment<3>(row_of(c)) =
+        frame.transpose() * (relative_velocity(contact, problem.free)) + Vec3(contact.bias, 0, 0);
+    friction_.push_back(contact.friction * std::sqrt(tangential / normal));
+    frame_.push_back(frame);
+    least_unit_ = std::max(least_unit_, speeds * speed_of_bodies(problem, contact) / std::sqrt(normal));
+  }
+  q_ = q_.cwiseProduct(scale_).eval();
+  Matrix H(row_of(contacts), static_cast<Eigen::Index>(6 * grains + problem.wall_normal.size()));
+  H.setFromTriplets(entries.begin(), entries.end());
+  H = scale_.asDiagonal() * H;
+  W_ = H * Matrix(H.transpose());
+}
+
+FrictionNewton::Vector FrictionNewton::scaled(std::span<const Vec3> r) const {
+  Vector s(scale_.size());
+  for (std::size_t c = 0; c < r.size(); ++c) s.segment<3>(row_of(c)) = frame_[c].transpose() * r[c];
+  return s.cwiseQuotient(scale_);
+}
+
+std::vector<Vec3> FrictionNewton::unscaled(const Vector& s) const {
+  std::vector<Vec3> r;
+  for (std::size_t c = 0; c < frame_.size(); ++c)
+    r.push_back(frame_[c] * s.segment<3>(row_of(c)).cwiseProduct(scale_.segment<3>(row_of(c))));
+  return r;
+}
+
+FrictionNewton::Vector FrictionNewton::law(const Vector& s, const Vector& centre, double shift) const {
+  const Vector z = s - (W_ * s + q_ + shift * (s - centre));
+  Vector F = s;
+  for (std::size_t c = 0; c < frame_.size(); ++c) {
+    const Eigen::Index k = row_of(c);
+    const double normal = std::max(0.0, z[k]), size = std::hypot(z[k + 1], z[k + 2]);
+    const double most = friction_[c] * normal, part = size > most ? (size > 0 ? most / size : 0) : 1;
+    F[k] -= normal;
+    F[k + 1] -= part * z[k + 1];
+    F[k + 2] -= part * z[k + 2];
+  }
+  return F;
+}
+
+double FrictionNewton::unit(const Vector& s) const {
+  double size = std::max(least_unit_, s.cwiseAbs().maxCoeff());
+  for (std::size_t c = 0; c < frame_.size(); ++c) size = std::max(size, -q_[row_of(c)]);
+  return size;
+}
+
+/// P' of contact c at z; 0 where it is open.
+void FrictionNewton::derivative(const Vector& z, std::size_t c, Eigen::Matrix3d& D) const {
+  const Eigen::Index k = row_of(c);
+  D.setZero();
+  if (z[k] <= 0) return;
+  const double most = friction_[c] * z[k], size = std::hypot(z[k + 1], z[k + 2]);
+  D(0, 0) = 1;
+  if (size <= most) {
+    D(1, 1) = D(2, 2) = friction_[c] > 0 ? 1 : 0;
+  } else if (most > 0) {
+    const Eigen::Vector2d d = z.segment<2>(k + 1) / size;
+    D.block<2, 1>(1, 0) = friction_[c] * d;
+    D.block<2, 2>(1, 1) = most / size * (Eigen::Matrix2d::Identity() - d * d.transpose());
+  }
+}
+
+bool FrictionNewton::step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const {
+  const auto& [centre, shift] = near;
+  const Vector z = s - (W_ * s + q_ + shift * (s - centre));
+  const auto size = s.size();
+  // Open contacts lose their impulses, which leaves a system of those that carry.
+  std::vector<Eigen::Index> place(static_cast<std::size_t>(size), -1);
+  Eigen::Index rows = 0;
+  for (std::size_t c = 0; c < frame_.size(); ++c)
+    if (z[row_of(c)] > 0)
+      for (Eigen::Index i = 0; i < 3; ++i) place[static_cast<std::size_t>(row_of(c) + i)] = rows++;
+  ds = -F;
+  if (rows == 0) return true;
+  Triplets select, derivatives;
+  Eigen::Matrix3d D;
+  for (std::size_t c = 0; c < frame_.size(); ++c) {
+    const Eigen::Index k = row_of(c), row = place[static_cast<std::size_t>(k)];
+    if (row < 0) continue;
+    derivative(z, c, D);
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      select.emplace_back(row + i, k + i, 1);
+      for (Eigen::Index j = 0; j < 3; ++j)
+        if (D(i, j) != 0) derivatives.emplace_back(row + i, row + j, D(i, j));
+    }
+  }
+  Matrix S(rows, size), P(rows, rows), one(rows, rows);
+  S.setFromTriplets(select.begin(), select.end());
+  P.setFromTriplets(derivatives.begin(), derivatives.end());
+  one.setIdentity();
+  const Matrix SW = S * W_;
+  Matrix J = one - P + P * Matrix(SW * Matrix(S.transpose()) + shift * one);
+  J.makeCompressed();
+  Vector open = ds;
+  for (Eigen::Index k = 0; k < size; ++k)
+    if (place[static_cast<std::size_t>(k)] >= 0) open[k] = 0;
+  const Vector right = -(S * F) - P * (SW * open);
+  Eigen::SparseLU<Matrix> factor(J);
+  if (factor.info() != Eigen::Success) return false;
+  const Vector part = factor.solve(right);
+  if (!part.allFinite()) return false;
+  ds = open + S.transpose() * part;
+  return true;
+}
+
+bool FrictionNewton::solve_near(const Vector& centre, double shift, double enough, Vector& s) const {
+  Vector ds, F = law(s, centre, shift);
+  double now = F.norm();
+  for (int k = 0; k < inner_steps && now > enough; ++k) {
+    if (!step(s, F, {centre, shift}, ds)) return false;
+    double part = 1, after = 0;
+    Vector there;
+    for (int halving = 0; halving <= halvings; ++halving, part /= 2) {
+      there = s + part * ds;
+      F = law(there, centre, shift);
+      after = F.norm();
+      if (after <= (1 - part / 10) * now) break;
+    }
+    if (after > now) return false;
+    s = there;
+    now = after;
+  }
+  return now <= enough;
+}
+
+NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int most) const {
+  Vector s = scaled(r);
+  const double size = unit(s);
+  NewtonResult result;
+  result.residual = law(s, s, 0).cwiseAbs().maxCoeff() / size;
+  double shift = first_shift;
+  for (int k = 0; k < most && result.residual > enough && shift <= most_shift; ++k) {
+    const Vector centre = s;
+    if (!solve_near(centre, shift, inner_part * law(s, s, 0).norm(), s)) {
+      s = centre;
+      shift *= 10;
+      continue;
+    }
+    const double after = law(s, s, 0).cwiseAbs().maxCoeff() / size;
+    if (after > 0.1 * result.residual) shift = std::max(least_shift, shift / 10);
+    result.residual = after;
+  }
+  Vector ds;
+  if (step(s, law(s, s, 0), {s, least_shift}, ds)) {
+    const double exchanged = std::sqrt(std::max(0.0, s.dot(W_ * s)));
+    result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds))) / std::max(exchanged, floor_of_exchange * size);
+  }
+  r = unscaled(s);
+  return result;
+}
+
+}  // namespace talus::audit

@@ -1,0 +1,64 @@
+#pragma once
+
+/// A semismooth Newton method for one step with friction (Alart and Curnier 1991).
+
+#include <Eigen/SparseCore>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "apps/study_certificate/step_problem.hpp"
+
+namespace talus::audit {
+
+struct NewtonResult {
+  /// Largest entry of the law's residual over the largest impulse that the search began with, or the largest
+  /// speed of approach, in scaled coordinates.
+  double residual = 1;
+  /// Velocities that one more step would change, kinetic norm, over what impulses change: about the error of
+  /// the velocities.
+  double next = 1;
+};
+
+/// In coordinates s = r / scale, with scale W_nn^-1/2 along the normal and W_tt^-1/2 across it, the law of
+/// all contacts is F(s) = s - P(s - (W s + q)) = 0, P the projection on r_n >= 0 and then on Coulomb's disc,
+/// and W has ones on its diagonal. A proximal step replaces W s by W s + shift (s - centre), which has one
+/// answer near the centre, found by Newton steps (1 - P' + P' (W + shift)) ds = -F; that answer is the next
+/// centre. Redundant contacts stay where they are; what belongs to an eigenvalue l of W shrinks by
+/// shift/(shift + l). The shift falls only while the residual does so too slowly: so the answer found is near
+/// the beginning.
+class FrictionNewton {
+ public:
+  /// `speeds`: least unit of residuals over the speeds of bodies (ReferenceLimits).
+  FrictionNewton(const StepProblem& problem, double speeds);
+
+  /// Proximal steps from r, in and out, until the residual is `enough`, at most `most`.
+  NewtonResult improve(std::vector<Vec3>& r, double enough, int most) const;
+
+ private:
+  using Matrix = Eigen::SparseMatrix<double>;
+  using Vector = Eigen::VectorXd;
+  struct Near {
+    const Vector& centre;
+    double shift;
+  };
+
+  Vector scaled(std::span<const Vec3> r) const;
+  std::vector<Vec3> unscaled(const Vector& s) const;
+  Vector law(const Vector& s, const Vector& centre, double shift) const;
+  double unit(const Vector& s) const;
+  void derivative(const Vector& z, std::size_t c, Eigen::Matrix3d& D) const;
+  /// A Newton step; false when its system has no solution.
+  bool step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const;
+  /// Solves the problem around a centre to |F| <= enough.
+  bool solve_near(const Vector& centre, double shift, double enough, Vector& s) const;
+
+  std::vector<Eigen::Matrix3d> frame_;  ///< columns normal and two tangents, of each contact
+  std::vector<double> friction_;        ///< in scaled coordinates
+  Vector scale_, q_;                    ///< 3 per contact
+  double least_unit_ = 1e-300;
+  Matrix W_;
+};
+
+}  // namespace talus::audit

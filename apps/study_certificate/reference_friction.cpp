@@ -1,0 +1,212 @@
+#include <Eigen/Dense>
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+#include "apps/study_certificate/friction_newton.hpp"
+#include "apps/study_certificate/reference.hpp"
+
+namespace talus::audit {
+
+namespace {
+
+using Vector = Eigen::VectorXd;
+
+Eigen::Map<Vec3> at(Vector& r, std::size_t c) {
+  return Eigen::Map<Vec3>(r.data() + 3 * c);
+}
+Eigen::Map<const Vec3> at(const Vector& r, std::size_t c) {
+  return Eigen::Map<const Vec3>(r.data() + 3 * c);
+}
+
+/// Projected Gauss-Seidel on vectors in the frame of the scene.
+class Sweeps {
+ public:
+  explicit Sweeps(const StepProblem& problem) : problem_(problem) {
+    for (const StepContact& contact : problem.contacts) {
+      Mobility m{1 / problem.mass[contact.first], 0};
+      m.tangential = m.normal + problem.spin_mobility[contact.first];
+      if (contact.at_wall()) {
+        m.normal += problem.wall_inv_mass[contact.wall()];
+      } else {
+        m.normal += 1 / problem.mass[contact.other()];
+        m.tangential += 1 / problem.mass[contact.other()] + problem.spin_mobility[contact.other()];
+      }
+      mobility_.push_back(m);
+    }
+  }
+
+  std::size_t contacts() const { return mobility_.size(); }
+
+  /// Velocities afresh under r.
+  void begin(const Vector& r) {
+    std::vector<Vec3> impulses(contacts());
+    for (std::size_t c = 0; c < contacts(); ++c) impulses[c] = at(r, c);
+    motion_ = motion_under(problem_, impulses);
+  }
+
+  /// One pass, forwards or backwards. Velocities must be those under r.
+  void sweep(Vector& r, bool backwards) {
+    const std::size_t count = contacts();
+    for (std::size_t k = 0; k < count; ++k) solve(backwards ? count - 1 - k : k, r);
+  }
+
+ private:
+  struct Mobility {
+    double normal, tangential;
+  };
+
+  /// The impulse that meets the law at contact c, everything else held.
+  Vec3 answer(std::size_t c, const Vec3& now, const Vec3& v) const {
+    const StepContact& contact = problem_.contacts[c];
+    const Vec3& n = contact.normal;
+    const double v_n = v.dot(n), r_n = now.dot(n);
+    const double normal = std::max(0.0, r_n - (v_n + contact.bias) / mobility_[c].normal);
+    if (contact.friction == 0) return normal * n;
+    Vec3 tangential = now - r_n * n - (v - v_n * n) / mobility_[c].tangential;
+    const double size = tangential.norm(), most = contact.friction * normal;
+    if (size > most) tangential *= size > 0 ? most / size : 0;
+    return normal * n + tangential;
+  }
+
+  void solve(std::size_t c, Vector& r) {
+    const StepContact& contact = problem_.contacts[c];
+    const Vec3 now = at(r, c);
+    const Vec3 next = answer(c, now, relative_velocity(contact, motion_));
+    const Vec3 change = next - now;
+    at(r, c) = next;
+    const Vec3 turn = contact.normal.cross(change);
+    const std::size_t i = contact.first;
+    motion_.u[i] += change / problem_.mass[i];
+    motion_.w[i] -= problem_.spin_mobility[i] * turn;
+    if (contact.at_wall()) {
+      const std::size_t w = contact.wall();
+      const Vec3& n = problem_.wall_normal[w];
+      motion_.walls[w] -= problem_.wall_inv_mass[w] * change.dot(n) * n;
+    } else {
+      const std::size_t j = contact.other();
+      motion_.u[j] -= change / problem_.mass[j];
+      motion_.w[j] -= problem_.spin_mobility[j] * turn;
+    }
+  }
+
+  const StepProblem& problem_;
+  std::vector<Mobility> mobility_;
+  Motion motion_;
+};
+
+/// Anderson's extrapolation of a fixed point x = g(x), by the last few differences.
+class Anderson {
+ public:
+  /// From x and g(x): the next x.
+  Vector next(const Vector& x, const Vector& g) {
+    const Vector f = g - x;
+    if (last_f_.size() > 0) {
+      df_.push_back(f - last_f_);
+      dg_.push_back(g - last_g_);
+      if (df_.size() > depth) df_.pop_front(), dg_.pop_front();
+    }
+    last_f_ = f;
+    last_g_ = g;
+    if (df_.empty()) return g;
+    const auto m = static_cast<Eigen::Index>(df_.size());
+    Eigen::MatrixXd normal(m, m);
+    Vector right(m);
+    for (Eigen::Index a = 0; a < m; ++a) {
+      right[a] = df_[static_cast<std::size_t>(a)].dot(f);
+      for (Eigen::Index b = 0; b <= a; ++b)
+        normal(a, b) = normal(b, a) = df_[static_cast<std::size_t>(a)].dot(df_[static_cast<std::size_t>(b)]);
+    }
+    normal.diagonal() *= 1 + 1e-12;
+    const Vector weight = normal.ldlt().solve(right);
+    if (!weight.allFinite()) return forget(), g;
+    Vector x_next = g;
+    for (Eigen::Index a = 0; a < m; ++a) x_next -= weight[a] * dg_[static_cast<std::size_t>(a)];
+    return x_next;
+  }
+
+  void forget() {
+    df_.clear(), dg_.clear();
+    last_f_.resize(0);
+  }
+
+ private:
+  static constexpr std::size_t depth = 10;
+  std::deque<Vector> df_, dg_;
+  Vector last_f_, last_g_;
+};
+
+/// Passes before the extrapolation begins: they find out which contacts carry.
+constexpr std::int64_t plain_passes = 20;
+
+/// Newton's method is to leave this part of the residual that is enough: it comes at no cost.
+constexpr double sharpness = 1e-2;
+
+/// Largest difference of impulses over the largest impulse.
+double difference(const Vector& a, const Vector& b) {
+  const double size = b.size() > 0 ? b.cwiseAbs().maxCoeff() : 0;
+  return size > 0 ? (a - b).cwiseAbs().maxCoeff() / size : 0;
+}
+
+/// Sweeps with extrapolation, until one changes impulses by no more than `enough`, or `most` are done; r in
+/// and out. Returns what the best of them changed.
+double accelerate(Sweeps& sweeps, Vector& r, std::int64_t most, double enough) {
+  Anderson anderson;
+  Vector x = r;
+  double least = INFINITY;
+  bool lost = false;
+  for (std::int64_t pass = 0; pass < most && least > enough; ++pass) {
+    Vector g = x;
+    sweeps.begin(x);
+    sweeps.sweep(g, false);
+    sweeps.sweep(g, true);
+    const double change = difference(g, x);
+    if (change < least) least = change, r = g;
+    if (!lost && change > 10 * least) {  // the extrapolation has left its ground
+      anderson.forget();
+      x = r;
+      lost = true;
+      continue;
+    }
+    lost = false;
+    x = pass < plain_passes ? g : anderson.next(x, g);
+  }
+  return least;
+}
+
+}  // namespace
+
+Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,
+                           const ReferenceLimits& limits) {
+  Reference reference;
+  reference.r.assign(run.begin(), run.end());
+  reference.residual = reference.uncertainty = 1;
+  Sweeps sweeps(problem);
+  const FrictionNewton newton(problem, limits.speeds);
+  const std::size_t contacts = sweeps.contacts();
+  Vector r(static_cast<Eigen::Index>(3 * contacts));
+  for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
+  // Newton's method ends quickly where it begins with the right contacts sliding, sticking and open; sweeps
+  // find those. Each time that it falls short they get four times as many.
+  std::int64_t left = limits.contact_solves / static_cast<std::int64_t>(2 * contacts + 1);
+  for (std::int64_t passes = plain_passes; left > 0; passes *= 4) {
+    accelerate(sweeps, r, std::min(left, passes), limits.residual);
+    left -= passes;
+    std::vector<Vec3> impulses(contacts);
+    for (std::size_t c = 0; c < contacts; ++c) impulses[c] = at(r, c);
+    const NewtonResult result = newton.improve(impulses, sharpness * limits.residual, limits.proximal_steps);
+    if (!(result.residual < reference.residual)) continue;
+    reference.residual = result.residual;
+    reference.uncertainty = result.next;
+    reference.r = impulses;
+    reference.found = result.residual <= limits.residual;
+    if (reference.found) break;
+  }
+  reference.motion = motion_under(problem, reference.r);
+  if (!reference.found) reference.why = "neither sweeps nor Newton's method find the answer";
+  return reference;
+}
+
+}  // namespace talus::audit

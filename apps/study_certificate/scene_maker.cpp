@@ -1,0 +1,122 @@
+#include "apps/study_certificate/scene_maker.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "apps/study_certificate/scene_bench.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/scene/bodies_file.hpp"
+
+namespace talus::audit {
+
+namespace {
+
+constexpr std::array families = {
+    SceneFamily{"deposition", "grains at rest in a box, as they were deposited", make_deposition},
+    SceneFamily{"press", "deposited grains between pushed walls, light and heavy", make_press},
+    SceneFamily{"flight", "clusters in flight that run into one another", make_flight},
+    SceneFamily{"lattice", "equal grains on a lattice between walls: more contacts than unknowns",
+                make_lattice},
+    SceneFamily{"funnel", "grains in a funnel of inclined walls", make_funnel},
+    SceneFamily{"column", "a column on a floor", make_column},
+    SceneFamily{"among", "a column among single grains", make_among},
+    SceneFamily{"chain", "a nearly straight chain between walls", make_chain},
+    SceneFamily{"wedge", "grains in a V of half angle 1e-3 to 0.5", make_wedge},
+    SceneFamily{"arch", "an arch, and loose grains", make_arch},
+    SceneFamily{"rows", "rows of touching grains that run into one another", make_rows},
+    SceneFamily{"heavy", "heavy bodies on light ones", make_heavy}};
+
+double draw_time_step(SceneBench& bench) {
+  Draws& draws = bench.draws;
+  double fastest = 0;
+  for (const auto& v : bench.made.grains.velocity) fastest = std::max(fastest, Vec3(v[0], v[1], v[2]).norm());
+  const double fall = bench.gravity > 0 ? std::sqrt(bench.radius / bench.gravity) : INFINITY;
+  const double flight = fastest > 0 ? bench.radius / fastest : INFINITY;
+  const double natural = std::min({fall, 3 * flight, std::sqrt(bench.radius)});
+  return natural * draws.between_decades(1e-3, 0.1);
+}
+
+/// Loads of the second half of the steps.
+void change_loads(SceneBench& bench, Stage& stage) {
+  Draws& draws = bench.draws;
+  const Setup& setup = bench.made.scene.setup;
+  const auto pushed =
+      std::ranges::find_if(setup.walls, [](const Wall& wall) { return wall.load.drive == WallDrive::force; });
+  const double kind = draws.unit();
+  if (pushed != setup.walls.end() && kind < 0.4) {
+    WallLoad load = pushed->load;
+    load.force *= draws.chance(0.5) ? 2 : 0.5;
+    stage.loads.emplace_back(pushed->name, load);
+  } else if (kind < 0.7) {
+    stage.gravity *= 2;
+  } else {
+    const double angle = draws.between(0.02, 0.6), g = stage.gravity.norm();
+    stage.gravity = {g * std::sin(angle), 0, -g * std::cos(angle)};
+  }
+}
+
+}  // namespace
+
+void finish_scene(SceneBench& bench, const MakerSettings& settings) {
+  Draws& draws = bench.draws;
+  io::Scene& scene = bench.made.scene;
+  Stage stage;
+  stage.name = "first";
+  stage.time_step = draw_time_step(bench);
+  stage.gravity = {0, 0, -bench.gravity};
+  const double friction = draws.chance(0.5) ? 0 : draws.between(0.1, 0.8);
+  const double at_walls = draws.chance(0.7) ? friction : 0;
+  const double restitution = draws.chance(0.6) ? 0 : draws.chance(0.2) ? 1 : draws.unit();
+  stage.laws = laws_of_one_material(friction, at_walls, restitution);
+  scene.common = stage;
+  const bool changes = draws.chance(0.5) && settings.steps > 1;
+  const int first = changes ? settings.steps / 2 : settings.steps;
+  stage.end.steps = first;
+  scene.setup.stages.push_back(stage);
+  if (changes) {
+    stage.name = "second";
+    stage.end.steps = settings.steps - first;
+    change_loads(bench, stage);
+    scene.setup.stages.push_back(stage);
+  }
+  SolverSettings& solver = scene.setup.solver;
+  solver.overlap_correction = draws.chance(0.6) ? 0 : draws.between(0, 0.5);
+  solver.warm_start = draws.chance(0.8);
+  solver.tolerance = solver.balance_tolerance = settings.tolerance;
+  scene.setup.decomposition.subdomains = settings.subdomains;
+  scene.setup.decomposition.coupling = settings.coupling;
+  scene.setup.seed = bench.made.seed;
+  scene.sample.kind = io::SampleSpec::Kind::bodies;
+  scene.output.every_steps = 1;
+  scene.output.sinks = {};
+}
+
+std::span<const SceneFamily> scene_families() {
+  return families;
+}
+
+MadeScene make_scene(std::string_view family, std::uint64_t seed, const MakerSettings& settings) {
+  const auto found = std::ranges::find(families, family, &SceneFamily::name);
+  if (found == families.end())
+    throw std::invalid_argument(fmt::format("no family of scenes is called '{}'", family));
+  SceneBench bench(seed, static_cast<std::uint64_t>(found - families.begin()), settings.steps);
+  bench.made.family = family;
+  found->make(bench);
+  finish_scene(bench, settings);
+  io::Scene& scene = bench.made.scene;
+  scene.name = bench.made.name();
+  scene.description = fmt::format("{} (talus study certificate, seed {})", found->sentence, seed);
+  scene.sample.file = scene.name + ".csv";
+  return std::move(bench.made);
+}
+
+void keep_scene(const MadeScene& made, const std::filesystem::path& directory) {
+  io::write_bodies(directory / (made.name() + ".csv"), made.grains);
+  io::write_whole(directory / (made.name() + ".toml"), io::resolved_scene(made.scene));
+}
+
+}  // namespace talus::audit

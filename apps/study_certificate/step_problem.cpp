@@ -1,0 +1,232 @@
+#include "apps/study_certificate/step_problem.hpp"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <unordered_map>
+
+namespace talus::audit {
+
+namespace {
+
+/// Numbers that decide which pairs are contacts.
+struct GapNumbers {
+  double h, alert, slow, overlap_correction;
+};
+
+/// A pair on its way through the step.
+struct Approach {
+  double gap;     ///< in the middle of the step [m]
+  double v_n;     ///< before the step [m/s]
+  double v_free;  ///< at its end without contacts [m/s]
+};
+
+/// Whether the pair is a contact; then its bias (docs/theory.md, "Gap term and restitution").
+bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double& bias) {
+  if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
+  bias = (pair.gap > 0 ? pair.gap : numbers.overlap_correction * pair.gap) / numbers.h;
+  if (restitution > 0 && std::abs(pair.v_n) > numbers.slow) {
+    if (pair.gap > 0) return false;
+    bias = restitution * pair.v_n;
+  }
+  return true;
+}
+
+void refuse_what_is_unknown(const StepInput& input) {
+  if (!input.setup.clumps.empty()) throw std::invalid_argument("the audit knows spheres only, no clumps");
+  for (const Wall& wall : input.walls)
+    if (wall.surface() != nullptr)
+      throw std::invalid_argument("the audit knows plane walls only; '" + wall.name + "' is none");
+  for (auto number : {&PairLaw::cohesion, &PairLaw::rolling_resistance})
+    if (input.stage.laws.largest(number) > 0)
+      throw std::invalid_argument("the audit knows neither cohesion nor rolling resistance");
+}
+
+/// What rebuild_step works with.
+class Builder {
+ public:
+  explicit Builder(const StepInput& input) : in_(input), n_(input.before.x.size()) {
+    const double h = in_.stage.time_step;
+    double smallest = INFINITY;
+    for (double radius : in_.before.radius) smallest = std::min(smallest, radius);
+    numbers_ = {h, in_.setup.detection.alert > 0 ? in_.setup.detection.alert : 0.1 * smallest,
+                2 * h * in_.stage.gravity.norm(), in_.setup.solver.overlap_correction};
+  }
+
+  StepProblem build() {
+    made_.time_step = numbers_.h;
+    made_.gravity = in_.stage.gravity;
+    take_grains();
+    take_walls();
+    meet_grains();
+    meet_walls();
+    return std::move(made_);
+  }
+
+ private:
+  void take_grains() {
+    std::unordered_map<std::int64_t, std::size_t> slots;
+    for (std::size_t s = 0; s < in_.bodies.size(); ++s)
+      slots.emplace(static_cast<std::int64_t>(in_.bodies.id[s]), s);
+    const bool turns = in_.stage.laws.largest(&PairLaw::friction) > 0 && in_.setup.rotation;
+    for (std::size_t k = 0; k < n_; ++k) {
+      const std::size_t s = slots.at(in_.before.id[k]);
+      const double m = in_.bodies.mass(s), R = in_.before.radius[k];
+      made_.mass.push_back(m);
+      made_.spin_mobility.push_back(turns ? 2.5 / m : 0);
+      made_.free.u.push_back(in_.before.u[k] + numbers_.h * in_.stage.gravity);
+      made_.free.w.push_back(in_.before.omega.empty() ? Vec3::Zero() : Vec3(R * in_.before.omega[k]));
+      middle_.push_back(in_.before.x[k] + numbers_.h / 2 * in_.before.u[k]);
+      material_.push_back(in_.bodies.material.empty() ? material_of_grains : in_.bodies.material[s]);
+    }
+  }
+
+  void take_walls() {
+    for (std::size_t w = 0; w < in_.walls.size(); ++w) {
+      const Wall& wall = in_.walls[w];
+      const double gain = numbers_.h * in_.loads[w] * wall.inv_mass();
+      made_.wall_normal.push_back(wall.normal);
+      made_.wall_inv_mass.push_back(wall.inv_mass());
+      made_.wall_load.push_back(in_.loads[w]);
+      made_.free.walls.push_back(wall.velocity + gain * wall.normal);
+      if (wall.load.drive == WallDrive::velocity)
+        made_.drive_speed = std::max(made_.drive_speed, wall.velocity.norm());
+    }
+  }
+
+  const PairLaw& law(Material a, Material b) const { return in_.stage.laws.between(a, b); }
+
+  void meet(std::size_t i, std::size_t j) {
+    const Vec3 d = middle_[i] - middle_[j];
+    const double distance = d.norm();
+    const Vec3 normal = distance > 0 ? Vec3(d / distance) : Vec3(Vec3::UnitZ());
+    const double v_n = normal.dot(in_.before.u[i] - in_.before.u[j]);
+    const PairLaw& pair = law(material_[i], material_[j]);
+    double bias = 0;
+    if (!meets(numbers_, {distance - in_.before.radius[i] - in_.before.radius[j], v_n, v_n}, pair.restitution,
+               bias))
+      return;
+    made_.contacts.push_back({i, static_cast<std::ptrdiff_t>(j), normal, bias, pair.friction});
+  }
+
+  /// Sort and sweep along the longest axis of the sample.
+  void meet_grains() {
+    Vec3 low = Vec3::Constant(INFINITY), high = -low;
+    for (const Vec3& x : middle_) low = low.cwiseMin(x), high = high.cwiseMax(x);
+    Eigen::Index axis = 0;
+    if (n_ > 0) (high - low).maxCoeff(&axis);
+    std::vector<double> reach(n_);
+    std::vector<std::size_t> order(n_);
+    for (std::size_t k = 0; k < n_; ++k) {
+      order[k] = k;
+      reach[k] = in_.before.radius[k] + numbers_.alert + numbers_.h * in_.before.u[k].norm();
+    }
+    const auto begin = [&](std::size_t k) { return middle_[k][axis] - reach[k]; };
+    std::ranges::sort(order, [&](std::size_t a, std::size_t b) { return begin(a) < begin(b); });
+    for (std::size_t a = 0; a < n_; ++a)
+      for (std::size_t b = a + 1; b < n_ && begin(order[b]) <= middle_[order[a]][axis] + reach[order[a]];
+           ++b) {
+        const auto [j, i] = std::minmax(order[a], order[b]);
+        if ((middle_[i] - middle_[j]).cwiseAbs().maxCoeff() <= reach[i] + reach[j]) meet(i, j);
+      }
+  }
+
+  void meet_walls() {
+    for (std::size_t w = 0; w < in_.walls.size(); ++w) {
+      const Wall& wall = in_.walls[w];
+      const Vec3 middle = wall.point + numbers_.h / 2 * wall.velocity;
+      for (std::size_t i = 0; i < n_; ++i) {
+        const PairLaw& pair = law(material_[i], wall.material);
+        const Approach approach{wall.normal.dot(middle_[i] - middle) - in_.before.radius[i],
+                                wall.normal.dot(in_.before.u[i] - wall.velocity),
+                                wall.normal.dot(made_.free.u[i] - made_.free.walls[w])};
+        double bias = 0;
+        if (meets(numbers_, approach, pair.restitution, bias))
+          made_.contacts.push_back(
+              {i, -1 - static_cast<std::ptrdiff_t>(w), wall.normal, bias, pair.friction});
+      }
+    }
+  }
+
+  const StepInput& in_;
+  std::size_t n_;
+  GapNumbers numbers_{};
+  StepProblem made_;
+  std::vector<Vec3> middle_;
+  std::vector<Material> material_;
+};
+
+}  // namespace
+
+bool StepProblem::smooth() const {
+  return std::ranges::all_of(contacts, [](const StepContact& contact) { return contact.friction == 0; });
+}
+
+StepProblem rebuild_step(const StepInput& input) {
+  refuse_what_is_unknown(input);
+  return Builder(input).build();
+}
+
+Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses) {
+  Motion motion = problem.free;
+  for (std::size_t c = 0; c < impulses.size(); ++c) {
+    const StepContact& contact = problem.contacts[c];
+    const Vec3& r = impulses[c];
+    const Vec3 turn = contact.normal.cross(r);
+    motion.u[contact.first] += r / problem.mass[contact.first];
+    motion.w[contact.first] -= problem.spin_mobility[contact.first] * turn;
+    if (contact.at_wall()) {
+      const std::size_t w = contact.wall();
+      const Vec3& n = problem.wall_normal[w];
+      motion.walls[w] -= problem.wall_inv_mass[w] * r.dot(n) * n;
+    } else {
+      motion.u[contact.other()] -= r / problem.mass[contact.other()];
+      motion.w[contact.other()] -= problem.spin_mobility[contact.other()] * turn;
+    }
+  }
+  return motion;
+}
+
+Vec3 relative_velocity(const StepContact& contact, const Motion& motion) {
+  const std::size_t i = contact.first;
+  if (contact.at_wall())
+    return motion.u[i] - motion.walls[contact.wall()] - motion.w[i].cross(contact.normal);
+  const std::size_t j = contact.other();
+  return motion.u[i] - motion.u[j] - (motion.w[i] + motion.w[j]).cross(contact.normal);
+}
+
+double speed_of_bodies(const StepProblem& problem, const StepContact& contact) {
+  const Motion& free = problem.free;
+  const Vec3& other = contact.at_wall() ? free.walls[contact.wall()] : free.u[contact.other()];
+  return free.u[contact.first].norm() + other.norm();
+}
+
+RunImpulses impulses_of(const StepProblem& problem, const Frame& after) {
+  std::map<std::array<std::int64_t, 2>, std::pair<Vec3, bool>> found;
+  for (std::size_t k = 0; k < after.contact_bodies.size(); ++k) {
+    auto [a, b] = after.contact_bodies[k];
+    Vec3 r = problem.time_step * after.contact_force[k];
+    if (b >= 0 && a < b) std::swap(a, b), r = -r;
+    found[{a, b}] = {r, false};
+  }
+  RunImpulses all;
+  for (const StepContact& contact : problem.contacts) {
+    std::int64_t a = after.id[contact.first],
+                 b = contact.at_wall() ? contact.second : after.id[contact.other()];
+    const bool turned = !contact.at_wall() && a < b;
+    if (turned) std::swap(a, b);
+    const auto entry = found.find({a, b});
+    all.r.push_back(Vec3::Zero());
+    if (entry == found.end()) continue;
+    all.r.back() = turned ? Vec3(-entry->second.first) : entry->second.first;
+    entry->second.second = true;
+  }
+  for (const auto& [ids, entry] : found) all.unknown += entry.second ? 0 : 1;
+  return all;
+}
+
+}  // namespace talus::audit

@@ -1,0 +1,82 @@
+#pragma once
+
+/// The contact problem of one step, made anew from the state before it and the formulas of docs/theory.md.
+/// Nothing here comes from the solver's rooms (kernels/law, sweeps, global): a judge that shared code with
+/// what it judges would share its errors.
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "runtime/step/frame.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus::audit {
+
+/// A pair that may exchange an impulse r [N s], which acts on `first`, and -r on `second`.
+struct StepContact {
+  std::size_t first = 0;       ///< grain, its place in the frame
+  std::ptrdiff_t second = 0;   ///< grain, or -(1 + wall)
+  Vec3 normal = Vec3::Zero();  ///< unit, from the second to the first
+  double bias = 0;             ///< b [m/s]: 0 <= v_n + b, perpendicular to r_n >= 0
+  double friction = 0;         ///< mu
+
+  bool at_wall() const { return second < 0; }
+  std::size_t wall() const { return static_cast<std::size_t>(-1 - second); }
+  std::size_t other() const { return static_cast<std::size_t>(second); }
+};
+
+/// Velocities of everything: per grain [m/s], w = R omega, and per wall.
+struct Motion {
+  std::vector<Vec3> u, w, walls;
+};
+
+/// n grains in the order of the frame, k walls (planes, which move along their normals only where pushed).
+struct StepProblem {
+  double time_step = 0;               ///< [s]
+  Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
+  std::vector<double> mass;           ///< n [kg]
+  std::vector<double> spin_mobility;  ///< n, R^2/I [1/kg]; 0 where a grain does not turn
+  Motion free;                        ///< at the end of the step without contacts
+  std::vector<Vec3> wall_normal;      ///< k
+  std::vector<double> wall_inv_mass;  ///< k [1/kg]; 0: fixed or driven
+  std::vector<double> wall_load;      ///< k [N]
+  double drive_speed = 0;             ///< largest of the driven walls [m/s]
+  std::vector<StepContact> contacts;
+
+  bool smooth() const;  ///< no contact has friction
+};
+
+/// The scene's part of a step: what does not change within it.
+struct StepInput {
+  const Frame& before;            ///< positions and velocities
+  std::span<const Wall> walls;    ///< positions and velocities before the step, loads in force
+  std::span<const double> loads;  ///< of each wall, along its normal [N]
+  const Stage& stage;             ///< time step, gravity, laws
+  const Bodies& bodies;           ///< masses, by id, in any order
+  const Setup& setup;             ///< alert distance, overlap correction, rotation
+};
+
+/// Throws std::invalid_argument for what it has no formulas for: clumps, walls other than planes, cohesion,
+/// rolling resistance.
+StepProblem rebuild_step(const StepInput& input);
+
+/// Velocity at the end of the step under the impulses, one per contact.
+Motion motion_under(const StepProblem& problem, std::span<const Vec3> impulses);
+
+/// Relative velocity of a contact, u_1 - u_2 - (w_1 + w_2) x n [m/s].
+Vec3 relative_velocity(const StepContact& contact, const Motion& motion);
+
+/// Speed of both bodies without contacts [m/s], of which the relative velocity is a difference.
+double speed_of_bodies(const StepProblem& problem, const StepContact& contact);
+
+/// The impulses [N s] that the run found, in the order of the problem's contacts; `unknown`: contacts with a
+/// force that the problem does not have.
+struct RunImpulses {
+  std::vector<Vec3> r;
+  std::size_t unknown = 0;
+};
+RunImpulses impulses_of(const StepProblem& problem, const Frame& after);
+
+}  // namespace talus::audit

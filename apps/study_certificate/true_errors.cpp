@@ -1,0 +1,157 @@
+#include "apps/study_certificate/true_errors.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace talus::audit {
+
+namespace {
+
+/// Floors of the units, as parts of other quantities of the step.
+struct Floors {
+  double walls = 1e-2;     ///< of the largest wall impulse: least momentum exchanged
+  double motion = 1e-12;   ///< of the momentum of all
+  double exchange = 1e-2;  ///< of the momentum exchanged: least wall impulse
+  double contact = 1e-3;   ///< likewise: least contact impulse
+  double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
+  double cluster = 1e-9;   ///< of a cluster's momentum, likewise: grains that graze one another
+};
+constexpr Floors floors;
+
+/// Velocities of pushed walls at the end of the step, as the run says.
+Vec3 wall_velocity(const StepProblem& problem, const Frame& after, std::size_t w) {
+  return after.walls[w].velocity * problem.wall_normal[w];
+}
+
+std::vector<Vec3> wall_impulses(const StepProblem& problem, std::span<const Vec3> r) {
+  std::vector<Vec3> sum(problem.wall_normal.size(), Vec3::Zero());
+  for (std::size_t c = 0; c < r.size(); ++c)
+    if (problem.contacts[c].at_wall()) sum[problem.contacts[c].wall()] += r[c];
+  return sum;
+}
+
+/// Momentum that is wrong, and exchanged, by grain and then by wall.
+struct Momenta {
+  std::vector<double> wrong, exchanged;
+  double all_wrong() const { return std::accumulate(wrong.begin(), wrong.end(), 0.0); }
+  double all_exchanged() const { return std::accumulate(exchanged.begin(), exchanged.end(), 0.0); }
+};
+
+Momenta momenta(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
+  Momenta found;
+  const Motion &exact = reference.motion, &free = problem.free;
+  for (std::size_t k = 0; k < problem.mass.size(); ++k) {
+    found.wrong.push_back(problem.mass[k] * (end.after.u[k] - exact.u[k]).norm());
+    found.exchanged.push_back(problem.mass[k] * (exact.u[k] - free.u[k]).norm());
+  }
+  for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
+    const bool moves = problem.wall_inv_mass[w] > 0;
+    const double mass = moves ? 1 / problem.wall_inv_mass[w] : 0;
+    found.wrong.push_back(moves ? mass * (wall_velocity(problem, end.after, w) - exact.walls[w]).norm() : 0);
+    found.exchanged.push_back(mass * (exact.walls[w] - free.walls[w]).norm());
+  }
+  return found;
+}
+
+/// Of the cluster where the momentum error is largest against what the cluster exchanges.
+double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::span<const Vec3> exact) {
+  std::size_t count = 0;
+  const std::vector<std::size_t> cluster = clusters_of(problem, count);
+  struct Sums {
+    double wrong = 0, exchanged = 0, mass = 0, momentum = 0, wall_impulse = 0;
+  };
+  std::vector<Sums> sums(count);
+  std::vector<char> seen(momentum.wrong.size(), 0);
+  const std::size_t grains = problem.mass.size();
+  for (std::size_t c = 0; c < cluster.size(); ++c) {
+    const StepContact& contact = problem.contacts[c];
+    Sums& own = sums[cluster[c]];
+    const auto add = [&](std::size_t body) {
+      if (seen[body]) return;
+      seen[body] = 1;
+      own.wrong += momentum.wrong[body];
+      own.exchanged += momentum.exchanged[body];
+      if (body >= grains) return;
+      own.mass += problem.mass[body];
+      own.momentum += problem.mass[body] * problem.free.u[body].norm();
+    };
+    add(contact.first);
+    if (!contact.at_wall())
+      add(contact.other());
+    else if (problem.wall_inv_mass[contact.wall()] > 0)
+      add(grains + contact.wall());
+    if (contact.at_wall()) own.wall_impulse = std::max(own.wall_impulse, exact[c].norm());
+  }
+  double worst = 0;
+  const double weight = problem.time_step * problem.gravity.norm();
+  for (const Sums& own : sums) {
+    const double unit =
+        std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * problem.drive_speed,
+                  floors.load * own.mass * weight, floors.cluster * own.momentum, 1e-300});
+    worst = std::max(worst, own.wrong / unit);
+  }
+  return worst;
+}
+
+}  // namespace
+
+TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
+  TrueErrors errors;
+  const double h = problem.time_step;
+  const std::vector<Vec3> walls = wall_impulses(problem, reference.r);
+  double wall_unit = 0, wall_wrong = 0;
+  for (std::size_t w = 0; w < walls.size(); ++w) {
+    wall_unit = std::max({wall_unit, walls[w].norm(), h * std::abs(problem.wall_load[w])});
+    wall_wrong = std::max(wall_wrong, (walls[w] - h * end.after.walls[w].force).norm());
+  }
+  const Momenta momentum = momenta(problem, reference, end);
+  double mass = 0, speed = 0, contact_unit = 0, contact_wrong = 0;
+  for (std::size_t k = 0; k < problem.mass.size(); ++k) {
+    mass += problem.mass[k];
+    speed = std::max(speed, problem.free.u[k].norm());
+  }
+  const double exchange = std::max({momentum.all_exchanged(), floors.walls * wall_unit,
+                                    mass * problem.drive_speed, floors.motion * mass * speed, 1e-300});
+  for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+    contact_unit = std::max(contact_unit, reference.r[c].norm());
+    contact_wrong = std::max(contact_wrong, (reference.r[c] - end.r[c]).norm());
+  }
+  errors.velocity = momentum.all_wrong() / exchange;
+  errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);
+  errors.contact_force = contact_wrong / std::max(contact_unit, floors.contact * exchange);
+  errors.cluster = worst_cluster(problem, momentum, reference.r);
+  return errors;
+}
+
+double disagreement(const StepProblem& problem, const StepEnd& end) {
+  const Motion motion = motion_under(problem, end.r);
+  double most = 0, speed = 1e-300;
+  for (std::size_t k = 0; k < problem.mass.size(); ++k) {
+    most = std::max(most, (motion.u[k] - end.after.u[k]).norm());
+    speed = std::max(
+        {speed, end.after.u[k].norm(), problem.free.u[k].norm(), problem.time_step * problem.gravity.norm()});
+  }
+  return most / speed;
+}
+
+double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after) {
+  for (std::size_t w = 0; w < problem.wall_normal.size(); ++w)
+    if (problem.wall_inv_mass[w] > 0) return 0;
+  if (problem.drive_speed > 0) return 0;
+  double gained = 0, free = 0, fall = 0;
+  const auto spin = [](const Frame& frame, std::size_t k) {
+    return frame.omega.empty() ? 0.0 : (frame.radius[k] * frame.omega[k]).squaredNorm();
+  };
+  for (std::size_t k = 0; k < problem.mass.size(); ++k) {
+    const double m = problem.mass[k], inertia = 0.4 * m;
+    gained += 0.5 * m * (after.u[k].squaredNorm() - before.u[k].squaredNorm()) -
+              m * problem.gravity.dot(after.x[k] - before.x[k]) +
+              0.5 * inertia * (spin(after, k) - spin(before, k));
+    free += 0.5 * m * problem.free.u[k].squaredNorm() + 0.5 * inertia * spin(before, k);
+    fall += m * (problem.time_step * problem.gravity).squaredNorm() / 8;
+  }
+  return free > 0 ? std::max(0.0, gained - fall) / free : 0;
+}
+
+}  // namespace talus::audit

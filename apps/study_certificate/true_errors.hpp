@@ -1,0 +1,39 @@
+#pragma once
+
+/// How far a step is from its exact answer.
+
+#include <optional>
+
+#include "apps/study_certificate/reference.hpp"
+
+namespace talus::audit {
+
+/// True errors of a step, each relative. Let E be the momentum that the contacts exchange in the exact
+/// answer, sum m |u* - u_free| over grains and pushed walls, but at least a hundredth of the largest wall
+/// impulse (grains pressed between fixed walls gain nothing), and what a driven wall's speed gives to all.
+struct TrueErrors {
+  double velocity = 0;       ///< V: sum m |u - u*| over E
+  double wall_force = 0;     ///< wf: largest error of a wall's impulse over the largest wall impulse or load
+  double contact_force = 0;  ///< cf: largest error of a contact's impulse over the largest contact impulse
+  double cluster = 0;        ///< V of the connected cluster of contacts where it is largest
+  double energy = 0;         ///< energy gained that neither loads nor the time step explain, over the kinetic
+                             ///< energy without contacts; 0 where walls move
+};
+
+/// What a step ended with, as the run says.
+struct StepEnd {
+  const Frame& after;
+  std::span<const Vec3> r;  ///< impulses_of
+};
+
+TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end);
+
+/// Largest difference between the velocities that the run ended with and those that its impulses give, over
+/// the largest speed: rounding, unless the run's contacts are not those of the problem.
+double disagreement(const StepProblem& problem, const StepEnd& end);
+
+/// Energy that a step gained beyond the share that the scheme itself may add, m (h g)^2/8 a grain
+/// (docs/theory.md), over its kinetic energy without contacts.
+double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after);
+
+}  // namespace talus::audit
