@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/larger.hpp"
 #include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -79,6 +80,19 @@ Measures total_measures(const BodyParts& parts, std::span<const Measures> own) {
   return all;
 }
 
+/// The change of r that the Newton step makes when it is put on the cones.
+PartImpulses admissible_change(const BodyParts& parts, const Correction& correction) {
+  PartImpulses change = correction.impulse;
+  parts.each([&](std::size_t p) {
+    for (std::size_t k = 0; k < change[p].size(); ++k) {
+      const ContactEquation& c = parts[p].contacts[k];
+      const Vec3& r = parts[p].impulse[k];
+      change[p][k] = project_on_cone(r + change[p][k], c.normal, c.mu) - r;
+    }
+  });
+  return change;
+}
+
 /// Impulses of walls and their changes, over the largest impulse of a wall: the largest.
 double wall_error(const BodyParts& parts, const PartImpulses& change) {
   const std::vector<double> counts = parts.rows(1, [&](std::size_t p, std::span<double> row) {
@@ -104,22 +118,22 @@ double wall_error(const BodyParts& parts, const PartImpulses& change) {
 
 /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times that
 /// of all, or of what the cluster's bodies exchange.
-double contact_error(const BodyParts& parts, const Correction& correction,
+double contact_error(const BodyParts& parts, const Clusters& clusters, const PartImpulses& changes,
                      const std::vector<std::vector<double>>& scales, double interest) {
   enum { impulse, change, width };
   const ClusterRows rows =
-      rows_of_clusters(parts, correction.clusters, 0, width, [&](std::size_t p, ClusterRows& to) {
+      rows_of_clusters(parts, clusters, 0, width, [&](std::size_t p, ClusterRows& to) {
         for (std::size_t k = 0; k < parts[p].contacts.size(); ++k) {
-          const std::span<double> row = to.of(p, correction.clusters.of_contact(p, parts[p].contacts[k]));
-          const Vec3& by = correction.impulse[p][k];
+          const std::span<double> row = to.of(p, clusters.of_contact(p, parts[p].contacts[k]));
+          const Vec3& by = changes[p][k];
           row[impulse] = larger(row[impulse], (parts[p].impulse[k] + by).norm());
           row[change] = larger(row[change], by.norm());
         }
       });
-  const double most = largest_of_clusters(parts, correction.clusters, [&](std::size_t p, std::int32_t c) {
+  const double most = largest_of_clusters(parts, clusters, [&](std::size_t p, std::int32_t c) {
     return rows.of(p, c)[impulse];
   });
-  return largest_of_clusters(parts, correction.clusters, [&](std::size_t p, std::int32_t c) {
+  return largest_of_clusters(parts, clusters, [&](std::size_t p, std::int32_t c) {
     const std::span<const double> row = rows.of(p, c);
     return row[change] > 0 ? row[change] / std::max({row[impulse], interest * most, interest * scales[p][at(c)]})
                            : 0;
@@ -158,8 +172,9 @@ StepError step_error(std::span<const BodyProblem> problems, const PartLink& link
     // Where nothing moves overlaps may still ask for it.
     return scales[p][at(c)] > 0 ? momentum / scales[p][at(c)] : std::numeric_limits<double>::infinity();
   });
-  error.wall = wall_error(parts, error.correction.impulse);
-  error.contact = contact_error(parts, error.correction, scales, thresholds.interest);
+  const PartImpulses change = admissible_change(parts, error.correction);
+  error.wall = wall_error(parts, change);
+  error.contact = contact_error(parts, clusters, change, scales, thresholds.interest);
   return error;
 }
 

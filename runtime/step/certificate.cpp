@@ -15,7 +15,8 @@ void Certificate::begin(Scales scales) {
   result_ = {};
   history_.clear();
   wall_impulses_.clear();
-  small_check_ = velocity_check_ = {};
+  small_check_ = large_check_ = {};
+  corrected_from_ = std::numeric_limits<double>::infinity();
 }
 
 /// The error and the drift of the wall forces, and where they stand in the history.
@@ -103,7 +104,7 @@ bool Certificate::checks_velocities(WholeProblem& whole) const {
 
 /// The last answer where nothing can have changed it, a guess from the residual where that is too large, else a
 /// new one.
-double Certificate::repeated(VelocityCheck& then, const std::function<double(double)>& ask) {
+double Certificate::repeated(WholeCheck& then, const std::function<double(double)>& ask) {
   const double tolerance = settings_.balance_tolerance;
   const int done = result_.iterations;
   // From a residual of 0 nothing is inferred.
@@ -135,17 +136,29 @@ bool Certificate::balanced(WholeProblem& whole) {
 
 double Certificate::large_unbalance(WholeProblem& whole) {
   if (checks_velocities(whole))
-    return repeated(velocity_check_, [&](double enough) { return whole.large_error(enough); });
+    return repeated(large_check_, [&](double enough) { return whole.large_error(enough); });
   if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
     return unbalance(result_.drift, result_.iterations, whole.sweeps_needed());
   return result_.drift;
+}
+
+bool Certificate::correctable() const {
+  return small_check_.at == result_.iterations && small_check_.error > settings_.balance_tolerance &&
+         small_check_.error <= thresholds_.newton_gain * corrected_from_;
+}
+
+void Certificate::corrected() {
+  corrected_from_ = small_check_.error;
+  ++result_.corrections;
+  history_.start_anew();
+  small_check_ = large_check_ = {};
 }
 
 void Certificate::solved_by_admm(const BodyAdmmResult& result) {
   result_.stiff = result;
   ++result_.stiff_calls;
   history_.start_anew();
-  small_check_ = velocity_check_ = {};
+  small_check_ = large_check_ = {};
 }
 
 void Certificate::forgive() {

@@ -53,11 +53,13 @@ struct CertificateThresholds {
   double velocity_check_cost = 100;
   /// And at least so many plain sweeps per contact, >= 0: that is stiff for a problem of its size.
   double stiff_per_contact = 0.1;
-  /// Behind ADMM sweeps still mend much: no velocity check before so many, >= 0.
+  /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
   int settling = 50;
-  /// Behind a Newton step none before so many.
+  /// Behind a Newton step, which leaves less to mend, not before so many, >= 0.
   int settling_newton = 10;
-  /// A velocity check tells nothing apart below this part of the tolerance on the balance, in (0, 1).
+  /// A Newton step helps when the next check finds less than this part of the error before, in (0, 1).
+  double newton_gain = 0.5;
+  /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0, 1).
   double velocity_resolution = 0.2;
   /// It is repeated when the sweeps done have grown by this factor, > 1, if the residual has not fallen far
   /// enough before to promise a balance within the tolerance.
@@ -132,16 +134,11 @@ class Certificate {
     return thresholds_.stiff_per_contact * static_cast<double>(contacts);
   }
 
-  /// The last check has a Newton step to offer that its impulses need.
-  bool correctable() const {
-    return small_check_.at == result_.iterations && small_check_.error > settings_.balance_tolerance;
-  }
-  /// It was taken.
-  void corrected() {
-    ++result_.corrections;
-    history_.start_anew();
-    small_check_ = velocity_check_ = {};
-  }
+  /// The last check has found small clusters in error, and the Newton step that would mend them; the one before
+  /// it, if any was taken in this step, had helped.
+  bool correctable() const;
+  /// It was taken: sweeps that follow are a new start.
+  void corrected();
   int most_direct() const { return thresholds_.most_direct; }
 
   /// The impulses of the last check were replaced by those of ADMM.
@@ -174,14 +171,16 @@ class Certificate {
   double scale2_ = 0;                             ///< what it is compared with [m^2/s^2]
   /// Of the first check of the step, or the first since ADMM, or since sweeps became plain [m^2/s^2].
   double first_residual2_ = 0;
-  /// The last velocity check.
-  struct VelocityCheck {
-    int at = -1;  ///< sweeps then; -1: none in this step, or since ADMM
+  /// The last answer about the whole problem.
+  struct WholeCheck {
+    int at = -1;  ///< sweeps then; -1: none in this step, or since a new start
     double error_rms = 0, error = 0;
   };
-  VelocityCheck velocity_check_, small_check_;
-  double repeated(VelocityCheck& check, const std::function<double(double)>& ask);
+  double repeated(WholeCheck& then, const std::function<double(double)>& ask);
   double large_unbalance(WholeProblem& whole);
+
+  WholeCheck small_check_, large_check_;
+  double corrected_from_ = 0;  ///< error before the last Newton step of the step
 };
 
 /// Whether a step whose iterations ended so is to be believed. `momentum_defect`: what the sample gained
