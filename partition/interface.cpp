@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// The shared grains of an interface in order of id, with their owners and hubs.
 void list_shared(SubdomainInterface& here, const BodySubdomains& standings, std::span<const BodyId> id,

@@ -19,6 +19,12 @@
 
 namespace talus {
 
+/// The place in an array that a plain number (of a body, contact or chunk) means. Not of a negative one.
+template <std::signed_integral Number>
+constexpr std::size_t at(Number k) {
+  return static_cast<std::size_t>(k);
+}
+
 /// The number of a thing of one kind: 4 bytes, in order of the number. `Tag` is never defined.
 template <class Tag>
 class Index {

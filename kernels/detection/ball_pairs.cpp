@@ -2,18 +2,11 @@
 
 #include <algorithm>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/touch.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 
 namespace talus {
-
-namespace {
-
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
-}  // namespace
 
 void split_into_balls(const ClumpView& clumps, Candidates& candidates) {
   if (clumps.shape.empty()) return;
@@ -21,14 +14,14 @@ void split_into_balls(const ClumpView& clumps, Candidates& candidates) {
   candidates.grain_pairs.clear();
   candidates.balls.clear();
   for (const GrainPair& pair : pairs)
-    for (std::size_t a = 0; a < clumps.balls(index(pair.first)); ++a)
-      for (std::size_t b = 0; b < clumps.balls(index(pair.second)); ++b) {
+    for (std::size_t a = 0; a < clumps.balls(at(pair.first)); ++a)
+      for (std::size_t b = 0; b < clumps.balls(at(pair.second)); ++b) {
         candidates.grain_pairs.push_back(pair);
         candidates.balls.push_back(ball_numbers(a, b));
       }
   std::vector<WallPair> at_walls;
   for (const WallPair& pair : candidates.wall_pairs) {
-    const auto balls = static_cast<std::int32_t>(clumps.balls(index(pair.body)));
+    const auto balls = static_cast<std::int32_t>(clumps.balls(at(pair.body)));
     for (std::int32_t ball = 0; ball < balls; ++ball)
       at_walls.push_back({pair.wall, pair.body, pair.feature * balls + ball});
   }
@@ -41,7 +34,7 @@ void note_kinds(const ClumpView& clumps, Chunks& chunks) {
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const auto begin = chunks.bodies.begin() + chunks.body_begin[c],
                end = chunks.bodies.begin() + chunks.body_begin[c + 1];
-    if (std::any_of(begin, end, [&](Slot slot) { return clumps.is_clump(index(slot)); }))
+    if (std::any_of(begin, end, [&](Slot slot) { return clumps.is_clump(at(slot)); }))
       chunks.kind[c] = ChunkKind::blocks;
   }
 }

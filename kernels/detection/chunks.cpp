@@ -6,16 +6,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/law/pair_table.hpp"
 
 namespace talus {
 
 namespace {
-
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 void place_boundaries(std::span<const CandidateGroup> groups, Chunks& chunks) {
   for (const CandidateGroup& group : groups) {
@@ -52,7 +49,7 @@ void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunk
       }
       return place[s];
     };
-    for (std::size_t k = index(chunks.begin[c]); k < index(chunks.begin[c + 1]); ++k) {
+    for (std::size_t k = at(chunks.begin[c]); k < at(chunks.begin[c + 1]); ++k) {
       if (k < grains) {
         chunks.local[2 * k] = local(candidates.grain_pairs[k].first);
         chunks.local[2 * k + 1] = local(candidates.grain_pairs[k].second);
@@ -71,8 +68,8 @@ void order_candidates(const Candidates& candidates, Chunks& chunks) {
   chunks.order.resize(candidates.grain_pairs.size());
   std::vector<std::uint16_t> degree;
   for (std::size_t c = 0; c < chunks.wall.size() && chunks.wall[c] < 0; ++c) {
-    const std::size_t begin = index(chunks.begin[c]), end = index(chunks.begin[c + 1]);
-    degree.assign(index(chunks.body_begin[c + 1] - chunks.body_begin[c]), 0);
+    const std::size_t begin = at(chunks.begin[c]), end = at(chunks.begin[c + 1]);
+    degree.assign(at(chunks.body_begin[c + 1] - chunks.body_begin[c]), 0);
     for (std::size_t k = 2 * begin; k < 2 * end; ++k) ++degree[chunks.local[k]];
     std::array<std::size_t, ranks + 1> next{};
     const auto rank = [&](std::size_t k) {
@@ -96,13 +93,13 @@ struct Incidence {
 Incidence chunks_of_bodies(const Chunks& chunks, std::size_t bodies) {
   Incidence incidence;
   incidence.begin.assign(bodies + 1, 0);
-  for (Slot s : chunks.bodies) ++incidence.begin[index(s) + 1];
+  for (Slot s : chunks.bodies) ++incidence.begin[at(s) + 1];
   std::partial_sum(incidence.begin.begin(), incidence.begin.end(), incidence.begin.begin());
   incidence.chunk.resize(chunks.bodies.size());
   std::vector<std::int32_t> next(incidence.begin.begin(), incidence.begin.end() - 1);
   for (std::size_t c = 0; c < chunks.wall.size(); ++c)
     for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1]; ++k)
-      incidence.chunk[index(next[index(chunks.bodies[index(k)])]++)] = static_cast<std::uint32_t>(c);
+      incidence.chunk[at(next[at(chunks.bodies[at(k)])]++)] = static_cast<std::uint32_t>(c);
   return incidence;
 }
 
@@ -114,9 +111,9 @@ void find_conflicts(const Incidence& incidence, Chunks& chunks) {
     const auto from = chunks.conflicts.size();
     met[c] = static_cast<std::uint32_t>(c);
     for (auto k = chunks.body_begin[c]; k < chunks.body_begin[c + 1]; ++k) {
-      const auto s = index(chunks.bodies[index(k)]);
+      const auto s = at(chunks.bodies[at(k)]);
       for (auto m = incidence.begin[s]; m < incidence.begin[s + 1]; ++m) {
-        const std::uint32_t other = incidence.chunk[index(m)];
+        const std::uint32_t other = incidence.chunk[at(m)];
         if (met[other] == c) continue;
         met[other] = static_cast<std::uint32_t>(c);
         chunks.conflicts.push_back(other);
@@ -138,11 +135,11 @@ void colour_chunks(Chunks& chunks) {
     for (std::size_t c = 0; c < count; ++c) {
       if (chunks.side[c] != side) continue;
       for (auto k = chunks.conflict_begin[c]; k < chunks.conflict_begin[c + 1]; ++k) {
-        const std::int32_t colour = chunks.colour[chunks.conflicts[index(k)]];
-        if (colour >= 0) taken_by[index(colour)] = static_cast<std::uint32_t>(c);
+        const std::int32_t colour = chunks.colour[chunks.conflicts[at(k)]];
+        if (colour >= 0) taken_by[at(colour)] = static_cast<std::uint32_t>(c);
       }
       std::int32_t colour = lowest;
-      while (taken_by[index(colour)] == c) ++colour;
+      while (taken_by[at(colour)] == c) ++colour;
       chunks.colour[c] = colour;
       chunks.colours = std::max(chunks.colours, colour + 1);
     }
@@ -157,19 +154,19 @@ void assign_resets(const Incidence& incidence, std::size_t bodies, std::span<con
   for (std::size_t s = 0; s < bodies; ++s) {
     if (!taken.empty() && taken[s] != 0) continue;
     for (auto m = incidence.begin[s]; m < incidence.begin[s + 1]; ++m) {
-      const auto c = static_cast<std::int32_t>(incidence.chunk[index(m)]);
-      if (owner[s] < 0 || chunks.colour[index(c)] < chunks.colour[index(owner[s])]) owner[s] = c;
+      const auto c = static_cast<std::int32_t>(incidence.chunk[at(m)]);
+      if (owner[s] < 0 || chunks.colour[at(c)] < chunks.colour[at(owner[s])]) owner[s] = c;
     }
     if (owner[s] < 0)
       chunks.untouched.push_back(static_cast<Slot>(s));
     else
-      ++chunks.owned_begin[index(owner[s]) + 1];
+      ++chunks.owned_begin[at(owner[s]) + 1];
   }
   std::partial_sum(chunks.owned_begin.begin(), chunks.owned_begin.end(), chunks.owned_begin.begin());
-  chunks.owned.resize(index(chunks.owned_begin.back()));
+  chunks.owned.resize(at(chunks.owned_begin.back()));
   std::vector<std::int32_t> next(chunks.owned_begin.begin(), chunks.owned_begin.end() - 1);
   for (std::size_t s = 0; s < bodies; ++s)
-    if (owner[s] >= 0) chunks.owned[index(next[index(owner[s])]++)] = static_cast<Slot>(s);
+    if (owner[s] >= 0) chunks.owned[at(next[at(owner[s])]++)] = static_cast<Slot>(s);
 }
 
 /// Walks two sorted lists together and calls same(k_old, k_fresh) where they meet.
@@ -227,12 +224,12 @@ std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates
   std::vector<CandidateGroup> groups;
   if (grains > 0) groups.push_back({0, grains, -1, 0, ChunkSide::inside, target});
   for (std::int32_t from = grains; from < all;) {
-    const std::int32_t wall = candidates.wall_pairs[index(from - grains)].wall;
+    const std::int32_t wall = candidates.wall_pairs[at(from - grains)].wall;
     std::int32_t to = from;
-    while (to < all && candidates.wall_pairs[index(to - grains)].wall == wall &&
-           (to == from || !begins_layer(candidates.wall_pairs, index(to - grains))))
+    while (to < all && candidates.wall_pairs[at(to - grains)].wall == wall &&
+           (to == from || !begins_layer(candidates.wall_pairs, at(to - grains))))
       ++to;
-    const bool at_glued = !glued.empty() && glued[index(wall)] != 0;
+    const bool at_glued = !glued.empty() && glued[at(wall)] != 0;
     groups.push_back({from, to, wall, 0, at_glued ? ChunkSide::wall : ChunkSide::inside, target});
     from = to;
   }
@@ -280,7 +277,7 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
   const std::size_t grains = candidates.grain_pairs.size();
   for (std::size_t k = 0; k < grains; ++k) {
     GrainPair& pair = candidates.grain_pairs[k];
-    pair = {place[index(pair.first)], place[index(pair.second)]};
+    pair = {place[at(pair.first)], place[at(pair.second)]};
     if (pair.first < pair.second) continue;
     std::swap(pair.first, pair.second);
     if (!candidates.balls.empty())
@@ -288,16 +285,16 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
           static_cast<std::uint16_t>(candidates.balls[k] % 256 * 256 + candidates.balls[k] / 256);
     candidates.impulse.swap_bodies(k);
   }
-  for (WallPair& pair : candidates.wall_pairs) pair.body = place[index(pair.body)];
+  for (WallPair& pair : candidates.wall_pairs) pair.body = place[at(pair.body)];
 
   std::vector<std::size_t> order(candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto split = order.begin() + static_cast<std::ptrdiff_t>(grains);
   // A body is first in a few pairs only: counting by the first leaves short runs.
   std::vector<std::size_t> begin(place.size() + 2, 0);
-  for (const GrainPair& pair : candidates.grain_pairs) ++begin[index(pair.first) + 2];
+  for (const GrainPair& pair : candidates.grain_pairs) ++begin[at(pair.first) + 2];
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  for (std::size_t k = 0; k < grains; ++k) order[begin[index(candidates.grain_pairs[k].first) + 1]++] = k;
+  for (std::size_t k = 0; k < grains; ++k) order[begin[at(candidates.grain_pairs[k].first) + 1]++] = k;
   for (std::size_t body = 0; body < place.size(); ++body)
     std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin[body]),
               order.begin() + static_cast<std::ptrdiff_t>(begin[body + 1]),

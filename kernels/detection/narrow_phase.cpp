@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/detail/block_phase.hpp"
 #include "kernels/detection/detail/contact_groups.hpp"
 #include "kernels/detection/detail/gap_kernels.hpp"
@@ -14,17 +15,13 @@ namespace talus {
 
 namespace {
 
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
 struct Pairing {
   Vec3 d;  ///< x_i - x_j
   Vec3 v;  ///< u_i - u_j
   double radius_i, radius_j;
 };
 Pairing meet(const PairView& pairs, std::size_t k) {
-  const std::size_t i = index(pairs.first[k]), j = index(pairs.second[k]);
+  const std::size_t i = at(pairs.first[k]), j = at(pairs.second[k]);
   using Map = Eigen::Map<const Vec3>;
   return {pairs.domain.separation(Vec3(Map(pairs.x + 3 * i)), Vec3(Map(pairs.x + 3 * j))),
           Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
@@ -66,14 +63,14 @@ std::vector<double> own_restitution(const ChunkPhase& phase, const Slot* first, 
   const Chunks& chunks = phase.chunks;
   if (chunks.law[phase.chunk] != mixed_laws) return own;
   const MaterialView materials = materials_of(phase.in);
-  for (std::size_t k = 0; k < index(chunks.begin[phase.chunk + 1] - chunks.begin[phase.chunk]); ++k)
+  for (std::size_t k = 0; k < at(chunks.begin[phase.chunk + 1] - chunks.begin[phase.chunk]); ++k)
     own.push_back(phase.in.laws.laws()[materials.law(GrainPair{first[k], second[k]})].restitution);
   return own;
 }
 
 void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
-  const std::size_t begin = index(chunks.begin[chunk]), count = index(chunks.begin[chunk + 1]) - begin;
+  const std::size_t begin = at(chunks.begin[chunk]), count = at(chunks.begin[chunk + 1]) - begin;
   Slot *first = contacts.first.data() + begin, *second = contacts.second.data() + begin;
   std::vector<std::int64_t> contact(count);
   static_assert(sizeof(Vec3) == 3 * sizeof(double) && sizeof(Velocity) == 8 * sizeof(double));
@@ -102,31 +99,31 @@ double restitution_at(const ChunkPhase& phase, const WallPair& pair) {
 /// At a plane.
 void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
-  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
-  const Wall& wall = in.walls[index(chunks.wall[chunk])];
+  const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);
+  const Wall& wall = in.walls[at(chunks.wall[chunk])];
   const double fall = wall.normal.dot(in.time_step * in.gravity - wall.gain);
   std::int32_t through = 0;
-  std::size_t at = begin;
-  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+  std::size_t place = begin;
+  for (std::size_t k = begin; k < at(chunks.begin[chunk + 1]); ++k) {
     const WallPair& pair = candidates.wall_pairs[k - grains];
     const Slot body = pair.body;
-    const std::size_t i = index(body);
+    const std::size_t i = at(body);
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
     const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
     const GapResult<double> found = solve_gap(rule, gap, v_n, v_n + fall, restitution_at(phase, pair));
     if (found.absent) continue;
-    contacts.bias[at] = found.bias;
-    contacts.nx[at] = wall.normal[0];
-    contacts.ny[at] = wall.normal[1];
-    contacts.nz[at] = wall.normal[2];
-    contacts.first[at] = body;
-    contacts.first_record[at] = record_of(body);
-    contacts.second[at] = -1;
-    contacts.candidate[at++] = static_cast<std::int32_t>(k);
+    contacts.bias[place] = found.bias;
+    contacts.nx[place] = wall.normal[0];
+    contacts.ny[place] = wall.normal[1];
+    contacts.nz[place] = wall.normal[2];
+    contacts.first[place] = body;
+    contacts.first_record[place] = record_of(body);
+    contacts.second[place] = -1;
+    contacts.candidate[place++] = static_cast<std::int32_t>(k);
   }
   contacts.passed[chunk] = through;
-  detail::close_groups(chunks, chunk, at, contacts);
+  detail::close_groups(chunks, chunk, place, contacts);
 }
 
 /// True when a body that has come by `way` to `x` was deep in a surface on it: such a step is too long, and a
@@ -143,15 +140,15 @@ bool passed_surface(const Surface& surface, const Vec3& x, const Vec3& way, doub
 /// At a surface: a chunk has each grain once, with one of the features that it may touch.
 void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
-  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
-  const Surface& surface = *in.walls[index(chunks.wall[chunk])].surface();
+  const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);
+  const Surface& surface = *in.walls[at(chunks.wall[chunk])].surface();
   std::int32_t through = 0;
-  std::size_t at = begin;
+  std::size_t place = begin;
   std::vector<SurfacePoint> points;
-  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+  for (std::size_t k = begin; k < at(chunks.begin[chunk + 1]); ++k) {
     const WallPair& pair = candidates.wall_pairs[k - grains];
     const auto [wall, body, feature] = pair;
-    const std::size_t i = index(body);
+    const std::size_t i = at(body);
     const Vec3 v = Eigen::Map<const Vec3>(in.velocity[i].u), free = v + in.time_step * in.gravity;
     points.clear();
     surface.collide(in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
@@ -161,17 +158,17 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const GapResult<double> found = solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v),
                                               point->normal.dot(free), restitution_at(phase, pair));
     if (found.absent) continue;
-    contacts.bias[at] = found.bias;
-    contacts.nx[at] = point->normal[0];
-    contacts.ny[at] = point->normal[1];
-    contacts.nz[at] = point->normal[2];
-    contacts.first[at] = body;
-    contacts.first_record[at] = record_of(body);
-    contacts.second[at] = -1 - feature;
-    contacts.candidate[at++] = static_cast<std::int32_t>(k);
+    contacts.bias[place] = found.bias;
+    contacts.nx[place] = point->normal[0];
+    contacts.ny[place] = point->normal[1];
+    contacts.nz[place] = point->normal[2];
+    contacts.first[place] = body;
+    contacts.first_record[place] = record_of(body);
+    contacts.second[place] = -1 - feature;
+    contacts.candidate[place++] = static_cast<std::int32_t>(k);
   }
   contacts.passed[chunk] = through;
-  detail::close_groups(chunks, chunk, at, contacts);
+  detail::close_groups(chunks, chunk, place, contacts);
 }
 
 }  // namespace
@@ -179,7 +176,7 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, InstructionSet set, Contacts& contacts) {
   const std::int32_t law = chunks.law[chunk];
-  const double restitution = law == mixed_laws ? 0 : in.laws.laws()[index(law)].restitution;
+  const double restitution = law == mixed_laws ? 0 : in.laws.laws()[at(law)].restitution;
   const ChunkPhase phase{
       in,
       {in.time_step, in.alert, restitution, in.overlap_correction, 2 * in.time_step * in.gravity.norm()},
@@ -190,7 +187,7 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
     detail::narrow_blocks(in, phase.rule, candidates, chunks, chunk, contacts);
   else if (chunks.wall[chunk] < 0)
     narrow_grains(phase, set, contacts);
-  else if (in.walls[index(chunks.wall[chunk])].surface() == nullptr)
+  else if (in.walls[at(chunks.wall[chunk])].surface() == nullptr)
     narrow_wall(phase, contacts);
   else
     narrow_surface(phase, contacts);

@@ -5,16 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/global/body_solver.hpp"
 #include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// What the iteration carries along, of one part: an entry per contact.
 struct PartState {

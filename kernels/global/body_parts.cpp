@@ -2,15 +2,9 @@
 
 #include <utility>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus {
-
-namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
-}  // namespace
 
 void PartLink::each(std::size_t parts, const std::function<void(std::size_t)>& work) const {
   for (std::size_t p = 0; p < parts; ++p) work(p);

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
 
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// Of a body over that of the copy at a slot.
 double masses_of_slot(const BodyProblemSource& source, std::size_t slot) {

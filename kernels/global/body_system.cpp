@@ -2,13 +2,11 @@
 
 #include <Eigen/Cholesky>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 Eigen::Matrix3d cross_matrix(const Vec3& n) {
   Eigen::Matrix3d N;

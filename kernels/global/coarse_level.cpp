@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// Grains that a part makes aggregates of.
 bool grain_here(const BodyProblem& problem, std::int32_t body) {

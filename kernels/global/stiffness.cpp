@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// One part's bodies by their distance over contacts from the driven walls.
 struct Layers {

@@ -1,11 +1,12 @@
 #include "kernels/law/friction_cone.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
+
+#include "kernels/law/detail/quartic.hpp"
 
 namespace talus {
 namespace {
@@ -105,9 +106,8 @@ double slide_residual(const Mat3& W, const Vec3& q, const Vec3& r) {
   return miss.norm() / (q.norm() + 8 * epsilon / accepted * (W.cwiseAbs() * r.cwiseAbs()).norm());
 }
 
-/// Roots of the quartic |n(alpha)|^2 weight_t^2 = (weight_n normal(alpha))^2 as eigenvalues of its companion
-/// matrix; the sliding impulse of least residual among them. For blocks on which the bracket fails (not
-/// positive semi-definite).
+/// Of all roots of the quartic |n(alpha)|^2 weight_t^2 = (weight_n normal(alpha))^2 the sliding impulse of
+/// least residual. For blocks on which the bracket fails (not positive semi-definite).
 Vec3 best_of_all_roots(const SlidingEquation& e, const Mat3& W, const Vec3& q, double mu) {
   Vec3 best = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   double best_residual = std::numeric_limits<double>::infinity();
@@ -116,14 +116,9 @@ Vec3 best_of_all_roots(const SlidingEquation& e, const Mat3& W, const Vec3& q, d
   const double a0 = t * e.n0.squaredNorm() - n * c0 * c0, a1 = 2 * t * e.n0.dot(e.n1) - 2 * n * c0 * c1,
                a2 = t * e.n1.squaredNorm() - n * (c1 * c1 + 2 * c0 * c2), a3 = -2 * n * c1 * c2,
                a4 = -n * c2 * c2;
-  Eigen::Matrix4d companion = Eigen::Matrix4d::Zero();
-  companion.bottomLeftCorner<3, 3>().setIdentity();
-  companion.col(3) << -a0 / a4, -a1 / a4, -a2 / a4, -a3 / a4;
-  if (!companion.allFinite()) return best;
-  const Eigen::EigenSolver<Eigen::Matrix4d> solver(companion, false);
-  if (solver.info() != Eigen::Success) return best;
-  for (int i = 0; i < 4; ++i) {
-    double alpha = solver.eigenvalues()[i].real();
+  const auto roots = detail::real_parts_of_roots({a0 / a4, a1 / a4, a2 / a4, a3 / a4});
+  if (!roots) return best;
+  for (double alpha : *roots) {
     if (alpha <= 0) continue;
     for (int step = 0; step < 5; ++step) {
       const double value = (((a4 * alpha + a3) * alpha + a2) * alpha + a1) * alpha + a0;

@@ -25,7 +25,7 @@ namespace {
 // Supports that are not grains; the lower number counts as the older.
 enum Plane : std::int32_t { floor_plane = -1, x_high = -2, x_low = -3, y_high = -4, y_low = -5 };
 
-struct Grain {
+struct LyingGrain {
   Vec3 x;
   double radius;
 };
@@ -148,7 +148,7 @@ class Deposition {
 
  private:
   Site& site(std::int32_t id) { return sites_[static_cast<std::size_t>(id)]; }
-  const Grain& grain(std::int32_t g) const { return grains_[static_cast<std::size_t>(g)]; }
+  const LyingGrain& grain(std::int32_t g) const { return grains_[static_cast<std::size_t>(g)]; }
 
   double class_low(std::size_t c) const {
     return smallest_ + static_cast<double>(c) * (largest_ - smallest_) / static_cast<double>(heaps_.size());
@@ -160,7 +160,7 @@ class Deposition {
   }
 
   /// Obstacle `s`, grain or plane, seen from `base`.
-  Obstacle obstacle(std::int32_t s, const Grain& base) const {
+  Obstacle obstacle(std::int32_t s, const LyingGrain& base) const {
     switch (s) {
       case floor_plane:
         return wall_obstacle(Vec3::UnitZ(), base.x[2]);
@@ -178,7 +178,7 @@ class Deposition {
   }
 
   SiteCurve curve_of(const Site& s) const {
-    const Grain& base = grain(s.support[0]);
+    const LyingGrain& base = grain(s.support[0]);
     SiteCurve curve;
     site_curve(base.radius, obstacle(s.support[1], base), obstacle(s.support[2], base), s.side, curve);
     return curve;
@@ -224,7 +224,7 @@ class Deposition {
     });
     if (blocker < 0) return false;
     if (site(id).support[0] < 0) return true;  // the four corners stay as they are
-    const Grain& base = grain(site(id).support[0]);
+    const LyingGrain& base = grain(site(id).support[0]);
     ranges_.assign(1, site(id).range);
     keep_clear(curve_of(site(id)), obstacle(blocker, base), 0, ranges_);
     // A grain in the middle of the range leaves two parts; the second becomes a site of its own.
@@ -323,7 +323,7 @@ class Deposition {
 
   double smallest_, largest_, lx_, ly_;
   Cells cells_;
-  std::vector<Grain> grains_;
+  std::vector<LyingGrain> grains_;
   std::vector<Site> sites_;
   std::vector<std::int32_t> free_;
   std::vector<std::vector<Entry>> heaps_;  ///< by class of radius

@@ -30,12 +30,12 @@ class Disc final : public Surface {
   double radius_;
 };
 
-std::shared_ptr<const Surface> make(const ShapeValues& values) {
+std::shared_ptr<const Surface> make_disc(const ShapeValues& values) {
   if (!(values.vector("axis").norm() > 0)) throw std::invalid_argument("axis must not be zero");
   return std::make_shared<Disc>(values.vector("centre"), values.vector("axis"), values.scalar("radius"));
 }
 
-constexpr ShapeParameter parameters[] = {
+constexpr ShapeParameter disc_parameters[] = {
     {"centre", "m", ShapeParameter::Kind::vector, "Centre."},
     {"axis", "", ShapeParameter::Kind::vector, "Direction at right angles to the disc, of any length."},
     {"radius", "m", ShapeParameter::Kind::length, "Radius."},
@@ -44,7 +44,7 @@ constexpr ShapeParameter parameters[] = {
 }  // namespace
 
 extern const ShapeEntry disc_shape;
-const ShapeEntry disc_shape = {"disc", "a round plate without thickness, touched from both sides", parameters,
-                               make};
+const ShapeEntry disc_shape = {"disc", "a round plate without thickness, touched from both sides",
+                               disc_parameters, make_disc};
 
 }  // namespace talus

@@ -4,7 +4,7 @@ namespace talus {
 
 namespace {
 
-Clump make() {
+Clump make_dumbbell() {
   const Ball balls[] = {{{-1, 0, 0}, 1}, {{1, 0, 0}, 1}};
   return make_clump(balls).clump;
 }
@@ -12,6 +12,7 @@ Clump make() {
 }  // namespace
 
 extern const BodyShapeEntry dumbbell_body;
-const BodyShapeEntry dumbbell_body = named<BodyShape>("dumbbell", "two equal balls that touch", make);
+const BodyShapeEntry dumbbell_body =
+    named<BodyShape>("dumbbell", "two equal balls that touch", make_dumbbell);
 
 }  // namespace talus

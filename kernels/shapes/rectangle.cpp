@@ -38,7 +38,7 @@ class Rectangle final : public Surface {
   Vec3 along_[2];     ///< unit
 };
 
-std::shared_ptr<const Surface> make(const ShapeValues& values) {
+std::shared_ptr<const Surface> make_rectangle(const ShapeValues& values) {
   const Vec3 a = values.vector("edge_a"), b = values.vector("edge_b");
   if (!(a.norm() > 0)) throw std::invalid_argument("edge_a must not be zero");
   if (!(b.norm() > 0)) throw std::invalid_argument("edge_b must not be zero");
@@ -47,7 +47,7 @@ std::shared_ptr<const Surface> make(const ShapeValues& values) {
   return std::make_shared<Rectangle>(values.vector("corner"), a, b);
 }
 
-constexpr ShapeParameter parameters[] = {
+constexpr ShapeParameter rectangle_parameters[] = {
     {"corner", "m", ShapeParameter::Kind::vector, "A corner of the rectangle."},
     {"edge_a", "m", ShapeParameter::Kind::vector, "Edge of the rectangle that begins at `corner`."},
     {"edge_b", "m", ShapeParameter::Kind::vector, "The other edge there, at right angles to `edge_a`."},
@@ -57,6 +57,6 @@ constexpr ShapeParameter parameters[] = {
 
 extern const ShapeEntry rectangle_shape;
 const ShapeEntry rectangle_shape = {"rectangle", "a plate without thickness, touched from both sides",
-                                    parameters, make};
+                                    rectangle_parameters, make_rectangle};
 
 }  // namespace talus

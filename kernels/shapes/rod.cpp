@@ -4,7 +4,7 @@ namespace talus {
 
 namespace {
 
-Clump make() {
+Clump make_rod() {
   const Ball balls[] = {{{-2, 0, 0}, 1}, {{0, 0, 0}, 1}, {{2, 0, 0}, 1}};
   return make_clump(balls).clump;
 }
@@ -13,6 +13,6 @@ Clump make() {
 
 extern const BodyShapeEntry rod_body;
 const BodyShapeEntry rod_body =
-    named<BodyShape>("rod", "three equal balls in a row, each touching the next", make);
+    named<BodyShape>("rod", "three equal balls in a row, each touching the next", make_rod);
 
 }  // namespace talus

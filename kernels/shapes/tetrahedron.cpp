@@ -5,7 +5,7 @@ namespace talus {
 namespace {
 
 /// Every other corner of a cube of side sqrt(2): 2 apart.
-Clump make() {
+Clump make_tetrahedron() {
   constexpr double c = 0.70710678118654752;
   const Ball balls[] = {{{c, c, c}, 1}, {{c, -c, -c}, 1}, {{-c, c, -c}, 1}, {{-c, -c, c}, 1}};
   return make_clump(balls).clump;
@@ -15,6 +15,6 @@ Clump make() {
 
 extern const BodyShapeEntry tetrahedron_body;
 const BodyShapeEntry tetrahedron_body =
-    named<BodyShape>("tetrahedron", "four equal balls, each touching all others", make);
+    named<BodyShape>("tetrahedron", "four equal balls, each touching all others", make_tetrahedron);
 
 }  // namespace talus

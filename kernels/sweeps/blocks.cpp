@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/measures.hpp"
 #include "kernels/law/contact_law.hpp"
 #include "kernels/law/friction_cone.hpp"
@@ -10,10 +11,6 @@
 namespace talus {
 
 namespace {
-
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 using Map = Eigen::Map<Vec3>;
 using ConstMap = Eigen::Map<const Vec3>;
@@ -25,9 +22,9 @@ Vec3 surface_velocity(const Velocity& body, const Mat3& lever) {
 Vec3 relative_velocity(const Contacts& contacts, std::size_t k, std::span<const Velocity> velocity,
                        const WallCopy* wall) {
   const Levers& levers = contacts.levers[k];
-  const Vec3 v = surface_velocity(velocity[index(contacts.first[k])], levers.first);
+  const Vec3 v = surface_velocity(velocity[at(contacts.first[k])], levers.first);
   if (wall != nullptr) return v - ConstMap(wall->velocity);
-  return v - surface_velocity(velocity[index(contacts.second[k])], levers.second);
+  return v - surface_velocity(velocity[at(contacts.second[k])], levers.second);
 }
 
 /// Adds what a body, of whose mass the record holds one of `parts`, gives to W.
@@ -39,14 +36,14 @@ void add_mobility(const Velocity& body, const Mat3& lever, double parts, Mat3& W
 Mat3 mobility_of(const Contacts& contacts, std::size_t k, std::span<const Velocity> velocity,
                  const WallCopy* wall, Multiplicities parts) {
   const auto parts_of = [&](std::size_t slot) { return parts.empty() ? 1.0 : double{1} * parts[slot]; };
-  const std::size_t i = index(contacts.first[k]);
+  const std::size_t i = at(contacts.first[k]);
   Mat3 W = Mat3::Zero();
   add_mobility(velocity[i], contacts.levers[k].first, parts_of(i), W);
   if (wall != nullptr) {
     const Vec3 n = contact_normal(contacts, k);
     W += wall->inv_mass * n * n.transpose();
   } else {
-    const std::size_t j = index(contacts.second[k]);
+    const std::size_t j = at(contacts.second[k]);
     add_mobility(velocity[j], contacts.levers[k].second, parts_of(j), W);
   }
   return W;
@@ -61,8 +58,8 @@ void push(Velocity& body, const Mat3& lever, const Vec3& impulse) {
 void push(const Contacts& contacts, std::size_t k, const Vec3& impulse, std::span<Velocity> velocity,
           WallCopy* wall) {
   const Levers& levers = contacts.levers[k];
-  push(velocity[index(contacts.first[k])], levers.first, impulse);
-  if (wall == nullptr) return push(velocity[index(contacts.second[k])], levers.second, -impulse);
+  push(velocity[at(contacts.first[k])], levers.first, impulse);
+  if (wall == nullptr) return push(velocity[at(contacts.second[k])], levers.second, -impulse);
   const Vec3 n = contact_normal(contacts, k);
   Map(wall->velocity) -= wall->inv_mass * n.dot(impulse) * n;
 }

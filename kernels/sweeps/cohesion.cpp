@@ -2,19 +2,12 @@
 
 #include <algorithm>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
 #include "kernels/detection/touch.hpp"
 
 namespace talus {
-
-namespace {
-
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
-}  // namespace
 
 void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                    std::size_t chunk, Contacts& contacts) {
@@ -22,10 +15,10 @@ void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Ch
   constexpr CohesionRule rule;
   const MaterialView materials{in.material, in.walls};
   const Poses poses{in.x, in.radius, in.walls, in.clumps, in.domain};
-  const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[index(chunks.wall[chunk])];
-  const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
+  const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[at(chunks.wall[chunk])];
+  const std::size_t begin = at(chunks.begin[chunk]), end = begin + at(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k) {
-    const double c = law_at(in.laws, candidates, materials, index(contacts.candidate[k])).cohesion;
+    const double c = law_at(in.laws, candidates, materials, at(contacts.candidate[k])).cohesion;
     const Touch touch = touch_of(poses, contacts, k, wall);
     contacts.cohesion[k] = touch.gap <= rule.reach * touch.smaller_radius ? c * in.time_step : 0;
   }
@@ -36,14 +29,14 @@ void pull_together(const Contacts& contacts, ContactRange range, std::span<Veloc
   if (contacts.cohesion.empty()) return;
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const Vec3 normal = contact_normal(contacts, k), pull = contacts.cohesion[k] * normal;
-    Velocity& first = velocity[index(contacts.first[k])];
+    Velocity& first = velocity[at(contacts.first[k])];
     Eigen::Map<Vec3> u(first.u);
     u -= first.inv_mass * pull;
     if (wall) {
       Eigen::Map<Vec3> v(wall->velocity);
       v += wall->inv_mass * pull;
     } else {
-      Velocity& second = velocity[index(contacts.second[k])];
+      Velocity& second = velocity[at(contacts.second[k])];
       Eigen::Map<Vec3> v(second.u);
       v += second.inv_mass * pull;
     }

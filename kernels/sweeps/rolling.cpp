@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/measures.hpp"
 #include "kernels/law/rolling_law.hpp"
@@ -9,10 +10,6 @@
 namespace talus {
 
 namespace {
-
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// A body as moments see it: a sphere of radius 1 that nothing turns stands in for a wall.
 struct Turning {
@@ -22,8 +19,8 @@ struct Turning {
 };
 Turning turning_of(std::span<const double> radius, std::span<const Velocity> velocity, Slot slot) {
   if (slot < 0) return {};
-  const Velocity& v = velocity[index(slot)];
-  const double r = radius[index(slot)];
+  const Velocity& v = velocity[at(slot)];
+  const double r = radius[at(slot)];
   return {r, v.spin_mobility / (r * r), Eigen::Map<const Vec3>(v.w) / r};
 }
 
@@ -41,9 +38,9 @@ Vec3 moment_of(const Contacts& contacts, std::size_t k) {
 /// Turns a body by the impulse of a moment [N m s].
 void turn(const Vec3& moment, std::span<const double> radius, std::span<Velocity> velocity, Slot slot) {
   if (slot < 0) return;
-  Velocity& v = velocity[index(slot)];
+  Velocity& v = velocity[at(slot)];
   Eigen::Map<Vec3> w(v.w);
-  w += v.spin_mobility / radius[index(slot)] * moment;
+  w += v.spin_mobility / radius[at(slot)] * moment;
 }
 
 }  // namespace
@@ -52,12 +49,12 @@ void find_arms(const NarrowPhase& in, const Candidates& candidates, const Chunks
                Contacts& contacts) {
   if (contacts.arm.empty()) return;
   const MaterialView materials{in.material, in.walls};
-  const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
+  const std::size_t begin = at(chunks.begin[chunk]), end = begin + at(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k) {
-    const PairLaw& law = law_at(in.laws, candidates, materials, index(contacts.candidate[k]));
+    const PairLaw& law = law_at(in.laws, candidates, materials, at(contacts.candidate[k]));
     const double mu = law.friction > 0 ? law.rolling_resistance : 0;  // smooth contacts do not roll
-    const double a = in.radius[index(contacts.first[k])];
-    const double b = contacts.second[k] < 0 ? a : in.radius[index(contacts.second[k])];
+    const double a = in.radius[at(contacts.first[k])];
+    const double b = contacts.second[k] < 0 ? a : in.radius[at(contacts.second[k])];
     contacts.arm[k] = mu * (contacts.second[k] < 0 ? a : a * b / (a + b));
   }
 }
@@ -95,7 +92,7 @@ void add_error_of_moments(const Contacts& contacts, ContactRange range, std::spa
   if (contacts.arm.empty()) return;
   const auto whole = [&](Slot slot) {
     Turning body = turning_of(radius, velocity, slot);
-    if (slot >= 0 && !parts.empty()) body.mobility /= parts[index(slot)];
+    if (slot >= 0 && !parts.empty()) body.mobility /= parts[at(slot)];
     return body;
   };
   for (std::size_t k = range.begin; k < range.end; ++k) {

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus::detail {
 
 namespace {
@@ -39,10 +41,6 @@ struct Node {
   std::int64_t below = 0;
   std::int64_t total = 0;
 };
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// One level of the tree at a time, all nodes of a level together, so that ranks meet a number of times that
 /// grows with the depth and not with the number of subdomains.

@@ -10,15 +10,13 @@
 #include <string>
 #include <tuple>
 
+#include "kernels/bodies/index.hpp"
+
 namespace talus::detail {
 
 namespace {
 
 constexpr std::int64_t most_cells = 1 << 18;
-
-std::size_t at(std::int64_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 CellTable empty_table(const IntegerFrame& frame, double cells) {
   // Edge of a cube of which `cells` fill the box. Axes shorter than it get one cell, and the others all.

@@ -11,7 +11,7 @@ void cut_with(PartitionKind kind, const Cutting& cutting, Partition& partition) 
   partitioner_registry().of(kind).make->cut(cutting, partition);
 }
 
-void cut(const Cutting& cutting, Partition& partition) {
+void cut_automatic(const Cutting& cutting, Partition& partition) {
   if (cutting.previous != nullptr && cutting.previous->kind != PartitionKind::boxes)
     return cut_with(cutting.previous->kind, cutting, partition);
   cut_with(PartitionKind::boxes, cutting, partition);
@@ -21,6 +21,6 @@ void cut(const Cutting& cutting, Partition& partition) {
 
 }  // namespace
 
-const Partitioner automatic_partitioner{cut, true};
+const Partitioner automatic_partitioner{cut_automatic, true};
 
 }  // namespace talus

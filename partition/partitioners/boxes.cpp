@@ -5,12 +5,12 @@
 namespace talus {
 namespace {
 
-void cut(const Cutting& cutting, Partition& partition) {
+void cut_boxes(const Cutting& cutting, Partition& partition) {
   partition.tree = detail::regular_boxes(boxes_of(cutting.options, partition.frame));
 }
 
 }  // namespace
 
-const Partitioner boxes_partitioner{cut, true};
+const Partitioner boxes_partitioner{cut_boxes, true};
 
 }  // namespace talus

@@ -5,13 +5,13 @@
 namespace talus {
 namespace {
 
-void cut(const Cutting& cutting, Partition& partition) {
+void cut_fitted(const Cutting& cutting, Partition& partition) {
   partition.tree = detail::fitted_boxes(weighted_points(cutting, partition.frame),
                                         boxes_of(cutting.options, partition.frame), cutting.reduction);
 }
 
 }  // namespace
 
-const Partitioner fitted_partitioner{cut, true};
+const Partitioner fitted_partitioner{cut_fitted, true};
 
 }  // namespace talus

@@ -56,7 +56,7 @@ std::vector<std::size_t> along_curve(const CellTable& table) {
   return order;
 }
 
-void cut(const Cutting& cutting, Partition& partition) {
+void cut_hilbert(const Cutting& cutting, Partition& partition) {
   const std::int64_t n = partition.subdomains;
   std::vector<std::int64_t> weight;
   CellTable& table = partition.table;
@@ -76,6 +76,6 @@ void cut(const Cutting& cutting, Partition& partition) {
 
 }  // namespace
 
-const Partitioner hilbert_partitioner{cut};
+const Partitioner hilbert_partitioner{cut_hilbert};
 
 }  // namespace talus

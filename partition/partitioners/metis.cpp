@@ -7,7 +7,7 @@
 namespace talus {
 namespace {
 
-void cut(const Cutting& cutting, Partition& partition) {
+void cut_metis(const Cutting& cutting, Partition& partition) {
   const std::int32_t n = partition.subdomains;
   const auto graph = detail::build_cell_graph(cutting.points, partition.frame,
                                               detail::cells_per_subdomain * n, cutting.reduction);
@@ -19,6 +19,6 @@ void cut(const Cutting& cutting, Partition& partition) {
 
 }  // namespace
 
-const Partitioner metis_partitioner{cut, false, true};
+const Partitioner metis_partitioner{cut_metis, false, true};
 
 }  // namespace talus

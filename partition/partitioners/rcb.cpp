@@ -6,7 +6,7 @@
 namespace talus {
 namespace {
 
-void cut(const Cutting& cutting, Partition& partition) {
+void cut_rcb(const Cutting& cutting, Partition& partition) {
   const bool same = cutting.previous != nullptr && cutting.previous->kind == PartitionKind::rcb;
   partition.tree = detail::recursive_bisection(weighted_points(cutting, partition.frame),
                                                partition.subdomains, partition.frame,
@@ -15,6 +15,6 @@ void cut(const Cutting& cutting, Partition& partition) {
 
 }  // namespace
 
-const Partitioner rcb_partitioner{cut};
+const Partitioner rcb_partitioner{cut_rcb};
 
 }  // namespace talus

@@ -14,7 +14,7 @@ namespace talus {
 namespace {
 
 /// Grains on the way at a time, of all receivers together: less than a megabyte.
-constexpr std::size_t piece = 8192;
+constexpr std::size_t dealt_at_once = 8192;
 
 /// A grain on its way.
 struct GrainRecord {
@@ -107,9 +107,9 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
   for (std::int32_t to : rank) ++count[static_cast<std::size_t>(to)];
   ranks.sum(count);
   reserve(bodies, static_cast<std::size_t>(count[static_cast<std::size_t>(ranks.rank())]));
-  for (std::size_t begin = 0; begin < static_cast<std::size_t>(all.grains); begin += piece) {
+  for (std::size_t begin = 0; begin < static_cast<std::size_t>(all.grains); begin += dealt_at_once) {
     std::vector<std::vector<GrainRecord>> to(count.size());
-    for (std::size_t k = begin; k < std::min(begin + piece, sample.size()); ++k)
+    for (std::size_t k = begin; k < std::min(begin + dealt_at_once, sample.size()); ++k)
       to[static_cast<std::size_t>(rank[k])].push_back(record_of(sample, k));
     for (const auto& part : ranks.exchange_records(std::move(to)))
       for (const GrainRecord& record : part) add(record, all, bodies);

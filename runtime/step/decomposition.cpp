@@ -8,6 +8,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/bodies/morton.hpp"
 #include "kernels/bodies/release.hpp"
 #include "partition/halo.hpp"
@@ -26,10 +27,6 @@ struct BodyRecord {
   double orientation[4];
   std::int32_t material, shape;
 };
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 BodyRecord record_of(const Decomposition& decomposition, const Bodies& bodies, std::span<const double> reach,
                      std::size_t s) {

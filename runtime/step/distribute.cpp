@@ -5,6 +5,7 @@
 #include <numeric>
 #include <tuple>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "partition/subdomain_colours.hpp"
@@ -22,10 +23,6 @@ struct ImpulseRecord {
   std::int64_t feature;  ///< of the wall; between bodies Candidates::balls, or 0
   double r[static_cast<std::size_t>(ImpulseKind::rolling)];  ///< a row of KeptImpulses
 };
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// The midpoint decides; at a wall the centre.
 Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3> x) {

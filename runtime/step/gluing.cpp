@@ -11,7 +11,6 @@ namespace talus {
 
 using detail::any_colour;
 using detail::assign;
-using detail::at;
 using detail::await;
 using detail::behind_all;
 using detail::mean;

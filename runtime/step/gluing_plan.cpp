@@ -11,7 +11,6 @@
 
 namespace talus {
 
-using detail::at;
 using detail::behind_all;
 using detail::tag_of;
 

@@ -7,7 +7,6 @@
 
 namespace talus {
 
-using detail::at;
 using detail::Link;
 using detail::root_tag;
 

@@ -6,7 +6,7 @@
 
 #include "tests/validation/clump_scenes.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_clumps_test {
 namespace {
 
 TEST(Clumps, HaveMassAndInertiaOfTheirBalls) {
@@ -307,4 +307,4 @@ TEST(Clumps, MoveTheSameByAdmm) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_clumps_test

@@ -4,7 +4,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_cohesion_test {
 namespace {
 
 constexpr double h = 1e-3, radius = 0.1, mass = 2, weight = mass * g_earth;
@@ -107,4 +107,4 @@ TEST(Cohesion, ChainHangsTheSameInOneSubdomainAndInSeveralAndByEveryMethod) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_cohesion_test

@@ -6,7 +6,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_cone_test {
 namespace {
 
 constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
@@ -58,4 +58,4 @@ TEST(BallInACone, SlidesDownItsSideAsDownAPlane) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_cone_test

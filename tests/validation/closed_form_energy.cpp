@@ -7,7 +7,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_energy_test {
 namespace {
 
 constexpr double h = 1e-3, edge = 1.0;
@@ -122,4 +122,4 @@ TEST(Momentum, OfACloudIsKeptWhenItsGrainsCollide) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_energy_test

@@ -8,7 +8,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_impacts_test {
 namespace {
 
 /// A sphere about to meet the floor with (v_t, -v_n), without gravity.
@@ -128,7 +128,7 @@ Scene two_spheres(double e, double mu, double head_start) {
   return scene;
 }
 
-Vec3 momentum(const Experiment& run) {
+Vec3 sphere_momentum(const Experiment& run) {
   const Bodies& bodies = run.simulation().state().bodies;
   Vec3 sum = Vec3::Zero();
   for (std::size_t s = 0; s < bodies.size(); ++s)
@@ -137,7 +137,7 @@ Vec3 momentum(const Experiment& run) {
 }
 
 /// About the origin; I omega = w R / (R^2/I).
-Vec3 angular_momentum(const Experiment& run) {
+Vec3 sphere_angular_momentum(const Experiment& run) {
   const Bodies& bodies = run.simulation().state().bodies;
   Vec3 sum = Vec3::Zero();
   for (std::size_t s = 0; s < bodies.size(); ++s) {
@@ -152,12 +152,12 @@ TEST(TwoSpheres, ObliqueCollisionKeepsMomentumAndAngularMomentum) {
   for (double e : {0.0, 0.5, 1.0})
     for (double mu : {0.0, 0.2, 5.0}) {
       Experiment run(two_spheres(e, mu, 0.5));
-      const Vec3 p = momentum(run), l = angular_momentum(run);
+      const Vec3 p = sphere_momentum(run), l = sphere_angular_momentum(run);
       const double energy = run.kinetic_energy();
       run.steps(20);
       EXPECT_GT((run.u(0) - Vec3(-1.1, 0.2, 0.4)).norm(), 0.1) << "they met";
-      EXPECT_LE((momentum(run) - p).norm(), 32 * epsilon * 2) << e << ' ' << mu;
-      EXPECT_LE((angular_momentum(run) - l).norm(), 64 * epsilon) << e << ' ' << mu;
+      EXPECT_LE((sphere_momentum(run) - p).norm(), 32 * epsilon * 2) << e << ' ' << mu;
+      EXPECT_LE((sphere_angular_momentum(run) - l).norm(), 64 * epsilon) << e << ' ' << mu;
       EXPECT_LE(run.kinetic_energy(), energy * (1 + 8 * epsilon)) << e << ' ' << mu;
       if (e == 1 && mu == 0) {
         EXPECT_NEAR(run.kinetic_energy(), energy, 16 * epsilon * energy);
@@ -169,12 +169,12 @@ TEST(TwoSpheres, GapAtDetectionCostsAtMostItselfTimesTheFriction) {
   // The lever of a contact is R, not R + gap/2: angular momentum is off by gap x r_t and falls with h.
   for (double head_start : {0.6, 1.3, 1.9}) {
     Experiment run(two_spheres(0, 0.2, head_start));
-    const Vec3 p = momentum(run), l = angular_momentum(run);
+    const Vec3 p = sphere_momentum(run), l = sphere_angular_momentum(run);
     const Vec3 closing = run.u(0) - run.u(1);
     run.steps(20);
     const double impulse = 0.5 * (run.u(0) - Vec3(-1.1, 0.2, 0.4)).norm();
-    EXPECT_LE((momentum(run) - p).norm(), 64 * epsilon);
-    EXPECT_LE((angular_momentum(run) - l).norm(), 1e-3 * closing.norm() * impulse) << head_start;
+    EXPECT_LE((sphere_momentum(run) - p).norm(), 64 * epsilon);
+    EXPECT_LE((sphere_angular_momentum(run) - l).norm(), 1e-3 * closing.norm() * impulse) << head_start;
   }
 }
 
@@ -214,4 +214,4 @@ TEST(ThreeSpheres, PushingASeparatingNeighbourGivesNoEnergy) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_impacts_test

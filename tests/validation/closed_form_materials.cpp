@@ -7,7 +7,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_materials_test {
 namespace {
 
 /// Gives the bodies these materials, in the order in which they were added.
@@ -105,4 +105,4 @@ TEST(Materials, ThatTheLawsOfAStageDoNotHaveAreRefused) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_materials_test

@@ -8,7 +8,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_order_test {
 namespace {
 
 /// Mean order over the halvings of a list of errors.
@@ -160,4 +160,4 @@ TEST(Units, AMillionOrAMillionthGivesTheSameAnswer) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_order_test

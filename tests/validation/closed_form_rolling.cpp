@@ -4,7 +4,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_rolling_test {
 namespace {
 
 constexpr double h = 1e-3, radius = 0.1, mu = 0.9;
@@ -129,4 +129,4 @@ TEST(RollingResistance, IsRefusedByMethodsThatCarryImpulsesOn) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_rolling_test

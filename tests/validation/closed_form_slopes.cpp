@@ -6,7 +6,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_slopes_test {
 namespace {
 
 constexpr double h = 1e-3;
@@ -153,4 +153,4 @@ TEST(Resting, DroppedGrainComesToRestOnTheFloorNotInIt) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_slopes_test

@@ -4,7 +4,7 @@
 
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_statics_test {
 namespace {
 
 constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
@@ -215,4 +215,4 @@ TEST(Wedge, SphereDrivenIntoItByAWallStops) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_statics_test

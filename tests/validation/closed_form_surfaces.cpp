@@ -8,7 +8,7 @@
 #include "tests/unit/mesh_makers.hpp"
 #include "tests/validation/experiment.hpp"
 
-namespace talus::validation {
+namespace talus::validation::closed_form_surfaces_test {
 namespace {
 
 constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
@@ -86,4 +86,4 @@ TEST(BallInAMeshCorner, IsHeldByItsFacesAndNotByTheirEdge) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::closed_form_surfaces_test

@@ -8,7 +8,7 @@
 
 #include "tests/validation/clump_scenes.hpp"
 
-namespace talus::validation {
+namespace talus::validation::clump_reference_test {
 namespace {
 
 using Quaternion = Eigen::Quaterniond;
@@ -215,4 +215,4 @@ TEST(ClumpReference, GivesTheVelocitiesOfEveryStepWithoutFriction) {
 }
 
 }  // namespace
-}  // namespace talus::validation
+}  // namespace talus::validation::clump_reference_test

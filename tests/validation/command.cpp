@@ -10,7 +10,7 @@
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
-namespace talus {
+namespace talus::command_test {
 namespace {
 
 using namespace test;
@@ -131,7 +131,7 @@ TEST_F(Command, RefusesMissingScenesAndBadOverridesAndWritesNothing) {
 // ---- the directory of the results
 
 TEST_F(Command, LeavesAnExistingDirectoryAloneUnlessForced) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   ASSERT_EQ(run("run scene.toml --out results").code, 0);
   write(at("results/notes.txt"), "mine");
   const auto before = files_below(at("results"));
@@ -147,7 +147,7 @@ TEST_F(Command, LeavesAnExistingDirectoryAloneUnlessForced) {
 }
 
 TEST_F(Command, ReplacesNothingForASceneItCannotRun) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   ASSERT_EQ(run("run scene.toml --out results").code, 0);
   const auto before = files_below(at("results"));
   EXPECT_EQ(run("run scene.toml --out results --force --set seeed=2").code, 2);
@@ -156,10 +156,10 @@ TEST_F(Command, ReplacesNothingForASceneItCannotRun) {
 
 // What a step could not go on from is seen before anything is removed.
 TEST_F(Command, KeepsEarlierResultsWhenABodyHasNoMass) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   ASSERT_EQ(run("run scene.toml --out results").code, 0);
   const auto before = files_below(at("results"));
-  write(at("scene.toml"), with_bodies(column));
+  write(at("scene.toml"), with_bodies(column_scene));
   const std::vector<std::pair<std::string, std::string>> mistakes = {
       {"radius\n0,0,0,1,0.01\n7,0,0,2,1e-120\n", "1e-120"},
       {"radius\n7,0,0,0,1e120\n", "1e+120"},
@@ -175,7 +175,7 @@ TEST_F(Command, KeepsEarlierResultsWhenABodyHasNoMass) {
 }
 
 TEST_F(Command, NamesADirectoryItCannotWriteTo) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   write(at("file"), "not a directory");
   for (const std::string place : {"file", "file/below", "/proc/talus"}) {
     const Outcome outcome = run("run scene.toml --out " + place);
@@ -199,7 +199,7 @@ TEST_F(Command, EndsWithOneAndTheNameOfTheFileWhenTheDiskIsFull) {
 }
 
 TEST_F(Command, WritesToTheSceneDirectoryUnlessToldOtherwise) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   EXPECT_EQ(run("run scene.toml --steps 1").code, 0);
   EXPECT_TRUE(fs::exists(at("out/column/run.json")));
   EXPECT_EQ(run("run scene.toml --steps 1 --set output.directory=elsewhere").code, 0);
@@ -275,7 +275,7 @@ TEST_F(Command, StopsAfterSoManyStepsAndTakesOverrides) {
 }
 
 TEST_F(Command, SaysWhatAStepOptionAskedForAndDidNotGet) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const Outcome late =
       run("run scene.toml --out results --error-history 2,50 --trace --trace-steps 90:99 --steps 3");
   EXPECT_EQ(late.code, 0) << late.messages;
@@ -311,7 +311,7 @@ class StageEnds : public Command {
 };
 
 TEST_F(StageEnds, AreSaidWithHowFarFromRest) {
-  const Outcome outcome = of(column, "steps = 2, equilibrium = 1e-12", "steps = 50, equilibrium = 0.1");
+  const Outcome outcome = of(column_scene, "steps = 2, equilibrium = 1e-12", "steps = 50, equilibrium = 0.1");
   EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: steps reached, unrest ")) << outcome.messages;
   EXPECT_TRUE(says(outcome, "(asked 1e-12)")) << outcome.messages;
   EXPECT_TRUE(says(outcome, "stage 'then' ended after 1 step: equilibrium reached")) << outcome.messages;
@@ -325,7 +325,7 @@ TEST_F(StageEnds, AreSaidWithHowFarFromRest) {
 
 // A floor and a lid make no box, but they bound the sample: the lid rises by a sixtieth of its height a step.
 TEST_F(StageEnds, MayBeAStrainOrATime) {
-  std::string lidded = column;
+  std::string lidded = column_scene;
   lidded.insert(lidded.find("[[stage]]"),
                 "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"velocity\"\nvelocity = [0, 0, 1]\n\n");
   const Outcome outcome = of(lidded, "strain = 0.02, time = 1", "steps = 50, time = 2e-3");
@@ -334,7 +334,7 @@ TEST_F(StageEnds, MayBeAStrainOrATime) {
 }
 
 TEST_F(Command, WarnsOfGrainsThatBeginDeepInsideOthersOrWalls) {
-  std::string text = with_bodies(column);
+  std::string text = with_bodies(column_scene);
   text.replace(text.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
   write(at("scene.toml"), text);
   write(at("grains.csv"), "id,x,y,z,radius\n3,0,0,0.01,0.01\n4,0,0,0.0292,0.01\n9,1,0,0.008,0.01\n");
@@ -378,4 +378,4 @@ TEST_F(Command, GivesTheSameBitsOnAnyNumberOfThreadsAndFromTheResolvedScene) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::command_test

@@ -11,7 +11,7 @@
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
-namespace talus {
+namespace talus::command_endings_test {
 namespace {
 
 using namespace test;
@@ -27,7 +27,7 @@ class Ending : public testing::Test {
 };
 
 TEST_F(Ending, WithMissedTolerancesIsThreeAndMarkedUnlessAllowed) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const std::string strict =
       "run scene.toml --force --out results --set solver.max_iterations=1 --set solver.tolerance=1e-9";
   const Outcome missed = run(strict);
@@ -74,7 +74,7 @@ overlap_correction = 1
 
 // A folder stands where a file of the run belongs: seen when the run has begun, before its first step.
 TEST_F(Ending, BeforeTheFirstStepIsInRunJson) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   for (const std::string name : {"trace.h5", "results.h5"}) {
     fs::create_directories(at("results/" + name));
     const Outcome outcome = run("run scene.toml --trace --force --out results");
@@ -217,4 +217,4 @@ TEST_F(Ending, OfOneStepOfLmgc90IsThatOfLmgc90) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::command_endings_test

@@ -144,7 +144,7 @@ every_steps = 4
 )";
 
 /// Three grains on a floor, a column that no single sweep solves.
-inline const std::string column = R"(name = "column"
+inline const std::string column_scene = R"(name = "column"
 gravity = [0, 0, -9.81]
 time_step = 1e-3
 

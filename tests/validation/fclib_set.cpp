@@ -15,7 +15,7 @@
 #include "io/fclib/fclib.hpp"
 #include "kernels/delassus/delassus_solve.hpp"
 
-namespace talus {
+namespace talus::fclib_set_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ TEST_F(FclibSet, CondensesGlobalProblemsToTheWThatOthersCondensedThemTo) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::fclib_set_test

@@ -8,7 +8,7 @@
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
-namespace talus {
+namespace talus::partition_command_test {
 namespace {
 
 using namespace test;
@@ -54,7 +54,7 @@ using Numbers = std::vector<std::int64_t>;
 /// Three grains on a floor: the candidates lie at heights r (floor), 2r and 4r; the plane between two equal
 /// boxes at 2.5r. Below it two contacts with the first two grains, above it one with the last two.
 TEST_F(PartitionCommand, SharesOutAColumnAsOneDoesByHand) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const Outcome outcome = run("partition scene.toml --subdomains 2 --partitioner boxes");
   ASSERT_EQ(outcome.code, 0) << outcome.messages;
   EXPECT_NE(outcome.output.find("3 grains, 3 contacts (1 at walls"), std::string::npos) << outcome.output;
@@ -112,7 +112,7 @@ TEST_F(PartitionCommand, SaysTheSameOnAnyNumberOfThreads) {
 }
 
 TEST_F(PartitionCommand, MoreSubdomainsThanContactsLeaveSomeEmpty) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const Outcome outcome = run("partition scene.toml --subdomains 64");
   ASSERT_EQ(outcome.code, 0) << outcome.messages;
   Numbers none_or_one;
@@ -121,14 +121,14 @@ TEST_F(PartitionCommand, MoreSubdomainsThanContactsLeaveSomeEmpty) {
 }
 
 TEST_F(PartitionCommand, AutoSaysWhatItIs) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const Outcome outcome = run("partition scene.toml --subdomains 2 --partitioner auto");
   ASSERT_EQ(outcome.code, 0) << outcome.messages;
   EXPECT_NE(outcome.output.find("auto is rcb"), std::string::npos) << outcome.output;
 }
 
 TEST_F(PartitionCommand, SaysWhenNothingTouches) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const Outcome outcome =
       run("partition scene.toml --subdomains 2 --set sample.spacing=2 --set wall.floor.position=-1");
   ASSERT_EQ(outcome.code, 0) << outcome.messages;
@@ -137,7 +137,7 @@ TEST_F(PartitionCommand, SaysWhenNothingTouches) {
 }
 
 TEST_F(PartitionCommand, CutsTheBoxesOfTheScene) {
-  write(at("scene.toml"), column + "[decomposition]\nboxes = [1, 3, 1]\n");
+  write(at("scene.toml"), column_scene + "[decomposition]\nboxes = [1, 3, 1]\n");
   const Outcome outcome = run("partition scene.toml --subdomains 3 --partitioner boxes");
   ASSERT_EQ(outcome.code, 0) << outcome.messages;
   // All grains stand above one another: chosen boxes would lie so too.
@@ -151,7 +151,7 @@ TEST_F(PartitionCommand, CutsTheBoxesOfTheScene) {
 }
 
 TEST_F(PartitionCommand, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   const std::string command = "partition scene.toml --subdomains 2 --out cut";
   ASSERT_EQ(run(command).code, 0);
   write(at("cut/run.json"), "a run's");
@@ -170,7 +170,7 @@ TEST_F(PartitionCommand, ReplacesItsOwnFilesOnlyAndOnlyWithForce) {
 }
 
 TEST_F(PartitionCommand, RefusesWhatHasNoMeaningAndWritesNothing) {
-  write(at("scene.toml"), column);
+  write(at("scene.toml"), column_scene);
   for (const std::string arguments :
        {"", "scene.toml", "scene.toml --subdomains 0", "scene.toml --subdomains -3",
         "scene.toml --subdomains 2 --partitioner boxers", "scene.toml --subdomains 2 --threads 0",
@@ -191,4 +191,4 @@ TEST_F(PartitionCommand, AFileThatCannotBeWrittenIsAFailureAndLeavesNoHalf) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::partition_command_test

@@ -16,7 +16,7 @@
 #include "io/fclib/fclib.hpp"
 #include "kernels/delassus/delassus_solve.hpp"
 
-namespace talus {
+namespace talus::siconos_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -114,4 +114,4 @@ TEST_F(Dump, SiconosReadsItAndFindsTheSameVelocities) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::siconos_test

@@ -8,7 +8,7 @@
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
-namespace talus {
+namespace talus::study_command_test {
 namespace {
 
 using namespace test;
@@ -81,7 +81,7 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
 /// The residual of a long column is small long before anything is carried: `auto`, which the reference tries
 /// first, ends on the balance, and the reference must ask more of that than anybody else.
 TEST_F(StudyError, TheReferenceIsTheAnswerInStiffSamplesToo) {
-  const Table truth = first_step(column, 60, "auto,admm", "1e-2");
+  const Table truth = first_step(column_scene, 60, "auto,admm", "1e-2");
   const auto last = [&](const char* method) {
     return rows_where(truth, [&](const auto& row) { return row.at("method") == method; }).back();
   };
@@ -92,13 +92,13 @@ TEST_F(StudyError, TheReferenceIsTheAnswerInStiffSamplesToo) {
 /// With gravity such a column hangs in the balance of the scene; a variant asked for a hundredth of the
 /// scene's tolerance is asked for a hundredth of its balance as well.
 TEST_F(StudyError, ATighterToleranceTightensTheBalance) {
-  const Table truth = first_step(column, 60, "auto", "1e-5");
+  const Table truth = first_step(column_scene, 60, "auto", "1e-5");
   EXPECT_LT(truth.number(truth.rows.size() - 1, "wall_force_error"), 5e-3) << "the scene's balance is 5e-2";
 }
 
 /// Likewise for whole runs; what these are held against is found by `auto`, asked for more.
 TEST_F(StudyError, WholeRunsTightenTheBalanceToo) {
-  write(at("column.toml"), column);
+  write(at("column.toml"), column_scene);
   const auto error = [&](const std::string& method, const std::string& tolerance) {
     const Outcome outcome =
         run("study error column.toml --out s --force --threads 1 --only run --steps 1 --methods " + method +
@@ -112,7 +112,7 @@ TEST_F(StudyError, WholeRunsTightenTheBalanceToo) {
 
 /// Velocities are nothing but the solver's noise there, and no measure of its errors.
 TEST_F(StudyError, VelocityErrorsOfASamplePressedAtRestAreThoseOfItsForces) {
-  std::string pressed = column;
+  std::string pressed = column_scene;
   pressed.replace(pressed.find("gravity"), pressed.find("time_step") - pressed.find("gravity"), "");
   pressed.insert(pressed.find("[[stage]]"),
                  "[[wall]]\nname = \"lid\"\nside = \"z+\"\ndrive = \"force\"\nforce = 1\n\n");
@@ -176,7 +176,7 @@ TEST_F(StudyError, TimeStepsLongerThanAStageMakeOneStepOfIt) {
 }
 
 TEST_F(StudyError, LeavesOutWhatTheSceneDoesNotHave) {
-  write(at("column.toml"), column);
+  write(at("column.toml"), column_scene);
   const Outcome outcome =
       run("study error column.toml --out s --threads 1 --only run --steps 2 --methods nlgs "
           "--tolerances 1e-1 --set allow_unconverged=true");
@@ -340,4 +340,4 @@ TEST_F(StudyError, PlanMeasuresWhatOmissionsSave) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::study_command_test

@@ -7,7 +7,7 @@
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
-namespace talus {
+namespace talus::study_scaling_command_test {
 namespace {
 
 using namespace test;
@@ -271,4 +271,4 @@ TEST_F(StudyScaling, OverwritesItsOwnFilesOnlyAndOnlyWhenAsked) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::study_scaling_command_test

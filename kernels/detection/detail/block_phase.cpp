@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/detection/detail/passing.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/touch.hpp"
@@ -13,20 +14,16 @@ namespace talus::detail {
 
 namespace {
 
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
-
 /// B of a body whose surface at `arm` from its centre of mass moves with u + omega x arm = u + B w.
 Mat3 lever_of(const NarrowPhase& in, Slot slot, const Vec3& arm) {
   Mat3 lever;
-  const Mat3 turning = turning_of(in.clumps, index(slot), in.radius[index(slot)]);
+  const Mat3 turning = turning_of(in.clumps, at(slot), in.radius[at(slot)]);
   for (Eigen::Index c = 0; c < 3; ++c) lever.col(c) = turning.col(c).cross(arm);
   return lever;
 }
 
 Vec3 velocity_at(const NarrowPhase& in, Slot slot, const Mat3& lever) {
-  const Velocity& v = in.velocity[index(slot)];
+  const Velocity& v = in.velocity[at(slot)];
   return Eigen::Map<const Vec3>(v.u) + lever * Eigen::Map<const Vec3>(v.w);
 }
 
@@ -46,8 +43,8 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
       touch_bodies(poses, pair.first, pair.second, balls), {}, {}, {}, pair.first, pair.second, balls};
   const Touch& touch = meeting.touch;
   // From one centre of mass to the same point: angular momentum is kept across a gap, too.
-  const Vec3 between = in.domain.separation(in.x[index(pair.first)], in.x[index(pair.second)]);
-  const Vec3 arm = touch.point - in.x[index(pair.first)];
+  const Vec3 between = in.domain.separation(in.x[at(pair.first)], in.x[at(pair.second)]);
+  const Vec3 arm = touch.point - in.x[at(pair.first)];
   meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between)};
   meeting.v =
       velocity_at(in, pair.first, meeting.levers.first) - velocity_at(in, pair.second, meeting.levers.second);
@@ -57,10 +54,10 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
 }
 
 Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
-  const Wall& wall = in.walls[index(pair.wall)];
+  const Wall& wall = in.walls[at(pair.wall)];
   Meeting meeting{touch_wall(poses, wall, pair.body, pair.feature), {}, {}, {}, pair.body, -1 - pair.feature};
   const Touch& touch = meeting.touch;
-  meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[index(pair.body)]);
+  meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[at(pair.body)]);
   meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity;
   meeting.fall = in.time_step * in.gravity - wall.gain;
   // The wall in place of a body as large as the ball, whose surface it is.
@@ -72,9 +69,9 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
 /// Whether a surface has, for this ball and in this step, the feature that the candidate is of: near an edge
 /// another one counts (kernels/shapes/surface.hpp).
 bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
-  const Surface* surface = in.walls[index(pair.wall)].surface();
+  const Surface* surface = in.walls[at(pair.wall)].surface();
   if (surface == nullptr) return true;
-  const auto balls = static_cast<std::int32_t>(in.clumps.balls(index(pair.body)));
+  const auto balls = static_cast<std::int32_t>(in.clumps.balls(at(pair.body)));
   std::vector<SurfacePoint> points;
   surface->collide(meeting.touch.ball.centre,
                    meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(),
@@ -82,25 +79,26 @@ bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& mee
   return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
 }
 
-void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t at, Contacts& contacts) {
+void write(const Meeting& meeting, double bias, std::size_t candidate, std::size_t place,
+           Contacts& contacts) {
   const bool wall = meeting.second < 0;
-  contacts.nx[at] = meeting.touch.normal[0];
-  contacts.ny[at] = meeting.touch.normal[1];
-  contacts.nz[at] = meeting.touch.normal[2];
-  contacts.bias[at] = bias;
-  contacts.levers[at] = meeting.levers;
-  contacts.balls[at] = meeting.balls;
-  contacts.first[at] = meeting.first;
-  contacts.second[at] = meeting.second;
-  contacts.first_record[at] = record_of(meeting.first);
-  if (!wall) contacts.second_record[at] = record_of(meeting.second);
-  contacts.candidate[at] = static_cast<std::int32_t>(candidate);
+  contacts.nx[place] = meeting.touch.normal[0];
+  contacts.ny[place] = meeting.touch.normal[1];
+  contacts.nz[place] = meeting.touch.normal[2];
+  contacts.bias[place] = bias;
+  contacts.levers[place] = meeting.levers;
+  contacts.balls[place] = meeting.balls;
+  contacts.first[place] = meeting.first;
+  contacts.second[place] = meeting.second;
+  contacts.first_record[place] = record_of(meeting.first);
+  if (!wall) contacts.second_record[place] = record_of(meeting.second);
+  contacts.candidate[place] = static_cast<std::int32_t>(candidate);
 }
 
 }  // namespace
 
 void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Contacts& contacts) {
-  const std::size_t begin = index(chunks.begin[chunk]);
+  const std::size_t begin = at(chunks.begin[chunk]);
   contacts.count[chunk] = static_cast<std::int32_t>(end - begin);
   std::uint8_t* size = contacts.group.data() + begin;
   for (std::size_t k = begin; k < end; k += group_size)
@@ -109,12 +107,12 @@ void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Cont
 
 void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
                    const Chunks& chunks, std::size_t chunk, Contacts& contacts) {
-  const std::size_t grains = candidates.grain_pairs.size(), begin = index(chunks.begin[chunk]);
+  const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);
   const Poses poses{in.x, in.radius, in.walls, in.clumps, in.domain};
   const MaterialView materials{in.material, in.walls};
   std::int32_t through = 0;
-  std::size_t at = begin;
-  for (std::size_t k = begin; k < index(chunks.begin[chunk + 1]); ++k) {
+  std::size_t place = begin;
+  for (std::size_t k = begin; k < at(chunks.begin[chunk + 1]); ++k) {
     const bool wall = k >= grains;
     const Meeting meeting = wall ? meet(in, poses, candidates.wall_pairs[k - grains])
                                  : meet(in, poses, candidates.grain_pairs[k], candidates.balls[k]);
@@ -124,10 +122,10 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     const GapResult<double> found =
         solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall),
                   law_at(in.laws, candidates, materials, k).restitution);
-    if (!found.absent) write(meeting, found.bias, k, at++, contacts);
+    if (!found.absent) write(meeting, found.bias, k, place++, contacts);
   }
   contacts.passed[chunk] = through;
-  close_groups(chunks, chunk, at, contacts);
+  close_groups(chunks, chunk, place, contacts);
 }
 
 }  // namespace talus::detail

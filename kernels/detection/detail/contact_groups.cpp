@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/simd/contact_view.hpp"
 
 namespace talus::detail {
@@ -17,10 +18,6 @@ namespace {
 constexpr std::size_t groups_open = 64;
 static_assert(longest_chunk <= groups_open * group_size);
 constexpr std::size_t few = 16;  ///< of so many contacts one may change: repairs cost less than dealing
-
-std::size_t index(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// What stands in each place, but the impulses: those are read from the candidates afterwards.
 template <class Rule>
@@ -33,16 +30,18 @@ void for_each_array(Contacts& contacts, Rule rule) {
 /// The groups of a chunk while they are repaired. Places count from the chunk's first.
 class Repair {
  public:
-  explicit Repair(const ChunkPlaces& at)
-      : at_(at), begin_(index(at.chunks.begin[at.chunk])), count_(index(at.contacts.count[at.chunk])) {
-    const std::uint8_t* size = at.contacts.group.data() + begin_;
+  explicit Repair(const ChunkPlaces& places)
+      : places_(places),
+        begin_(at(places.chunks.begin[places.chunk])),
+        count_(at(places.contacts.count[places.chunk])) {
+    const std::uint8_t* size = places.contacts.group.data() + begin_;
     for (std::size_t k = 0; k < count_; k += *size++) group_begin_.push_back(k);
   }
 
   bool run() {
     std::vector<std::size_t> holes, came;
-    for (std::size_t k = 0; k < at_.contact.size(); ++k)
-      if ((at_.contact[k] != 0) != (k < count_)) (k < count_ ? holes : came).push_back(k);
+    for (std::size_t k = 0; k < places_.contact.size(); ++k)
+      if ((places_.contact[k] != 0) != (k < count_)) (k < count_ ? holes : came).push_back(k);
     std::vector<std::size_t> left;
     for (const std::size_t hole : holes) {
       const auto fit = std::ranges::find_if(came, [&](std::size_t k) { return fits(k, group_of(hole)); });
@@ -71,17 +70,19 @@ class Repair {
   }
   /// Whether the pair at `place` shares no grain with the contacts of a group that it is not in.
   bool fits(std::size_t place, std::size_t group) const {
-    const Slot *first = at_.contacts.first.data() + begin_, *second = at_.contacts.second.data() + begin_;
+    const Slot *first = places_.contacts.first.data() + begin_,
+               *second = places_.contacts.second.data() + begin_;
     const Slot i = first[place], j = second[place];
     for (std::size_t k = group_begin_[group]; k < end_of(group); ++k)
-      if (at_.contact[k] != 0 && (first[k] == i || first[k] == j || second[k] == i || second[k] == j))
+      if (places_.contact[k] != 0 && (first[k] == i || first[k] == j || second[k] == i || second[k] == j))
         return false;
     return true;
   }
   void swap(std::size_t a, std::size_t b) {
     if (a == b) return;
-    std::swap(at_.contact[a], at_.contact[b]);
-    for_each_array(at_.contacts, [&](auto& values) { std::swap(values[begin_ + a], values[begin_ + b]); });
+    std::swap(places_.contact[a], places_.contact[b]);
+    for_each_array(places_.contacts,
+                   [&](auto& values) { std::swap(values[begin_ + a], values[begin_ + b]); });
   }
   bool close(std::size_t hole) {
     const std::size_t group = group_of(hole);
@@ -105,12 +106,12 @@ class Repair {
     return true;
   }
   void write() {
-    at_.contacts.count[at_.chunk] = static_cast<std::int32_t>(count_);
+    places_.contacts.count[places_.chunk] = static_cast<std::int32_t>(count_);
     for (std::size_t group = 0; group < group_begin_.size(); ++group)
-      at_.contacts.group[begin_ + group] = static_cast<std::uint8_t>(end_of(group) - group_begin_[group]);
+      places_.contacts.group[begin_ + group] = static_cast<std::uint8_t>(end_of(group) - group_begin_[group]);
   }
 
-  const ChunkPlaces& at_;
+  const ChunkPlaces& places_;
   std::size_t begin_;
   std::size_t count_;                     ///< contacts that stand in groups
   std::vector<std::size_t> group_begin_;  ///< first place of each group
@@ -118,14 +119,14 @@ class Repair {
 
 }  // namespace
 
-void deal_groups(const ChunkPlaces& at) {
-  const Chunks& chunks = at.chunks;
-  Contacts& contacts = at.contacts;
-  const std::size_t begin = index(chunks.begin[at.chunk]), count = at.contact.size();
-  const std::size_t bodies = index(chunks.body_begin[at.chunk + 1] - chunks.body_begin[at.chunk]);
+void deal_groups(const ChunkPlaces& places) {
+  const Chunks& chunks = places.chunks;
+  Contacts& contacts = places.contacts;
+  const std::size_t begin = at(chunks.begin[places.chunk]), count = places.contact.size();
+  const std::size_t bodies = at(chunks.body_begin[places.chunk + 1] - chunks.body_begin[places.chunk]);
   std::vector<std::uint16_t> place(count);  // of the candidates
   for (std::size_t k = 0; k < count; ++k)
-    place[index(contacts.candidate[begin + k]) - begin] = static_cast<std::uint16_t>(k);
+    place[at(contacts.candidate[begin + k]) - begin] = static_cast<std::uint16_t>(k);
   // One bit per group and grain. What fits in none of the open groups (a large grain among small ones)
   // follows, each a group of its own, and behind them the pairs that are no contacts.
   std::vector<std::uint64_t> in_group(bodies, 0);
@@ -138,7 +139,7 @@ void deal_groups(const ChunkPlaces& at) {
   for (std::size_t k = begin; k < begin + count; ++k) {
     const std::size_t candidate = chunks.order[k];
     const std::uint16_t p = place[candidate];
-    if (at.contact[p] == 0) {
+    if (places.contact[p] == 0) {
       others.push_back(p);
       continue;
     }
@@ -164,7 +165,7 @@ void deal_groups(const ChunkPlaces& at) {
   from.insert(from.end(), late.begin(), late.end());
   std::fill_n(sizes, late.size(), std::uint8_t{1});
   from.insert(from.end(), others.begin(), others.end());
-  contacts.count[at.chunk] = static_cast<std::int32_t>(count - others.size());
+  contacts.count[places.chunk] = static_cast<std::int32_t>(count - others.size());
   std::tuple<std::vector<double>, std::vector<std::int32_t>, std::vector<std::uint32_t>> rooms;
   for_each_array(contacts, [&](auto& values) {
     auto& before = std::get<std::remove_reference_t<decltype(values)>>(rooms);
@@ -174,13 +175,13 @@ void deal_groups(const ChunkPlaces& at) {
   });
 }
 
-bool repair_groups(const ChunkPlaces& at) {
-  const std::size_t count = index(at.contacts.count[at.chunk]);
-  const auto were = at.contact.first(count), others = at.contact.subspan(count);
+bool repair_groups(const ChunkPlaces& places) {
+  const std::size_t count = at(places.contacts.count[places.chunk]);
+  const auto were = places.contact.first(count), others = places.contact.subspan(count);
   const auto changed = static_cast<std::size_t>(std::ranges::count(were, 0) +
                                                 std::ranges::count_if(others, [](auto c) { return c != 0; }));
   if (changed == 0) return true;
-  return few * changed <= count && Repair(at).run();
+  return few * changed <= count && Repair(places).run();
 }
 
 }  // namespace talus::detail

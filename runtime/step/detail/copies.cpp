@@ -6,15 +6,12 @@
 #include <limits>
 #include <stdexcept>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/bodies/release.hpp"
 
 namespace talus::detail {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
 /// without knowing of one another. Hubs are glued once a sweep, whosever subdomain colour it is.

@@ -9,16 +9,13 @@
 #include <span>
 #include <vector>
 
+#include "kernels/bodies/index.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/trace/recorder.hpp"
 
 namespace talus::detail {
 
 using graph::Channel;
-
-inline std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// Adds the time it took to `waited`.
 inline void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 
+#include "kernels/bodies/index.hpp"
 #include "partition/load_table.hpp"
 #include "partition/partitioner.hpp"
 #include "runtime/graph/pretend_ranks.hpp"
@@ -15,10 +16,6 @@
 
 namespace talus {
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 struct Decomposed {
   Bodies bodies;

@@ -10,7 +10,7 @@
 #include "io/scene/bodies_file.hpp"
 #include "io/scene/detail/spelling.hpp"
 
-namespace talus::io {
+namespace talus::io::scene_test {
 namespace {
 
 const char* const file = "test.toml";
@@ -500,4 +500,4 @@ TEST(Spelling, CountsInsertionsReplacementsAndSwaps) {
 }
 
 }  // namespace
-}  // namespace talus::io
+}  // namespace talus::io::scene_test

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "kernels/bodies/index.hpp"
 #include "tests/unit/dense_sample.hpp"
 
 namespace talus {
@@ -15,10 +16,6 @@ namespace {
 
 using test::Random;
 using test::uniform;
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// Grains that candidate k writes.
 std::vector<Slot> grains_of(const Candidates& candidates, std::size_t k) {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace talus {
+namespace talus::friction_cone_test {
 namespace {
 
 /// Random numbers that are the same on every platform (std distributions are not).
@@ -264,4 +264,4 @@ TEST(LocalLaw, SolvesOrSaysSoForAnyMatrix) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::friction_cone_test

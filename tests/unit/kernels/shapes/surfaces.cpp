@@ -7,7 +7,7 @@
 
 #include "kernels/shapes/shape.hpp"
 
-namespace talus {
+namespace talus::surfaces_test {
 namespace {
 
 using Numbers = std::map<std::string, std::vector<double>>;
@@ -89,4 +89,4 @@ TEST(WallShapes, RefuseWhatMakesNoSurface) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::surfaces_test

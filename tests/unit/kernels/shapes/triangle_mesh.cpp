@@ -11,7 +11,7 @@
 
 #include "tests/unit/mesh_makers.hpp"
 
-namespace talus {
+namespace talus::triangle_mesh_test {
 namespace {
 
 using detail::make_mesh;
@@ -141,4 +141,4 @@ TEST(TriangleMesh, RefusalsNameTheTriangle) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::triangle_mesh_test

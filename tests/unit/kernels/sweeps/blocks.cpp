@@ -10,7 +10,7 @@
 #include "kernels/detection/measures.hpp"
 #include "kernels/law/friction_cone.hpp"
 
-namespace talus {
+namespace talus::blocks_test {
 namespace {
 
 /// One contact between two bodies that turn with any levers, drawn at random.
@@ -167,4 +167,4 @@ TEST(Blocks, OfSpheresAreSweptAsSpheresAre) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::blocks_test

@@ -10,7 +10,7 @@
 #include "kernels/detection/measures.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus {
+namespace talus::sweep_test {
 namespace {
 
 using test::dense_sample;
@@ -431,4 +431,4 @@ TEST(Gluing, OfASplitWallConvergesToTheUnsplitVelocity) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::sweep_test

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-namespace talus::graph {
+namespace talus::graph::executor_test {
 namespace {
 
 constexpr int thread_counts[] = {1, 2, 3, 4, 8};
@@ -356,4 +356,4 @@ TEST(Background, EndsItsTasksBeforeTheExecutorGoes) {
 }
 
 }  // namespace
-}  // namespace talus::graph
+}  // namespace talus::graph::executor_test

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace talus::graph {
+namespace talus::graph::tree_test {
 namespace {
 
 std::vector<RankLoad> equal_loads(int ranks) {
@@ -97,4 +97,4 @@ TEST(Tree, HandsUpBeforeItHandsDown) {
 }
 
 }  // namespace
-}  // namespace talus::graph
+}  // namespace talus::graph::tree_test

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace talus {
+namespace talus::certificate_test {
 namespace {
 
 /// A problem with known answers. Those of velocity checks are given in turn, the last one again and again.
@@ -263,4 +263,4 @@ TEST(Certificate, AStepIsCertifiedOnlyWithItsMomentumAndWithoutBodiesThatPassed)
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::certificate_test

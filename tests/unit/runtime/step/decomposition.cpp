@@ -10,7 +10,7 @@
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus {
+namespace talus::decomposition_test {
 namespace {
 
 using test::Random;
@@ -418,4 +418,4 @@ TEST(Decomposition, CarriesOrientationsAndStagesAlong) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::decomposition_test

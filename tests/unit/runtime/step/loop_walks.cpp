@@ -15,7 +15,7 @@
 #include "partition/subdomain_colours.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus::graph {
+namespace talus::graph::loop_walks_test {
 namespace {
 
 using test::Random;
@@ -227,4 +227,4 @@ TEST(LoopWalks, OfAnyRanksThreadsAndTurnsComeToTheirEnds) {
 }
 
 }  // namespace
-}  // namespace talus::graph
+}  // namespace talus::graph::loop_walks_test

@@ -15,7 +15,7 @@
 #include "runtime/step/task_kinds.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus {
+namespace talus::simulation_test {
 namespace {
 
 using test::Random;
@@ -539,4 +539,4 @@ TEST(Stages, TooShortForAStepAreRefused) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::simulation_test
