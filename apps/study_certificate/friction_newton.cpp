@@ -219,8 +219,9 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int mo
   }
   Vector ds;
   if (step(s, law(s, s, 0), {s, least_shift}, ds)) {
-    const double exchanged = std::sqrt(std::max(0.0, s.dot(W_ * s)));
-    result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds))) / std::max(exchanged, floor_of_exchange * size);
+    result.exchanged =
+        std::max(std::sqrt(std::max(0.0, s.dot(W_ * s))), floor_of_exchange * s.cwiseAbs().maxCoeff());
+    result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds)));
   }
   r = unscaled(s);
   return result;
