@@ -18,8 +18,8 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Rounding of velocities that sweeps, copies and files leave, over the largest speed.
-constexpr double rounding = 1e-7;
+/// Momentum that may be unexplained, see disagreement().
+constexpr double rounding = 1e-6;
 
 /// A reference has to be known to this part of what the step claims.
 constexpr double sharpness = 0.1;
@@ -48,20 +48,21 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   if (run.unknown > 0 || apart > rounding) {
     step.judged = Judged::other_problem;
     step.why =
-        fmt::format("{} contacts unknown to the audit, velocities apart by {:.1e}", run.unknown, apart);
+        fmt::format("{} contacts unknown to the audit, momentum unexplained {:.1e}", run.unknown, apart);
     return;
   }
   const Reference reference = solve_reference(problem, run.r, limits);
   step.residual = reference.residual;
-  step.uncertainty = reference.uncertainty;
+  step.uncertainty = reference.uncertainty();
+  step.why = reference.why;
+  if (reference.found == Found::no_answer) step.judged = Judged::no_answer;
+  if (reference.found > Found::velocities) return;
   step.errors = true_errors(problem, reference, end);
   step.errors.energy = energy_gain(problem, start.before, after);
-  const bool sharp = reference.uncertainty <= sharpness * step.claimed;
-  step.judged = reference.found && sharp ? Judged::yes : Judged::no_reference;
-  if (!reference.found)
-    step.why = reference.why;
-  else if (!sharp)
-    step.why = fmt::format("known to {:.1e} only", reference.uncertainty);
+  step.forces_known = reference.found == Found::answer;
+  const bool sharp = step.uncertainty <= sharpness * step.claimed;
+  step.judged = sharp ? Judged::yes : Judged::no_reference;
+  if (!sharp) step.why = fmt::format("known to {:.1e} only", step.uncertainty);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace talus::audit {
 enum class Judged {
   yes,            ///< found: the errors are those of the step
   no_reference,   ///< not found, or not to a tenth of what the step claims
+  no_answer,      ///< there is none: walls close on grains that cannot get away
   other_problem,  ///< the run has contacts that the audit does not, or other velocities than its impulses
                   ///< give
 };
@@ -30,7 +31,8 @@ struct AuditedStep {
   double asked = 0;    ///< the larger of tolerance and balance_tolerance
   int iterations = 0;
   Judged judged = Judged::no_reference;
-  std::string why;  ///< where it is not judged
+  std::string why;           ///< where it is not judged
+  bool forces_known = true;  ///< where judged; else forces are over-determined, velocities are not
   TrueErrors errors;
   double residual = 0, uncertainty = 0;  ///< of the reference
   double run_seconds = 0, audit_seconds = 0;

@@ -12,14 +12,15 @@ namespace talus::audit {
 namespace {
 
 constexpr std::array all_measures = {
-    Measure{"V", "velocities: momentum that is wrong over momentum exchanged", &TrueErrors::velocity, true},
+    Measure{"V", "velocities: momentum that is wrong over momentum exchanged", &TrueErrors::velocity, true,
+            false},
     Measure{"wf", "largest error of a wall's force over the largest wall force", &TrueErrors::wall_force,
-            true},
+            true, true},
     Measure{"cf", "largest error of a contact's force over the largest contact force",
-            &TrueErrors::contact_force, true},
-    Measure{"cluster", "V of the connected cluster where it is largest", &TrueErrors::cluster, false},
+            &TrueErrors::contact_force, true, true},
+    Measure{"cluster", "V of the connected cluster where it is largest", &TrueErrors::cluster, false, false},
     Measure{"energy", "energy gained that nothing supplied, over the kinetic energy without contacts",
-            &TrueErrors::energy, false}};
+            &TrueErrors::energy, false, false}};
 
 constexpr std::string_view all_families = "all";
 
@@ -36,11 +37,15 @@ CalibrationRow row_of(std::span<const StepOfScene> steps, double tolerance, std:
     if (one.tolerance != tolerance || (family != all_families && one.family != family)) continue;
     const AuditedStep& step = one.step;
     ++row.steps;
+    row.unsolvable += step.judged == Judged::no_answer ? 1 : 0;
+    row.missed += !step.certified && step.judged != Judged::no_answer ? 1 : 0;
     if (!step.certified) continue;
     ++row.certified;
+    row.disputed += step.judged == Judged::no_answer ? 1 : 0;
     row.disputed += step.judged == Judged::other_problem ? 1 : 0;
-    row.unjudged += step.judged == Judged::no_reference ? 1 : 0;
-    if (step.judged != Judged::yes) continue;
+    const bool known = step.judged == Judged::yes && (step.forces_known || !measure.of_forces);
+    row.unjudged += step.judged == Judged::no_reference || (step.judged == Judged::yes && !known) ? 1 : 0;
+    if (!known) continue;
     ++row.judged;
     const double error = step.errors.*measure.error;
     // NaN is the worst of all.
@@ -62,8 +67,8 @@ std::span<const Measure> measures() {
   return all_measures;
 }
 
-double CalibrationRow::missed() const {
-  return steps > 0 ? static_cast<double>(steps - certified) / static_cast<double>(steps) : 0;
+double CalibrationRow::missed_share() const {
+  return steps > unsolvable ? static_cast<double>(missed) / static_cast<double>(steps - unsolvable) : 0;
 }
 
 Quantiles quantiles_of(std::vector<double> ratios) {
@@ -108,7 +113,7 @@ std::vector<std::string> broken_bounds(std::span<const CalibrationRow> rows,
       const auto share = [&](std::int64_t count) {
         return row.certified > 0 ? static_cast<double>(count) / static_cast<double>(row.certified) : 0;
       };
-      check("the share of steps that missed", row.missed(), bounds.missed);
+      check("the share of steps that missed", row.missed_share(), bounds.missed);
       check("the share of certified steps without a reference", share(row.unjudged), bounds.unjudged);
       check("the share of certified steps of another problem", share(row.disputed), bounds.disputed);
     }

@@ -23,7 +23,8 @@ struct StepOfScene {
 struct Measure {
   std::string_view name, meaning;
   double TrueErrors::*error;
-  bool bounded;  ///< the bounds hold for it
+  bool bounded;    ///< the bounds hold for it
+  bool of_forces;  ///< known only where forces are
 };
 std::span<const Measure> measures();
 
@@ -41,12 +42,15 @@ struct CalibrationRow {
   std::string_view measure;
   bool bounded = false;
   std::int64_t steps = 0, certified = 0, judged = 0;
-  std::int64_t unjudged = 0;  ///< certified steps without a reference
-  std::int64_t disputed = 0;  ///< certified steps whose contacts or velocities the audit does not find
-  Quantiles claimed, asked;   ///< true error over claimed error, over tolerance asked for
-  std::string worst;          ///< scene and step where the first is largest
+  std::int64_t missed = 0;      ///< steps that have an answer and were not certified
+  std::int64_t unjudged = 0;    ///< certified steps without a reference
+  std::int64_t unsolvable = 0;  ///< steps that have no answer
+  std::int64_t disputed = 0;    ///< certified steps that have no answer, or whose contacts or velocities are
+                                ///< not those of the step
+  Quantiles claimed, asked;     ///< true error over claimed error, over tolerance asked for
+  std::string worst;            ///< scene and step where the first is largest
 
-  double missed() const;  ///< share of steps that were not certified
+  double missed_share() const;  ///< of the steps that have an answer
 };
 
 /// A row per tolerance (descending) and measure of all families, then of each family.

@@ -27,6 +27,8 @@ std::string_view word_of(Judged judged) {
       return "yes";
     case Judged::no_reference:
       return "no reference";
+    case Judged::no_answer:
+      return "no answer";
     case Judged::other_problem:
       return "other problem";
   }
@@ -35,13 +37,13 @@ std::string_view word_of(Judged judged) {
 
 std::string calibration_csv(std::span<const CalibrationRow> rows) {
   io::CsvTable table({"tolerance", "family", "measure", "steps", "certified", "judged", "unjudged",
-                      "disputed", "missed_share", "claimed_50", "claimed_95", "claimed_999", "claimed_worst",
-                      "asked_50", "asked_95", "asked_999", "asked_worst", "worst"});
+                      "unsolvable", "disputed", "missed_share", "claimed_50", "claimed_95", "claimed_999",
+                      "claimed_worst", "asked_50", "asked_95", "asked_999", "asked_worst", "worst"});
   for (const CalibrationRow& row : rows)
     table.row(row.tolerance, row.family, row.measure, row.steps, row.certified, row.judged, row.unjudged,
-              row.disputed, row.missed(), row.claimed.median, row.claimed.most, row.claimed.nearly_all,
-              row.claimed.worst, row.asked.median, row.asked.most, row.asked.nearly_all, row.asked.worst,
-              row.worst);
+              row.unsolvable, row.disputed, row.missed_share(), row.claimed.median, row.claimed.most,
+              row.claimed.nearly_all, row.claimed.worst, row.asked.median, row.asked.most,
+              row.asked.nearly_all, row.asked.worst, row.worst);
   return table.text();
 }
 
@@ -76,9 +78,9 @@ io::ChartSeries curve_of(std::span<const StepOfScene> steps, double tolerance, c
   return series;
 }
 
-const std::vector<std::string> columns{"tolerance", "family",       "measure",       "steps",     "missed",
-                                       "judged",    "no reference", "disputed",      "median",    "95 %",
-                                       "99.9 %",    "worst",        "worst / asked", "worst step"};
+const std::vector<std::string> columns{
+    "tolerance", "family", "measure", "steps",  "missed", "judged",        "no reference", "no answer",
+    "disputed",  "median", "95 %",    "99.9 %", "worst",  "worst / asked", "worst step"};
 
 std::vector<std::string> cells_of(const CalibrationRow& row) {
   const auto number = [](double value) { return fmt::format("{:.2g}", value); };
@@ -86,9 +88,10 @@ std::vector<std::string> cells_of(const CalibrationRow& row) {
           row.family,
           std::string(row.measure),
           fmt::format("{}", row.steps),
-          fmt::format("{:.1f} %", 100 * row.missed()),
+          fmt::format("{:.1f} %", 100 * row.missed_share()),
           fmt::format("{}", row.judged),
           fmt::format("{}", row.unjudged),
+          fmt::format("{}", row.unsolvable),
           fmt::format("{}", row.disputed),
           number(row.claimed.median),
           number(row.claimed.most),

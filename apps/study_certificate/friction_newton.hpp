@@ -16,9 +16,11 @@ struct NewtonResult {
   /// Largest entry of the law's residual over the largest impulse that the search began with, or the largest
   /// speed of approach, in scaled coordinates.
   double residual = 1;
-  /// Velocities that one more step would change, kinetic norm, over what impulses change: about the error of
-  /// the velocities.
-  double next = 1;
+  /// What one more step would change of the velocities, about their error, and what impulses change of them,
+  /// at least a hundredth of the largest impulse; in the kinetic norm [J^1/2].
+  double next = 1, exchanged = 1;
+  /// d.W d / |d|^2 of what the search has changed, diagonal of W 1.
+  double stiffness = 1;
 };
 
 /// In coordinates s = r / scale, with scale W_nn^-1/2 along the normal and W_tt^-1/2 across it, the law of

@@ -1,6 +1,7 @@
 #include "apps/study_certificate/reference.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace talus::audit {
@@ -83,16 +84,20 @@ std::vector<std::size_t> clusters_of(const StepProblem& problem, std::size_t& co
 Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
                           const ReferenceLimits& limits) {
   Reference whole;
-  whole.found = true;
+  whole.found = Found::answer;
   whole.r.assign(run.size(), Vec3::Zero());
+  double error2 = 0, exchanged2 = 0;
   for (const Part& part : split(problem, run)) {
     const Reference own = part.problem.smooth() ? solve_smooth(part.problem, part.run, limits)
                                                 : solve_frictional(part.problem, part.run, limits);
     for (std::size_t c = 0; c < part.contacts.size(); ++c) whole.r[part.contacts[c]] = own.r[c];
     whole.residual = std::max(whole.residual, own.residual);
-    whole.uncertainty = std::max(whole.uncertainty, own.uncertainty);
-    if (!own.found) whole.found = false, whole.why = own.why;
+    error2 += own.error * own.error;
+    exchanged2 += own.exchanged * own.exchanged;
+    if (own.found > whole.found) whole.found = own.found, whole.why = own.why;
   }
+  whole.error = std::sqrt(error2);
+  whole.exchanged = std::sqrt(exchanged2);
   whole.motion = motion_under(problem, whole.r);
   return whole;
 }

@@ -18,22 +18,44 @@ namespace talus::audit {
 
 struct ReferenceLimits {
   double residual = 1e-10;  ///< of the law at a contact, relative: below it the answer counts as found
+  double pumped = 1e6;  ///< impulses that grow so many times over what the step can ask for have no answer
+  double velocities = 1e-8;  ///< error() of velocities that are known though the law is not met
+  /// Where an answer differs from the run by impulses d with d.W d < redundant |d|^2 (diagonal of W 1),
+  /// forces are not known: a change of all of them would change velocities by 1e-4, so that which of the
+  /// contacts carry is decided by gaps that no tolerance sees. (A smooth wedge of half angle 1e-3 has 1e-6.)
+  double redundant = 1e-8;
+  double nearly = 1e-6;     ///< residual up to which that may be
   double speeds = 1e-5;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
   int proximal_steps = 30;  ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
 };
 
+/// What a search has come to.
+enum class Found {
+  answer,      ///< the law is met: velocities and forces are known
+  velocities,  ///< velocities are known; of redundant contacts, which rounding has over-determined, forces
+               ///< are not
+  nothing,     ///< the search failed
+  no_answer,   ///< there is none: walls close on grains that cannot get away
+};
+
+inline constexpr const char* redundant_forces = "redundant contacts: forces are not known";
+
 /// An answer and how well it is known.
 struct Reference {
-  bool found = false;
-  std::string why = {};      ///< where it was not found
+  Found found = Found::nothing;
+  std::string why = {};      ///< where no answer was found
   std::vector<Vec3> r = {};  ///< impulses of the problem's contacts [N s]
   Motion motion = {};        ///< under them
   double residual = 0;       ///< of the law (natural map), the largest, over the run's largest impulse or the
                              ///< largest speed of approach
-  double uncertainty = 0;    ///< of the velocities, kinetic norm, over what the contacts change: a bound
-                             ///< without friction, with friction the next step of Newton's method
+  /// Error of the velocities in the kinetic norm [J^1/2], a bound without friction, with friction the next
+  /// step of Newton's method; and the norm of what the contacts change, at least a hundredth of the largest
+  /// impulse.
+  double error = 0, exchanged = 0;
+
+  double uncertainty() const { return exchanged > 0 ? error / exchanged : 0; }
 };
 
 /// Number of the cluster of each contact: contacts that share a grain or a pushed wall are of one. `count`:
@@ -47,6 +69,9 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
 /// Without friction: proximal steps, each an exact solve of the complementarity problem by block principal
 /// pivoting (Portugal, Judice and Vicente 1994) in 80-bit arithmetic.
 Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, const ReferenceLimits& limits);
+
+/// Whether some velocities meet v_n + b >= 0 at all contacts, up to rounding.
+bool has_answer(const StepProblem& problem, const ReferenceLimits& limits);
 
 /// With friction: projected Gauss-Seidel with Anderson's acceleration, and Newton's method from where it got.
 Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,

@@ -182,7 +182,7 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
                            const ReferenceLimits& limits) {
   Reference reference;
   reference.r.assign(run.begin(), run.end());
-  reference.residual = reference.uncertainty = 1;
+  reference.residual = reference.error = reference.exchanged = 1;
   Sweeps sweeps(problem);
   const FrictionNewton newton(problem, limits.speeds);
   const std::size_t contacts = sweeps.contacts();
@@ -199,13 +199,25 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
     const NewtonResult result = newton.improve(impulses, sharpness * limits.residual, limits.proximal_steps);
     if (!(result.residual < reference.residual)) continue;
     reference.residual = result.residual;
-    reference.uncertainty = result.next;
+    reference.error = result.next;
+    reference.exchanged = result.exchanged;
     reference.r = impulses;
-    reference.found = result.residual <= limits.residual;
-    if (reference.found) break;
+    if (result.residual > limits.residual) continue;
+    reference.found = result.stiffness < limits.redundant ? Found::velocities : Found::answer;
+    break;
   }
   reference.motion = motion_under(problem, reference.r);
-  if (!reference.found) reference.why = "neither sweeps nor Newton's method find the answer";
+  if (reference.found == Found::velocities) reference.why = redundant_forces;
+  if (reference.found != Found::nothing) return reference;
+  if (!has_answer(problem, limits)) {
+    reference.found = Found::no_answer;
+    reference.why = "no velocities are admissible";
+  } else if (reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly) {
+    reference.found = Found::velocities;
+    reference.why = redundant_forces;
+  } else {
+    reference.why = "neither sweeps nor Newton's method find the answer";
+  }
   return reference;
 }
 

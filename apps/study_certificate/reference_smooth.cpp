@@ -189,7 +189,24 @@ bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough,
   return true;
 }
 
+/// What impulses and speeds of approach are compared with.
+Real unit_of(const StepProblem& problem, const Dual& dual, const Vector& s, const ReferenceLimits& limits) {
+  Real unit = std::max({s.maxCoeff(), (-dual.q).maxCoeff(), Real{1e-300L}});
+  for (Eigen::Index c = 0; c < s.size(); ++c)
+    unit = std::max<Real>(unit, limits.speeds * dual.scale[c] *
+                                    speed_of_bodies(problem, problem.contacts[static_cast<std::size_t>(c)]));
+  return unit;
+}
+
 }  // namespace
+
+bool has_answer(const StepProblem& problem, const ReferenceLimits& limits) {
+  const Dual dual = dual_of(problem);
+  Vector s = Vector::Zero(dual.q.size());
+  const Real unit = unit_of(problem, dual, s, limits);
+  find_impulses(dual, limits, sharpness * limits.residual * unit, s);
+  return s.maxCoeff() <= limits.pumped * unit;
+}
 
 Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, const ReferenceLimits& limits) {
   Reference reference;
@@ -200,23 +217,30 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
     const auto k = static_cast<std::size_t>(c);
     s[c] = std::max(0.0, run[k].dot(problem.contacts[k].normal)) / dual.scale[c];
   }
-  Real unit = std::max({s.maxCoeff(), (-dual.q).maxCoeff(), Real{1e-300L}});
-  for (Eigen::Index c = 0; c < count; ++c)
-    unit = std::max<Real>(unit, limits.speeds * dual.scale[c] *
-                                    speed_of_bodies(problem, problem.contacts[static_cast<std::size_t>(c)]));
+  const Real unit = unit_of(problem, dual, s, limits);
+  const Vector begun = s;
   const bool ended = find_impulses(dual, limits, sharpness * limits.residual * unit, s);
   const Met met = met_by(dual, s);
-  const Real exchange = std::sqrt(std::max<Real>(0, s.dot(dual.W * s)));
   reference.residual = static_cast<double>(met.residual / unit);
-  reference.uncertainty = static_cast<double>(
-      std::sqrt(met.gap) / std::max(exchange, floor_of_exchange * s.maxCoeff() + Real{1e-300L}));
+  reference.error = static_cast<double>(std::sqrt(met.gap));
+  reference.exchanged = static_cast<double>(
+      std::max(std::sqrt(std::max<Real>(0, s.dot(dual.W * s))), floor_of_exchange * s.maxCoeff()));
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto k = static_cast<std::size_t>(c);
     reference.r.push_back(static_cast<double>(s[c] * dual.scale[c]) * problem.contacts[k].normal);
   }
   reference.motion = motion_under(problem, reference.r);
-  reference.found = ended && reference.residual <= limits.residual;
-  if (!reference.found) reference.why = ended ? "the law is not met" : "the pivots do not end";
+  if (s.maxCoeff() > limits.pumped * unit) {
+    reference.found = Found::no_answer;
+    reference.why = "no velocities are admissible";
+  } else if (ended && reference.residual <= limits.residual) {
+    const Vector moved = s - begun;
+    const bool free = moved.dot(dual.W * moved) < limits.redundant * moved.squaredNorm();
+    reference.found = free ? Found::velocities : Found::answer;
+    if (free) reference.why = redundant_forces;
+  } else {
+    reference.why = ended ? "the law is not met" : "the pivots do not end";
+  }
   return reference;
 }
 

@@ -126,13 +126,13 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
 
 double disagreement(const StepProblem& problem, const StepEnd& end) {
   const Motion motion = motion_under(problem, end.r);
-  double most = 0, speed = 1e-300;
+  double impulse = 1e-300, most = 0;
+  for (const Vec3& r : end.r) impulse = std::max(impulse, r.norm());
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    most = std::max(most, (motion.u[k] - end.after.u[k]).norm());
-    speed = std::max(
-        {speed, end.after.u[k].norm(), problem.free.u[k].norm(), problem.time_step * problem.gravity.norm()});
+    const double m = problem.mass[k], own = m * (end.after.u[k].norm() + problem.free.u[k].norm());
+    most = std::max(most, m * (motion.u[k] - end.after.u[k]).norm() / std::max(impulse, own));
   }
-  return most / speed;
+  return most;
 }
 
 double energy_gain(const StepProblem& problem, const Frame& before, const Frame& after) {

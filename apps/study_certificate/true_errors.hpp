@@ -28,8 +28,9 @@ struct StepEnd {
 
 TrueErrors true_errors(const StepProblem& problem, const Reference& reference, const StepEnd& end);
 
-/// Largest difference between the velocities that the run ended with and those that its impulses give, over
-/// the largest speed: rounding, unless the run's contacts are not those of the problem.
+/// Largest momentum of a grain that its impulses do not explain, over the largest impulse or its own
+/// momentum: rounding (frames have forces in single precision), unless the run's contacts are not those of
+/// the problem.
 double disagreement(const StepProblem& problem, const StepEnd& end);
 
 /// Energy that a step gained beyond the share that the scheme itself may add, m (h g)^2/8 a grain
