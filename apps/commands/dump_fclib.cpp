@@ -50,8 +50,13 @@ std::function<void()> fclib_dump(const Simulation& simulation, const std::filesy
           "the step found, error {:.2e}",
           state.bodies.size(), step.problem.contacts(), report.time, parameters.time_step, report.error_rms),
       .math_info =
-          "u = W r + q: velocities in m/s at the end of the step, impulses in N s, normal first; q has "
-          "the gap and restitution terms in it"};
+          parameters.reflection > 0
+              ? fmt::format("u = W r + q: velocities in m/s, impulses in N s, normal first; with E = {:g} of "
+                            "Moreau's restitution u is (v + E v_begin)/(1 + E) and r the impulse over 1 + E; "
+                            "q has the gap and restitution terms in it",
+                            parameters.reflection)
+              : "u = W r + q: velocities in m/s at the end of the step, impulses in N s, normal first; q has "
+                "the gap and restitution terms in it"};
   return [problem = io::FclibProblem{.contact = std::move(step.problem), .global = {}}, r = std::move(step.r),
           info = std::move(info), path = directory / fmt::format("fclib_{:06}.hdf5", report.step)] {
     io::write_fclib(problem.contact, io::fclib_solution(problem, r), info, path);

@@ -68,7 +68,12 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
   line("gravity", parameters.gravity.norm() > 0,
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   const double restitution = parameters.laws.largest(&PairLaw::restitution);
-  line("restitution", restitution > 0, fmt::format("e = {:g}", restitution));
+  line("restitution", restitution > 0,
+       fmt::format("e = {:g}, {} law", restitution, parameters.reflection > 0 ? "Moreau's" : "Newton's"));
+  const double undone = scene.setup.solver.overlap_correction;
+  line("overlaps undone", undone > 0,
+       undone > 0 ? fmt::format("{:g} of an overlap per step, by ten sweeps behind the others", undone)
+                  : "overlap_correction = 0: no sweeps of positions");
   print_laws(simulation);
   line("moving walls", driven + pressed > 0,
        fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));

@@ -128,7 +128,7 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
       "{} overlap{} of more than 10 % of the smaller radius, the deepest of {:.0f} % between {}; {}",
       overlaps.count, overlaps.count == 1 ? "" : "s", 100 * overlaps.worst, overlaps.between,
       scene.setup.solver.overlap_correction > 0
-          ? "solver.overlap_correction parts them, and gives them the speed that this takes"
+          ? "solver.overlap_correction parts them"
           : "they stay as they are: set solver.overlap_correction to 0.1, or begin from another sample");
 }
 

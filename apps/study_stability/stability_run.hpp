@@ -13,8 +13,8 @@ namespace talus::stability {
 /// The bound of a certified step is twice what its certificate says (the larger of error_rms and balance),
 /// but at least twice the tolerance asked for, below which nothing is claimed; with TruthFrom::rest
 /// the step's distance from rest is added, in momentum over the impulse of the loads. Energy goes with the
-/// square of velocities: without restitution and correction of overlaps a step may gain twice that bound of
-/// what it would have without contacts.
+/// square of velocities: without Newton's restitution and correction of overlaps a step may gain twice that
+/// bound of what it would have without contacts.
 struct Outcome {
   Verdict verdict = Verdict::failed;
   int steps = 0, judged = 0;  ///< done; certified and compared with a truth

@@ -122,7 +122,7 @@ gain of a step that no load supplied, over the kinetic energy that it would reac
 <b>overlap</b>: largest, over the smallest radius; <b>judged</b>: steps that are certified and were compared
 with an exact answer, of those made. The <b>bound</b> of a step is twice the largest of rms, balance and
 tolerance; where the exact answer is that of a sample at rest, how far the step begins from rest is added.
-Without restitution and correction of overlaps a step may gain twice its bound of energy.</p>
+Without Newton's restitution and correction of overlaps a step may gain twice its bound of energy.</p>
 <p><b>right</b>: every step is certified and judged, and within its bounds; <b>certified</b>: every step is
 certified, but not all of it is known to be right; <b>honest</b>: missed the tolerance and says so;
 <b>refused</b>: an error that names its cause; <b>WRONG</b>: certified, and further from the exact answer than

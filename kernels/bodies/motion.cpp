@@ -46,17 +46,35 @@ void MotionSums::add(const MotionSums& other) {
   }
 }
 
-MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free, const CopyShares& copies) {
+namespace {
+
+/// V = Vbar + E (Vbar - V-) of body s: written so, a body that meets nothing keeps its velocity to the bit.
+void reflect(Velocity& v, const FreeVelocity& free, std::size_t s, const StepFinish& end) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double before = free.u[s][c] - end.gain[static_cast<Eigen::Index>(c)];
+    v.u[c] += end.reflection * (v.u[c] - before);
+    if (!free.w.empty()) v.w[c] += end.reflection * (v.w[c] - free.w[s][c]);
+  }
+}
+
+template <bool Reflects>
+MotionSums finish_with(SlotRange range, std::span<Vec3> x, std::span<Velocity> velocity,
+                       const FreeVelocity& free, const StepFinish& end) {
+  const CopyShares& copies = end.copies;
   MotionSums sums;
   for (std::size_t s = range.begin; s < range.end; ++s) {
-    const Velocity& v = velocity[s];
-    const Vec3 u(v.u[0], v.u[1], v.u[2]), u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
-    x[s] += 0.5 * time_step * u;
+    Velocity& v = velocity[s];
+    Vec3 u(v.u[0], v.u[1], v.u[2]);
+    const Vec3 u_free(free.u[s][0], free.u[s][1], free.u[s][2]), change = u - u_free;
+    if constexpr (Reflects) {
+      reflect(v, free, s, end);
+      u = {v.u[0], v.u[1], v.u[2]};
+    }
+    x[s] += 0.5 * end.time_step * u;
     const double share =
         copies.multiplicity.empty() ? 1 : static_cast<double>(copies.parts[s]) / copies.multiplicity[s];
     const double mass = share / v.inv_mass, u2 = u.squaredNorm();
-    const Vec3 gained = mass * (u - u_free);
+    const Vec3 gained = mass * change;
     sums.energy.translation += 0.5 * mass * u2;
     sums.energy_free += 0.5 * mass * u_free.squaredNorm();
     if (v.spin_mobility > 0) {
@@ -78,6 +96,14 @@ MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> 
     }
   }
   return sums;
+}
+
+}  // namespace
+
+MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<Velocity> velocity, const FreeVelocity& free,
+                  const StepFinish& end) {
+  return end.reflection > 0 ? finish_with<true>(range, x, velocity, free, end)
+                            : finish_with<false>(range, x, velocity, free, end);
 }
 
 std::array<double, 4> turned(const std::array<double, 4>& q, const double* w, double radius,

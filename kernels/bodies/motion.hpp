@@ -48,9 +48,19 @@ struct CopyShares {
   Multiplicities multiplicity = {}, parts = {};
 };
 
-/// Second half: x += h/2 u, with the sums. A copy adds M/m_i to the sums over bodies.
-MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<const Velocity> velocity, double time_step,
-                  const FreeVelocity& free, const CopyShares& copies = {});
+/// How a step ends.
+struct StepFinish {
+  double time_step;  ///< h [s]
+  CopyShares copies = {};
+  double reflection =
+      0;  ///< E: with Moreau's restitution V = (1 + E) Vbar - E V-, of the Vbar that was found
+  Vec3 gain = Vec3::Zero();  ///< of the free velocity from V- [m/s]; asked for where E > 0
+};
+
+/// Second half: V of the end of the step where Vbar stood, x += h/2 u, and the sums. Impulses are those that
+/// made Vbar. A copy adds M/m_i to the sums over bodies.
+MotionSums finish(SlotRange range, std::span<Vec3> x, std::span<Velocity> velocity, const FreeVelocity& free,
+                  const StepFinish& end);
 
 /// The unit quaternion q turned by omega = w/R over `time_step`: exact for constant omega. w [m/s] of 3.
 std::array<double, 4> turned(const std::array<double, 4>& q, const double* w, double radius,

@@ -21,7 +21,7 @@ struct NarrowPhase {
   double alert;                        ///< [m]
   PairTable laws;
   Vec3 gravity;                             ///< [m/s^2]
-  double overlap_correction = 0;            ///< in [0, 1]
+  double reflection = 0;                    ///< E of the step (kernels/law/restitution_law.hpp)
   std::span<const Material> material = {};  ///< of the bodies; empty: material_of_grains
   ClumpView clumps = {};
   [[no_unique_address]] Domain domain = {};
@@ -31,8 +31,7 @@ struct NarrowPhase {
 /// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
 /// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
 /// approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once g <= 0, and no constraint before.
-/// A resting overlap is undone at the rate of b = overlap_correction x g/h. Coincident centres get the normal
-/// +z.
+/// Coincident centres get the normal +z.
 ///
 /// A chunk whose contacts are the candidates that they were keeps their places and groups; where a few came
 /// or went these are repaired, else dealt anew (kernels/detection/detail/contact_groups.hpp). So groups

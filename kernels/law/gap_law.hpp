@@ -9,11 +9,11 @@ namespace talus {
 
 /// Numbers of the rule, the same for all pairs of a step.
 struct GapRule {
-  double time_step;           ///< h [s]
-  double alert;               ///< [m]
-  double restitution;         ///< e in [0, 1], where pairs have none of their own
-  double overlap_correction;  ///< in [0, 1]
-  double slow;                ///< [m/s] no restitution up to here
+  double time_step;       ///< h [s]
+  double alert;           ///< [m]
+  double restitution;     ///< e in [0, 1], where pairs have none of their own
+  double slow;            ///< [m/s] no restitution up to here
+  double reflection = 0;  ///< E of Moreau's law (restitution_law.hpp); 0: the bias is that of v_n
 };
 
 namespace {
@@ -35,7 +35,7 @@ struct GapResult {
   BitsOf<V> absent;  ///< where the pair constrains nothing in this step
 };
 
-/// Inelastic quasi-Signorini, b = max(g, 0)/h; an overlap is undone at the rate `overlap_correction`. With
+/// Inelastic quasi-Signorini, b = max(g, 0)/h. With
 /// restitution, a pair faster than `slow` follows Moreau's impact law instead: b = e v_n once g <= 0, and no
 /// constraint before. `v_n` [m/s] is the normal velocity at the beginning of the step, `v_n_free` the one at
 /// its end without contacts. `restitution` is a number, or one per lane.
@@ -43,7 +43,7 @@ template <class V, class E>
 [[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free,
                                                      E restitution) {
   BitsOf<V> absent = stays_apart(gap, v_n_free, rule.time_step, rule.alert);
-  V bias = (gap > 0 ? gap : rule.overlap_correction * gap) / rule.time_step;
+  V bias = positive_part(gap) / rule.time_step;
   // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
   // between both would gain energy.
   const auto impact = [&](BitsOf<V> quick) {
@@ -55,6 +55,7 @@ template <class V, class E>
   } else {
     impact((restitution > 0) & (absolute(v_n) > rule.slow));
   }
+  if (rule.reflection > 0) bias = positive_part(bias - rule.reflection * v_n) / (1 + rule.reflection);
   return {bias, absent};
 }
 

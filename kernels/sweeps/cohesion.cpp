@@ -13,6 +13,7 @@ void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Ch
                    std::size_t chunk, Contacts& contacts) {
   if (contacts.cohesion.empty()) return;
   constexpr CohesionRule rule;
+  const double impulse_time = in.time_step / (1 + in.reflection);
   const MaterialView materials{in.material, in.walls};
   const Poses poses{in.x, in.radius, in.walls, in.clumps, in.domain};
   const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[at(chunks.wall[chunk])];
@@ -20,7 +21,7 @@ void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Ch
   for (std::size_t k = begin; k < end; ++k) {
     const double c = law_at(in.laws, candidates, materials, at(contacts.candidate[k])).cohesion;
     const Touch touch = touch_of(poses, contacts, k, wall);
-    contacts.cohesion[k] = touch.gap <= rule.reach * touch.smaller_radius ? c * in.time_step : 0;
+    contacts.cohesion[k] = touch.gap <= rule.reach * touch.smaller_radius ? c * impulse_time : 0;
   }
 }
 

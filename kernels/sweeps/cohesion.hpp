@@ -22,8 +22,8 @@ struct CohesionRule {
   double reach = 1e-3;
 };
 
-/// Fills Contacts::cohesion of a chunk, c h [N s], 0 for contacts that do not touch; nothing where the array
-/// is empty.
+/// Fills Contacts::cohesion of a chunk, c h [N s] (c h/(1 + E) with Moreau's restitution), 0 for contacts
+/// that do not touch; nothing where the array is empty.
 void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                    std::size_t chunk, Contacts& contacts);
 

@@ -87,6 +87,8 @@ void ChunkWork::work(std::size_t c, int epoch) {
       return measure<Friction>(c);
     case Work::sweep:
       return sweep<Friction>(c, epoch);
+    case Work::position:
+      return;  // PositionCorrection
   }
 }
 

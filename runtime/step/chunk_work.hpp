@@ -47,6 +47,10 @@ class ChunkWork {
   std::vector<double> busy() const;
   const AccelerationHistory& acceleration() const { return acceleration_; }
 
+  /// Contacts of a chunk, and the bodies that it is the first to write.
+  ContactRange range_of(std::size_t c) const;
+  std::span<const Slot> owned(std::size_t c) const;
+
  private:
   template <bool Friction>
   void work(std::size_t c, int epoch);
@@ -60,8 +64,6 @@ class ChunkWork {
   void change_precision(std::size_t c, int epoch);
   void to_single(std::size_t c, int epoch, bool before);
   void to_double(std::size_t c, int epoch, bool before);
-  ContactRange range_of(std::size_t c) const;
-  std::span<const Slot> owned(std::size_t c) const;
   ChunkFriction friction_of(std::size_t c) const;
   bool at_wall(std::size_t c) const { return state_.chunks.wall[c] >= 0; }
   bool blocks(std::size_t c) const { return state_.chunks.kind[c] == ChunkKind::blocks; }

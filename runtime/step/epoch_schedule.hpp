@@ -14,18 +14,21 @@ namespace talus {
 /// With several ranks the sums of a check travel while the next sweep goes on. They are read behind that
 /// sweep; if they say that the step is solved, `restore` brings back the impulses that were certified.
 ///
+/// Where overlaps are undone, as many epochs as positions_from() says follow, whatever the loop ended with.
+///
 ///   behind measure, sums known:     sweep_on(epoch, n), again_from(epoch), or the loop ends
 ///   behind measure, sums under way: sweep_on(epoch, n); read_sums_after_next(epoch)
 ///   behind the epoch that reads:    stretch(n), again_from(epoch), or restore_after(epoch)
 class EpochSchedule {
  public:
-  enum class Work { accumulate, measure, sweep, restore };
+  enum class Work { accumulate, measure, sweep, restore, position };
 
   Work work(int epoch) const {
-    return epoch == restore_at_ ? Work::restore
-           : epoch < segment_   ? Work::sweep
-           : epoch == segment_  ? Work::accumulate
-                                : Work::measure;
+    return position_end_ != never && epoch >= position_end_ - positions_ ? Work::position
+           : epoch == restore_at_                                        ? Work::restore
+           : epoch < segment_                                            ? Work::sweep
+           : epoch == segment_                                           ? Work::accumulate
+                                                                         : Work::measure;
   }
   /// Number of the sweep of this epoch among those of the step.
   int sweep(int epoch) const { return checked_ + epoch - first_sweep_; }
@@ -38,6 +41,9 @@ class EpochSchedule {
   bool measures_at(int epoch) const { return epoch == segment_ + 1; }
   bool reads_sums_at(int epoch) const { return epoch == read_at_; }
   bool restores_at(int epoch) const { return epoch == restore_at_; }
+  /// Number, from 0, of a sweep of positions; and whether the loop ends behind it.
+  int position_sweep(int epoch) const { return epoch - (position_end_ - positions_); }
+  bool ends_at(int epoch) const { return epoch + 1 == position_end_; }
 
   /// Sweeps done at the last measure, and at the next accumulate.
   int checked() const { return checked_; }
@@ -63,6 +69,13 @@ class EpochSchedule {
   void sums_read() { read_at_ = never; }
   /// The step ends behind the next epoch, with the impulses of the last measure.
   void restore_after(int epoch) { restore_at_ = epoch + 1; }
+  /// The velocities stand: `sweeps` >= 1 epochs that undo overlaps follow, and nothing else.
+  void positions_from(int epoch, int sweeps) {
+    *this = {};
+    segment_ = first_sweep_ = never - 1;
+    positions_ = sweeps;
+    position_end_ = epoch + 1 + sweeps;
+  }
 
  private:
   static constexpr int never = -1;
@@ -72,6 +85,8 @@ class EpochSchedule {
   int restore_at_ = never;
   int checked_ = 0;
   int planned_ = 0;
+  int position_end_ = never;  ///< epoch behind the last sweep of positions
+  int positions_ = 0;
 };
 
 }  // namespace talus

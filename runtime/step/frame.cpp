@@ -67,7 +67,7 @@ std::vector<Active> active_contacts(const StepState& state) {
   return active;
 }
 
-ContactRow contact_row(const StepState& state, const Active& active, double time_step) {
+ContactRow contact_row(const StepState& state, const Active& active, double impulse_time) {
   const Bodies& bodies = state.bodies;
   const auto k = static_cast<std::size_t>(active.contact);
   const Vec3 normal = contact_normal(state.contacts, k), impulse = contact_impulse(state.contacts, k);
@@ -84,7 +84,7 @@ ContactRow contact_row(const StepState& state, const Active& active, double time
   copy3(normal, row.normal);
   copy3(touch.ball.centre - (touch.ball.radius + 0.5 * touch.gap) * normal, row.point);
   row.gap = touch.gap;
-  copy3(impulse / time_step, row.force);
+  copy3(impulse / impulse_time, row.force);
   return row;
 }
 
@@ -141,7 +141,7 @@ std::vector<Slot> ascending(std::span<const Key> keys) {
 }  // namespace
 
 void fill_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
-                double time_step, Frame& frame) {
+                double impulse_time, Frame& frame) {
   std::vector<std::size_t> counted;
   std::vector<std::int64_t> ids;
   for (std::size_t s = 0; s < state.bodies.size(); ++s) {
@@ -177,7 +177,7 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   if (!contacts) return;
   const std::vector<Active> active = active_contacts(state);
   deal_rows(
-      active.size(), first, ranks, [&](std::size_t k) { return contact_row(state, active[k], time_step); },
+      active.size(), first, ranks, [&](std::size_t k) { return contact_row(state, active[k], impulse_time); },
       [](const ContactRow& row) { return row.bodies[0]; },
       [&](const ContactRow& row) {
         frame.contact_bodies.push_back({row.bodies[0], row.bodies[1]});

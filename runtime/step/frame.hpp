@@ -83,8 +83,9 @@ struct Frame {
 struct StepState;
 
 /// Fills the bodies and contacts of `frame`: this rank's part, about as large as that of any other; a contact
-/// is where its first body is. Collective; rows travel in bounded pieces.
+/// is where its first body is, its force its impulse over `impulse_time` [s]. Collective; rows travel in
+/// bounded pieces.
 void fill_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
-                double time_step, Frame& frame);
+                double impulse_time, Frame& frame);
 
 }  // namespace talus

@@ -66,21 +66,12 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
   for (const Wall& wall : state.walls)
     fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
   const double energy = motion.energy.translation + motion.energy.rotation;
-  // So fast part two grains whose overlap is opened within the step, and the faster the more of them stand
-  // in a row; deep ones are no supply that anybody wants.
-  constexpr double deep = 1e-2;  // of the smallest radius
-  const double opened = setup.solver.overlap_correction *
-                        std::min(sums.contacts.penetration_max, deep * sample.smallest) /
-                        parameters.time_step;
-  const double supplied =
-      motion.energy_free + wall_energy_free +
-      sample.total_mass * (fastest_wall2 + 0.5 * opened * opened * static_cast<double>(sample.bodies));
+  const double supplied = motion.energy_free + wall_energy_free + sample.total_mass * fastest_wall2;
   if (energy > 100 * supplied && energy > 0)
-    throw RunawayError(fmt::format(
-        "{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "
-        "Reduce the time step or raise solver.max_iterations; with solver.overlap_correction, begin "
-        "without deep overlaps",
-        step.text(), energy, supplied, describe(state.bodies, motion.fastest)));
+    throw RunawayError(
+        fmt::format("{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "
+                    "Reduce the time step or raise solver.max_iterations",
+                    step.text(), energy, supplied, describe(state.bodies, motion.fastest)));
 }
 
 }  // namespace talus

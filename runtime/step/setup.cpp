@@ -131,6 +131,9 @@ void validate(const Setup& setup) {
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,
       fmt::format("solver.overlap_correction must lie in [0, 1], got {}", setup.solver.overlap_correction));
+  require(setup.solver.overlap_correction == 0 || setup.decomposition.coupling != Coupling::schwarz,
+          "solver.overlap_correction: Schwarz does not glue displacements. Set it to 0, or coupling to "
+          "\"alternating\" or \"nscdd\"");
   require(setup.decomposition.repartition_every >= 1 && setup.decomposition.sweeps_per_exchange >= 1,
           "decomposition.repartition_every and sweeps_per_exchange must be >= 1");
   require(

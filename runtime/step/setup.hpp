@@ -12,6 +12,7 @@
 
 #include "kernels/bodies/types.hpp"
 #include "kernels/law/pair_table.hpp"
+#include "kernels/law/restitution_law.hpp"
 #include "kernels/registry.hpp"
 #include "kernels/shapes/clump.hpp"
 #include "kernels/shapes/walls.hpp"
@@ -90,8 +91,9 @@ struct SolverSettings {
   int check_every =
       10;  ///< sweeps between the first checks; later ones stand where the tolerance is expected, >= 1
   bool warm_start = true;  ///< begin from the impulses of the last step
+  RestitutionLaw restitution_law = RestitutionLaw::moreau;
   double overlap_correction =
-      0;  ///< in [0, 1]: part of an overlap that a step undoes, v_n >= -correction x g/h for g < 0
+      0;  ///< in [0, 1]: part of an overlap that a step undoes (kernels/sweeps/positions.hpp)
   Precision precision = Precision::mixed;
   InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps
 };

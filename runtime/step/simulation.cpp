@@ -106,10 +106,11 @@ struct Simulation::Implementation {
       if (wall.load.drive == WallDrive::pressure)
         face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
     }
-    const double last_time_step = parameters.time_step;
+    const double last_impulse_time = parameters.impulse_time();
     parameters.time_step = stage.time_step;
     parameters.gravity = stage.gravity;
     parameters.laws = stage.laws;
+    parameters.reflection = reflection_of(setup.solver.restitution_law, stage.laws);
     parameters.clumps = !setup.clumps.empty();
     parameters.friction = parameters.clumps || stage.laws.largest(&PairLaw::friction) > 0;
     parameters.rotates = parameters.friction && setup.rotation;
@@ -127,7 +128,8 @@ struct Simulation::Implementation {
     }
     if (state.candidates_valid) {
       // Forces outlive the change of stage, so impulses go with the time step.
-      for (double& value : state.candidates.impulse.values()) value *= stage.time_step / last_time_step;
+      for (double& value : state.candidates.impulse.values())
+        value *= parameters.impulse_time() / last_impulse_time;
       convert_impulses(state.candidates, parameters.impulses(), state.bodies.x, state.walls);
       state.candidates_valid = false;
     }
@@ -151,7 +153,7 @@ struct Simulation::Implementation {
                            : wall.load.drive == WallDrive::force ? wall.load.force
                                                                  : 0;
       wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
-      wall_state.free_velocity = wall.velocity + wall.gain;
+      wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);
     }
   }
 
@@ -306,7 +308,7 @@ std::vector<WallReport> Simulation::walls() const {
   for (std::size_t w = 0; w < impl_->state.walls.size(); ++w) {
     const Wall& wall = impl_->state.walls[w];
     reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
-                       impl_->state.wall_states[w].impulse / impl_->parameters.time_step});
+                       impl_->state.wall_states[w].impulse / impl_->parameters.impulse_time()});
   }
   return reports;
 }
@@ -319,7 +321,8 @@ std::optional<TriaxialReport> Simulation::triaxial() const {
   out.time = impl_->report.time;
   out.stage = stage().name;
   out.solid_fraction = impl_->report.solid_fraction;
-  const Eigen::Matrix3d stress = impl_->graph.sums().contacts.moment / (box * impl_->parameters.time_step);
+  const Eigen::Matrix3d stress =
+      impl_->graph.sums().contacts.moment / (box * impl_->parameters.impulse_time());
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
     out.strain[a] = impl_->strain(axis);
@@ -359,7 +362,7 @@ Frame Simulation::frame(bool contacts) const {
   frame.time = impl_->report.time;
   frame.stage = stage().name;
   fill_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
-             impl_->parameters.time_step, frame);
+             impl_->parameters.impulse_time(), frame);
   frame.walls = walls();
   return frame;
 }

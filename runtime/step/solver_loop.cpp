@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -36,6 +37,8 @@ TaskKind kind_of_work(Work work) {
       return TaskKind::measure;
     case Work::restore:
       return TaskKind::restore;
+    case Work::position:
+      return TaskKind::position;
     case Work::sweep:
       break;
   }
@@ -106,6 +109,7 @@ SolverLoop::SolverLoop(StepState& state, const StepParameters& parameters, const
       gluing_(state, decomposition, ranks),
       admm_(state, parameters, decomposition, gluing_, ranks),
       work_(state, parameters, kernels_, schedule_, courses_),
+      positions_(state, settings, kernels_, work_),
       certificate_(settings),
       problem_(state, admm_, courses_, certificate_) {}
 
@@ -156,12 +160,13 @@ bool SolverLoop::schwarz() const {
 void SolverLoop::begin() {
   split_walls();
   work_.begin(schwarz() && decomposition_.damping, ranks_.ranks() > 1);
+  positions_.forget();
   began_ = graph::seconds_now();
   Certificate::Scales scales;
   scales.rounding_velocity =
       std::numeric_limits<double>::epsilon() * parameters_.alert / parameters_.time_step;
   for (const WallState& wall : state_.wall_states)
-    scales.wall_pushes.push_back(parameters_.time_step * wall.applied);
+    scales.wall_pushes.push_back(parameters_.impulse_time() * wall.applied);
   certificate_.begin(std::move(scales));
   problem_.begin();
   pending_.reset();
@@ -190,6 +195,7 @@ bool SolverLoop::single_will_do(SweepKind kind) const {
 Gluing::Mode SolverLoop::gluing_mode(int epoch) const {
   const Work work = schedule_.work(epoch);
   if (work == Work::accumulate || work == Work::restore) return Gluing::Mode::fresh;
+  if (work == Work::position) return Gluing::Mode::iterate;
   if (schedule_.closes_segment(epoch)) return Gluing::Mode::measured;
   return schedule_.sweeps_of_segment(epoch) % decomposition_.sweeps_per_exchange == 0 ? Gluing::Mode::iterate
                                                                                       : Gluing::Mode::local;
@@ -198,14 +204,17 @@ Gluing::Mode SolverLoop::gluing_mode(int epoch) const {
 void SolverLoop::node(std::uint32_t node, int epoch) {
   const auto [role, group] = plan_.nodes[node];
   if (role == graph::LoopRole::work) {
-    work_.run(node, epoch);
+    if (schedule_.work(epoch) == Work::position)
+      positions_.run(node, schedule_.position_sweep(epoch));
+    else
+      work_.run(node, epoch);
     // Long messages advance only while somebody calls MPI.
     if (ranks_.ranks() > 1 && node % 4 == 0 && ranks_.any_thread()) ranks_.progress();
     return;
   }
   if (schedule_.work(epoch) == Work::measure) return;
   const Gluing::Mode mode = gluing_mode(epoch);
-  const bool single = work_.single(epoch);
+  const bool single = in_single(epoch);
   const SubdomainPlace e(group);  // means nothing for collect and root
   switch (role) {
     case graph::LoopRole::work:
@@ -228,10 +237,9 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
 /// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
 /// look for it with the first of them.
 void SolverLoop::take(SubdomainPlace e, int epoch) {
-  const bool now = work_.single(epoch);
-  if (now && !work_.single_before(epoch))
+  if (work_.single(epoch) && !work_.single_before(epoch))
     narrow_bodies(gluing_.taken(e), state_.bodies.velocity, state_.single);
-  gluing_.take(e, now);
+  gluing_.take(e, in_single(epoch));
 }
 
 std::optional<trace::Kind> SolverLoop::kind(std::uint32_t node, int epoch) const {
@@ -282,6 +290,20 @@ void SolverLoop::fetch(std::size_t subdomain) const {
 }
 
 bool SolverLoop::decide(int epoch) {
+  if (schedule_.work(epoch) == Work::position) {
+    positions_.end();
+    return false;
+  }
+  if (decide_on_velocities(epoch)) return true;
+  const IterationResult& ended = certificate_.result();
+  if (!positions_.wanted() || ended.contacts == 0 || !std::isfinite(ended.error_rms)) return false;
+  positions_.begin();
+  schedule_.positions_from(epoch, positions_.sweeps());
+  return true;
+}
+
+/// False: the velocities of the step stand.
+bool SolverLoop::decide_on_velocities(int epoch) {
   if (schedule_.restores_at(epoch)) return false;
   return schedule_.work(epoch) == Work::measure ? measured(epoch) : swept(epoch);
 }

@@ -14,6 +14,7 @@
 #include "runtime/step/epoch_schedule.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/methods/method.hpp"
+#include "runtime/step/position_correction.hpp"
 #include "runtime/step/present_problem.hpp"
 #include "runtime/step/state.hpp"
 
@@ -28,6 +29,7 @@ InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
 ///
 ///   EpochSchedule   which epoch does what            ChunkWork     what that is for a chunk
 ///   Certificate     whether the step is solved       Method        how sweeps go on, and when ADMM helps
+///   PositionCorrection  behind all that: sweeps that undo overlaps, where the scene asks for them
 ///
 /// At a gate one thread adds the chunks' sums in order, by subdomain, and asks certificate and method. With
 /// several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read at a
@@ -48,7 +50,7 @@ class SolverLoop {
   void node(std::uint32_t node, int epoch);
   bool gate(int epoch) const {
     return schedule_.measures_at(epoch) || schedule_.reads_sums_at(epoch) || schedule_.restores_at(epoch) ||
-           conjugate(epoch);
+           schedule_.ends_at(epoch) || conjugate(epoch);
   }
   bool decide(int epoch);
   /// The decision behind this epoch waits for the sums of all ranks, however many there are.
@@ -77,6 +79,7 @@ class SolverLoop {
 
   const Gluing& gluing() const { return gluing_; }
   const SweepKernels& kernels() const { return kernels_; }
+  const PositionCorrection& positions() const { return positions_; }
   const IterationResult& result() const { return certificate_.result(); }
   /// The checks of the step.
   const std::vector<ErrorCheck>& history() const { return certificate_.history().all(); }
@@ -91,9 +94,13 @@ class SolverLoop {
            work_.course(epoch).plan.kind == SweepKind::conjugate;
   }
   bool schwarz() const;
+  bool in_single(int epoch) const {
+    return work_.single(epoch) || schedule_.work(epoch) == EpochSchedule::Work::position;
+  }
   Gluing::Mode gluing_mode(int epoch) const;
   void split_walls();
   void take(SubdomainPlace e, int epoch);
+  bool decide_on_velocities(int epoch);
   bool measured(int epoch);
   bool swept(int epoch);
   bool judge();
@@ -115,6 +122,7 @@ class SolverLoop {
   EpochSchedule schedule_;  ///< written at gates only, when every thread waits; so are courses_
   Courses courses_;
   ChunkWork work_;
+  PositionCorrection positions_;
   Certificate certificate_;
   PresentProblem problem_;
   graph::LoopPlan plan_;

@@ -29,8 +29,11 @@ struct StepParameters {
   ImpulseKind impulses() const {
     return rolls ? ImpulseKind::rolling : friction ? ImpulseKind::force : ImpulseKind::normal;
   }
-  double alert = 0;  ///< [m]
-  double skin = 0;   ///< [m]
+  double alert = 0;       ///< [m]
+  double skin = 0;        ///< [m]
+  double reflection = 0;  ///< E of Moreau's restitution, 0 without (kernels/law/restitution_law.hpp)
+  /// How long loads act on the velocities that the iterations find [s]: force = impulse / impulse_time().
+  double impulse_time() const { return time_step / (1 + reflection); }
 };
 
 /// Number of a chunk of this rank, as in Chunks.

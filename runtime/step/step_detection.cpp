@@ -33,7 +33,7 @@ void StepGraph::predict_share(std::uint32_t share) {
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * h);
   // What clumps spin with belongs to their axes, so that these come before the free velocity.
   turn_clumps(range, bodies, state_.clumps, 0.5 * h);
-  free_velocities(range, bodies.velocity, h, parameters_.gravity, state_.free);
+  free_velocities(range, bodies.velocity, parameters_.impulse_time(), parameters_.gravity, state_.free);
   left_[share].clear();
   if (state_.candidates_valid)
     find_skin_escapes(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[share]);
@@ -196,7 +196,6 @@ void StepGraph::make_chunks() {
 /// What is kept per slot follows the copies to their new places.
 void StepGraph::renew_slots() {
   const Bodies& bodies = state_.bodies;
-  const double h = parameters_.time_step;
   state_.x_then = bodies.x;
   state_.reach_then.clear();
   for (const SubdomainInterface& interface : state_.decomposition.interfaces)
@@ -205,7 +204,8 @@ void StepGraph::renew_slots() {
   around_ = {};
   state_.free.u.resize(bodies.size());
   state_.free.w.resize(parameters_.rotates ? bodies.size() : 0);
-  free_velocities({0, bodies.size()}, bodies.velocity, h, parameters_.gravity, state_.free);
+  free_velocities({0, bodies.size()}, bodies.velocity, parameters_.impulse_time(), parameters_.gravity,
+                  state_.free);
 }
 
 void StepGraph::narrow_share(std::uint32_t share) {
@@ -218,7 +218,7 @@ void StepGraph::narrow_share(std::uint32_t share) {
   }
   const NarrowPhase in{bodies.x,         bodies.radius,         bodies.velocity,
                        state_.walls,     parameters_.time_step, parameters_.alert,
-                       parameters_.laws, parameters_.gravity,   settings_.overlap_correction,
+                       parameters_.laws, parameters_.gravity,   parameters_.reflection,
                        bodies.material,  clumps_of(state_)};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {

@@ -83,6 +83,8 @@ class StepGraph {
   trace::Plan describe_plan(const graph::LoopPlan& loop) const;
   void finish_share(std::uint32_t share);
   void finish_walls();
+  template <class Otherwise>
+  std::vector<double> copies_of_walls(const std::vector<WallCopy>& copies, const Otherwise& otherwise) const;
   void measure_share(std::uint32_t share);
   void sum_up();
   SlotRange range_of_share(std::size_t count, std::uint32_t share) const;

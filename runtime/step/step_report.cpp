@@ -59,7 +59,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, double elapsed) {
 
 double unrest(const StepOutcome& outcome, const StepReport& report) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
-  const double h = parameters.time_step;
+  const double h = parameters.impulse_time();
   double load = sample.total_mass * parameters.gravity.norm(), net = 0;
   for (std::size_t w = 0; w < state.walls.size(); ++w) {
     const double applied = state.wall_states[w].applied;

@@ -110,30 +110,51 @@ void StepGraph::finish_share(std::uint32_t share) {
   const SlotRange range = slots(share);
   const Decomposition& all = state_.decomposition;
   const bool uneven = decomposition_.coupling != Coupling::nscdd;
-  motion_[share] = finish(range, bodies.x, bodies.velocity, parameters_.time_step, state_.free,
-                          uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{});
+  motion_[share] = finish(range, bodies.x, bodies.velocity, state_.free,
+                          {.time_step = parameters_.time_step,
+                           .copies = uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{},
+                           .reflection = parameters_.reflection,
+                           .gain = parameters_.impulse_time() * parameters_.gravity});
+  loop_.positions().move(range, bodies.x);
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * parameters_.time_step);
   turn_clumps(range, bodies, state_.clumps, 0.5 * parameters_.time_step);
 }
 
+/// Per wall: the velocity of a copy, or its displacement in that place, from the ranks that hold one; without
+/// a copy anywhere `otherwise(wall)`. Collective.
+template <class Otherwise>
+std::vector<double> StepGraph::copies_of_walls(const std::vector<WallCopy>& copies,
+                                               const Otherwise& otherwise) const {
+  std::vector<double> numbers(3 * state_.walls.size(), -std::numeric_limits<double>::infinity());
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    const WallState& wall = state_.wall_states[w];
+    if (!wall.copies.empty())
+      std::copy_n(copies[wall.copies.front().at()].velocity, 3, &numbers[3 * w]);
+    else if (wall.copies_everywhere == 0)
+      std::copy_n(otherwise(wall).data(), 3, &numbers[3 * w]);
+  }
+  ranks_.max(numbers);
+  return numbers;
+}
+
 void StepGraph::finish_walls() {
   iterated_ = graph::seconds_now();
-  // A wall without a copy here has its velocity from the ranks that hold one, or its free one.
-  const std::size_t walls = state_.walls.size();
-  std::vector<double> velocities(3 * walls, -std::numeric_limits<double>::infinity());
-  for (std::size_t w = 0; w < walls; ++w) {
-    const WallState& wall = state_.wall_states[w];
-    const double* copy = wall.free_velocity.data();
-    if (!wall.copies.empty())
-      copy = state_.copies[wall.copies.front().at()].velocity;
-    else if (wall.copies_everywhere > 0)
-      continue;
-    std::copy_n(copy, 3, &velocities[3 * w]);
+  const auto velocities =
+      copies_of_walls(state_.copies, [](const WallState& wall) -> const Vec3& { return wall.free_velocity; });
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    Wall& wall = state_.walls[w];
+    const Vec3 before = wall.velocity;
+    wall.velocity = Eigen::Map<const Vec3>(&velocities[3 * w]);
+    if (parameters_.reflection > 0) wall.velocity += parameters_.reflection * (wall.velocity - before);
+    wall.point += 0.5 * parameters_.time_step * wall.velocity;
   }
-  ranks_.max(velocities);
-  for (std::size_t w = 0; w < walls; ++w) {
-    state_.walls[w].velocity = Eigen::Map<const Vec3>(&velocities[3 * w]);
-    state_.walls[w].point += 0.5 * parameters_.time_step * state_.walls[w].velocity;
+  if (loop_.positions().found()) {
+    const Vec3 stays = Vec3::Zero();
+    const auto moved = copies_of_walls(loop_.positions().wall_copies(),
+                                       [&](const WallState&) -> const Vec3& { return stays; });
+    // A wall that is driven, too, has the displacement 0 of its copies.
+    for (std::size_t w = 0; w < state_.walls.size(); ++w)
+      state_.walls[w].point += Eigen::Map<const Vec3>(&moved[3 * w]);
   }
   contact_sums_.resize(state_.chunks.size());
 }

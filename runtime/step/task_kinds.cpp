@@ -17,7 +17,8 @@ std::vector<trace::KindInfo> task_kinds() {
       {"restore", Phase::sweeps, false, false},        {"publish", Phase::exchange, false, false},
       {"root", Phase::exchange, false, false},         {"glue", Phase::sweeps, false, false},
       {"take", Phase::sweeps, false, false},           {"tell", Phase::exchange, false, false},
-      {"whole", Phase::sweeps, false, false},          {"sums", Phase::sweeps, false, true}};
+      {"whole", Phase::sweeps, false, false},          {"sums", Phase::sweeps, false, true},
+      {"position", Phase::sweeps, false, false}};
   kinds.insert(kinds.end(), std::begin(own), std::end(own));
   return kinds;
 }

@@ -28,8 +28,9 @@ enum class TaskKind : std::uint8_t {
   glue,
   take,
   tell,
-  whole,  ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
-  sums    ///< within a check: a rank adds up what its chunks have measured
+  whole,    ///< within a check: looks at the whole problem, or solves it; node: trace::Meetings
+  sums,     ///< within a check: a rank adds up what its chunks have measured
+  position  ///< a sweep that undoes overlaps
 };
 
 inline trace::Kind kind_of(TaskKind kind) {

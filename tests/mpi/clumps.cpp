@@ -34,6 +34,7 @@ drive = "pressure"
 pressure = 2000
 [solver]
 max_iterations = 60
+overlap_correction = 0.2
 [decomposition]
 subdomains = 6
 repartition_every = 7

@@ -63,6 +63,7 @@ pressure = 500
 steps = 40
 [solver]
 max_iterations = 60
+overlap_correction = 0.2
 [decomposition]
 repartition_every = 7
 [output]

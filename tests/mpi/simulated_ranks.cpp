@@ -110,10 +110,8 @@ kind = "bodies"
 file = "grains.csv"
 [[stage]]
 end = { steps = 30 }
-[solver]
-overlap_correction = 1
 )");
-  write(at("grains.csv"), "id,x,y,z,radius\n0,0,0,1,0.01\n7,0.01,0,1,0.01\n");
+  write(at("grains.csv"), "id,x,y,z,radius,vx,vy,vz\n0,0,0,1,0.01,0,0,0\n7,1,0,1,0.01,1e200,0,0\n");
   EXPECT_NE(simulate(3, three, "burst"), 0) << file(".", "burst.txt");
   EXPECT_EQ(summary(at("burst")).at("status"), "failed") << file(".", "burst.txt");
 }

@@ -21,21 +21,32 @@ Scene oblique(double v_t, double v_n, double mu, double e) {
   return scene;
 }
 
-TEST(ObliqueImpact, SticksWhereFrictionSufficesAndSlidesElsewhere) {
+/// Where it sticks the surface's speed goes from v_t to -e_t v_t: e_t is 0 with Newton's law, e with Moreau's.
+void expect_oblique_impacts(RestitutionLaw law) {
   const double v_n = 2;
   for (double mu : {0.1, 0.3, 0.6})
     for (double e : {0.0, 0.3, 0.9}) {
-      const double limit = 3.5 * mu * (1 + e) * v_n;
+      const double e_t = law == RestitutionLaw::moreau ? e : 0, limit = 3.5 * mu * (1 + e) / (1 + e_t) * v_n;
       for (double v_t : {0.0, 0.5 * limit, 0.999 * limit, 1.001 * limit, 3 * limit}) {
-        Experiment run(oblique(v_t, v_n, mu, e));
+        Scene scene = oblique(v_t, v_n, mu, e);
+        scene.setup.solver.restitution_law = law;
+        Experiment run(std::move(scene));
         run.steps(40);
         const bool sticks = v_t <= limit;
-        const double after = sticks ? 5 * v_t / 7 : v_t - mu * (1 + e) * v_n;
+        const double after = v_t - (sticks ? 2 * (1 + e_t) * v_t / 7 : mu * (1 + e) * v_n);
         EXPECT_NEAR(run.u()[0], after, 1e-11) << mu << ' ' << e << ' ' << v_t;
         EXPECT_NEAR(run.w()[1], 2.5 * (v_t - after), 1e-11) << mu << ' ' << e << ' ' << v_t;
         EXPECT_NEAR(run.u()[2], e * v_n, 1e-11) << mu << ' ' << e << ' ' << v_t;
       }
     }
+}
+
+TEST(ObliqueImpact, SticksWhereFrictionSufficesAndSlidesElsewhere) {
+  expect_oblique_impacts(RestitutionLaw::moreau);
+}
+
+TEST(ObliqueImpact, StopsWhatSticksWithNewtonsLaw) {
+  expect_oblique_impacts(RestitutionLaw::newton);
 }
 
 struct Bounces {

@@ -50,6 +50,26 @@ TEST(Tower, EachContactCarriesWhatStandsOnIt) {
   }
 }
 
+// Each grain begins 1 % of its radius in the one below: that is undone, and is no motion.
+TEST(Column, ComesToRestWhileItsOverlapsAreUndone) {
+  const int count = 30;
+  for (const double correction : {0.1, 0.5}) {
+    Scene scene(h);
+    scene.slope(0);
+    scene.friction(0.35);
+    scene.setup.solver.overlap_correction = correction;
+    for (int k = 0; k < count; ++k) scene.sphere({0, 0, 0.99 * radius * (2 * k + 1)}, radius, mass);
+    Experiment run(std::move(scene));
+    run.steps(1);
+    const double first = run.simulation().report().penetration_max;
+    run.steps(400);
+    EXPECT_LT(run.kinetic_energy(), 1e-12 * count * mass * g_earth * radius) << correction;
+    EXPECT_LT(run.simulation().report().penetration_max, 0.1 * first) << correction;
+    EXPECT_NEAR(run.wall_force(0)[2], count * mass * g_earth, 1e-8 * count * mass * g_earth) << correction;
+    EXPECT_TRUE(run.simulation().report().converged) << correction;
+  }
+}
+
 Scene pressed_column(int count, double pressure, double area, double wall_mass, double e) {
   Scene scene(h);
   scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());

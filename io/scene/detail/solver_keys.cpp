@@ -50,6 +50,13 @@ Section<SolverSettings> solver_keys() {
               "leaves adds up over many steps; 0.1 keeps long quasi-static runs tight.",
               &SolverSettings::overlap_correction),
           choice<SolverSettings>(
+              "restitution_law", {"moreau", "newton"},
+              "What `restitution` means. `moreau`: what sticks rebounds along the contact, "
+              "too, with the largest restitution of the stage; contacts create no energy. "
+              "`newton`: what sticks stops; impacts of many grains with friction may "
+              "create energy.",
+              &SolverSettings::restitution_law),
+          choice<SolverSettings>(
               "precision", {"mixed", "double"},
               "Numbers of the sweeps. `mixed`: single precision with momentum, on more "
               "than 1000 candidates, until the error is 1e-5; what is judged and written is in "

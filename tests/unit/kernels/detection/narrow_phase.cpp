@@ -84,7 +84,7 @@ TEST(NarrowPhase, FindsTheSameBitsOnEveryInstructionSet) {
       const Sample sample = fresh_sample(friction, target, 3);
       NarrowPhase in = narrow_phase(sample);
       expect_scalar_contacts(sample, in);
-      in.overlap_correction = 0.3;
+      in.reflection = 0.6;
       in.laws.set_all(&PairLaw::restitution, 0.6);
       expect_scalar_contacts(sample, in);
     }

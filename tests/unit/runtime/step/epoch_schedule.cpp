@@ -12,7 +12,7 @@ namespace {
 /// One letter per epoch of [from, to): accumulate, measure, sweep, restore.
 std::string works(const EpochSchedule& schedule, int from, int to) {
   std::string text;
-  for (int epoch = from; epoch < to; ++epoch) text += "amsr"[static_cast<std::size_t>(schedule.work(epoch))];
+  for (int epoch = from; epoch < to; ++epoch) text += "amsrp"[static_cast<std::size_t>(schedule.work(epoch))];
   return text;
 }
 
@@ -85,6 +85,21 @@ TEST(EpochSchedule, BehindAdmmAnAccumulateFollowsAndNoSweepIsCounted) {
   schedule.measured();
   schedule.sweep_on(9, 1);
   EXPECT_EQ(schedule.sweep(10), 3);
+}
+
+TEST(EpochSchedule, SweepsOfPositionsAreTheLastThatHappens) {
+  EpochSchedule schedule;
+  schedule.measured();
+  schedule.sweep_on(1, 2);
+  schedule.read_sums_after_next(1);
+  schedule.restore_after(2);
+  schedule.positions_from(3, 4);
+  EXPECT_EQ(works(schedule, 4, 8), "pppp");
+  EXPECT_EQ(schedule.position_sweep(4), 0);
+  for (int epoch = 4; epoch < 8; ++epoch) {
+    EXPECT_EQ(schedule.ends_at(epoch), epoch == 7);
+    EXPECT_FALSE(schedule.measures_at(epoch) || schedule.reads_sums_at(epoch) || schedule.restores_at(epoch));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,89 @@
+#include "kernels/sweeps/positions.hpp"
+
+#include <algorithm>
+
+#include "kernels/detection/touch.hpp"
+
+namespace talus {
+
+namespace {
+
+std::size_t index(std::int32_t k) {
+  return static_cast<std::size_t>(k);
+}
+
+/// What one contact has of `push` on its bodies.
+void shift(float push, const float (&n)[3], SingleVelocity& body) {
+  for (std::size_t c = 0; c < 3; ++c) body.u[c] += body.inv_mass * push * n[c];
+}
+
+float along(const float (&n)[3], const SingleVelocity& body) {
+  return n[0] * body.u[0] + n[1] * body.u[1] + n[2] * body.u[2];
+}
+
+}  // namespace
+
+void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
+                     SweepSteps& steps) {
+  allocate(single, contacts, velocity.size());
+  single.contacts.rn.resize(contacts.nx.size());
+  steps.n.resize(contacts.nx.size());
+  for (std::size_t s = 0; s < velocity.size(); ++s) {
+    single.velocity[s] = {};
+    single.velocity[s].inv_mass = static_cast<float>(single.contacts.unit * velocity[s].inv_mass);
+  }
+}
+
+void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
+                   double part, SingleState& single, SweepSteps& steps) {
+  const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
+  const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &poses.walls[index(chunks.wall[chunk])];
+  const bool spheres = wall == nullptr && chunks.kind[chunk] != ChunkKind::blocks;
+  narrow_geometry(contacts, {begin, end}, single.contacts);
+  for (std::size_t k = begin; k < end; ++k) {
+    const std::size_t i = index(contacts.first[k]);
+    double gap;
+    if (spheres) {
+      const std::size_t j = index(contacts.second[k]);
+      gap = poses.domain.separation(poses.x[i], poses.x[j]).norm() - poses.radius[i] - poses.radius[j];
+    } else {
+      gap = touch_of(poses, contacts, k, wall).gap;
+    }
+    single.contacts.bias[k] = static_cast<float>(gap < 0 ? part * gap : gap);
+    single.contacts.rn[k] = 0;
+    steps.n[k] = 0;
+  }
+}
+
+void sweep_displacements(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall,
+                         const SweepMomentum& momentum) {
+  SingleContacts& c = single.contacts;
+  const auto beta = static_cast<float>(momentum.beta), omega = static_cast<float>(momentum.omega);
+  SingleVelocity at_wall;
+  if (wall) {
+    for (std::size_t a = 0; a < 3; ++a) at_wall.u[a] = static_cast<float>(wall->velocity[a]);
+    at_wall.inv_mass = static_cast<float>(wall->inv_mass * c.unit);
+  }
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    SingleVelocity& first = single.velocity[index(contacts.first[k])];
+    SingleVelocity& second = wall ? at_wall : single.velocity[index(contacts.second[k])];
+    const float n[3] = {c.nx[k], c.ny[k], c.nz[k]}, w = first.inv_mass + second.inv_mass;
+    if (w == 0) continue;
+    const float from = c.rn[k] + beta * momentum.steps.n[k];
+    const float push = std::max(0.0F, from - omega * (along(n, first) - along(n, second) + c.bias[k]) / w);
+    shift(push - from, n, first);
+    shift(from - push, n, second);
+    momentum.steps.n[k] = push - c.rn[k];
+    c.rn[k] = push;
+  }
+  if (wall)
+    for (std::size_t a = 0; a < 3; ++a) wall->velocity[a] = static_cast<double>(at_wall.u[a]);
+}
+
+void displace(SlotRange range, std::span<const SingleVelocity> displacement, std::span<Vec3> x) {
+  for (std::size_t s = range.begin; s < range.end; ++s)
+    for (std::size_t c = 0; c < 3; ++c)
+      x[s][static_cast<Eigen::Index>(c)] += static_cast<double>(displacement[s].u[c]);
+}
+
+}  // namespace talus

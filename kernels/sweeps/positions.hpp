@@ -1,0 +1,39 @@
+#pragma once
+
+/// Overlaps are undone in a problem of their own, whose unknowns are displacements d [m] of the bodies:
+///
+///     min 1/2 d.M d   with   n.(d_i - d_j) + b >= 0,     b = c g where g < 0, else g,
+///
+/// g [m] being the gap of a contact and c the part of an overlap that goes. It is the problem of a step
+/// without friction in which bodies are at rest, with displacements for velocities, so that the sweeps of
+/// steps solve it. Velocities, impulses, and all that is judged of a step know nothing of it. Bodies are
+/// shifted and do not turn. In single precision: 1e-7 of a displacement is below the rounding of positions.
+
+#include <span>
+
+#include "kernels/bodies/motion.hpp"
+#include "kernels/detection/contacts.hpp"
+#include "kernels/detection/measures.hpp"
+#include "kernels/sweeps/single_precision.hpp"
+#include "kernels/sweeps/sweep.hpp"
+
+namespace talus {
+
+/// Room for the contacts and bodies, all of which stand where they are: displacements 0, masses those of
+/// `velocity`.
+void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
+                     SweepSteps& steps);
+
+/// Normals and b of a chunk from where its bodies are; nothing pushes yet. `part`: c in [0, 1].
+void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
+                   double part, SingleState& single, SweepSteps& steps);
+
+/// One sweep with momentum over a chunk of blocks, which has no groups that could be swept at once; others
+/// have SweepKernels. `wall` is null between bodies.
+void sweep_displacements(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall,
+                         const SweepMomentum& momentum);
+
+/// x += d of a range of bodies.
+void displace(SlotRange range, std::span<const SingleVelocity> displacement, std::span<Vec3> x);
+
+}  // namespace talus

@@ -1,0 +1,47 @@
+#include "runtime/step/position_correction.hpp"
+
+#include <algorithm>
+
+namespace talus {
+
+void PositionCorrection::begin() {
+  begin_positions(state_.contacts, state_.bodies.velocity, state_.single, acceleration_.steps);
+  acceleration_.last_wall_v.resize(state_.chunks.size());
+  kept_ = state_.copies;
+  for (WallCopy& copy : state_.copies) std::fill_n(copy.velocity, 3, 0.0);
+}
+
+void PositionCorrection::run(std::size_t chunk, int sweep) {
+  const Chunks& chunks = state_.chunks;
+  const ContactRange range = work_.range_of(chunk);
+  SingleState& single = state_.single;
+  WallCopy& copy = state_.copies[chunk];
+  const bool wall = chunks.wall[chunk] >= 0;
+  if (sweep == 0)
+    find_overlaps(state_.contacts, chunks, chunk,
+                  {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)},
+                  settings_.overlap_correction, single, acceleration_.steps);
+  const double beta = momentum_beta(rule_.momentum, sweep, rule_.momentum.most_without_friction);
+  const SweepMomentum momentum{beta, beta > 0 ? rule_.momentum.over_relaxation : 1, acceleration_.steps};
+  carry_velocities(kernels_, beta, work_.owned(chunk), single.velocity, single.last_v);
+  if (wall) carry_wall(Carry::momentum, beta, chunk, copy, acceleration_);
+  if (chunks.kind[chunk] == ChunkKind::blocks)
+    sweep_displacements(state_.contacts, range, single, wall ? &copy : nullptr, momentum);
+  else if (wall)
+    kernels_.sweep_wall<false>(state_.contacts, single, range, 0.0, copy, momentum);
+  else
+    kernels_.sweep_grains<false>(state_.contacts, single, range, 0.0, momentum);
+}
+
+void PositionCorrection::end() {
+  state_.copies.swap(kept_);
+  moved_.swap(kept_);
+  state_.single.contacts.rn.resize(state_.contacts.rn.size());
+  found_ = true;
+}
+
+void PositionCorrection::move(SlotRange range, std::span<Vec3> x) const {
+  if (found_) displace(range, state_.single.velocity, x);
+}
+
+}  // namespace talus
