@@ -14,24 +14,25 @@ class Patience {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// The first line comes after `interval` at the earliest, and as much lies between two.
-  explicit Patience(std::FILE* stream = stderr, Clock::duration interval = std::chrono::seconds(1))
-      : stream_(stream), interval_(interval), last_(Clock::now()) {}
+  /// The first line comes after `first` at the earliest, and `between` two lies at least so much.
+  explicit Patience(std::FILE* stream = stderr, Clock::duration first = std::chrono::seconds(1),
+                    Clock::duration between = std::chrono::seconds(5))
+      : stream_(stream), due_(Clock::now() + first), between_(between) {}
 
   /// Prints "talus: " and what `line()` gives, when a line is due.
   template <class Line>
   void tell(const Line& line) {
     const Clock::time_point now = Clock::now();
-    if (now - last_ < interval_) return;
-    last_ = now;
+    if (now < due_) return;
+    due_ = now + between_;
     fmt::print(stream_, "talus: {}\n", line());
     std::fflush(stream_);
   }
 
  private:
   std::FILE* stream_;
-  Clock::duration interval_;
-  Clock::time_point last_;
+  Clock::time_point due_;
+  Clock::duration between_;
 };
 
 }  // namespace talus

@@ -28,7 +28,7 @@ struct StepReport {
   double jump = 0;     ///< interface jump (several subdomains)
   double penetration_mean = 0, penetration_max = 0;  ///< over smallest radius, at the end of the step
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
-  std::optional<OverlapPair> overlapping;                ///< that pair, where it is beyond the tolerance
+  std::optional<OverlapPair> overlapping = {};           ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
   double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   double equilibrium =

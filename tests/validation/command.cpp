@@ -215,11 +215,10 @@ TEST_F(Command, WritesEveryFileOfItsPageAndTheyRead) {
   EXPECT_TRUE(outcome.output.empty()) << outcome.output;
 
   const Table steps = read_table(at("results/steps.csv"));
-  EXPECT_EQ(
-      steps.header,
-      "step,time,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,penetration_mean,"
-      "penetration_max,kinetic_translation,kinetic_rotation,solid_fraction,migrants,imbalance,wall_s,"
-      "converged");
+  EXPECT_EQ(steps.header,
+            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,"
+            "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
+            "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged");
   ASSERT_EQ(steps.rows.size(), 12U);
   for (std::size_t k = 0; k < 12; ++k) {
     EXPECT_EQ(steps.number(k, "step"), static_cast<double>(k + 1));

@@ -311,7 +311,7 @@ TEST_F(StudyError, SaysWhenTheSceneEndsBeforeTheStep) {
   // Nobody knows before when a sample comes to rest.
   const Outcome late =
       run("study error scene.toml --out t --only step --at-step 12 --set "
-          "'stage.press.end={equilibrium=1e9}'");
+          "'stage.press.end={equilibrium=1e9, equilibrium_hold=0}'");
   EXPECT_EQ(late.code, 1);
   EXPECT_NE(late.messages.find("--at-step"), std::string::npos) << late.messages;
 }

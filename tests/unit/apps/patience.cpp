@@ -7,9 +7,9 @@
 namespace talus {
 namespace {
 
-std::string told(std::chrono::nanoseconds interval, int times) {
+std::string told(std::chrono::nanoseconds first, std::chrono::nanoseconds between, int times) {
   std::FILE* file = std::tmpfile();
-  Patience patience(file, interval);
+  Patience patience(file, first, between);
   for (int k = 0; k < times; ++k) patience.tell([&] { return fmt::format("{} of {}", k, times); });
   std::rewind(file);
   std::string text;
@@ -19,11 +19,12 @@ std::string told(std::chrono::nanoseconds interval, int times) {
 }
 
 TEST(Patience, SaysNothingOfShortWork) {
-  EXPECT_EQ(told(std::chrono::hours(1), 1000), "");
+  EXPECT_EQ(told(std::chrono::hours(1), std::chrono::hours(0), 1000), "");
 }
 
 TEST(Patience, SaysALineWheneverOneIsDue) {
-  EXPECT_EQ(told(std::chrono::nanoseconds(0), 2), "talus: 0 of 2\ntalus: 1 of 2\n");
+  EXPECT_EQ(told(std::chrono::hours(0), std::chrono::hours(0), 2), "talus: 0 of 2\ntalus: 1 of 2\n");
+  EXPECT_EQ(told(std::chrono::hours(0), std::chrono::hours(1), 9), "talus: 0 of 9\n");
 }
 
 }  // namespace
