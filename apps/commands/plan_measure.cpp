@@ -13,6 +13,7 @@
 #include "apps/shared/sample_builder.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
+#include "runtime/step/time_step.hpp"
 
 namespace talus {
 
@@ -109,7 +110,7 @@ class Forms {
       // Still pressing, or there would be nothing to solve: a hundredth of the smallest radius in the step.
       if (!in && wall.load.pushed())
         wall.load = {.drive = WallDrive::velocity,
-                     .velocity = 0.01 * smallest_ / setup.stages.front().time_step * wall.normal};
+                     .velocity = 0.01 * smallest_ / first_time_step(setup) * wall.normal};
       if (in && !any) wall.load = {.drive = WallDrive::force, .force = 9.81 * mass_, .mass = 0.1 * mass_};
     }
     return setup;
@@ -129,6 +130,11 @@ class Forms {
   bool has_walls() const { return !base_.walls.empty(); }
 
  private:
+  double first_time_step(const Setup& setup) const {
+    const Stage& first = setup.stages.front();
+    return first.chooses_time_step ? time_step_bounds(first, setup.solver, smallest_).longest
+                                   : first.time_step;
+  }
   int several() const { return has_subdomains() ? base_.decomposition.subdomains : subdomains_put_in; }
 
   Setup base_;

@@ -16,6 +16,7 @@
 #include "apps/commands/step_list.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/sample_builder.hpp"
+#include "apps/shared/scene_warnings.hpp"
 #include "apps/shared/trace_feed.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
@@ -45,34 +46,35 @@ trace::Trace order_of(const RunOptions& options, const graph::Communicator& rank
   return recorded;
 }
 
-int run_scene(const RunOptions& options, const io::Scene& scene, Sample sample, const Recordings& recordings,
-              const graph::Communicator& ranks) {
-  const int threads = threads_of(options);
-  const std::string directory = options.out.empty() ? scene.output.directory : options.out;
-  io::Provenance provenance = io::collect_provenance();
-  provenance.threads = threads;
-  provenance.simd = name_of(SweepKernels(settled(scene.setup.solver.simd, ranks)).set());
-  provenance.command_line = options.command_line;
-  provenance.seed = scene.setup.seed;
-  provenance.scene_file = scene.source_file;
+/// Fills in the directory and the provenance of `run`, and runs.
+int run_scene(PreparedRun run, Sample sample) {
+  const RunOptions& options = run.options;
+  const io::Scene& scene = run.scene;
+  const graph::Communicator& ranks = run.ranks;
+  run.directory = options.out.empty() ? scene.output.directory : options.out;
+  run.provenance = io::collect_provenance();
+  run.provenance.threads = threads_of(options);
+  run.provenance.simd = name_of(SweepKernels(settled(scene.setup.solver.simd, ranks)).set());
+  run.provenance.command_line = options.command_line;
+  run.provenance.seed = scene.setup.seed;
+  run.provenance.scene_file = scene.source_file;
   std::string refused;
   std::optional<io::DirectoryLock> lock;
   if (ranks.rank() == 0) {
     try {
-      lock.emplace(io::prepare_output_directory(directory, options.force, io::is_output_name));
+      lock.emplace(io::prepare_output_directory(run.directory, options.force, io::is_output_name));
     } catch (const io::FileError& error) {
       refused = error.what();
     }
   }
   if (any_refused(refused, ranks)) return exit_bad_input;
   if (ranks.rank() == 0) {
-    io::write_whole(directory + "/scene.resolved.toml", io::resolved_scene(scene));
-    print_start(scene, sample.size(), threads, ranks);
+    io::write_whole(run.directory + "/scene.resolved.toml", io::resolved_scene(scene));
+    print_start(scene, sample.size(), run.provenance.threads, ranks);
   }
-  const io::Summary summary =
-      simulate({options, scene, recordings, ranks, directory, provenance}, std::move(sample));
+  const io::Summary summary = simulate(run, std::move(sample));
   if (ranks.rank() == 0) {
-    print_end(summary, scene.setup.solver, directory);
+    print_end(summary, scene.setup.solver, run.directory);
   } else if (summary.status == "failed") {
     fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);
   }
@@ -86,6 +88,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   io::Scene scene;
   Sample sample;
   Recordings recordings;
+  std::vector<std::string> warnings;
   std::string refused;
   try {
     if (options.threads < 0)
@@ -113,8 +116,8 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
     if (ranks.rank() == 0) {
       sample = build_sample(scene);
       io::place_walls(scene, sample);
-      if (const std::string overlaps = describe_overlaps(scene, sample); !overlaps.empty())
-        fmt::print(stderr, "talus: warning: {}\n", overlaps);
+      warnings = scene_warnings(scene, sample);
+      for (const std::string& warning : warnings) fmt::print(stderr, "talus: warning: {}\n", warning);
     }
     if (options.dry_run && ranks.rank() == 0) {
       fmt::print("{}", io::resolved_scene(scene));
@@ -129,7 +132,7 @@ int run_command(const RunOptions& options, const graph::Communicator& ranks) {
   share_walls(scene.setup, ranks);
   stop_on_signals();
   try {
-    return run_scene(options, scene, std::move(sample), recordings, ranks);
+    return run_scene({options, scene, recordings, ranks, {}, {}, std::move(warnings)}, std::move(sample));
   } catch (const std::exception& error) {
     fmt::print(stderr, "talus: error: {}\n", error.what());
     if (ranks.ranks() > 1) end_all(exit_failure, ranks);

@@ -25,6 +25,23 @@ void Tally::add(const Simulation& simulation) {
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
   worst_penetration = larger(worst_penetration, report.penetration_max);
+  add_overlap(simulation);
+}
+
+void Tally::add_overlap(const Simulation& simulation) {
+  const StepReport& report = simulation.report();
+  const double tolerance = simulation.setup().solver.overlap_tolerance;
+  worst_overlap = larger(worst_overlap, report.overlap);
+  if (report.overlap > tolerance) {
+    if (overlapped++ == 0 || report.overlap > deepest.overlap) deepest = report;
+    // Where in a step an impact falls is chance: another step would have been missed by more.
+    constexpr double margin = 0.5;
+    const double enough = margin * report.time_step * tolerance / report.overlap;
+    // Steps that only keep what was made before say nothing of their own time step.
+    if (report.overlap > last_overlap && (sufficient_time_step == 0 || enough < sufficient_time_step))
+      sufficient_time_step = enough;
+  }
+  last_overlap = report.overlap;
 }
 
 void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
@@ -36,6 +53,9 @@ void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
   summary.worst_error_rms = worst_error;
   summary.worst_balance = worst_balance;
   summary.worst_penetration = worst_penetration;
+  summary.overlapping_steps = overlapped;
+  summary.worst_overlap = worst_overlap;
+  if (sufficient_time_step > 0) summary.sufficient_time_step = sufficient_time_step;
 }
 
 std::string counted(std::size_t count, const char* what) {
@@ -70,9 +90,16 @@ void print_stage_end(const Simulation& simulation) {
   const StageEnd& end = simulation.stage().end;
   fmt::print(stderr, "talus: stage '{}' ended after {}: {} reached{}\n", simulation.stage().name,
              counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"), simulation.end_reached(),
-             end.equilibrium
-                 ? fmt::format(", unrest {:.2g} (asked {:.2g})", simulation.unrest(), *end.equilibrium)
-                 : "");
+             end.equilibrium ? fmt::format(", equilibrium {:.2g} (asked {:.2g})",
+                                           simulation.report().equilibrium, *end.equilibrium)
+                             : "");
+}
+
+std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls) {
+  if (pair.with < 0)
+    return fmt::format("body {} and wall '{}'", pair.body,
+                       walls[static_cast<std::size_t>(-1 - pair.with)].name);
+  return fmt::format("bodies {} and {}", pair.body, pair.with);
 }
 
 void print_notes(const Simulation& simulation, const Tally& tally) {
@@ -88,6 +115,18 @@ void print_notes(const Simulation& simulation, const Tally& tally) {
                "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
                "these steps count as unconverged. Reduce time_step\n",
                tally.passed);
+  if (tally.overlapped > 0)
+    fmt::print(
+        stderr,
+        "talus: warning: {} ended with overlaps beyond solver.overlap_tolerance = {:.2g}: the deepest, "
+        "{:.2g} of the smaller radius, of {} in step {}; overlap_body and overlap_with in steps.csv "
+        "name one of each step{}\n",
+        counted(static_cast<std::size_t>(tally.overlapped), "step"),
+        simulation.setup().solver.overlap_tolerance, tally.deepest.overlap,
+        name_of(*tally.deepest.overlapping, simulation.setup().walls), tally.deepest.step,
+        tally.sufficient_time_step > 0
+            ? fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step)
+            : "");
   if (tally.stagnated > 0)
     fmt::print(stderr,
                "talus: warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
@@ -111,10 +150,11 @@ void print_end(const io::Summary& summary, const SolverSettings& solver, const s
     fmt::print(
         stderr,
         "talus: {} of {} steps missed the tolerance: worst error {:.2e} (allowed {:.2g}), worst balance "
-        "{:.2e} (allowed {:.2g}); `converged` in steps.csv says which. Raise solver.max_iterations, "
-        "reduce time_step, or accept them with allow_unconverged = true\n",
+        "{:.2e} (allowed {:.2g}), worst overlap {:.2g} (allowed {:.2g}); `converged` in steps.csv says "
+        "which. Raise solver.max_iterations, reduce time_step, or accept them with allow_unconverged = "
+        "true\n",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
-        summary.worst_balance, solver.balance_tolerance);
+        summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance);
   fmt::print(stderr, "talus: results in {}\n", directory);
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "io/results/run_json.hpp"
 #include "io/scene/scene.hpp"
@@ -22,11 +23,18 @@ struct Tally {
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;
-  double worst_penetration = 0;       ///< [smallest radius]
+  double worst_penetration = 0;                ///< [smallest radius]
+  double worst_overlap = 0, last_overlap = 0;  ///< [smaller radius of a pair]: of all steps, of the last
+  std::int64_t overlapped = 0;                 ///< steps that ended with an overlap beyond its tolerance
+  StepReport deepest;                          ///< of these steps the one with the deepest
+  double sufficient_time_step = 0;    ///< [s] at which they would have stayed within it; 0: not known
   double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
 
   /// A step that is done.
   void add(const Simulation& simulation);
+  /// An overlap is at most the time step times a speed (docs/theory.md, "Gap term and restitution"): the step
+  /// that made one would have kept within the tolerance at a time step smaller by as much as it was missed.
+  void add_overlap(const Simulation& simulation);
   /// Fills in steps, iterations and worst errors; `last` is the report of the last step.
   void sum_up(const StepReport& last, io::Summary& summary) const;
 };
@@ -43,8 +51,11 @@ void print_start(const io::Scene& scene, std::size_t grains, int threads, const 
 /// Which of its conditions a stage has come to, and how far it was from rest where that was one.
 void print_stage_end(const Simulation& simulation);
 
-/// Messages of an exchange, and warnings of steps that grains passed through one another in, or whose error
-/// stood still.
+/// "bodies 3 and 17", "body 3 and wall 'floor'".
+std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls);
+
+/// Messages of an exchange, and warnings of steps that grains passed through one another in, that ended with
+/// overlaps, or whose error stood still.
 void print_notes(const Simulation& simulation, const Tally& tally);
 
 /// What came of the run, of which the results are in `directory`.

@@ -138,7 +138,7 @@ void fail(io::Summary& summary, const std::exception& error) {
 /// Takes the run to its end, or to what breaks it off; the summary says which. Throws what the beginning and
 /// the end of a run throw.
 void run_steps(const PreparedRun& run, Sample sample, io::Recorder& recorder, io::Summary& summary) {
-  const auto& [options, scene, recordings, ranks, directory, provenance] = run;
+  const auto& [options, scene, recordings, ranks, directory, provenance, warnings] = run;
   Tally tally;
   std::optional<TraceFeed> trace;
   if (options.trace)
@@ -194,6 +194,7 @@ io::Summary simulate(const PreparedRun& run, Sample sample) {
   const double begin = graph::seconds_now();
   io::Summary summary;
   summary.bodies = sample.size();
+  summary.warnings = run.warnings;
   // Of one rank it writes on the background thread, from where a trace must hear of no call.
   io::OutputContext context = io::output_context(run.directory, run.scene.setup,
                                                  run.ranks.ranks() > 1 ? run.ranks : graph::one_rank());

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "apps/commands/run.hpp"
 #include "io/results/run_json.hpp"
@@ -25,8 +26,9 @@ struct PreparedRun {
   const io::Scene& scene;
   const Recordings& recordings;
   const graph::Communicator& ranks;
-  std::string directory;      ///< of the results
-  io::Provenance provenance;  ///< with the number of threads
+  std::string directory;                   ///< of the results
+  io::Provenance provenance;               ///< with the number of threads
+  std::vector<std::string> warnings = {};  ///< of the scene; rank 0's
 };
 
 /// From now on SIGINT and SIGTERM end a run after the step it is in, with all its files whole.

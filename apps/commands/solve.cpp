@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
 
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/patience.hpp"
 #include "apps/shared/solve_table.hpp"
 #include "io/fclib/fclib.hpp"
 #include "io/files/error.hpp"
@@ -79,8 +81,9 @@ struct Solved {
   std::int64_t failed_contacts = 0;
 };
 
+/// `alive` is called now and then while it solves.
 Solved solve_one(const DelassusProblem& problem, const std::string& name, DelassusMethod method,
-                 const Plan& plan, const SolveOptions& options) {
+                 const Plan& plan, const SolveOptions& options, const std::function<void()>& alive) {
   Solved solved;
   DelassusReport report;
   std::vector<double> times;
@@ -88,6 +91,7 @@ Solved solve_one(const DelassusProblem& problem, const std::string& name, Delass
     solved.r.assign(3 * problem.contacts(), 0.0);
     const auto start = Clock::now();
     const DelassusGoal goal{.tolerance = options.tol, .measure = plan.measure, .stop = [&] {
+                              alive();
                               return std::chrono::duration<double>(Clock::now() - start).count() >
                                      options.max_seconds;
                             }};
@@ -117,6 +121,7 @@ void print_line(const SolveRow& row) {
 int solve(const SolveOptions& options, const Plan& plan) {
   std::vector<SolveRow> rows;
   bool unreadable = false;
+  Patience patience;
   for (const auto& file : plan.files) {
     io::FclibProblem problem;
     try {
@@ -128,7 +133,14 @@ int solve(const SolveOptions& options, const Plan& plan) {
       continue;
     }
     for (const DelassusMethod method : plan.methods) {
-      Solved solved = solve_one(problem.contact, file.name, method, plan, options);
+      Solved solved = solve_one(problem.contact, file.name, method, plan, options, [&] {
+        if (plan.table)
+          patience.tell([&] {
+            return fmt::format("solve {} of {}: {}, {} contacts, {}", rows.size() + 1,
+                               plan.files.size() * plan.methods.size(), file.name, problem.contact.contacts(),
+                               name_of(method));
+          });
+      });
       if (!plan.table) print_line(solved.row);
       if (!options.out.empty())
         io::write_fclib_solution(file.path, options.out, io::fclib_solution(problem, solved.r));

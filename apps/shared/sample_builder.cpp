@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "apps/shared/patience.hpp"
 #include "io/scene/bodies_file.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -35,8 +36,14 @@ Sample make_sample(const io::Scene& scene) {
   if (!scene.setup.clumps.empty()) sample.shape = mass_of(1, scene.setup.clumps.front());
   sample.seed = scene.setup.seed;
   sample.radius = draw_radii(spec.radii, static_cast<std::size_t>(spec.grains()), scene.setup.seed);
-  sample.x = spec.kind == io::SampleSpec::Kind::lattice ? lattice_sites(spec, sample.radius)
-                                                        : deposit(sample.radius, spec.base[0], spec.base[1]);
+  if (spec.kind == io::SampleSpec::Kind::lattice) {
+    sample.x = lattice_sites(spec, sample.radius);
+    return sample;
+  }
+  Patience patience;
+  sample.x = deposit(sample.radius, spec.base[0], spec.base[1], [&](std::size_t placed) {
+    patience.tell([&] { return fmt::format("{} of {} grains deposited", placed, sample.radius.size()); });
+  });
   return sample;
 }
 

@@ -50,6 +50,7 @@ struct Solve {
   double seconds = 0;  ///< of the iterations
   Motion motion;
   std::vector<Vec3> wall_forces;
+  double push = 0;  ///< sum of the forces that walls are pushed with [N]
 };
 
 /// The step that is solved again and again.
@@ -75,9 +76,8 @@ class Problem {
           "smaller --at-step",
           sample.scene.source_file, simulation.report().step, plan.at_step));
     saved_ = simulation.save();
-    time_step_ = simulation.parameters().time_step;
-    free_ = simulation.frame(false);
-    for (Vec3& u : free_.u) u += time_step_ * simulation.parameters().gravity;
+    before_ = simulation.frame(false);
+    gravity_ = simulation.parameters().gravity;
     setup_.solver = at_tolerance(setup_.solver, plan.tolerances.back());
   }
 
@@ -101,13 +101,18 @@ class Problem {
     solve.seconds = simulation.sums().times.iteration;
     solve.motion = motion_of(simulation.frame(false), mass_);
     for (const WallReport& wall : simulation.walls()) solve.wall_forces.push_back(wall.force);
+    for (const WallState& wall : simulation.state().wall_states) solve.push += std::abs(wall.applied);
     return solve;
   }
 
-  /// The motion without the impulses of the step.
-  Motion free_motion() const { return motion_of(free_, mass_); }
-  /// Kinetic norm of the motion that a wall's force [N] gives in the step to all grains as one body.
-  double motion_by(double force) const { return time_step_ * force / std::sqrt(total_mass_); }
+  /// The motion without the impulses of a step of `time_step` [s].
+  Motion free_motion(double time_step) const {
+    Frame free = before_;
+    for (Vec3& u : free.u) u += time_step * gravity_;
+    return motion_of(free, mass_);
+  }
+  /// Kinetic norm of the motion that an impulse [N s] gives to all grains as one body.
+  double motion_by(double impulse) const { return impulse / std::sqrt(total_mass_); }
   std::int64_t bodies() const { return static_cast<std::int64_t>(mass_.size()); }
   const StudyPlan& plan() const { return plan_; }
 
@@ -115,8 +120,8 @@ class Problem {
   const StudyPlan& plan_;
   Setup setup_;
   SavedState saved_;
-  Frame free_;
-  double time_step_ = 0;                 ///< of the step [s]
+  Frame before_;                         ///< the beginning of the step
+  Vec3 gravity_ = Vec3::Zero();          ///< [m/s^2]
   std::map<std::int64_t, double> mass_;  ///< by id
   double total_mass_ = 0;                ///< of the grains [kg]
 };
@@ -188,10 +193,14 @@ Reference solve_reference(const Problem& problem, int threads, const Say& say, P
   Reference reference;
   for (const Vec3& force : best->wall_forces)
     reference.force_scale = std::max(reference.force_scale, force.norm());
-  // Grains pressed at rest neither move nor gain: what the walls give is the measure then.
+  // Grains pressed at rest neither move nor gain: what the walls are pushed with is the measure then. What
+  // walls answer with is none, where something else is: in a narrow wedge it is any multiple of the load.
+  const double h = best->report.time_step, answer = problem.motion_by(h * reference.force_scale);
   reference.scale =
       std::max({distance(best->motion, Motion(best->motion.size(), 0.0)),
-                distance(best->motion, problem.free_motion()), problem.motion_by(reference.force_scale)});
+                distance(best->motion, problem.free_motion(h)), problem.motion_by(h * best->push)});
+  constexpr double rounding = 1e-9;
+  if (reference.scale <= rounding * answer) reference.scale = answer;
   reference.motion = std::move(best->motion);
   reference.wall_forces = std::move(best->wall_forces);
   return reference;

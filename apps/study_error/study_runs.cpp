@@ -98,6 +98,12 @@ std::string why_no_step(const io::Scene& scene, const StudyPlan& plan, double ti
         "--time-steps {:g}: a run of {} steps of the scene has no step that long; raise --steps", time_step,
         plan.steps);
   for (const Stage& stage : stages)
+    if (stage.chooses_time_step)
+      return fmt::format(
+          "stage '{}' chooses its time steps, so that there is none to multiply by --time-steps; give one by "
+          "--set time_step=H, or leave the whole runs out by --only step",
+          stage.name);
+  for (const Stage& stage : stages)
     if (stage.end.time && steps_in(*stage.end.time, time_step * stage.time_step) < 1)
       return fmt::format(
           "--time-steps {:g}: stage '{}' ends after {:g} s, no more than half a step of {:g} s; choose a "

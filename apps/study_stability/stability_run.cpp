@@ -98,7 +98,7 @@ bool finite(const StepReport& report, const Frame& frame) {
 
 /// How far a step begins from rest where the sample began, over the impulse of the loads: what moves is
 /// stopped, and the gaps that it has opened by the middle of the step are fallen into.
-double unrest(const Problem& problem, const StepView& step, const Frame& start) {
+double distance_from_start(const Problem& problem, const StepView& step, const Frame& start) {
   const double h = step.time_step();
   double moved = 0, load = 0;
   for (std::size_t k = 0; k < start.x.size(); ++k) {  // ids count from 0: the order of frames
@@ -165,7 +165,7 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
     std::optional<double> error;
     if (truth.error && (truth.from == TruthFrom::any_state || outcome.missed == 0)) error = truth.error(view);
     double bound = problem.allowed > 0 ? problem.allowed : 2 * std::max(certified, tolerance);
-    if (truth.from == TruthFrom::rest) bound += unrest(problem, view, at_start);
+    if (truth.from == TruthFrom::rest) bound += distance_from_start(problem, view, at_start);
     const double share = error ? *error / bound : 0;
     if (!any_truth || !(share <= worst)) {
       worst = share;

@@ -18,8 +18,9 @@ struct TriaxialPicture {
 };
 
 /// Two diagrams over a common axis, the axial strain in per cent, positive in compression: q/p, and the
-/// volume strain (29) in per cent, positive where the sample dilates. Rows with a value that is not finite
-/// are left out; without any row the picture says so.
+/// volume strain (29) in per cent, positive where the sample dilates. Steps that missed their tolerance are
+/// marked, and are no peak. Rows with a value that is not finite are left out; without any row the picture
+/// says so.
 std::string draw_triaxial(std::span<const TriaxialReport> reports, const TriaxialPicture& options);
 
 struct ForcePicture {

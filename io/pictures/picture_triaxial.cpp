@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "io/pictures/detail/svg.hpp"
@@ -15,12 +16,15 @@ using detail::Svg;
 namespace style = detail::style;
 
 constexpr double width = 720, height = 640;
+/// Of steps that missed their tolerance.
+constexpr std::string_view missed_colour = style::ink;
 constexpr double left = 84, right = width - 28;
 
 struct Row {
   double strain;         ///< axial, compression positive [%]
   double stress_ratio;   ///< q/p
   double volume_strain;  ///< dilation positive [%]
+  bool converged;        ///< of its step
 };
 
 /// One diagram: where it stands, what it shows.
@@ -36,7 +40,7 @@ std::vector<Row> rows_of(std::span<const TriaxialReport> reports, const Triaxial
   for (const TriaxialReport& report : reports) {
     if (!options.stage.empty() && report.stage != options.stage) continue;
     const Row row{-100 * report.strain.at(static_cast<std::size_t>(options.axis)), report.q_over_p,
-                  100 * report.strain_volume};
+                  100 * report.strain_volume, report.converged};
     if (std::isfinite(row.strain) && std::isfinite(row.stress_ratio) && std::isfinite(row.volume_strain)) {
       rows.push_back(row);
     }
@@ -85,12 +89,18 @@ void draw_panel(Svg& svg, const Panel& panel, const std::vector<Row>& rows,
                       place(row.*panel.value, ticks, panel.bottom, panel.top)});
   }
   svg.polyline(points, {panel.colour, 2});
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (!rows[k].converged) svg.circle(points[k][0], points[k][1], 2.5, missed_colour);
   if (!points.empty()) svg.circle(points.back()[0], points.back()[1], 3.5, panel.colour);
 }
 
+/// Peak and last value of the steps that converged: what others give is no result.
 std::string findings(const std::vector<Row>& rows) {
-  const Row& peak = *std::ranges::max_element(rows, {}, &Row::stress_ratio);
-  const Row& last = rows.back();
+  std::vector<Row> sound;
+  std::ranges::copy_if(rows, std::back_inserter(sound), &Row::converged);
+  if (sound.empty()) return "no step converged";
+  const Row& peak = *std::ranges::max_element(sound, {}, &Row::stress_ratio);
+  const Row& last = sound.back();
   return fmt::format("peak q/p = {:.3f} at {:.3g} %;  at {:.3g} %: q/p = {:.3f}, volume strain {:+.3g} %",
                      peak.stress_ratio, peak.strain, last.strain, last.stress_ratio, last.volume_strain);
 }
@@ -105,6 +115,9 @@ std::string draw_triaxial(std::span<const TriaxialReport> reports, const Triaxia
                                  : fmt::format("Triaxial test, stage \u201c{}\u201d", options.stage),
            {18, style::ink, "start", true});
   svg.text(left, 54, rows.empty() ? "No data yet" : findings(rows), {13, style::soft_ink});
+  if (const auto missed = std::ranges::count(rows, false, &Row::converged); missed > 0)
+    svg.text(left, 72, fmt::format("\u25cf {} of {} steps drawn missed their tolerance", missed, rows.size()),
+             {12, missed_colour});
   const std::vector<double> strain_ticks = ticks_of(rows, &Row::strain, 8);
   draw_panel(svg, {80, 320, &Row::stress_ratio, "q / p  [1]", style::blue}, rows, strain_ticks);
   draw_panel(svg, {350, 570, &Row::volume_strain, "volume strain, dilation +  [%]", style::orange}, rows,

@@ -36,6 +36,7 @@ struct ErrorRow {
 constexpr Column<StepReport> steps_columns[] = {
     {"step", [](std::string& t, const StepReport& r) { put(t, r.step); }},
     {"time", [](std::string& t, const StepReport& r) { put(t, r.time); }},
+    {"time_step", [](std::string& t, const StepReport& r) { put(t, r.time_step); }},
     {"candidates", [](std::string& t, const StepReport& r) { put(t, r.candidates); }},
     {"contacts", [](std::string& t, const StepReport& r) { put(t, r.contacts); }},
     {"active", [](std::string& t, const StepReport& r) { put(t, r.active); }},
@@ -46,9 +47,19 @@ constexpr Column<StepReport> steps_columns[] = {
     {"jump", [](std::string& t, const StepReport& r) { put(t, r.jump); }},
     {"penetration_mean", [](std::string& t, const StepReport& r) { put(t, r.penetration_mean); }},
     {"penetration_max", [](std::string& t, const StepReport& r) { put(t, r.penetration_max); }},
+    {"overlap", [](std::string& t, const StepReport& r) { put(t, r.overlap); }},
+    {"overlap_body",
+     [](std::string& t, const StepReport& r) {
+       if (r.overlapping) put(t, r.overlapping->body);
+     }},
+    {"overlap_with",
+     [](std::string& t, const StepReport& r) {
+       if (r.overlapping) put(t, r.overlapping->with);
+     }},
     {"kinetic_translation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_translation); }},
     {"kinetic_rotation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_rotation); }},
     {"solid_fraction", [](std::string& t, const StepReport& r) { put(t, r.solid_fraction); }},
+    {"equilibrium", [](std::string& t, const StepReport& r) { put(t, r.equilibrium); }},
     {"migrants", [](std::string& t, const StepReport& r) { put(t, r.migrants); }},
     {"imbalance", [](std::string& t, const StepReport& r) { put(t, r.imbalance); }},
     {"wall_s", [](std::string& t, const StepReport& r) { put(t, r.wall_s); }},
@@ -83,6 +94,7 @@ constexpr Column<TriaxialReport> triaxial_columns[] = {
     {"q", [](std::string& t, const TriaxialReport& r) { put(t, r.q); }},
     {"q_over_p", [](std::string& t, const TriaxialReport& r) { put(t, r.q_over_p); }},
     {"coordination", [](std::string& t, const TriaxialReport& r) { put(t, r.coordination); }},
+    {"converged", [](std::string& t, const TriaxialReport& r) { put(t, r.converged); }},
 };
 
 constexpr Column<ErrorRow> error_history_columns[] = {

@@ -78,6 +78,8 @@ std::string run_json(const Provenance& p, const Summary& s) {
   };
   nlohmann::ordered_json digest;  // null
   if (s.digest) digest = fmt::format("{:016x}", *s.digest);
+  nlohmann::ordered_json sufficient;  // null
+  if (s.sufficient_time_step) sufficient = *s.sufficient_time_step;
   root["summary"] = {
       {"status", s.status},
       {"message", s.message},
@@ -90,10 +92,14 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"worst_error_rms", s.worst_error_rms},
       {"worst_balance", s.worst_balance},
       {"worst_penetration", s.worst_penetration},
+      {"overlapping_steps", s.overlapping_steps},
+      {"worst_overlap", s.worst_overlap},
+      {"sufficient_time_step", sufficient},
       {"iterations", s.iterations},
       {"wall_s", s.wall_s},
       {"bodies", s.bodies},
       {"frames", s.frames},
+      {"warnings", s.warnings},
   };
   // Names of files and hosts may be anything: bytes that are not UTF-8 are replaced, not a reason to lose the
   // run.

@@ -46,13 +46,17 @@ struct Summary {
   std::optional<std::uint64_t> digest;  ///< talus::digest of the final state, as 16 hexadecimal digits
   std::int64_t converged_steps = 0;
   std::int64_t unconverged_steps = 0;
-  double worst_error_rms = 0;    ///< over all steps
-  double worst_balance = 0;      ///< over all steps
-  double worst_penetration = 0;  ///< over all steps, in smallest radii
-  std::int64_t iterations = 0;   ///< over all steps
-  double wall_s = 0;             ///< elapsed [s]
+  double worst_error_rms = 0;                  ///< over all steps
+  double worst_balance = 0;                    ///< over all steps
+  double worst_penetration = 0;                ///< over all steps, in smallest radii
+  std::int64_t overlapping_steps = 0;          ///< that ended with an overlap beyond its tolerance
+  double worst_overlap = 0;                    ///< over all steps, in smaller radii of a pair
+  std::optional<double> sufficient_time_step;  ///< [s] that would have kept them within it
+  std::int64_t iterations = 0;                 ///< over all steps
+  double wall_s = 0;                           ///< elapsed [s]
   std::size_t bodies = 0;
-  std::size_t frames = 0;  ///< output times
+  std::vector<std::string> warnings = {};  ///< of the scene, said when the run began
+  std::size_t frames = 0;                  ///< output times
 };
 
 /// The text of run.json. Without a digest, as long as it runs and when it failed, that is null; so are

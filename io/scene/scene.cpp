@@ -213,7 +213,10 @@ class SceneReader {
       for (const Stage& earlier : scene_.setup.stages)
         if (earlier.name == stage.name)
           fail_at(*table, path + ".name", fmt::format("another stage is named '{}' already", stage.name));
-      if (stage.time_step == 0)
+      if (stage.chooses_time_step && stage.time_step_max == 0 && stage.gravity.norm() == 0)
+        fail_at(*table, path + ".time_step_max",
+                "missing; without gravity time_step = \"auto\" has nothing to find it by");
+      if (stage.time_step == 0 && !stage.chooses_time_step)
         fail_at(*table, path + ".time_step", "missing; expected: real [s], here or at the top of the scene");
       read_loads(*table, path, stage, in_force);
       read_end(*table, path, stage, in_force);

@@ -16,6 +16,7 @@ struct ContactSums {
   std::int64_t passed = 0;       ///< pairs that went through one another (Contacts::passed)
   double penetration = 0;        ///< sum of -gap over them [m]
   double penetration_max = 0;    ///< [m]
+  double deepest = 0;            ///< largest -gap over the smaller radius of the two that touch
   Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();  ///< sum of r (x) l [N s m], l the branch vector: h V
                                                      ///< times the Love-Weber stress
   double normal_impulse = 0;                         ///< sum of r_n [N s]
@@ -66,7 +67,9 @@ inline bool is_active(const Contacts& contacts, std::size_t k) {
   return law_impulse(contacts, k).dot(contact_normal(contacts, k)) > 0;
 }
 
-/// Active contacts of each grain: one entry per slot.
-std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks, std::size_t bodies);
+/// Active contacts of each grain but those with a grain that is `left_out`, which has none: one entry per
+/// slot.
+std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks,
+                                       std::span<const char> left_out);
 
 }  // namespace talus

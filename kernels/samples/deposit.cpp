@@ -334,7 +334,8 @@ class Deposition {
 
 }  // namespace
 
-std::vector<Vec3> deposit(std::span<const double> radii, double length_x, double length_y) {
+std::vector<Vec3> deposit(std::span<const double> radii, double length_x, double length_y,
+                          const std::function<void(std::size_t)>& placed) {
   std::vector<Vec3> centres;
   if (radii.empty()) return centres;
   for (std::size_t k = 0; k < radii.size(); ++k)
@@ -346,7 +347,10 @@ std::vector<Vec3> deposit(std::span<const double> radii, double length_x, double
   const auto [smallest, largest] = std::minmax_element(radii.begin(), radii.end());
   Deposition deposition(*smallest, *largest, length_x, length_y, radii.size());
   centres.reserve(radii.size());
-  for (const double r : radii) centres.push_back(deposition.place(r));
+  for (const double r : radii) {
+    centres.push_back(deposition.place(r));
+    if (placed) placed(centres.size());
+  }
   return centres;
 }
 

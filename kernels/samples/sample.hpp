@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -81,8 +82,9 @@ std::vector<double> draw_radii(const SizeDistribution& sizes, std::size_t n, std
 /// of fall. Radii [m] > 0 of any distribution. Time a grain: about 0.1 ms up to max/min = 1.5; by volume
 /// fraction 0.2 ms at 2, 0.5 ms at 4, 3 ms at 8. Equal radii grow a crystal from the first corner; a spread
 /// of 5 % does not. Throws std::invalid_argument if a radius is not positive or a grain is wider than the
-/// box.
-std::vector<Vec3> deposit(std::span<const double> radii, double length_x, double length_y);
+/// box. `placed`, where there is one, hears behind each grain how many are in place.
+std::vector<Vec3> deposit(std::span<const double> radii, double length_x, double length_y,
+                          const std::function<void(std::size_t)>& placed = {});
 
 /// A lattice of sites that fills the base [0, length_x] x [0, length_y] layer by layer from z = bottom
 /// upwards.

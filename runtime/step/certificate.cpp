@@ -165,9 +165,10 @@ void Certificate::forgive() {
   first_residual2_ = std::max(first_residual2_, residual2_);
 }
 
-bool certified(const IterationResult& result, double momentum_defect, std::int64_t passed,
+bool certified(const IterationResult& result, double momentum_defect, std::int64_t passed, double overlap,
                const SolverSettings& settings) {
-  return result.converged && momentum_defect <= settings.balance_tolerance && passed == 0;
+  return result.converged && momentum_defect <= settings.balance_tolerance && passed == 0 &&
+         overlap <= settings.overlap_tolerance;
 }
 
 }  // namespace talus

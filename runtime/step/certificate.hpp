@@ -184,8 +184,9 @@ class Certificate {
 };
 
 /// Whether a step whose iterations ended so is to be believed. `momentum_defect`: what the sample gained
-/// beside what walls and weight gave, relative; `passed`: pairs of bodies that went through one another.
-bool certified(const IterationResult& result, double momentum_defect, std::int64_t passed,
+/// beside what walls and weight gave, relative; `passed`: pairs of bodies that went through one another;
+/// `overlap`: the largest that the run has made, over the smaller radius (runtime/step/overlap.hpp).
+bool certified(const IterationResult& result, double momentum_defect, std::int64_t passed, double overlap,
                const SolverSettings& settings);
 
 }  // namespace talus

@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/step/overlap.hpp"
 
 namespace talus {
 
@@ -16,6 +18,7 @@ namespace talus {
 struct StepReport {
   std::int64_t step = 0;  ///< number of steps done, from 1
   double time = 0;        ///< [s] at the end of the step
+  double time_step = 0;   ///< h of the step [s]
   std::int64_t candidates = 0;
   std::int64_t contacts = 0;            ///< pairs that touch, or may within the step (docs/theory.md)
   std::int64_t active = 0;              ///< normal impulse > 0
@@ -23,9 +26,14 @@ struct StepReport {
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale
   double balance = 0;  ///< estimated error of the forces, or momentum defect of the sample, the larger
   double jump = 0;     ///< interface jump (several subdomains)
-  double penetration_mean = 0, penetration_max = 0;      ///< over smallest radius, at the end of the step
+  double penetration_mean = 0, penetration_max = 0;  ///< over smallest radius, at the end of the step
+  double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
+  std::optional<OverlapPair> overlapping = {};           ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
   double solid_fraction = 0;                             ///< 0 when the walls do not close a box
+  double equilibrium =
+      0;  ///< distance from it: the largest of net forces over load and of kinetic energy over
+          ///< load x mean diameter (docs/theory.md, "Equilibrium"); infinite without a load
   std::int64_t migrants = 0;
   double imbalance = 1;  ///< largest over mean work of the subdomains
   double wall_s = 0;     ///< elapsed time of the step [s]
@@ -54,8 +62,8 @@ struct TriaxialReport {
   double solid_fraction = 0;
   std::array<double, 3> stress{};     ///< [Pa] diagonal of the Love-Weber stress
   double p = 0, q = 0, q_over_p = 0;  ///< p = mean stress; q = axial minus mean lateral [Pa]
-  double coordination =
-      0;  ///< 2 x active grain-grain contacts (+ walls) per grain with contacts, rattlers left out
+  double coordination = 0;  ///< active contacts of a grain, those of rattlers and with them left out
+  bool converged = true;    ///< of the step (StepReport)
 };
 
 /// State at an output time. Vectors named first are per body, those after `contact` per active contact; on

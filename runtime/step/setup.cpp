@@ -59,6 +59,30 @@ void validate_laws(const Stage& stage) {
                       stage.name, resistance));
 }
 
+void validate_time_step(const Stage& stage) {
+  if (!stage.chooses_time_step) {
+    require(
+        stage.time_step > 0 && std::isfinite(stage.time_step),
+        fmt::format("stage '{}': time_step must be finite and > 0 s, got {}", stage.name, stage.time_step));
+    require(
+        !stage.end.time || steps_in(*stage.end.time, stage.time_step) >= 1,
+        fmt::format(
+            "stage '{}': end.time = {} s is not more than half a time step of {} s: no step would be made",
+            stage.name, stage.end.time.value_or(0), stage.time_step));
+    return;
+  }
+  const double most = stage.time_step_max, least = stage.time_step_min;
+  require(most >= 0 && std::isfinite(most) && least >= 0 && std::isfinite(least),
+          fmt::format("stage '{}': time_step_max and time_step_min must be finite and > 0 s, got {} and {}",
+                      stage.name, most, least));
+  require(
+      most > 0 || stage.gravity.norm() > 0,
+      fmt::format("stage '{}': time_step = \"auto\" without gravity needs time_step_max [s]", stage.name));
+  require(
+      most == 0 || least <= most,
+      fmt::format("stage '{}': time_step_min = {} s is above time_step_max = {} s", stage.name, least, most));
+}
+
 bool rolls(const Setup& setup) {
   return std::ranges::any_of(
       setup.stages, [](const Stage& stage) { return stage.laws.largest(&PairLaw::rolling_resistance) > 0; });
@@ -94,9 +118,7 @@ void validate(const Setup& setup) {
   }
   require(!setup.stages.empty(), "at least one stage is needed");
   for (const Stage& stage : setup.stages) {
-    require(
-        stage.time_step > 0 && std::isfinite(stage.time_step),
-        fmt::format("stage '{}': time_step must be finite and > 0 s, got {}", stage.name, stage.time_step));
+    validate_time_step(stage);
     require(stage.gravity.allFinite(), fmt::format("stage '{}': gravity must be finite [m/s^2]", stage.name));
     validate_laws(stage);
     for (const Wall& wall : setup.walls)
@@ -105,11 +127,9 @@ void validate(const Setup& setup) {
                           wall.material, wall.name));
     require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
-    require(
-        !stage.end.time || steps_in(*stage.end.time, stage.time_step) >= 1,
-        fmt::format(
-            "stage '{}': end.time = {} s is not more than half a time step of {} s: no step would be made",
-            stage.name, stage.end.time.value_or(0), stage.time_step));
+    require(stage.end.equilibrium_hold >= 0 && std::isfinite(stage.end.equilibrium_hold),
+            fmt::format("stage '{}': end.equilibrium_hold must be finite and >= 0, got {}", stage.name,
+                        stage.end.equilibrium_hold));
     for (const auto& [name, load] : stage.loads) {
       const auto wall = std::find_if(setup.walls.begin(), setup.walls.end(),
                                      [&name = name](const Wall& w) { return w.name == name; });
@@ -120,6 +140,8 @@ void validate(const Setup& setup) {
   require(setup.solver.tolerance >= 0 && setup.solver.balance_tolerance >= 0,
           fmt::format("solver.tolerance and balance_tolerance must be >= 0, got {} and {}",
                       setup.solver.tolerance, setup.solver.balance_tolerance));
+  require(setup.solver.overlap_tolerance > 0,
+          fmt::format("solver.overlap_tolerance must be > 0, got {}", setup.solver.overlap_tolerance));
   require(setup.solver.max_iterations >= 1, "solver.max_iterations must be >= 1");
   require(
       setup.solver.method != SolverMethod::momentum || setup.decomposition.coupling != Coupling::schwarz,

@@ -33,17 +33,23 @@ struct StageEnd {
   std::optional<double> time;    ///< [s] of the stage
   std::optional<double> strain;  ///< |axial strain| (28) since the beginning of the stage, along strain_axis
   int strain_axis = 2;           ///< 0, 1, 2 = x, y, z
-  /// Bound on both the net over the applied force of every pushed wall, and the kinetic energy over (applied
-  /// forces + weight) x mean diameter; checked at the end of every step.
+  /// Bound on StepReport::equilibrium.
   std::optional<double> equilibrium;
+  /// Time for which that bound must have held without a break, >= 0, in times that a grain takes to fall by
+  /// its diameter under the load of the sample (fall_time in step_report.hpp): a sample that has just begun
+  /// to move is slow, too.
+  double equilibrium_hold = 3;
 };
 
 /// One stage: a time interval with its own loads.
 struct Stage {
   std::string name;
-  double time_step = 0;                                 ///< h [s] > 0
-  Vec3 gravity = Vec3::Zero();                          ///< [m/s^2]
-  PairTable laws;                                       ///< of the setup's materials
+  double time_step = 0;            ///< h [s] > 0; 0 where each step's is chosen
+  bool chooses_time_step = false;  ///< each step's h is chosen (time_step.hpp), between:
+  double time_step_max = 0;        ///< [s]; 0: the time of a small fall, so there must be gravity
+  double time_step_min = 0;        ///< [s]; 0: a part of the longest
+  Vec3 gravity = Vec3::Zero();     ///< [m/s^2]
+  PairTable laws;                  ///< of the setup's materials
   std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
   StageEnd end;
 };
@@ -87,6 +93,8 @@ struct SolverSettings {
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
+  /// On overlap: what two bodies end a step in by, beyond what they were given, over the smaller radius.
+  double overlap_tolerance = 0.05;
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
       10;  ///< sweeps between the first checks; later ones stand where the tolerance is expected, >= 1

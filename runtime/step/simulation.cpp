@@ -12,7 +12,9 @@
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/runaway.hpp"
+#include "runtime/step/stage_end.hpp"
 #include "runtime/step/step_report.hpp"
+#include "runtime/step/time_step.hpp"
 
 namespace talus {
 
@@ -35,7 +37,7 @@ struct Simulation::Implementation {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
     state.decomposition.shapes = !setup.clumps.empty();
-    const double unit = size.bodies > 0 ? size.smallest : 1;
+    const double unit = smallest_radius();
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
     begin_stage();
@@ -49,8 +51,13 @@ struct Simulation::Implementation {
     begin_stage();
     state.walls = from.walls;
     state.candidates = from.candidates;
+    state.given_overlaps = from.given_overlaps;
     report = from.report;
     stage_steps = from.steps_of_stage;
+    clock = from.clock;
+    held = from.held;
+    // The impulses are those of the last step.
+    if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
     lengths_at_start = from.lengths_of_box;
   }
 
@@ -94,9 +101,30 @@ struct Simulation::Implementation {
     return state;
   }
 
+  const Stage& stage() const { return setup.stages[stage_index]; }
+
+  /// The next step's. Forces outlive the change, so impulses go with the time step.
+  void take_time_step(double h) {
+    if (parameters.time_step > 0 && h != parameters.time_step)
+      for (double& value : state.candidates.impulse.values()) value *= h / parameters.time_step;
+    parameters.time_step = h;
+  }
+
+  /// Before the first step of a stage.
+  void wind_clock() {
+    if (!stage().chooses_time_step) {
+      take_time_step(stage().time_step);
+      return;
+    }
+    clock =
+        StageClock(time_step_bounds(stage(), setup.solver, smallest_radius()), stage().end.time, report.time);
+    if (parameters.time_step == 0) parameters.time_step = clock.step();
+  }
+
+  double smallest_radius() const { return size.bodies > 0 ? size.smallest : 1; }
+
   void begin_stage() {
-    const Stage& stage = setup.stages[stage_index];
-    for (const auto& [name, load] : stage.loads)
+    for (const auto& [name, load] : stage().loads)
       for (Wall& wall : state.walls)
         if (wall.name == name) wall.load = load;
     for (Wall& wall : state.walls) {
@@ -106,15 +134,15 @@ struct Simulation::Implementation {
       if (wall.load.drive == WallDrive::pressure)
         face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
     }
-    const double last_impulse_time = parameters.impulse_time();
-    parameters.time_step = stage.time_step;
-    parameters.gravity = stage.gravity;
-    parameters.laws = stage.laws;
-    parameters.reflection = reflection_of(setup.solver.restitution_law, stage.laws);
+    wind_clock();
+    parameters.gravity = stage().gravity;
+    parameters.laws = stage().laws;
+    const double last_reflection = parameters.reflection;
+    parameters.reflection = reflection_of(setup.solver.restitution_law, parameters.laws);
     parameters.clumps = !setup.clumps.empty();
-    parameters.friction = parameters.clumps || stage.laws.largest(&PairLaw::friction) > 0;
+    parameters.friction = parameters.clumps || stage().laws.largest(&PairLaw::friction) > 0;
     parameters.rotates = parameters.friction && setup.rotation;
-    parameters.rolls = parameters.rotates && stage.laws.largest(&PairLaw::rolling_resistance) > 0;
+    parameters.rolls = parameters.rotates && stage().laws.largest(&PairLaw::rolling_resistance) > 0;
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
     if (state.candidates_valid && !state.decomposition.several()) {
       // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt
@@ -127,13 +155,14 @@ struct Simulation::Implementation {
       renumber(state.candidates, place);
     }
     if (state.candidates_valid) {
-      // Forces outlive the change of stage, so impulses go with the time step.
+      // Forces outlive the change of law.
       for (double& value : state.candidates.impulse.values())
-        value *= parameters.impulse_time() / last_impulse_time;
+        value *= (1 + last_reflection) / (1 + parameters.reflection);
       convert_impulses(state.candidates, parameters.impulses(), state.bodies.x, state.walls);
       state.candidates_valid = false;
     }
     stage_steps = 0;
+    held = 0;
     lengths_at_start = Domain{}.lengths(state.walls);
   }
 
@@ -141,6 +170,23 @@ struct Simulation::Implementation {
   /// Of the step that the graph has run last.
   StepOutcome outcome() const {
     return {next_step(), setup, size, parameters, state, graph.sums(), graph.loop().result()};
+  }
+
+  void choose_time_step() {
+    if (!stage().chooses_time_step) return;
+    clock.choose(longest_time_step(state, setup, parameters, smallest_radius(), ranks));
+    take_time_step(clock.step());
+  }
+
+  /// Behind a step: time and steps of the stage.
+  void count_step() {
+    ++stage_steps;
+    if (stage().chooses_time_step) {
+      clock.advance();
+      report.time = clock.time();
+    }
+    const StageEnd& end = stage().end;
+    held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
   }
 
   /// Loads of the walls for the step: applied forces and free velocities.
@@ -157,31 +203,14 @@ struct Simulation::Implementation {
     }
   }
 
-  double unrest() const { return talus::unrest(outcome(), report); }
-
   double strain(int axis) const {
     return Domain{}.strain(Domain{}.lengths(state.walls)[axis], lengths_at_start[axis]);
   }
 
-  struct Done {
-    double fraction = 0;  ///< part of the stage done by its nearest end condition; >= 1 when it has ended
-    const char* by = "";  ///< that condition
-  };
-  Done done() const {
-    const StageEnd& end = setup.stages[stage_index].end;
-    Done nearest;
-    const auto consider = [&](const char* by, double fraction) {
-      if (fraction > nearest.fraction) nearest = {fraction, by};
-    };
-    if (end.steps)
-      consider("steps",
-               *end.steps > 0 ? static_cast<double>(stage_steps) / static_cast<double>(*end.steps) : 1.0);
-    if (end.time)
-      consider("time", static_cast<double>(stage_steps) / steps_in(*end.time, parameters.time_step));
-    if (stage_steps == 0) return nearest;
-    if (end.strain) consider("strain", std::abs(strain(end.strain_axis)) / *end.strain);
-    if (end.equilibrium && unrest() <= *end.equilibrium) consider("equilibrium", 1);
-    return nearest;
+  StageDone done() const {
+    const StageEnd& end = stage().end;
+    return stage_done(stage(), {stage_steps, clock, end.strain ? strain(end.strain_axis) : 0, held,
+                                held > 0 ? fall_time(outcome()) : 0});
   }
 
   void pass_ended_stages() {
@@ -202,6 +231,8 @@ struct Simulation::Implementation {
   StepParameters parameters;
   StepGraph graph;
   StepReport report;
+  StageClock clock;  ///< of a stage that chooses its time steps
+  double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
   std::int64_t stage_steps = 0;
   bool over = false;
@@ -233,11 +264,13 @@ SavedState Simulation::save() const {
   if (impl_->state.decomposition.several())
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
-          impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start};
+          impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
+          impl_->clock,        impl_->held};
 }
 
 const StepReport& Simulation::step() {
   const double start = graph::seconds_now();
+  impl_->choose_time_step();
   impl_->load_walls();
   double wall_energy_free = 0;
   for (std::size_t w = 0; w < impl_->state.walls.size(); ++w)
@@ -245,8 +278,10 @@ const StepReport& Simulation::step() {
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
   check_for_runaway(outcome, wall_energy_free);
-  add_step(impl_->report, outcome, graph::seconds_now() - start);
-  ++impl_->stage_steps;
+  const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
+                                                      impl_->setup.solver.overlap_tolerance, impl_->ranks);
+  add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
+  impl_->count_step();
   return impl_->report;
 }
 
@@ -267,16 +302,13 @@ const char* Simulation::end_reached() const {
   return fraction >= 1 ? by : "";
 }
 const Stage& Simulation::stage() const {
-  return impl_->setup.stages[impl_->stage_index];
+  return impl_->stage();
 }
 std::size_t Simulation::stage_index() const {
   return impl_->stage_index;
 }
 std::int64_t Simulation::steps_of_stage() const {
   return impl_->stage_steps;
-}
-double Simulation::unrest() const {
-  return impl_->unrest();
 }
 const Setup& Simulation::setup() const {
   return impl_->setup;
@@ -335,7 +367,8 @@ std::optional<TriaxialReport> Simulation::triaxial() const {
   out.strain_shear = out.strain[axial] - 0.5 * (out.strain[first] + out.strain[second]);
   out.q = out.stress[axial] - 0.5 * (out.stress[first] + out.stress[second]);
   out.q_over_p = out.p > 0 ? out.q / out.p : 0;
-  out.coordination = coordination(impl_->state, impl_->ranks, impl_->parameters.friction);
+  out.coordination = coordination(impl_->state, impl_->ranks, contacts_to_hold(impl_->parameters));
+  out.converged = impl_->report.converged;
   return out;
 }
 

@@ -14,6 +14,7 @@
 #include "runtime/step/solver_loop.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/step_graph.hpp"
+#include "runtime/step/time_step.hpp"
 
 namespace talus {
 
@@ -26,7 +27,10 @@ struct SavedState {
   StepReport report;
   std::size_t stage_index = 0;
   std::int64_t steps_of_stage = 0;
-  Vec3 lengths_of_box = Vec3::Zero();  ///< at the beginning of the stage [m]
+  Vec3 lengths_of_box = Vec3::Zero();                            ///< at the beginning of the stage [m]
+  std::optional<std::vector<GivenOverlap>> given_overlaps = {};  ///< of StepState
+  StageClock clock = {};                                         ///< of a stage that chooses its time steps
+  double held = 0;  ///< time for which the stage's bound on equilibrium has held [s]
 };
 
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
@@ -77,8 +81,6 @@ class Simulation {
   const Stage& stage() const;
   std::size_t stage_index() const;
   std::int64_t steps_of_stage() const;
-  /// Distance from rest after the last step, which StageEnd::equilibrium bounds.
-  double unrest() const;
 
   const Setup& setup() const;
   const StepState& state() const;

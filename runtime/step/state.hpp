@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "kernels/bodies/bodies.hpp"
@@ -12,6 +13,7 @@
 #include "kernels/sweeps/single_precision.hpp"
 #include "kernels/sweeps/sweep.hpp"
 #include "runtime/step/decomposition.hpp"
+#include "runtime/step/overlap.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus {
@@ -65,6 +67,8 @@ struct StepState {
   SingleState single;             ///< c rooms and n, or empty
   std::vector<WallCopy> copies;   ///< k; used by chunks at walls
   bool candidates_valid = false;  ///< false: the next step begins with a broad phase
+  /// What pairs overlap by that no step has made, the same on all ranks; nothing before the first step.
+  std::optional<std::vector<GivenOverlap>> given_overlaps;
 };
 
 /// The shapes of the bodies here.

@@ -16,7 +16,39 @@ std::string StepName::text() const {
   return fmt::format("step {} (stage '{}')", number, stage);
 }
 
-void add_step(StepReport& report, const StepOutcome& outcome, double elapsed) {
+namespace {
+
+double load_of(const StepOutcome& outcome) {
+  double load = outcome.sample.total_mass * outcome.parameters.gravity.norm();
+  for (const WallState& wall : outcome.state.wall_states) load += std::abs(wall.applied);
+  return load;
+}
+
+/// StepReport::equilibrium.
+double distance_from_equilibrium(const StepOutcome& outcome) {
+  const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
+  const double h = parameters.impulse_time(), load = load_of(outcome);
+  double net = 0;
+  for (std::size_t w = 0; w < state.walls.size(); ++w) {
+    const double applied = state.wall_states[w].applied;
+    if (applied == 0) continue;
+    net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
+                            std::abs(applied));
+  }
+  const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
+  if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
+  const Vec3 gained = sums.motion.impulse / h + sample.total_mass * parameters.gravity;
+  return std::max({net, gained.norm() / load, energy / (load * sample.mean_diameter)});
+}
+
+}  // namespace
+
+double fall_time(const StepOutcome& outcome) {
+  const double load = load_of(outcome);
+  return load > 0 ? std::sqrt(2 * outcome.sample.mean_diameter * outcome.sample.total_mass / load) : 0;
+}
+
+void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverlap& overlap, double elapsed) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
   // Grains at rest between pressed walls gain nothing, and what the walls give cancels: the walls' impulses
   // are the measure then.
@@ -32,6 +64,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, double elapsed) {
   const double defect = (sums.motion.impulse - from_walls).norm() / impulse_unit;
   report.step = step.number;
   report.time += parameters.time_step;
+  report.time_step = parameters.time_step;
   report.candidates = sums.candidates;
   report.contacts = result.contacts;
   report.active = result.active;
@@ -49,57 +82,64 @@ void add_step(StepReport& report, const StepOutcome& outcome, double elapsed) {
   report.penetration_max =
       sums.contacts.penetration_max > 0 ? sums.contacts.penetration_max / sample.smallest : 0;
   report.passed = sums.contacts.passed;
+  report.overlap = overlap.depth;
+  report.overlapping = overlap.named ? std::optional(overlap.pair) : std::nullopt;
   report.kinetic_translation = sums.motion.energy.translation;
   report.kinetic_rotation = sums.motion.energy.rotation;
   const double box = Domain{}.volume(state.walls);
   report.solid_fraction = box > 0 ? sample.volume / box : 0;
+  report.equilibrium = distance_from_equilibrium(outcome);
   report.wall_s = elapsed;
-  report.converged = certified(result, defect, report.passed, setup.solver);
+  report.converged = certified(result, defect, report.passed, report.overlap, setup.solver);
 }
 
-double unrest(const StepOutcome& outcome, const StepReport& report) {
-  const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
-  const double h = parameters.impulse_time();
-  double load = sample.total_mass * parameters.gravity.norm(), net = 0;
-  for (std::size_t w = 0; w < state.walls.size(); ++w) {
-    const double applied = state.wall_states[w].applied;
-    if (applied == 0) continue;
-    load += std::abs(applied);
-    net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
-                            std::abs(applied));
-  }
-  const double energy = report.kinetic_translation + report.kinetic_rotation;
-  if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
-  const Vec3 gained = sums.motion.impulse / h + sample.total_mass * parameters.gravity;
-  return std::max({net, gained.norm() / load, energy / (load * sample.mean_diameter)});
+std::int32_t contacts_to_hold(const StepParameters& parameters) {
+  if (parameters.friction) return 2;
+  return parameters.gravity.norm() > 0 ? 3 : 4;
 }
 
-double coordination(const StepState& state, const graph::Communicator& ranks, bool friction) {
-  const std::int32_t rattler_below = friction ? 2 : 4;
-  std::vector<std::int32_t> touching = count_active(state.contacts, state.chunks, state.bodies.size());
+namespace {
+
+/// Adds up the counts of bodies whose contacts are spread over subdomains. Collective.
+void sum_over_copies(const StepState& state, const graph::Communicator& ranks,
+                     std::vector<std::int32_t>& touching) {
   const Decomposition& all = state.decomposition;
-  if (all.several()) {
-    struct Part {
-      std::int64_t id, count;
-    };
-    std::vector<Part> parts;  // of bodies whose contacts are spread over subdomains
-    for (std::size_t s = 0; s < touching.size(); ++s)
-      if (all.multiplicity[s] > 1)
-        parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
-    parts = ranks.gather_records(std::span<const Part>(parts));
-    std::unordered_map<std::int64_t, std::int32_t> whole;
-    for (const Part& part : parts) whole[part.id] += static_cast<std::int32_t>(part.count);
-    for (std::size_t s = 0; s < touching.size(); ++s)
-      if (all.multiplicity[s] > 1) touching[s] = whole[static_cast<std::int64_t>(state.bodies.id[s])];
+  if (!all.several()) return;
+  struct Part {
+    std::int64_t id, count;
+  };
+  std::vector<Part> parts;
+  for (std::size_t s = 0; s < touching.size(); ++s)
+    if (all.multiplicity[s] > 1)
+      parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
+  parts = ranks.gather_records(std::span<const Part>(parts));
+  std::unordered_map<std::int64_t, std::int32_t> whole;
+  for (const Part& part : parts) whole[part.id] += static_cast<std::int32_t>(part.count);
+  for (std::size_t s = 0; s < touching.size(); ++s)
+    if (all.multiplicity[s] > 1) touching[s] = whole[static_cast<std::int64_t>(state.bodies.id[s])];
+}
+
+}  // namespace
+
+double coordination(const StepState& state, const graph::Communicator& ranks, std::int32_t hold) {
+  std::vector<char> rattles(state.bodies.size(), 0);
+  for (;;) {
+    std::vector<std::int32_t> touching = count_active(state.contacts, state.chunks, rattles);
+    sum_over_copies(state, ranks, touching);
+    std::int64_t sums[3] = {0, 0, 0};  // grains, their contacts, rattlers found
+    for (std::size_t s = 0; s < touching.size(); ++s) {
+      if (rattles[s] != 0) continue;
+      if (touching[s] < hold) {
+        rattles[s] = 1;
+        ++sums[2];
+      } else if (counts(state.decomposition, s)) {
+        ++sums[0];
+        sums[1] += touching[s];
+      }
+    }
+    ranks.sum(sums);
+    if (sums[2] == 0) return sums[0] > 0 ? static_cast<double>(sums[1]) / static_cast<double>(sums[0]) : 0;
   }
-  std::int64_t sums[2] = {0, 0};
-  for (std::size_t s = 0; s < touching.size(); ++s) {
-    if (touching[s] < rattler_below || (!all.counts.empty() && !all.counts[s])) continue;
-    ++sums[0];
-    sums[1] += touching[s];
-  }
-  ranks.sum(sums);
-  return sums[0] > 0 ? static_cast<double>(sums[1]) / static_cast<double>(sums[0]) : 0;
 }
 
 }  // namespace talus

@@ -35,14 +35,19 @@ struct StepOutcome {
 };
 
 /// From the report of the step before to that of this one. `elapsed`: time that the step took [s].
-void add_step(StepReport& report, const StepOutcome& outcome, double elapsed);
+void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverlap& overlap, double elapsed);
 
-/// Distance from rest: the larger of net force over load (walls, sample) and kinetic energy over load x
-/// grain diameter. `report`: of the step.
-double unrest(const StepOutcome& outcome, const StepReport& report);
+/// Time in which the sample would fall by a mean diameter d, were its load all that moves it [s]:
+/// sqrt(2 d m / load). Load is the weight plus the sum of the forces on pushed walls; under gravity alone
+/// that is the free fall of a grain. 0 without a load.
+double fall_time(const StepOutcome& outcome);
 
-/// Mean number of active contacts of the grains that are no rattlers: those with fewer than 4 without
-/// friction, 2 with it (a frictionless grain cannot be held by three). Collective.
-double coordination(const StepState& state, const graph::Communicator& ranks, bool friction);
+/// Contacts that hold a grain still, at least: with friction 2; without it 4, of which weight stands for one.
+std::int32_t contacts_to_hold(const StepParameters& parameters);
+
+/// Coordination number: (2 x active contacts between grains + those with walls) / grains, without rattlers
+/// and their contacts. Rattlers are grains with fewer than `hold` active contacts that are not with rattlers.
+/// Points of contact count, of which clumps may have several. 0 where all are rattlers. Collective.
+double coordination(const StepState& state, const graph::Communicator& ranks, std::int32_t hold);
 
 }  // namespace talus

@@ -88,6 +88,8 @@ Per<SubdomainId, double> StepGraph::costs(std::span<const double> work) const {
 }
 
 void StepGraph::plan_iteration() {
+  if (!state_.given_overlaps)
+    state_.given_overlaps = given_overlaps(state_, parameters_, settings_.overlap_tolerance, ranks_);
   reset_to_free(state_.chunks.untouched, state_.free, state_.bodies.velocity);
   if (!planned_) {
     const double planning = graph::seconds_now();
@@ -172,7 +174,7 @@ void StepGraph::measure_share(std::uint32_t share) {
 namespace {
 
 /// What a subdomain adds to the report, as numbers that travel.
-constexpr std::size_t row_width = 1 + 9 + 14;
+constexpr std::size_t row_width = 1 + 9 + 15;
 
 void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
   const double head[] = {static_cast<double>(subdomain.value()),
@@ -188,6 +190,7 @@ void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSum
                          static_cast<double>(contacts.overlapping),
                          contacts.penetration,
                          contacts.penetration_max,
+                         contacts.deepest,
                          contacts.normal_impulse,
                          static_cast<double>(contacts.passed)};
   row = std::copy(std::begin(head), std::end(head), row);
@@ -207,9 +210,10 @@ void add_row(const double* row, bool here, StepSums& sums) {
   contacts.overlapping = static_cast<std::int64_t>(row[10]);
   contacts.penetration = row[11];
   contacts.penetration_max = row[12];
-  contacts.normal_impulse = row[13];
-  contacts.passed = static_cast<std::int64_t>(row[14]);
-  contacts.moment = Eigen::Map<const Eigen::Matrix3d>(row + 15);
+  contacts.deepest = row[13];
+  contacts.normal_impulse = row[14];
+  contacts.passed = static_cast<std::int64_t>(row[15]);
+  contacts.moment = Eigen::Map<const Eigen::Matrix3d>(row + 16);
   sums.contacts.add(contacts);
 }
 

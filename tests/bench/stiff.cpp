@@ -257,8 +257,8 @@ SavedState settled_pile(const Packing& packing) {
     simulation.step();
     simulation.begin_next_stage();
   }
-  fmt::print("pile of 16k pressed for {} steps, unrest {:.1e}\n", simulation.report().step,
-             simulation.unrest());
+  fmt::print("pile of 16k pressed for {} steps, equilibrium {:.1e}\n", simulation.report().step,
+             simulation.report().equilibrium);
   return simulation.save();
 }
 

@@ -215,11 +215,10 @@ TEST_F(Command, WritesEveryFileOfItsPageAndTheyRead) {
   EXPECT_TRUE(outcome.output.empty()) << outcome.output;
 
   const Table steps = read_table(at("results/steps.csv"));
-  EXPECT_EQ(
-      steps.header,
-      "step,time,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,penetration_mean,"
-      "penetration_max,kinetic_translation,kinetic_rotation,solid_fraction,migrants,imbalance,wall_s,"
-      "converged");
+  EXPECT_EQ(steps.header,
+            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,"
+            "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
+            "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged");
   ASSERT_EQ(steps.rows.size(), 12U);
   for (std::size_t k = 0; k < 12; ++k) {
     EXPECT_EQ(steps.number(k, "step"), static_cast<double>(k + 1));
@@ -311,8 +310,10 @@ class StageEnds : public Command {
 };
 
 TEST_F(StageEnds, AreSaidWithHowFarFromRest) {
-  const Outcome outcome = of(column_scene, "steps = 2, equilibrium = 1e-12", "steps = 50, equilibrium = 0.1");
-  EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: steps reached, unrest ")) << outcome.messages;
+  const Outcome outcome =
+      of(column_scene, "steps = 2, equilibrium = 1e-12", "steps = 50, equilibrium = 0.1, equilibrium_hold = 0");
+  EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: steps reached, equilibrium "))
+      << outcome.messages;
   EXPECT_TRUE(says(outcome, "(asked 1e-12)")) << outcome.messages;
   EXPECT_TRUE(says(outcome, "stage 'then' ended after 1 step: equilibrium reached")) << outcome.messages;
   const Table steps = read_table(at("results/steps.csv"));

@@ -119,10 +119,22 @@ Wall wall_at_side(std::size_t side) {
 }
 
 Section<Stage> stage_keys() {
+  const auto chooses = [](const Stage& stage) { return stage.chooses_time_step; };
   std::vector<Key<Stage>> keys = {
       key<Stage>("name", "", any, "Name, unique among the stages.", &Stage::name)
           .or_else("stage-1, stage-2, ..."),
-      key<Stage>("time_step", "s", positive, "Time step h.", &Stage::time_step).or_else("that of the scene"),
+      time_step_key<Stage>(
+          "Time step h; \"auto\": each step's is chosen by what moves and how near it is "
+          "(docs/theory.md, \"Choice of the time step\").",
+          [](auto& stage) -> auto& { return stage; })
+          .or_else("that of the scene"),
+      key<Stage>("time_step_max", "s", positive, "Longest time step.", &Stage::time_step_max)
+          .or_auto(0,
+                   "that of the scene, else the time in which a grain falls by 2.5 % of the smallest radius")
+          .only("time_step = \"auto\"", chooses),
+      key<Stage>("time_step_min", "s", positive, "Shortest time step.", &Stage::time_step_min)
+          .or_auto(0, "that of the scene, else the longest over 1024")
+          .only("time_step = \"auto\"", chooses),
       key<Stage>("gravity", "m/s²", any, "Gravity.", &Stage::gravity).or_else("that of the scene")};
   for (Key<Stage>& law_key : stage_law_keys()) keys.push_back(std::move(law_key));
   return {"[[stage]]",
@@ -149,9 +161,15 @@ Section<StageEnd> stage_end_keys() {
               .only("strain is given", [](const StageEnd& end) { return end.strain.has_value(); }),
           key<StageEnd>(
               "equilibrium", "", positive,
-              "Bound on the net force over the applied force of every pushed wall, and on the kinetic energy "
-              "over p·V, or over m·g·d under gravity.",
+              "Bound on `equilibrium` of steps.csv: net forces over the load, and kinetic energy over load × "
+              "mean diameter.",
               &StageEnd::equilibrium),
+          key<StageEnd>("equilibrium_hold", "", not_negative,
+                        "Time for which that bound must have held, in times that a grain takes to fall by "
+                        "its diameter d: "
+                        "√(2 d m/load), under gravity alone √(2 d/g).",
+                        &StageEnd::equilibrium_hold)
+              .only("equilibrium is given", [](const StageEnd& end) { return end.equilibrium.has_value(); }),
       }};
 }
 

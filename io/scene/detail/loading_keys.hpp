@@ -13,6 +13,24 @@ namespace talus::io::detail {
 /// A load as a stage names it: wall and what moves it.
 using NamedLoad = std::pair<std::string, WallLoad>;
 
+/// `time_step` of the stage that `stage_of` finds in a Part: a number, or "auto".
+template <class Part, class StageOf>
+Key<Part> time_step_key(const char* meaning, StageOf stage_of) {
+  constexpr double chosen = -1;
+  return bound<double, Part>(
+             "time_step", "s", positive, meaning,
+             [stage_of](Part& part, double h) {
+               Stage& stage = stage_of(part);
+               stage.chooses_time_step = h == chosen;
+               stage.time_step = h == chosen ? 0 : h;
+             },
+             [stage_of](const Part& part) -> Value {
+               const Stage& stage = stage_of(part);
+               return stage.chooses_time_step ? chosen : stage.time_step;
+             })
+      .or_auto(chosen, "");
+}
+
 /// Keys of the walls around the sample, and of the stages that load it through them.
 Section<Wall> wall_keys();
 Section<Stage> stage_keys();

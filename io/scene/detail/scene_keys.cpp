@@ -24,6 +24,7 @@ Section<Scene> top_keys() {
           scene.setup.walls.push_back(wall_at_side(side));
       },
       [](const Scene&) -> Value { return false; });
+  const auto chooses = [](const Scene& s) { return s.common.chooses_time_step; };
   return {
       "",
       "At the top of the file, before the first table.",
@@ -44,11 +45,20 @@ Section<Scene> top_keys() {
               "allow_unconverged", "", any,
               "true: steps that miss their tolerance are still marked, and the exit code is 0.",
               [](auto& s) -> auto& { return s.setup.allow_unconverged; }),
-          key<Scene>(
-              "time_step", "s", positive, "Time step of the stages that give none.",
-              [](auto& s) -> auto& { return s.common.time_step; })
+          time_step_key<Scene>(
+              "Time step of the stages that give none.", [](auto& s) -> auto& { return s.common; })
               .blank_when_zero()
               .or_else("none: each stage gives its own"),
+          key<Scene>(
+              "time_step_max", "s", positive, "Longest time step in the stages that give none.",
+              [](auto& s) -> auto& { return s.common.time_step_max; })
+              .or_auto(0, "from gravity")
+              .only("time_step = \"auto\"", chooses),
+          key<Scene>(
+              "time_step_min", "s", positive, "Shortest time step in the stages that give none.",
+              [](auto& s) -> auto& { return s.common.time_step_min; })
+              .or_auto(0, "the longest over 1024")
+              .only("time_step = \"auto\"", chooses),
           key<Scene>(
               "gravity", "m/s²", any, "Gravity in the stages that give none.",
               [](auto& s) -> auto& { return s.common.gravity; }),

@@ -37,6 +37,11 @@ Section<SolverSettings> solver_keys() {
               "balance_tolerance", "", positive,
               "Bound on the estimated error of the forces and on the momentum defect (balance).",
               &SolverSettings::balance_tolerance),
+          key<SolverSettings>(
+              "overlap_tolerance", "", positive,
+              "Bound on what two bodies, or a body and a wall, end a step in by, over the smaller radius and "
+              "beyond what the sample began with (overlap).",
+              &SolverSettings::overlap_tolerance),
           key<SolverSettings>("max_iterations", "", countable, "Sweeps per step, at most.",
                               &SolverSettings::max_iterations),
           key<SolverSettings>("check_every", "", {.low = 2, .high = countable.high},

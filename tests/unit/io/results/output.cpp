@@ -162,31 +162,36 @@ TEST(WholeFile, KeepsTheOldContentWhenTheNewDoesNotFit) {
 }
 
 TEST(Csv, HeadersAreThosePromised) {
-  EXPECT_EQ(
-      steps_csv_header(),
-      "step,time,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,penetration_mean,"
-      "penetration_max,kinetic_translation,kinetic_rotation,solid_fraction,migrants,imbalance,wall_s,"
-      "converged\n");
+  EXPECT_EQ(steps_csv_header(),
+            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,"
+            "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
+            "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged\n");
   EXPECT_EQ(walls_csv_header(), "step,time,wall,position,velocity,force_x,force_y,force_z\n");
   EXPECT_EQ(triaxial_csv_header(),
             "step,time,stage,strain_x,strain_y,strain_z,strain_volume,strain_shear,solid_fraction,stress_x,"
             "stress_y,"
-            "stress_z,p,q,q_over_p,coordination\n");
+            "stress_z,p,q,q_over_p,coordination,converged\n");
 }
 
 TEST(Csv, StepsRowHoldsEveryValueInItsColumn) {
-  StepReport r{1, 2.5, 3, 4, 5, 6, 7.5, 8.5, 9.5, 10.5, 11.5, 12.5, 13.5, 14.5, 15.5, 16, 17.5, 18.5, true};
+  StepReport r{1,    2.5,  0.25, 3,    4,    5,    6,    7.5, 8.5,  9.5,  10.5, 11.5,
+               12.5, 0.75, {},   13.5, 14.5, 15.5, 19.5, 16,  17.5, 18.5, true};
   std::string row;
   append_steps_row(row, r);
-  EXPECT_EQ(row, "1,2.5,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,13.5,14.5,15.5,16,17.5,18.5,1\n");
+  EXPECT_EQ(row, "1,2.5,0.25,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,0.75,,,13.5,14.5,15.5,19.5,16,17.5,18.5,1\n");
+  r.overlapping = {7, -2};
+  row.clear();
+  append_steps_row(row, r);
+  EXPECT_NE(row.find(",0.75,7,-2,13.5,"), std::string::npos) << row;
 }
 
 TEST(Csv, TriaxialAndWallRowsHoldEveryValueInItsColumn) {
   std::string row;
   append_triaxial_row(
       row,
-      TriaxialReport{1, 2.5, "s", {3.5, 4.5, 5.5}, 6.5, 7.5, 8.5, {9.5, 10.5, 11.5}, 12.5, 13.5, 14.5, 15.5});
-  EXPECT_EQ(row, "1,2.5,s,3.5,4.5,5.5,6.5,7.5,8.5,9.5,10.5,11.5,12.5,13.5,14.5,15.5\n");
+      TriaxialReport{
+          1, 2.5, "s", {3.5, 4.5, 5.5}, 6.5, 7.5, 8.5, {9.5, 10.5, 11.5}, 12.5, 13.5, 14.5, 15.5, false});
+  EXPECT_EQ(row, "1,2.5,s,3.5,4.5,5.5,6.5,7.5,8.5,9.5,10.5,11.5,12.5,13.5,14.5,15.5,0\n");
   row.clear();
   append_walls_row(row, StepReport{.step = 3, .time = 0.5},
                    WallReport{"top", 1.5, -2.5, Vec3(3.5, 4.5, 5.5)});

@@ -284,6 +284,29 @@ TEST(Picture, OfATriaxialTestShowsOneStageAndLeavesOutWhatIsNotFinite) {
   EXPECT_EQ(occurrences(text.substr(begin, text.find('"', begin) - begin), ","), 10u);
 }
 
+// What a step gives that missed its tolerance is no result: neither peak nor last value.
+TEST(Picture, OfATriaxialTestTakesItsPeakFromStepsThatConverged) {
+  std::vector<TriaxialReport> reports;
+  for (int k = 0; k <= 10; ++k) {
+    TriaxialReport report = triaxial_row(k, "shear");
+    report.strain = {0, 0, -0.01 * k};
+    report.q_over_p = k == 5 || k == 10 ? 7 : 0.1 * k;
+    report.converged = k != 5 && k != 10;
+    reports.push_back(report);
+  }
+  const std::string text = draw_triaxial(reports, {.stage = "shear", .axis = 2});
+  EXPECT_TRUE(well_formed(text));
+  EXPECT_NE(text.find("peak q/p = 0.900 at 9 %;  at 9 %: q/p = 0.900"), std::string::npos) << text;
+  EXPECT_NE(text.find("2 of 11 steps drawn missed their tolerance"), std::string::npos);
+  for (TriaxialReport& report : reports) report.converged = true;
+  const std::string sound = draw_triaxial(reports, {.stage = "shear", .axis = 2});
+  EXPECT_EQ(sound.find("missed"), std::string::npos);
+  EXPECT_EQ(occurrences(text, "<circle"), occurrences(sound, "<circle") + 2 * 2) << "a mark in both diagrams";
+  for (TriaxialReport& report : reports) report.converged = false;
+  EXPECT_NE(draw_triaxial(reports, {.stage = "shear", .axis = 2}).find("no step converged"),
+            std::string::npos);
+}
+
 TEST(Ticks, AreRoundAndCoverTheRange) {
   EXPECT_EQ(detail::nice_ticks(0, 10, 5), (std::vector<double>{0, 2, 4, 6, 8, 10}));
   const auto ticks = detail::nice_ticks(-0.03, 0.91, 5);

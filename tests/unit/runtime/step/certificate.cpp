@@ -249,17 +249,19 @@ TEST(Certificate, RoundingOfVelocitiesIsNoError) {
   EXPECT_GT(certificate.result().error_rms, 0);
 }
 
-TEST(Certificate, AStepIsCertifiedOnlyWithItsMomentumAndWithoutBodiesThatPassed) {
+TEST(Certificate, AStepIsCertifiedOnlyWithItsMomentumAndPositions) {
   const SolverSettings settings;
   IterationResult result;
   result.converged = true;
   const double tolerance = settings.balance_tolerance;
-  EXPECT_TRUE(certified(result, tolerance, 0, settings));
-  EXPECT_FALSE(certified(result, 1.01 * tolerance, 0, settings));
-  EXPECT_FALSE(certified(result, nan, 0, settings));
-  EXPECT_FALSE(certified(result, 0, 1, settings));
+  EXPECT_TRUE(certified(result, tolerance, 0, settings.overlap_tolerance, settings));
+  EXPECT_FALSE(certified(result, 1.01 * tolerance, 0, 0, settings));
+  EXPECT_FALSE(certified(result, nan, 0, 0, settings));
+  EXPECT_FALSE(certified(result, 0, 1, 0, settings));
+  EXPECT_FALSE(certified(result, 0, 0, 1.01 * settings.overlap_tolerance, settings));
+  EXPECT_FALSE(certified(result, 0, 0, nan, settings));
   result.converged = false;
-  EXPECT_FALSE(certified(result, 0, 0, settings));
+  EXPECT_FALSE(certified(result, 0, 0, 0, settings));
 }
 
 }  // namespace

@@ -1,0 +1,109 @@
+#include "runtime/step/overlap.hpp"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "kernels/detection/measures.hpp"
+#include "kernels/detection/touch.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Part of the tolerance below which an overlap that a sample begins with is as good as none.
+constexpr double negligible = 0.1;
+
+OverlapPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
+  const auto id = [&](Slot slot) {
+    return static_cast<std::int64_t>(state.bodies.id[static_cast<std::size_t>(slot)]);
+  };
+  const std::int64_t first = id(state.contacts.first[k]);
+  if (wall >= 0) return {first, -1 - wall};
+  const std::int64_t second = id(state.contacts.second[k]);
+  return {std::min(first, second), std::max(first, second)};
+}
+
+/// Calls visit(k, wall index or -1, touch) for each contact of this rank, with the present poses.
+template <class Visit>
+void for_each_touch(const StepState& state, const Visit& visit) {
+  const Poses poses{state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)};
+  for (std::size_t c = 0; c < state.chunks.size(); ++c) {
+    const std::int32_t wall = state.chunks.wall[c];
+    const Wall* const surface = wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)];
+    const auto begin = static_cast<std::size_t>(state.chunks.begin[c]);
+    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(state.contacts.count[c]); ++k)
+      visit(k, wall, touch_of(poses, state.contacts, k, surface));
+  }
+}
+
+/// The deepest overlap of each pair, in order of the pairs: bodies may touch in several points.
+std::vector<GivenOverlap> deepest_of_pairs(std::vector<GivenOverlap> all) {
+  std::ranges::sort(all, [](const GivenOverlap& a, const GivenOverlap& b) {
+    return a.pair != b.pair ? a.pair < b.pair : a.depth > b.depth;
+  });
+  const auto rest = std::ranges::unique(all, {}, &GivenOverlap::pair);
+  all.erase(rest.begin(), rest.end());
+  return all;
+}
+
+std::vector<GivenOverlap> gathered(std::span<const GivenOverlap> part, const graph::Communicator& ranks) {
+  return deepest_of_pairs(ranks.gather_records(part));
+}
+
+double given_to(const std::vector<GivenOverlap>& given, const OverlapPair& pair) {
+  const auto found = std::ranges::lower_bound(given, pair, {}, &GivenOverlap::pair);
+  return found != given.end() && found->pair == pair ? found->depth : 0;
+}
+
+}  // namespace
+
+std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParameters& parameters,
+                                         double tolerance, const graph::Communicator& ranks) {
+  const auto velocity = [&](Slot slot) -> Vec3 {
+    return Eigen::Map<const Vec3>(state.bodies.velocity[static_cast<std::size_t>(slot)].u);
+  };
+  std::vector<GivenOverlap> given;
+  for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
+    const Vec3 other =
+        wall < 0 ? velocity(state.contacts.second[k]) : state.walls[static_cast<std::size_t>(wall)].velocity;
+    const Vec3 way = 0.5 * parameters.time_step * (velocity(state.contacts.first[k]) - other);
+    // Where separation and normal are parallel, as in overlaps less deep than a centre.
+    const double then =
+        wall < 0 ? (touch.separation - way).norm() - touch.separation.norm() : -touch.normal.dot(way);
+    const double depth = -(touch.gap + then);
+    if (depth > negligible * tolerance * touch.smaller_radius)
+      given.push_back({pair_of(state, k, wall), depth});
+  });
+  return gathered(given, ranks);
+}
+
+DeepestOverlap find_deepest_overlap(StepState& state, double deepest, double tolerance,
+                                    const graph::Communicator& ranks) {
+  if (deepest <= tolerance && state.given_overlaps->empty()) return {deepest, false, {}};
+  const std::vector<GivenOverlap>& given = *state.given_overlaps;
+  struct Candidate {
+    double depth;
+    OverlapPair pair;
+  };
+  Candidate worst{0, {}};
+  std::vector<GivenOverlap> left;
+  const auto worse = [](const Candidate& a, const Candidate& b) {
+    return a.depth != b.depth ? a.depth > b.depth : a.pair < b.pair;
+  };
+  for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
+    if (!(touch.gap < 0)) return;
+    const OverlapPair pair = pair_of(state, k, wall);
+    const double before = given_to(given, pair);
+    if (before > 0) left.push_back({pair, std::min(before, -touch.gap)});
+    const Candidate here{(-touch.gap - before) / touch.smaller_radius, pair};
+    if (worse(here, worst)) worst = here;
+  });
+  if (!given.empty()) state.given_overlaps = gathered(left, ranks);
+  for (const Candidate& other : ranks.gather_records(std::span<const Candidate>(&worst, 1)))
+    if (worse(other, worst)) worst = other;
+  return {worst.depth, worst.depth > tolerance, worst.pair};
+}
+
+}  // namespace talus

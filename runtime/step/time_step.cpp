@@ -1,0 +1,97 @@
+#include "runtime/step/time_step.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kernels/detection/closing.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Beyond so many halvings nobody looks for a bound, and ticks fit 64 bits.
+constexpr int most_levels = 30;
+
+/// Of an overlap that a step makes before it can see it [m].
+double unseen_overlap(const SolverSettings& solver, double smallest, const TimeStepRule& rule) {
+  return rule.part_of_tolerance * std::min(solver.overlap_tolerance, 2 * rule.longest_way) * smallest;
+}
+
+double square(const double (&v)[3]) {
+  return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+/// Of bodies here, without their spin, and of walls into the grains [m/s].
+double fastest(const StepState& state) {
+  double speed2 = 0;
+  for (const Velocity& v : state.bodies.velocity) speed2 = std::max(speed2, square(v.u));
+  double speed = std::sqrt(speed2);
+  for (const Wall& wall : state.walls) speed = std::max(speed, wall.normal.dot(wall.velocity));
+  return speed;
+}
+
+}  // namespace
+
+TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver, double smallest,
+                                const TimeStepRule& rule) {
+  TimeStepBounds bounds{stage.time_step_max, stage.time_step_min};
+  if (bounds.longest == 0)
+    bounds.longest = std::sqrt(2 * unseen_overlap(solver, smallest, rule) / stage.gravity.norm());
+  if (bounds.shortest == 0) bounds.shortest = bounds.longest / rule.range;
+  return bounds;
+}
+
+double longest_time_step(const StepState& state, const Setup& setup, const StepParameters& parameters,
+                         double smallest, const graph::Communicator& ranks, const TimeStepRule& rule) {
+  const double unseen = unseen_overlap(setup.solver, smallest, rule);
+  // Without restitution a pair within the alert distance is a contact, and does not overlap: bodies that are
+  // struck have that gap to use up, too, and half of it where both were. With it an impact waits for the
+  // overlap.
+  const bool bounces = parameters.laws.largest(&PairLaw::restitution) > 0;
+  const double near = unseen + (bounces ? 0 : 0.5 * parameters.alert);
+  const bool blind = !state.given_overlaps;  // before the first step any two may approach
+  double rates[2] = {
+      blind ? 0
+            : closing_rate(state.candidates, state.bodies,
+                           {state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)}, near),
+      fastest(state)};
+  ranks.max(rates);
+  if (blind) rates[0] = 2 * rates[1] / near;
+  const auto inverse = [](double rate) {
+    return rate > 0 ? 1 / rate : std::numeric_limits<double>::infinity();
+  };
+  return std::min({inverse(rates[0]), inverse(rates[1] / (rule.longest_way * smallest)),
+                   std::sqrt(2 * unseen * inverse(parameters.gravity.norm()))});
+}
+
+StageClock::StageClock(const TimeStepBounds& bounds, std::optional<double> end, double begin)
+    : begin_(begin), longest_(bounds.longest) {
+  double parts = 0;
+  if (end) {
+    // Rounding must not add a part.
+    parts = std::max(1.0, std::ceil(*end / bounds.longest * (1 - 1e-12)));
+    longest_ = *end / parts;
+  }
+  levels_ =
+      std::clamp(static_cast<int>(std::floor(std::log2(longest_ / bounds.shortest) + 1e-9)), 0, most_levels);
+  last_ = static_cast<std::int64_t>(parts) << levels_;
+}
+
+void StageClock::choose(double longest) {
+  const int before = level_;
+  level_ = before < 0 ? 0 : std::max(0, before - 1);
+  while (level_ < levels_ && std::ldexp(longest_, -level_) > longest) ++level_;
+  // At the last level every tick is a multiple.
+  while (ticks_ % ticks_of(level_) != 0) ++level_;
+}
+
+double StageClock::step() const {
+  return std::ldexp(longest_, -std::max(0, level_));
+}
+
+double StageClock::time() const {
+  return begin_ + static_cast<double>(ticks_) * std::ldexp(longest_, -levels_);
+}
+
+}  // namespace talus

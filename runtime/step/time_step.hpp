@@ -1,0 +1,77 @@
+#pragma once
+
+/// The time step, where a stage leaves it to the program (time_step = "auto"; docs/theory.md, "Choice of the
+/// time step"). Steps are the longest one halved so many times, and begin at multiples of themselves: a stage
+/// that ends by time ends exactly then, and the same steps come out of the same motion on any machine.
+///
+///   StageClock clock(bounds, end, begin);  at the beginning of a stage
+///   clock.choose(longest_time_step(...));  before each step, which then takes clock.step()
+///   clock.advance();                       behind it
+
+#include <cstdint>
+#include <optional>
+
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/setup.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// What chosen time steps are measured by. Lengths are in smallest radii, ratios have no unit.
+struct TimeStepRule {
+  /// Part of the overlap tolerance that a pair may use up of which nothing is known when the step begins: a
+  /// body that is struck meets the next one at the speed that it has then. In (0, 1].
+  double part_of_tolerance = 0.5;
+  /// Way of the fastest body, or wall into the grains, in a step, in (0, 0.5]: candidates are known that far,
+  /// and two bodies that go in by more have passed one another (StepReport::passed).
+  double longest_way = 0.5;
+  /// Where the scene gives no shortest time step, the longest over it, >= 1.
+  double range = 1024;
+};
+
+/// Longest and shortest time step of a stage [s].
+struct TimeStepBounds {
+  double longest = 0, shortest = 0;
+};
+
+/// Those of a stage that chooses its time steps; the longest is by default the time in which a grain falls by
+/// what the overlap tolerance leaves to it. `smallest`: radius [m].
+TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver, double smallest,
+                                const TimeStepRule& rule = {});
+
+/// The longest step that motion allows [s], infinity for a sample without motion and weight. `smallest`:
+/// radius [m]. One pass over bodies and candidates; collective, and a maximum of single bodies and pairs: the
+/// same on any ranks.
+double longest_time_step(const StepState& state, const Setup& setup, const StepParameters& parameters,
+                         double smallest, const graph::Communicator& ranks, const TimeStepRule& rule = {});
+
+/// Time of a stage as a whole number of its shortest steps.
+class StageClock {
+ public:
+  StageClock() = default;
+  /// `end`: time of the stage [s], if it ends by time; the longest step is then shortened to a part of it.
+  /// `begin`: time of the run then [s].
+  StageClock(const TimeStepBounds& bounds, std::optional<double> end, double begin);
+
+  /// The longest step that is at most `longest` [s], begins at a multiple of itself, and is at most twice the
+  /// step before: warm impulses are those of a step of another length.
+  void choose(double longest);
+  void advance() { ticks_ += ticks_of(level_); }
+
+  double step() const;  ///< chosen last [s]
+  double time() const;  ///< of the run [s]
+  /// Part of the time of the stage that is done; 0 where it has no end by time.
+  double fraction() const { return last_ > 0 ? static_cast<double>(ticks_) / static_cast<double>(last_) : 0; }
+
+ private:
+  std::int64_t ticks_of(int level) const { return std::int64_t{1} << (levels_ - level); }
+
+  double begin_ = 0;        ///< time of the run when the stage began [s]
+  double longest_ = 0;      ///< [s]
+  int levels_ = 0;          ///< the shortest step is the longest halved so many times
+  int level_ = -1;          ///< of the step chosen last; -1: none yet
+  std::int64_t ticks_ = 0;  ///< shortest steps done
+  std::int64_t last_ = 0;   ///< of the stage; 0: it does not end by time
+};
+
+}  // namespace talus

@@ -1,0 +1,69 @@
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+#include "runtime/graph/one_rank.hpp"
+#include "runtime/step/step_report.hpp"
+
+namespace talus {
+namespace {
+
+/// Frictionless contacts that all carry, between grains, and of grains at one wall.
+StepState state_of(std::size_t grains, const std::vector<std::pair<Slot, Slot>>& pairs,
+                   const std::vector<Slot>& at_wall) {
+  StepState state;
+  for (std::size_t k = 0; k < grains; ++k)
+    add_sphere(state.bodies, BodyId{static_cast<std::int64_t>(k)}, Vec3::Zero(), 1, 1);
+  Contacts& contacts = state.contacts;
+  for (const auto& [first, second] : pairs) {
+    contacts.first.push_back(first);
+    contacts.second.push_back(second);
+  }
+  for (const Slot body : at_wall) {
+    contacts.first.push_back(body);
+    contacts.second.push_back(-1);
+  }
+  contacts.nx.assign(contacts.first.size(), 1);
+  contacts.ny.assign(contacts.first.size(), 0);
+  contacts.nz.assign(contacts.first.size(), 0);
+  contacts.rn.assign(contacts.first.size(), 1);
+  const auto of_grains = static_cast<std::int32_t>(pairs.size()),
+             all = static_cast<std::int32_t>(contacts.first.size());
+  state.chunks.begin = {0, of_grains, all};
+  state.chunks.wall = {-1, 0};
+  state.chunks.colour = {0, 1};
+  contacts.count = {of_grains, all - of_grains};
+  return state;
+}
+
+/// Five grains that all touch one another, and each the wall.
+const std::vector<std::pair<Slot, Slot>> cluster = {{0, 1}, {0, 2}, {0, 3}, {0, 4}, {1, 2},
+                                                    {1, 3}, {1, 4}, {2, 3}, {2, 4}, {3, 4}};
+
+TEST(Coordination, CountsAContactForBothGrainsAndOnceAtAWall) {
+  EXPECT_EQ(coordination(state_of(5, cluster, {}), graph::one_rank(), 4), 4);
+  EXPECT_EQ(coordination(state_of(5, cluster, {0, 1, 2, 3, 4}), graph::one_rank(), 4), 5);
+}
+
+// 6 hangs on 5, which leans on 0, 1 and 2: without 6 three contacts do not hold 5, so neither counts, and
+// nothing of theirs does for 0, 1 and 2.
+TEST(Coordination, LeavesOutRattlersWithAllTheirContacts) {
+  std::vector<std::pair<Slot, Slot>> pairs = cluster;
+  for (const auto& pair : {std::pair<Slot, Slot>{5, 0}, {5, 1}, {5, 2}, {6, 5}}) pairs.push_back(pair);
+  EXPECT_EQ(coordination(state_of(7, pairs, {}), graph::one_rank(), 4), 4);
+  EXPECT_DOUBLE_EQ(coordination(state_of(7, pairs, {}), graph::one_rank(), 3), 26.0 / 6);
+  EXPECT_EQ(coordination(state_of(7, {{5, 6}}, {5}), graph::one_rank(), 2), 0);
+}
+
+TEST(Coordination, WeightHoldsAGrainOnThree) {
+  StepParameters parameters;
+  EXPECT_EQ(contacts_to_hold(parameters), 4);
+  parameters.gravity = Vec3(0, 0, -9.81);
+  EXPECT_EQ(contacts_to_hold(parameters), 3);
+  parameters.friction = true;
+  EXPECT_EQ(contacts_to_hold(parameters), 2);
+}
+
+}  // namespace
+}  // namespace talus

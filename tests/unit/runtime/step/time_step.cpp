@@ -1,0 +1,225 @@
+#include "runtime/step/time_step.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <mutex>
+
+#include "runtime/graph/pretend_ranks.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/dense_sample.hpp"
+
+namespace talus {
+namespace {
+
+constexpr double radius = 0.01, density = 2600, infinity = std::numeric_limits<double>::infinity();
+
+Stage choosing(double end, double longest = 0) {
+  Stage stage;
+  stage.name = "all";
+  stage.chooses_time_step = true;
+  stage.time_step_max = longest;
+  stage.gravity = Vec3(0, 0, -10);
+  stage.end.time = end;
+  return stage;
+}
+
+talus::Setup above_floor(Stage stage) {
+  talus::Setup setup;
+  setup.stages.push_back(std::move(stage));
+  Wall& floor = setup.walls.emplace_back();
+  floor.name = "floor";
+  floor.normal = Vec3::UnitZ();
+  return setup;
+}
+
+void add_ball(Bodies& bodies, const Vec3& x, const Vec3& u) {
+  add_sphere(bodies, BodyId{static_cast<std::int64_t>(bodies.size())}, x, radius, density);
+  for (int axis = 0; axis < 3; ++axis) bodies.velocity.back().u[axis] = u[axis];
+}
+
+// Whatever is asked for: between the bounds, no longer than asked where that is possible, no more than twice
+// the step before, and the end of the stage is met to the bit.
+TEST(StageClock, MeetsTheEndOfItsStage) {
+  test::Random random(3);
+  for (const double end : {1.0, 0.1, 0.37}) {
+    const TimeStepBounds bounds{4e-3, 1e-5};
+    StageClock clock(bounds, end, 2.5);
+    double before = infinity, time = 0;
+    while (clock.fraction() < 1) {
+      const double asked = std::pow(10, test::uniform(random, -5.5, -1));
+      clock.choose(asked);
+      const double step = clock.step();
+      EXPECT_LE(step, bounds.longest);
+      EXPECT_GE(step, bounds.shortest);
+      EXPECT_LE(step, 2 * before * (1 + 1e-15));
+      EXPECT_TRUE(step <= asked || step < 2 * bounds.shortest) << step << " where " << asked << " was asked";
+      clock.advance();
+      before = step;
+      time += step;
+    }
+    EXPECT_NEAR(time, end, 1e-12);
+    EXPECT_EQ(clock.fraction(), 1);
+    EXPECT_DOUBLE_EQ(clock.time(), 2.5 + end);
+  }
+}
+
+TEST(StageClock, TakesTheLongestStepsAgainWhenItMay) {
+  StageClock clock({1e-3, 1e-6}, std::nullopt, 0);
+  clock.choose(1e-5);
+  EXPECT_DOUBLE_EQ(clock.step(), 1e-3 / 128);
+  int steps = 0;
+  for (; clock.step() < 1e-3; ++steps) {
+    clock.advance();
+    clock.choose(infinity);
+  }
+  EXPECT_LE(steps, 2 * 7);
+  EXPECT_EQ(clock.fraction(), 0);
+}
+
+// One long flight in steps of many lengths: the theta-scheme is exact under gravity, whatever they are.
+TEST(ChosenTimeStep, FallsExactlyAndHitsTheEnd) {
+  Bodies bodies;
+  add_ball(bodies, Vec3(0, 0, 10), Vec3::Zero());
+  const double end = 1.1;
+  graph::Executor executor({});
+  Simulation simulation(above_floor(choosing(end)), std::move(bodies), executor);
+  double shortest = infinity, longest = 0, sum = 0;
+  for (; !simulation.finished(); simulation.begin_next_stage()) {
+    const StepReport& report = simulation.step();
+    shortest = std::min(shortest, report.time_step);
+    longest = std::max(longest, report.time_step);
+    sum += report.time_step;
+    EXPECT_NEAR(report.time, sum, 1e-12);
+    EXPECT_TRUE(report.converged);
+    EXPECT_NEAR(simulation.state().bodies.x[0][2], 10 - 0.5 * 10 * sum * sum, 1e-12);
+  }
+  EXPECT_EQ(simulation.report().time, end);
+  EXPECT_GT(longest, 3 * shortest) << "a fast grain takes shorter steps";
+  EXPECT_LE(longest, std::sqrt(0.05 * radius / 10)) << "a grain at rest falls by 2.5 % of its radius at most";
+}
+
+/// Largest overlap [radii] and steps of a ball that bounces from 0.5 m, which hits the floor at 3.1 m/s.
+std::pair<double, std::int64_t> bounce(Stage stage) {
+  Bodies bodies;
+  add_ball(bodies, Vec3(0, 0, 0.5 + radius), Vec3::Zero());
+  stage.laws = laws_of_one_material(0, 0, 0.5);
+  stage.gravity = Vec3(0, 0, -10);
+  graph::Executor executor({});
+  Simulation simulation(above_floor(std::move(stage)), std::move(bodies), executor);
+  double worst = 0;
+  for (; !simulation.finished(); simulation.begin_next_stage())
+    worst = std::max(worst, simulation.step().penetration_max);
+  return {worst, simulation.report().step};
+}
+
+TEST(ChosenTimeStep, KeepsImpactsWithinTheOverlapTolerance) {
+  Stage fixed = choosing(1);
+  fixed.chooses_time_step = false;
+  fixed.time_step = 1e-3;
+  EXPECT_GT(bounce(fixed).first, 0.05);
+  const auto [overlap, steps] = bounce(choosing(1, 4e-3));
+  EXPECT_LE(overlap, 0.05);
+  fixed.time_step = 0.05 * radius / 3.2;
+  EXPECT_LT(static_cast<double>(steps), 1 / fixed.time_step) << "fewer than a fixed step that would do";
+}
+
+// A column of 20 at rest beside a ball whose flight makes steps short, with no sweeps to speak of: the force
+// on the floor stays the weight only if warm impulses follow the time step.
+TEST(ChosenTimeStep, TakesWarmImpulsesAlong) {
+  Bodies bodies;
+  for (int k = 0; k < 20; ++k) add_ball(bodies, Vec3(0, 0, (2 * k + 1) * radius), Vec3::Zero());
+  const double weight = 10 * 20 * bodies.mass(0);
+  add_ball(bodies, Vec3(1, 0, 3), Vec3::Zero());
+  Stage rest = choosing(0.01, 1e-3), flight = choosing(0.6, 1e-3);
+  rest.name = "rest";
+  flight.name = "flight";
+  talus::Setup setup = above_floor(rest);
+  setup.stages.push_back(flight);
+  setup.solver.tolerance = 1e-8;
+  setup.solver.balance_tolerance = 1e-8;
+  graph::Executor executor({});
+  Simulation solved(setup, std::move(bodies), executor);
+  while (solved.stage_index() == 0) {
+    solved.step();
+    solved.begin_next_stage();
+  }
+  setup.solver.max_iterations = 1;
+  Simulation simulation(setup, solved.save(), executor);
+  double shortest = infinity, longest = 0;
+  for (; !simulation.finished(); simulation.begin_next_stage()) {
+    const StepReport& report = simulation.step();
+    shortest = std::min(shortest, report.time_step);
+    longest = std::max(longest, report.time_step);
+    ASSERT_NEAR(simulation.walls()[0].force[2], weight, 1e-4 * weight) << "step " << report.step;
+  }
+  EXPECT_GT(longest, shortest);
+}
+
+TEST(ChosenTimeStep, GoesOnFromASavedState) {
+  Bodies bodies;
+  for (int k = 0; k < 5; ++k)
+    add_ball(bodies, Vec3(0.3 * k * radius, 0, (3 * k + 1) * radius), Vec3(0, 0, -0.5 * k));
+  const talus::Setup setup = above_floor(choosing(0.05));
+  graph::Executor executor({});
+  Simulation whole(setup, bodies, executor), first(setup, bodies, executor);
+  for (int k = 0; k < 9; ++k) {
+    first.step();
+    first.begin_next_stage();
+  }
+  Simulation second(setup, first.save(), executor);
+  for (Simulation* simulation : {&whole, &second})
+    for (; !simulation->finished(); simulation->begin_next_stage()) simulation->step();
+  EXPECT_EQ(second.report().time, whole.report().time);
+  EXPECT_EQ(second.report().step, whole.report().step);
+}
+
+// Steps are decided from maxima over all ranks: the same steps, and the same bits, on 1 and 3.
+TEST(ChosenTimeStep, IsTheSameOnAnyRanksAndThreads) {
+  talus::Setup setup = test::pressed_setup(test::box_of_walls(-1, 7), 0.3, 12, 1e6, 200);
+  setup.stages[0].chooses_time_step = true;
+  setup.stages[0].time_step_max = 0.1;
+  setup.solver.max_iterations = 40;
+  setup.decomposition.subdomains = 6;
+  const Bodies bodies = test::jittered_lattice(7, 4, 5);
+  struct Result {
+    std::vector<double> steps;
+    std::uint64_t digest = 0;
+  };
+  const auto run = [&](const graph::Communicator& ranks, int threads) {
+    graph::Executor executor({.threads = threads});
+    Simulation simulation(setup, ranks.rank() == 0 ? bodies : Bodies{}, executor, ranks);
+    Result result;
+    for (; !simulation.finished(); simulation.begin_next_stage())
+      result.steps.push_back(simulation.step().time_step);
+    result.digest = simulation.digest();
+    return result;
+  };
+  Result alone;
+  graph::on_pretend_ranks(1, [&](const graph::Communicator& ranks) { alone = run(ranks, 1); });
+  EXPECT_NE(alone.steps.front(), alone.steps.back());
+  std::mutex comparing;
+  const auto expect_same = [&](const Result& result) {
+    const std::lock_guard lock(comparing);
+    EXPECT_EQ(result.steps, alone.steps);
+    EXPECT_EQ(result.digest, alone.digest);
+  };
+  graph::on_pretend_ranks(3, [&](const graph::Communicator& ranks) { expect_same(run(ranks, 1)); });
+  graph::on_pretend_ranks(1, [&](const graph::Communicator& ranks) { expect_same(run(ranks, 2)); });
+}
+
+TEST(ChosenTimeStep, NeedsABoundWithoutGravity) {
+  graph::Executor executor({});
+  Stage stage = choosing(1);
+  stage.gravity.setZero();
+  EXPECT_THROW(Simulation(above_floor(stage), Bodies{}, executor), std::invalid_argument);
+  stage.time_step_max = 1e-3;
+  stage.time_step_min = 2e-3;
+  EXPECT_THROW(Simulation(above_floor(stage), Bodies{}, executor), std::invalid_argument);
+  stage.time_step_min = 1e-5;
+  EXPECT_NO_THROW(Simulation(above_floor(stage), Bodies{}, executor));
+}
+
+}  // namespace
+}  // namespace talus

@@ -1,0 +1,139 @@
+/// What `talus run` says of scenes that are sound and seldom meant, and of steps that are too long.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus {
+namespace {
+
+using namespace test;
+
+class Warnings : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+  /// All warnings of a dry run of the scene.
+  std::string of(const std::string& scene) {
+    write(at("scene.toml"), scene);
+    const Outcome outcome = run("run scene.toml --dry-run");
+    EXPECT_EQ(outcome.code, 0) << outcome.messages;
+    std::string found, line;
+    for (std::istringstream lines(outcome.messages); std::getline(lines, line);)
+      if (line.find("warning") != std::string::npos) found += line + "\n";
+    return found;
+  }
+  static std::string replaced(std::string text, const std::string& what, const std::string& with) {
+    return text.replace(text.find(what), what.size(), with);
+  }
+
+  ScratchDirectory folder_;
+};
+
+TEST_F(Warnings, AreNoneWhereNothingIsOdd) {
+  EXPECT_EQ(of(column), "");
+  EXPECT_EQ(of(pressed_box), "");
+}
+
+TEST_F(Warnings, OfASceneWithoutWalls) {
+  const std::size_t begin = column.find("[[wall]]"), end = column.find("[[stage]]");
+  EXPECT_NE(of(std::string(column).erase(begin, end - begin)).find("no walls"), std::string::npos);
+}
+
+TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
+  EXPECT_NE(
+      of(replaced(column, "-9.81", "9.81")).find("gravity of stage 'rest' is (0, 0, 9.81) m/s^2, upwards"),
+      std::string::npos);
+  EXPECT_NE(of(replaced(column, "[0, 0, -9.81]", "[9.81, 0, 0]")).find("no wall stands against it"),
+            std::string::npos);
+}
+
+TEST_F(Warnings, OfADensityInOtherUnits) {
+  EXPECT_NE(
+      of(replaced(column, "2600", "2.6")).find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
+      std::string::npos);
+  EXPECT_NE(of(replaced(column, "2600", "2.6e6")).find("more than any element"), std::string::npos);
+}
+
+TEST_F(Warnings, AreInTheSummaryOfTheRun) {
+  write(at("scene.toml"), replaced(column, "2600", "2.6"));
+  ASSERT_EQ(run("run scene.toml --out results").code, 0);
+  const auto warnings = summary(at("results")).at("warnings");
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].get<std::string>().find("2.6 kg/m^3"), std::string::npos);
+}
+
+/// A grain that bounces off the floor at 2 m/s, a fifth of its radius in a step.
+std::string bouncing() {
+  std::string scene = with_bodies(column);
+  scene.replace(scene.find("[0, 0, -9.81]"), 13, "[0, 0, 0]");
+  scene.replace(scene.find("friction = 0.35"), 15, "friction = 0\nrestitution = 0.5");
+  scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
+  return scene.replace(scene.find("steps = 4"), 9, "time = 0.02");
+}
+
+// The step is exact and the position is not. Its time step follows from how far it was missed, and does.
+TEST_F(Warnings, NameTheOverlapOfAStepThatIsTooLongAndTheStepThatWouldDo) {
+  write(at("scene.toml"), bouncing());
+  write(at("grains.csv"), "id,x,y,z,radius,vx,vy,vz\n42,0,0,0.0115,0.01,0,0,-2\n");
+  const Outcome outcome = run("run scene.toml --out results");
+  EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("overlaps beyond solver.overlap_tolerance = 0.05: the deepest, 0.1 of the "
+                                  "smaller radius, of body 42 and wall 'floor' in step 2"),
+            std::string::npos)
+      << outcome.messages;
+  const Table steps = read_table(at("results/steps.csv"));
+  double worst = 0;
+  for (std::size_t k = 0; k < steps.rows.size(); ++k) {
+    const bool missed = steps.number(k, "overlap") > 0.05;
+    EXPECT_EQ(steps.rows[k].at("converged"), missed ? "0" : "1");
+    EXPECT_EQ(steps.rows[k].at("overlap_body"), missed ? "42" : "");
+    EXPECT_EQ(steps.rows[k].at("overlap_with"), missed ? "-1" : "");
+    worst = std::max(worst, steps.number(k, "overlap"));
+  }
+  const auto results = summary(at("results"));
+  EXPECT_EQ(results.at("worst_overlap").get<double>(), worst);
+  const double enough = results.at("sufficient_time_step").get<double>();
+  EXPECT_NEAR(enough, 0.5 * 1e-3 * 0.05 / worst, 1e-12);
+
+  const Outcome shorter = run("run scene.toml --out shorter --set time_step=" + std::to_string(enough));
+  EXPECT_EQ(shorter.code, 0) << shorter.messages;
+  EXPECT_TRUE(summary(at("shorter")).at("sufficient_time_step").is_null());
+  EXPECT_EQ(run("run scene.toml --out lenient --set solver.overlap_tolerance=0.2").code, 0);
+}
+
+TEST_F(Warnings, AreNotNeededWhereTheTimeStepIsChosen) {
+  write(at("scene.toml"), bouncing());
+  write(at("grains.csv"), "id,x,y,z,radius,vx,vy,vz\n42,0,0,0.0115,0.01,0,0,-2\n");
+  const Outcome outcome = run("run scene.toml --out results --set time_step=auto --set time_step_max=1e-3");
+  EXPECT_EQ(outcome.code, 0) << outcome.messages;
+  const Table steps = read_table(at("results/steps.csv"));
+  double time = 0, least = 1;
+  for (std::size_t k = 0; k < steps.rows.size(); ++k) {
+    time += steps.number(k, "time_step");
+    least = std::min(least, steps.number(k, "time_step"));
+    EXPECT_NEAR(steps.number(k, "time"), time, 1e-12);
+  }
+  EXPECT_EQ(steps.number(steps.rows.size() - 1, "time"), 0.02);
+  EXPECT_LT(least, 5e-4);
+  EXPECT_EQ(run("run results/scene.resolved.toml --out again").code, 0);
+  EXPECT_EQ(summary(at("again")).at("digest"), summary(at("results")).at("digest"));
+}
+
+TEST_F(Warnings, SayWhatAChosenTimeStepLacks) {
+  write(at("scene.toml"), bouncing());
+  write(at("grains.csv"), "id,x,y,z,radius\n42,0,0,0.0115,0.01\n");
+  const Outcome outcome = run("run scene.toml --dry-run --set time_step=auto");
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.messages.find("time_step_max"), std::string::npos) << outcome.messages;
+  EXPECT_EQ(run("run scene.toml --dry-run --set time_step_max=1e-3").code, 2)
+      << "without auto it says nothing";
+}
+
+}  // namespace
+}  // namespace talus
