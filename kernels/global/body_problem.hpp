@@ -151,6 +151,13 @@ inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V
   return v - b.u - c.levers->second * b.w;
 }
 
+/// [n] with [n] w = n x w: the lever of a sphere's first body.
+inline Mat3 cross_matrix(const Vec3& n) {
+  Mat3 N;
+  N << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
+  return N;
+}
+
 /// What counts of a vector at a contact: without friction its normal part.
 inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
   return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);

@@ -6,15 +6,7 @@
 
 namespace talus {
 
-namespace {
 
-Eigen::Matrix3d cross_matrix(const Vec3& n) {
-  Eigen::Matrix3d N;
-  N << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
-  return N;
-}
-
-}  // namespace
 
 /// rho H_i H_i^T of one contact of spheres, m = +-n.
 void BodySystem::add_own_block(const Vec3& m, double rho, std::int32_t kind, Matrix6& block) {

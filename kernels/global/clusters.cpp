@@ -7,15 +7,12 @@
 #include <tuple>
 #include <utility>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/bodies/larger.hpp"
 
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// Disjoint sets of 0 .. n - 1, each named by its lowest member.
 class DisjointSets {

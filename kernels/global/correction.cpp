@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/global/balance.hpp"
 #include "kernels/global/body_solver.hpp"
 #include "kernels/global/stiffness.hpp"
@@ -14,10 +15,6 @@
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 enum class ContactState : char { open, sliding, sticking };
 
@@ -85,12 +82,6 @@ struct ActiveProblem {
   std::vector<std::size_t> origin;
   std::vector<Levers> levers;  ///< of frictional contacts that slide: they push along the edge of their cones
 };
-
-Mat3 cross_matrix(const Vec3& n) {
-  Mat3 N;
-  N << 0, -n[2], n[1], n[2], 0, -n[0], -n[1], n[0], 0;
-  return N;
-}
 
 ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
   ActiveProblem active;

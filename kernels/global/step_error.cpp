@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "kernels/bodies/index.hpp"
 #include "kernels/bodies/larger.hpp"
 #include "kernels/global/stiffness.hpp"
 #include "kernels/law/friction_cone.hpp"
@@ -13,10 +14,6 @@
 namespace talus {
 
 namespace {
-
-std::size_t at(std::int32_t k) {
-  return static_cast<std::size_t>(k);
-}
 
 /// By Cauchy and Schwarz: the most momentum in so much energy.
 double most_momentum(double mass, double energy) {
