@@ -202,7 +202,6 @@ bool FrictionNewton::solve_near(const Vector& centre, double shift, double enoug
 
 NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int most) const {
   Vector s = scaled(r);
-  const Vector begun = s;
   const double size = unit(s);
   NewtonResult result;
   result.residual = law(s, s, 0).cwiseAbs().maxCoeff() / size;
@@ -224,9 +223,6 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int mo
         std::max(std::sqrt(std::max(0.0, s.dot(W_ * s))), floor_of_exchange * s.cwiseAbs().maxCoeff());
     result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds)));
   }
-  const Vector moved = s - begun;
-  if (const double square = moved.squaredNorm(); square > 0)
-    result.stiffness = moved.dot(W_ * moved) / square;
   r = unscaled(s);
   return result;
 }

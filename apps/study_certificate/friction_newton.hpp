@@ -19,8 +19,6 @@ struct NewtonResult {
   /// What one more step would change of the velocities, about their error, and what impulses change of them,
   /// at least a hundredth of the largest impulse; in the kinetic norm [J^1/2].
   double next = 1, exchanged = 1;
-  /// d.W d / |d|^2 of what the search has changed, diagonal of W 1.
-  double stiffness = 1;
 };
 
 /// In coordinates s = r / scale, with scale W_nn^-1/2 along the normal and W_tt^-1/2 across it, the law of

@@ -20,14 +20,10 @@ struct ReferenceLimits {
   double residual = 1e-10;  ///< of the law at a contact, relative: below it the answer counts as found
   double pumped = 1e6;  ///< impulses that grow so many times over what the step can ask for have no answer
   double velocities = 1e-8;  ///< error() of velocities that are known though the law is not met
-  /// Where an answer differs from the run by impulses d with d.W d < redundant |d|^2 (diagonal of W 1),
-  /// forces are not known: a change of all of them would change velocities by 1e-4, so that which of the
-  /// contacts carry is decided by gaps that no tolerance sees. (A smooth wedge of half angle 1e-3 has 1e-6.)
-  double redundant = 1e-8;
-  double nearly = 1e-6;     ///< residual up to which that may be
-  double speeds = 1e-5;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
-  int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
-  int proximal_steps = 30;  ///< each begins from the impulses of the last one
+  double nearly = 1e-6;      ///< residual up to which that may be
+  double speeds = 1e-5;      ///< least unit of residuals, over the speeds of bodies: below it is rounding
+  int pivots = 400;          ///< smooth: changes of the set of contacts that carry, per proximal step
+  int proximal_steps = 30;   ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
 };
 
@@ -39,8 +35,6 @@ enum class Found {
   nothing,     ///< the search failed
   no_answer,   ///< there is none: walls close on grains that cannot get away
 };
-
-inline constexpr const char* redundant_forces = "redundant contacts: forces are not known";
 
 /// An answer and how well it is known.
 struct Reference {

@@ -202,19 +202,17 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
     reference.error = result.next;
     reference.exchanged = result.exchanged;
     reference.r = impulses;
-    if (result.residual > limits.residual) continue;
-    reference.found = result.stiffness < limits.redundant ? Found::velocities : Found::answer;
-    break;
+    if (result.residual <= limits.residual) reference.found = Found::answer;
+    if (reference.found == Found::answer) break;
   }
   reference.motion = motion_under(problem, reference.r);
-  if (reference.found == Found::velocities) reference.why = redundant_forces;
-  if (reference.found != Found::nothing) return reference;
+  if (reference.found == Found::answer) return reference;
   if (!has_answer(problem, limits)) {
     reference.found = Found::no_answer;
     reference.why = "no velocities are admissible";
   } else if (reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly) {
     reference.found = Found::velocities;
-    reference.why = redundant_forces;
+    reference.why = "redundant contacts: forces are not known";
   } else {
     reference.why = "neither sweeps nor Newton's method find the answer";
   }
