@@ -14,7 +14,7 @@ namespace {
 /// and larger where they lead astray.
 constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
 /// Of Newton's steps around one centre.
-constexpr int inner_steps = 12, halvings = 4;
+constexpr int inner_steps = 8, halvings = 4;
 /// Part of the law's residual to which a problem around a centre is solved.
 constexpr double inner_part = 1e-2;
 /// Least momentum exchanged, kinetic norm, over the largest impulse.

@@ -23,8 +23,8 @@ struct ReferenceLimits {
   double nearly = 1e-6;      ///< residual up to which that may be
   double speeds = 1e-5;      ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;          ///< smooth: changes of the set of contacts that carry, per proximal step
-  int proximal_steps = 30;   ///< each begins from the impulses of the last one
-  std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
+  int proximal_steps = 16;   ///< each begins from the impulses of the last one
+  std::int64_t contact_solves = 500'000;  ///< friction: contacts that may be swept in all attempts
 };
 
 /// What a search has come to.
@@ -43,7 +43,7 @@ struct Reference {
   std::vector<Vec3> r = {};  ///< impulses of the problem's contacts [N s]
   Motion motion = {};        ///< under them
   double residual = 0;       ///< of the law (natural map), the largest, over the run's largest impulse or the
-                             ///< largest speed of approach
+                             ///< largest speed of approach; where there is no answer unavoidable_approach
   /// Error of the velocities in the kinetic norm [J^1/2], a bound without friction, with friction the next
   /// step of Newton's method; and the norm of what the contacts change, at least a hundredth of the largest
   /// impulse.
@@ -64,8 +64,9 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
 /// pivoting (Portugal, Judice and Vicente 1994) in 80-bit arithmetic.
 Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, const ReferenceLimits& limits);
 
-/// Whether some velocities meet v_n + b >= 0 at all contacts, up to rounding.
-bool has_answer(const StepProblem& problem, const ReferenceLimits& limits);
+/// The speed of approach that no velocities can avoid, at the worst contact, over the largest one; 0 where
+/// some velocities meet v_n + b >= 0 everywhere, up to rounding.
+double unavoidable_approach(const StepProblem& problem, const ReferenceLimits& limits);
 
 /// With friction: projected Gauss-Seidel with Anderson's acceleration, and Newton's method from where it got.
 Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,

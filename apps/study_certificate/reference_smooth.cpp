@@ -200,12 +200,13 @@ Real unit_of(const StepProblem& problem, const Dual& dual, const Vector& s, cons
 
 }  // namespace
 
-bool has_answer(const StepProblem& problem, const ReferenceLimits& limits) {
+double unavoidable_approach(const StepProblem& problem, const ReferenceLimits& limits) {
   const Dual dual = dual_of(problem);
   Vector s = Vector::Zero(dual.q.size());
   const Real unit = unit_of(problem, dual, s, limits);
   find_impulses(dual, limits, sharpness * limits.residual * unit, s);
-  return s.maxCoeff() <= limits.pumped * unit;
+  if (s.maxCoeff() <= limits.pumped * unit) return 0;
+  return static_cast<double>(met_by(dual, s).residual / unit);
 }
 
 Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, const ReferenceLimits& limits) {
