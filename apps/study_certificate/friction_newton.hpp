@@ -33,8 +33,14 @@ class FrictionNewton {
   /// `speeds`: least unit of residuals over the speeds of bodies (ReferenceLimits).
   FrictionNewton(const StepProblem& problem, double speeds);
 
-  /// Proximal steps from r, in and out, until the residual is `enough`, at most `most`.
-  NewtonResult improve(std::vector<Vec3>& r, double enough, int most) const;
+  /// What residuals are compared with: the largest of the impulses r, or speed of approach, scaled.
+  double unit(std::span<const Vec3> r) const;
+  /// Proximal steps from r, in and out, until the residual over `unit` is `enough`, at most `most`.
+  struct Goal {
+    double unit, enough;
+    int most;
+  };
+  NewtonResult improve(std::vector<Vec3>& r, const Goal& goal) const;
 
  private:
   using Matrix = Eigen::SparseMatrix<double>;
@@ -47,7 +53,6 @@ class FrictionNewton {
   Vector scaled(std::span<const Vec3> r) const;
   std::vector<Vec3> unscaled(const Vector& s) const;
   Vector law(const Vector& s, const Vector& centre, double shift) const;
-  double unit(const Vector& s) const;
   void derivative(const Vector& z, std::size_t c, Eigen::Matrix3d& D) const;
   /// A Newton step; false when its system has no solution.
   bool step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const;

@@ -185,6 +185,7 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.residual = reference.error = reference.exchanged = 1;
   Sweeps sweeps(problem);
   const FrictionNewton newton(problem, limits.speeds);
+  const FrictionNewton::Goal goal{newton.unit(run), sharpness * limits.residual, limits.proximal_steps};
   const std::size_t contacts = sweeps.contacts();
   Vector r(static_cast<Eigen::Index>(3 * contacts));
   for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
@@ -196,7 +197,7 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
     left -= passes;
     std::vector<Vec3> impulses(contacts);
     for (std::size_t c = 0; c < contacts; ++c) impulses[c] = at(r, c);
-    const NewtonResult result = newton.improve(impulses, sharpness * limits.residual, limits.proximal_steps);
+    const NewtonResult result = newton.improve(impulses, goal);
     if (!(result.residual < reference.residual)) continue;
     reference.residual = result.residual;
     reference.error = result.next;

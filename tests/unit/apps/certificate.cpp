@@ -383,6 +383,7 @@ TEST(CertificateScenes, KeptAsFilesAreTheSameScene) {
   EXPECT_TRUE(std::ranges::equal(grains.x, made.grains.x));
   EXPECT_EQ(read.setup.stages.size(), made.scene.setup.stages.size());
   made.scene.sample.file = read.sample.file;
+  made.scene.output.directory = read.output.directory;
   EXPECT_EQ(io::resolved_scene(read), io::resolved_scene(made.scene));
   EXPECT_TRUE(is_certificate_name(made.scene.name + ".toml"));
   EXPECT_FALSE(is_certificate_name("thesis.toml"));
@@ -409,20 +410,21 @@ TEST(CertificateAudit, OfASolverThatStopsAfterOneSweepFindsItFarFromItsAnswer) {
 }
 
 TEST(CertificateAudit, OfASolverThatGoesOnFindsItNearItsAnswer) {
-  for (const char* family : {"deposition", "flight", "column"}) {
-    const AuditedRun run = audited(make_scene(family, 3, {}), 3, [](io::Scene& scene) {
-      scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-10;
-      scene.setup.solver.max_iterations = 100000;
-      scene.setup.solver.method = SolverMethod::nncg;
-    });
-    int judged = 0;
-    for (const AuditedStep& step : run.steps) {
-      if (!step.certified || step.residual == 0 || step.errors.velocity == 0) continue;
-      ++judged;
-      EXPECT_LT(step.errors.velocity, 1e-5) << family << " step " << step.step;
+  int judged = 0;
+  for (const char* family : {"deposition", "flight", "column"})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const AuditedRun run = audited(make_scene(family, seed, {}), 2, [](io::Scene& scene) {
+        scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-8;
+        scene.setup.solver.max_iterations = 20000;
+        scene.setup.solver.method = SolverMethod::nncg;
+      });
+      for (const AuditedStep& step : run.steps) {
+        if (!step.certified || step.judged != Judged::yes || step.contacts == 0) continue;
+        ++judged;
+        EXPECT_LT(step.errors.velocity, 1e-5) << family << " " << seed << " step " << step.step;
+      }
     }
-    EXPECT_GT(judged, 0) << family;
-  }
+  EXPECT_GE(judged, 6);
 }
 
 }  // namespace
