@@ -11,10 +11,12 @@
 #include <numbers>
 #include <set>
 
+#include "apps/shared/exit_codes.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/study_certificate/calibration.hpp"
 #include "apps/study_certificate/certificate_report.hpp"
 #include "apps/study_certificate/scene_maker.hpp"
+#include "apps/study_certificate/study_certificate.hpp"
 #include "kernels/samples/sample.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
@@ -425,6 +427,33 @@ TEST(CertificateAudit, OfASolverThatGoesOnFindsItNearItsAnswer) {
       }
     }
   EXPECT_GE(judged, 6);
+}
+
+TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {
+  const test::ScratchDirectory scratch;
+  StudyCertificateOptions options;
+  options.scenes = 2;
+  options.steps = 2;
+  options.families = {"wedge", "rows"};
+  options.tolerances = {1e-2, 1e-4};
+  options.subdomains = 2;
+  options.out = (scratch / "made").string();
+  const int code = study_certificate_command(options);
+  EXPECT_TRUE(code == exit_done || code == exit_failure);
+  std::vector<std::filesystem::path> scenes;
+  for (const auto& entry : std::filesystem::directory_iterator(options.out)) {
+    EXPECT_TRUE(is_certificate_name(entry.path().filename().string())) << entry.path();
+    if (entry.path().extension() == ".toml") scenes.push_back(entry.path());
+  }
+  for (const char* name : {"calibration.csv", "steps.csv", "certificate-V.svg", "report.html"})
+    EXPECT_TRUE(std::filesystem::exists(scratch / "made" / name)) << name;
+  ASSERT_FALSE(scenes.empty());
+
+  StudyCertificateOptions again;
+  again.scenes_from = scenes.front().string();
+  again.out = (scratch / "again").string();
+  EXPECT_NE(study_certificate_command(again), exit_bad_input);
+  EXPECT_EQ(study_certificate_command(again), exit_bad_input);  // there is a study already
 }
 
 }  // namespace
