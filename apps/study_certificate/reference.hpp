@@ -21,10 +21,11 @@ struct ReferenceLimits {
   double pumped = 1e6;  ///< impulses that grow so many times over what the step can ask for have no answer
   double velocities = 1e-8;  ///< error() of velocities that are known though the law is not met
   double nearly = 1e-6;      ///< residual up to which that may be
-  double speeds = 1e-5;      ///< least unit of residuals, over the speeds of bodies: below it is rounding
-  int pivots = 400;          ///< smooth: changes of the set of contacts that carry, per proximal step
-  int proximal_steps = 16;   ///< each begins from the impulses of the last one
-  std::int64_t contact_solves = 500'000;  ///< friction: contacts that may be swept in all attempts
+  double motion = 1e-9;     ///< least exchange, over what all bodies have, kinetic norm: below it is rounding
+  double speeds = 1e-4;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
+  int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
+  int proximal_steps = 24;  ///< each begins from the impulses of the last one
+  std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
 };
 
 /// What a search has come to.
