@@ -11,10 +11,11 @@ namespace {
 /// Floors of the units, as parts of other quantities of the step.
 struct Floors {
   double walls = 1e-2;     ///< of the largest wall impulse: least momentum exchanged
-  double motion = 1e-9;    ///< of the momentum of all, or of a cluster: less is rounding
+  double motion = 1e-9;    ///< of the momentum of all: less is rounding
   double exchange = 1e-2;  ///< of the momentum exchanged: least wall impulse
   double contact = 1e-3;   ///< likewise: least contact impulse
   double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
+  double cluster = 1e-3;   ///< of a cluster's own momentum, likewise: grains that graze one another
 };
 constexpr Floors floors;
 
@@ -87,7 +88,7 @@ double worst_cluster(const StepProblem& problem, const Momenta& momentum, std::s
   for (const Sums& own : sums) {
     const double unit =
         std::max({own.exchanged, floors.walls * own.wall_impulse, own.mass * problem.drive_speed,
-                  floors.load * own.mass * weight, floors.motion * own.momentum, 1e-300});
+                  floors.load * own.mass * weight, floors.cluster * own.momentum, 1e-300});
     worst = std::max(worst, own.wrong / unit);
   }
   return worst;
