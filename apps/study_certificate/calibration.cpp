@@ -41,7 +41,7 @@ CalibrationRow row_of(std::span<const StepOfScene> steps, double tolerance, std:
     row.missed += !step.certified && step.judged != Judged::no_answer ? 1 : 0;
     if (!step.certified) continue;
     ++row.certified;
-    row.disputed += step.judged == Judged::no_answer ? 1 : 0;
+    row.disputed += step.judged == Judged::no_answer && step.residual > step.claimed ? 1 : 0;
     row.disputed += step.judged == Judged::other_problem ? 1 : 0;
     const bool known = step.judged == Judged::yes && (step.forces_known || !measure.of_forces);
     row.unjudged += step.judged == Judged::no_reference || (step.judged == Judged::yes && !known) ? 1 : 0;

@@ -45,10 +45,11 @@ struct CalibrationRow {
   std::int64_t missed = 0;      ///< steps that have an answer and were not certified
   std::int64_t unjudged = 0;    ///< certified steps without a reference
   std::int64_t unsolvable = 0;  ///< steps that have no answer
-  std::int64_t disputed = 0;    ///< certified steps that have no answer, or whose contacts or velocities are
-                                ///< not those of the step
-  Quantiles claimed, asked;     ///< true error over claimed error, over tolerance asked for
-  std::string worst;            ///< scene and step where the first is largest
+  /// Certified steps whose contacts or velocities are not those of the scene, or in which grains approach by
+  /// more than is claimed whatever their velocities.
+  std::int64_t disputed = 0;
+  Quantiles claimed, asked;  ///< true error over claimed error, over tolerance asked for
+  std::string worst;         ///< scene and step where the first is largest
 
   double missed_share() const;  ///< of the steps that have an answer
 };

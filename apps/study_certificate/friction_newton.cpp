@@ -14,9 +14,11 @@ namespace {
 /// and larger where they lead astray.
 constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
 /// Of Newton's steps around one centre.
-constexpr int inner_steps = 12, halvings = 4;
+constexpr int inner_steps = 8, halvings = 4;
 /// Part of the law's residual to which a problem around a centre is solved.
 constexpr double inner_part = 1e-2;
+/// Impulses that grow so many times over what the step can ask for: there is no answer.
+constexpr double pumped = 1e6;
 /// Least momentum exchanged, kinetic norm, over the largest impulse.
 constexpr double floor_of_exchange = 1e-2;
 
@@ -115,7 +117,8 @@ FrictionNewton::Vector FrictionNewton::law(const Vector& s, const Vector& centre
   return F;
 }
 
-double FrictionNewton::unit(const Vector& s) const {
+double FrictionNewton::unit(std::span<const Vec3> r) const {
+  const Vector s = scaled(r);
   double size = std::max(least_unit_, s.cwiseAbs().maxCoeff());
   for (std::size_t c = 0; c < frame_.size(); ++c) size = std::max(size, -q_[row_of(c)]);
   return size;
@@ -200,21 +203,23 @@ bool FrictionNewton::solve_near(const Vector& centre, double shift, double enoug
   return now <= enough;
 }
 
-NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int most) const {
+NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) const {
   Vector s = scaled(r);
-  const Vector begun = s;
-  const double size = unit(s);
   NewtonResult result;
-  result.residual = law(s, s, 0).cwiseAbs().maxCoeff() / size;
+  const auto residual = [&] {
+    const bool grown = s.cwiseAbs().maxCoeff() > pumped * goal.unit;
+    return grown ? 1 : law(s, s, 0).cwiseAbs().maxCoeff() / goal.unit;
+  };
+  result.residual = residual();
   double shift = first_shift;
-  for (int k = 0; k < most && result.residual > enough && shift <= most_shift; ++k) {
+  for (int k = 0; k < goal.most && result.residual > goal.enough && shift <= most_shift; ++k) {
     const Vector centre = s;
     if (!solve_near(centre, shift, inner_part * law(s, s, 0).norm(), s)) {
       s = centre;
       shift *= 10;
       continue;
     }
-    const double after = law(s, s, 0).cwiseAbs().maxCoeff() / size;
+    const double after = residual();
     if (after > 0.1 * result.residual) shift = std::max(least_shift, shift / 10);
     result.residual = after;
   }
@@ -224,9 +229,6 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, double enough, int mo
         std::max(std::sqrt(std::max(0.0, s.dot(W_ * s))), floor_of_exchange * s.cwiseAbs().maxCoeff());
     result.next = std::sqrt(std::max(0.0, ds.dot(W_ * ds)));
   }
-  const Vector moved = s - begun;
-  if (const double square = moved.squaredNorm(); square > 0)
-    result.stiffness = moved.dot(W_ * moved) / square;
   r = unscaled(s);
   return result;
 }

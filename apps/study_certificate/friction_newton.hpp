@@ -19,8 +19,6 @@ struct NewtonResult {
   /// What one more step would change of the velocities, about their error, and what impulses change of them,
   /// at least a hundredth of the largest impulse; in the kinetic norm [J^1/2].
   double next = 1, exchanged = 1;
-  /// d.W d / |d|^2 of what the search has changed, diagonal of W 1.
-  double stiffness = 1;
 };
 
 /// In coordinates s = r / scale, with scale W_nn^-1/2 along the normal and W_tt^-1/2 across it, the law of
@@ -35,8 +33,14 @@ class FrictionNewton {
   /// `speeds`: least unit of residuals over the speeds of bodies (ReferenceLimits).
   FrictionNewton(const StepProblem& problem, double speeds);
 
-  /// Proximal steps from r, in and out, until the residual is `enough`, at most `most`.
-  NewtonResult improve(std::vector<Vec3>& r, double enough, int most) const;
+  /// What residuals are compared with: the largest of the impulses r, or speed of approach, scaled.
+  double unit(std::span<const Vec3> r) const;
+  /// Proximal steps from r, in and out, until the residual over `unit` is `enough`, at most `most`.
+  struct Goal {
+    double unit, enough;
+    int most;
+  };
+  NewtonResult improve(std::vector<Vec3>& r, const Goal& goal) const;
 
  private:
   using Matrix = Eigen::SparseMatrix<double>;
@@ -49,7 +53,6 @@ class FrictionNewton {
   Vector scaled(std::span<const Vec3> r) const;
   std::vector<Vec3> unscaled(const Vector& s) const;
   Vector law(const Vector& s, const Vector& centre, double shift) const;
-  double unit(const Vector& s) const;
   void derivative(const Vector& z, std::size_t c, Eigen::Matrix3d& D) const;
   /// A Newton step; false when its system has no solution.
   bool step(const Vector& s, const Vector& F, const Near& near, Vector& ds) const;

@@ -96,6 +96,10 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
     exchanged2 += own.exchanged * own.exchanged;
     if (own.found > whole.found) whole.found = own.found, whole.why = own.why;
   }
+  double motion2 = 0;
+  for (std::size_t k = 0; k < problem.mass.size(); ++k)
+    motion2 += problem.mass[k] * problem.free.u[k].squaredNorm();
+  exchanged2 = std::max(exchanged2, limits.motion * limits.motion * motion2);
   whole.error = std::sqrt(error2);
   whole.exchanged = std::sqrt(exchanged2);
   whole.motion = motion_under(problem, whole.r);

@@ -20,14 +20,11 @@ struct ReferenceLimits {
   double residual = 1e-10;  ///< of the law at a contact, relative: below it the answer counts as found
   double pumped = 1e6;  ///< impulses that grow so many times over what the step can ask for have no answer
   double velocities = 1e-8;  ///< error() of velocities that are known though the law is not met
-  /// Where an answer differs from the run by impulses d with d.W d < redundant |d|^2 (diagonal of W 1),
-  /// forces are not known: a change of all of them would change velocities by 1e-4, so that which of the
-  /// contacts carry is decided by gaps that no tolerance sees. (A smooth wedge of half angle 1e-3 has 1e-6.)
-  double redundant = 1e-8;
-  double nearly = 1e-6;     ///< residual up to which that may be
-  double speeds = 1e-5;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
+  double nearly = 1e-6;      ///< residual up to which that may be
+  double motion = 1e-9;     ///< least exchange, over what all bodies have, kinetic norm: below it is rounding
+  double speeds = 1e-4;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
-  int proximal_steps = 30;  ///< each begins from the impulses of the last one
+  int proximal_steps = 24;  ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
 };
 
@@ -40,8 +37,6 @@ enum class Found {
   no_answer,   ///< there is none: walls close on grains that cannot get away
 };
 
-inline constexpr const char* redundant_forces = "redundant contacts: forces are not known";
-
 /// An answer and how well it is known.
 struct Reference {
   Found found = Found::nothing;
@@ -49,7 +44,7 @@ struct Reference {
   std::vector<Vec3> r = {};  ///< impulses of the problem's contacts [N s]
   Motion motion = {};        ///< under them
   double residual = 0;       ///< of the law (natural map), the largest, over the run's largest impulse or the
-                             ///< largest speed of approach
+                             ///< largest speed of approach; where there is no answer unavoidable_approach
   /// Error of the velocities in the kinetic norm [J^1/2], a bound without friction, with friction the next
   /// step of Newton's method; and the norm of what the contacts change, at least a hundredth of the largest
   /// impulse.
@@ -70,8 +65,9 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
 /// pivoting (Portugal, Judice and Vicente 1994) in 80-bit arithmetic.
 Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, const ReferenceLimits& limits);
 
-/// Whether some velocities meet v_n + b >= 0 at all contacts, up to rounding.
-bool has_answer(const StepProblem& problem, const ReferenceLimits& limits);
+/// The speed of approach that no velocities can avoid, at the worst contact, over the largest one; 0 where
+/// some velocities meet v_n + b >= 0 everywhere, up to rounding.
+double unavoidable_approach(const StepProblem& problem, const ReferenceLimits& limits);
 
 /// With friction: projected Gauss-Seidel with Anderson's acceleration, and Newton's method from where it got.
 Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,

@@ -185,36 +185,36 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.residual = reference.error = reference.exchanged = 1;
   Sweeps sweeps(problem);
   const FrictionNewton newton(problem, limits.speeds);
+  const FrictionNewton::Goal goal{newton.unit(run), sharpness * limits.residual, limits.proximal_steps};
   const std::size_t contacts = sweeps.contacts();
   Vector r(static_cast<Eigen::Index>(3 * contacts));
   for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
   // Newton's method ends quickly where it begins with the right contacts sliding, sticking and open; sweeps
-  // find those. Each time that it falls short they get four times as many.
+  // find those. Each time that it falls short they get eight times as many.
   std::int64_t left = limits.contact_solves / static_cast<std::int64_t>(2 * contacts + 1);
-  for (std::int64_t passes = plain_passes; left > 0; passes *= 4) {
+  for (std::int64_t passes = plain_passes; left > 0; passes *= 8) {
     accelerate(sweeps, r, std::min(left, passes), limits.residual);
     left -= passes;
     std::vector<Vec3> impulses(contacts);
     for (std::size_t c = 0; c < contacts; ++c) impulses[c] = at(r, c);
-    const NewtonResult result = newton.improve(impulses, sharpness * limits.residual, limits.proximal_steps);
+    const NewtonResult result = newton.improve(impulses, goal);
     if (!(result.residual < reference.residual)) continue;
     reference.residual = result.residual;
     reference.error = result.next;
     reference.exchanged = result.exchanged;
     reference.r = impulses;
-    if (result.residual > limits.residual) continue;
-    reference.found = result.stiffness < limits.redundant ? Found::velocities : Found::answer;
-    break;
+    if (result.residual <= limits.residual) reference.found = Found::answer;
+    if (reference.found == Found::answer) break;
   }
   reference.motion = motion_under(problem, reference.r);
-  if (reference.found == Found::velocities) reference.why = redundant_forces;
-  if (reference.found != Found::nothing) return reference;
-  if (!has_answer(problem, limits)) {
+  if (reference.found == Found::answer) return reference;
+  if (const double approach = unavoidable_approach(problem, limits); approach > 0) {
     reference.found = Found::no_answer;
+    reference.residual = approach;
     reference.why = "no velocities are admissible";
   } else if (reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly) {
     reference.found = Found::velocities;
-    reference.why = redundant_forces;
+    reference.why = "redundant contacts: forces are not known";
   } else {
     reference.why = "neither sweeps nor Newton's method find the answer";
   }

@@ -115,8 +115,8 @@ MadeScene make_scene(std::string_view family, std::uint64_t seed, const MakerSet
 }
 
 void keep_scene(const MadeScene& made, const std::filesystem::path& directory) {
-  io::write_bodies(directory / (made.name() + ".csv"), made.grains);
-  io::write_whole(directory / (made.name() + ".toml"), io::resolved_scene(made.scene));
+  io::write_bodies(directory / made.scene.sample.file, made.grains);
+  io::write_whole(directory / (made.scene.name + ".toml"), io::resolved_scene(made.scene));
 }
 
 }  // namespace talus::audit

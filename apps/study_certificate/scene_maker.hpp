@@ -61,7 +61,8 @@ std::span<const SceneFamily> scene_families();
 /// Scene of that seed. Throws std::invalid_argument when there is no such family.
 MadeScene make_scene(std::string_view family, std::uint64_t seed, const MakerSettings& settings);
 
-/// Writes NAME.toml and NAME.csv, which `talus run` takes. Throws io::FileError.
+/// Writes the scene as NAME.toml, NAME being that of the scene, and its grains beside it, for `talus run`.
+/// Throws io::FileError.
 void keep_scene(const MadeScene& made, const std::filesystem::path& directory);
 
 }  // namespace talus::audit

@@ -11,11 +11,11 @@ namespace {
 /// Floors of the units, as parts of other quantities of the step.
 struct Floors {
   double walls = 1e-2;     ///< of the largest wall impulse: least momentum exchanged
-  double motion = 1e-12;   ///< of the momentum of all
+  double motion = 1e-9;    ///< of the momentum of all: less is rounding
   double exchange = 1e-2;  ///< of the momentum exchanged: least wall impulse
   double contact = 1e-3;   ///< likewise: least contact impulse
   double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
-  double cluster = 1e-9;   ///< of a cluster's momentum, likewise: grains that graze one another
+  double cluster = 1e-3;   ///< of a cluster's own momentum, likewise: grains that graze one another
 };
 constexpr Floors floors;
 

@@ -1,0 +1,460 @@
+// The judge of `talus study certificate` is judged: its problems and answers against closed forms and brute
+// force, its scenes against their seeds, and what it says of a certificate that is false.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "apps/shared/exit_codes.hpp"
+#include "apps/shared/sample_builder.hpp"
+#include "apps/study_certificate/calibration.hpp"
+#include "apps/study_certificate/certificate_report.hpp"
+#include "apps/study_certificate/scene_maker.hpp"
+#include "apps/study_certificate/study_certificate.hpp"
+#include "kernels/samples/sample.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
+
+namespace talus::audit {
+namespace {
+
+constexpr double R = 0.01, density = 2600, h = 1e-3, g = 9.81;
+
+double mass_of(double radius) {
+  return density * 4 / 3 * std::numbers::pi * radius * radius * radius;
+}
+
+/// Grains and walls of one step, as a frame and a setup.
+struct Step {
+  Frame before;
+  Bodies bodies;
+  Setup setup;
+  Stage stage;
+
+  Step(double gravity, double friction, double restitution = 0) {
+    stage.time_step = h;
+    stage.gravity = {0, 0, -gravity};
+    stage.laws = laws_of_one_material(friction, friction, restitution);
+  }
+  void grain(const Vec3& x, double radius, const Vec3& u = Vec3::Zero()) {
+    const auto id = static_cast<std::int64_t>(before.x.size());
+    before.id.push_back(id);
+    before.x.push_back(x);
+    before.radius.push_back(radius);
+    before.u.push_back(u);
+    before.omega.push_back(Vec3::Zero());
+    add_sphere(bodies, BodyId{id}, x, radius, density);
+  }
+  Wall& wall(const Vec3& point, const Vec3& normal) {
+    Wall made;
+    made.point = point;
+    made.normal = normal.normalized();
+    return setup.walls.emplace_back(made);
+  }
+  StepProblem problem() const {
+    std::vector<double> loads;
+    for (const Wall& one : setup.walls) loads.push_back(one.load.force);
+    return rebuild_step({before, setup.walls, loads, stage, bodies, setup});
+  }
+};
+
+Reference solved(const StepProblem& problem) {
+  const std::vector<Vec3> nothing(problem.contacts.size(), Vec3::Zero());
+  return solve_reference(problem, nothing);
+}
+
+Step wedge(double half_angle) {
+  Step step(g, 0);
+  const double c = std::cos(half_angle), s = std::sin(half_angle);
+  step.grain({0, 0, R / s}, R);
+  step.wall(Vec3::Zero(), {c, 0, s});
+  step.wall(Vec3::Zero(), {-c, 0, s});
+  return step;
+}
+
+TEST(CertificateReference, AWallOfAWedgeCarriesTheWeightOverTwiceTheSine) {
+  for (const double a : {1e-3, 1e-2, 0.5}) {
+    const StepProblem problem = wedge(a).problem();
+    const Reference answer = solved(problem);
+    ASSERT_EQ(answer.found, Found::answer) << a;
+    const double exact = mass_of(R) * g * h / (2 * std::sin(a));
+    for (const Vec3& r : answer.r) EXPECT_NEAR(r.norm(), exact, 1e-5 * exact) << a;
+    EXPECT_LT(answer.motion.u[0].norm(), 1e-7 * g * h) << a;
+  }
+}
+
+TEST(CertificateReference, AColumnStandsOnItsWeight) {
+  for (const double friction : {0.0, 0.35}) {
+    Step step(g, friction);
+    constexpr int grains = 60;
+    for (int k = 0; k < grains; ++k) step.grain({0, 0, (2 * k + 1) * R}, R);
+    step.wall(Vec3::Zero(), Vec3::UnitZ());
+    const StepProblem problem = step.problem();
+    const Reference answer = solved(problem);
+    ASSERT_EQ(answer.found, Found::answer);
+    for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+      const auto above = grains - static_cast<double>(problem.contacts[c].first);
+      EXPECT_NEAR(answer.r[c][2], above * mass_of(R) * g * h, 1e-6 * grains * mass_of(R) * g * h);
+    }
+  }
+}
+
+TEST(CertificateReference, TwoBodiesInImpactKeepMomentumAndReverseTheirApproach) {
+  constexpr double e = 0.6, v = 2;
+  Step step(0, 0.3, e);
+  step.grain({0, 0, 0}, R, {v, 0, 0});
+  step.grain({2 * R, 0, 0}, 2 * R);
+  step.before.x[1][0] = 3 * R - 1e-2 * R;  // they overlap a little: the impact law holds
+  const Reference answer = solved(step.problem());
+  ASSERT_EQ(answer.found, Found::answer);
+  const double m1 = mass_of(R), m2 = mass_of(2 * R);
+  EXPECT_NEAR(answer.motion.u[0][0], (m1 - e * m2) / (m1 + m2) * v, 1e-9 * v);
+  EXPECT_NEAR(answer.motion.u[1][0], (1 + e) * m1 / (m1 + m2) * v, 1e-9 * v);
+}
+
+TEST(CertificateReference, AGrainThrownOnAFloorSlidesBackByFrictionOrSticks) {
+  // Spin of a solid sphere: r_t <= mu r_n slides, else the contact point stops, u = 5/7 of what it was.
+  for (const double along : {1e-4, 1.0}) {
+    constexpr double mu = 0.3, down = 0.5;
+    Step step(0, mu);
+    step.grain({0, 0, R}, R, {along, 0, -down});
+    step.before.x[0][2] += h / 2 * down;  // touches in the middle of the step
+    step.wall(Vec3::Zero(), Vec3::UnitZ());
+    const Reference answer = solved(step.problem());
+    ASSERT_EQ(answer.found, Found::answer);
+    const bool slides = along > 3.5 * mu * down;
+    EXPECT_NEAR(answer.motion.u[0][0], slides ? along - mu * down : 5.0 / 7 * along, 1e-9 * along);
+    EXPECT_NEAR(answer.motion.u[0][2], 0, 1e-9);
+  }
+}
+
+/// A pile in a corner, in motion, so that some contacts open and others close.
+Step small_pile(double friction, std::uint64_t seed) {
+  Step step(g, friction);
+  Draws draws(seed, 7);
+  const std::vector<double> radii(6, R);
+  const std::vector<Vec3> centres = deposit(radii, 5 * R, 5 * R);
+  for (const Vec3& x : centres) step.grain(x, R, Vec3(2 * g * h * draws.direction()));
+  step.wall(Vec3::Zero(), Vec3::UnitX());
+  step.wall(Vec3::Zero(), Vec3::UnitY());
+  step.wall(Vec3::Zero(), Vec3::UnitZ());
+  return step;
+}
+
+/// Velocities of the smooth problem by trying every set of contacts that carry.
+std::vector<Vec3> by_brute_force(const StepProblem& problem) {
+  const std::size_t contacts = problem.contacts.size();
+  Eigen::MatrixXd W(contacts, contacts);
+  Eigen::VectorXd q(contacts);
+  const auto index = [](std::size_t k) { return static_cast<Eigen::Index>(k); };
+  for (std::size_t d = 0; d < contacts; ++d) {
+    std::vector<Vec3> unit(contacts, Vec3::Zero());
+    unit[d] = problem.contacts[d].normal;
+    const Motion moved = motion_under(problem, unit);
+    for (std::size_t c = 0; c < contacts; ++c) {
+      const StepContact& contact = problem.contacts[c];
+      const double free = relative_velocity(contact, problem.free).dot(contact.normal);
+      W(index(c), index(d)) = relative_velocity(contact, moved).dot(contact.normal) - free;
+      q[index(c)] = free + contact.bias;
+    }
+  }
+  for (std::size_t set = 0; set < std::size_t{1} << contacts; ++set) {
+    std::vector<Eigen::Index> carry;
+    for (std::size_t c = 0; c < contacts; ++c)
+      if (set >> c & 1U) carry.push_back(index(c));
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(index(contacts));
+    if (!carry.empty()) {
+      const Eigen::MatrixXd block = W(carry, carry);
+      const Eigen::FullPivLU<Eigen::MatrixXd> factor(block);
+      if (!factor.isInvertible()) continue;
+      r(carry) = factor.solve(-q(carry));
+    }
+    const Eigen::VectorXd y = W * r + q;
+    if (r.minCoeff() < -1e-12 * r.cwiseAbs().maxCoeff() || y.minCoeff() < -1e-9 * q.cwiseAbs().maxCoeff())
+      continue;
+    std::vector<Vec3> impulses;
+    for (std::size_t c = 0; c < contacts; ++c) impulses.push_back(r[index(c)] * problem.contacts[c].normal);
+    return motion_under(problem, impulses).u;
+  }
+  return {};
+}
+
+TEST(CertificateReference, AgreesWithBruteForceOnSmallSmoothPiles) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const StepProblem problem = small_pile(0, seed).problem();
+    ASSERT_LE(problem.contacts.size(), 20U);
+    const Reference answer = solved(problem);
+    ASSERT_EQ(answer.found, Found::answer);
+    const std::vector<Vec3> exact = by_brute_force(problem);
+    ASSERT_EQ(exact.size(), answer.motion.u.size());
+    for (std::size_t k = 0; k < exact.size(); ++k)
+      EXPECT_LT((answer.motion.u[k] - exact[k]).norm(), 1e-9 * g * h) << seed;
+  }
+}
+
+TEST(CertificateReference, WithFrictionMeetsTheLawOfCoulomb) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const StepProblem problem = small_pile(0.3, seed).problem();
+    const Reference answer = solved(problem);
+    ASSERT_EQ(answer.found, Found::answer);
+    const double impulse = mass_of(R) * g * h, speed = g * h;
+    for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
+      const StepContact& contact = problem.contacts[c];
+      const Vec3 v = relative_velocity(contact, answer.motion);
+      const double v_n = v.dot(contact.normal) + contact.bias, r_n = answer.r[c].dot(contact.normal);
+      const Vec3 v_t = v - v.dot(contact.normal) * contact.normal, r_t = answer.r[c] - r_n * contact.normal;
+      EXPECT_GE(r_n, -1e-9 * impulse);
+      EXPECT_GE(v_n, -1e-8 * speed);
+      EXPECT_LT(std::min(r_n / impulse, v_n / speed), 1e-8);
+      EXPECT_LE(r_t.norm(), contact.friction * r_n + 1e-8 * impulse);
+      if (v_t.norm() > 1e-6 * speed && r_n > 1e-6 * impulse) {
+        EXPECT_LT((r_t + contact.friction * r_n * v_t.normalized()).norm(), 1e-5 * impulse);
+      }
+    }
+  }
+}
+
+TEST(CertificateReference, KnowsThatACrushedGrainHasNoAnswer) {
+  for (const double friction : {0.0, 0.3}) {
+    Step step(g, friction);
+    step.grain({0, 0, R}, R);
+    step.wall(Vec3::Zero(), Vec3::UnitZ());
+    Wall& lid = step.wall({0, 0, 2 * R}, -Vec3::UnitZ());
+    lid.load = {.drive = WallDrive::velocity, .velocity = Vec3(0, 0, -0.1)};
+    lid.velocity = lid.load.velocity;
+    const Reference answer = solved(step.problem());
+    EXPECT_EQ(answer.found, Found::no_answer) << friction;
+    EXPECT_GT(answer.residual, 0.1) << friction;
+  }
+}
+
+TEST(CertificateReference, SolvesClustersThatDoNotTouchEachByItself) {
+  Step step = wedge(0.1);
+  step.grain({10, 0, 1000}, R, {1, 0, 0});
+  step.grain({10 + 2 * R, 0, 1000}, R, {-1, 0, 0});
+  const StepProblem problem = step.problem();
+  std::size_t count = 0;
+  clusters_of(problem, count);
+  EXPECT_EQ(count, 2U);
+  const Reference answer = solved(problem);
+  EXPECT_LT(answer.motion.u[0].norm(), 1e-7 * g * h);
+  EXPECT_LT(std::abs(answer.motion.u[1][0]), 1e-9);
+}
+
+/// A step that ends as its impulses say.
+Frame ended(const StepProblem& problem, const Step& step, const std::vector<Vec3>& r) {
+  Frame after = step.before;
+  after.u = motion_under(problem, r).u;
+  for (std::size_t w = 0; w < step.setup.walls.size(); ++w) {
+    WallReport wall;
+    for (std::size_t c = 0; c < r.size(); ++c)
+      if (problem.contacts[c].at_wall() && problem.contacts[c].wall() == w) wall.force += r[c] / h;
+    after.walls.push_back(wall);
+  }
+  return after;
+}
+
+TEST(CertificateErrors, OfAnAnswerAreNoneAndOfHalfTheForcesAHalf) {
+  const Step step = wedge(0.1);
+  const StepProblem problem = step.problem();
+  const Reference answer = solved(problem);
+  std::vector<Vec3> half = answer.r;
+  const TrueErrors none = true_errors(problem, answer, {ended(problem, step, half), half});
+  EXPECT_LT(std::max({none.velocity, none.wall_force, none.contact_force, none.cluster}), 1e-12);
+  for (Vec3& r : half) r /= 2;
+  const TrueErrors some = true_errors(problem, answer, {ended(problem, step, half), half});
+  EXPECT_NEAR(some.velocity, 0.5, 1e-9);
+  EXPECT_NEAR(some.wall_force, 0.5, 1e-9);
+  EXPECT_NEAR(some.contact_force, 0.5, 1e-9);
+  EXPECT_NEAR(some.cluster, 0.5, 1e-9);
+}
+
+TEST(CertificateErrors, OfOneClusterDoNotHideAmongOthers) {
+  Step step = wedge(0.1);
+  for (int k = 0; k < 50; ++k) step.grain({0, 1.0 + 3 * R * k, R / std::sin(0.1)}, R);
+  const StepProblem problem = step.problem();
+  const Reference answer = solved(problem);
+  std::vector<Vec3> r = answer.r;
+  for (std::size_t c = 0; c < r.size(); ++c)
+    if (problem.contacts[c].first == 0) r[c].setZero();
+  const TrueErrors errors = true_errors(problem, answer, {ended(problem, step, r), r});
+  EXPECT_NEAR(errors.velocity, 1.0 / 51, 1e-6);
+  EXPECT_NEAR(errors.cluster, 1, 1e-6);
+}
+
+StepOfScene step_of(double error, double claimed, bool certified = true) {
+  StepOfScene one{"scene", "family", 1e-3, {}};
+  one.step.certified = certified;
+  one.step.claimed = claimed;
+  one.step.asked = 1e-3;
+  one.step.judged = Judged::yes;
+  one.step.errors.velocity = error;
+  return one;
+}
+
+TEST(CertificateCalibration, QuantilesAreThoseThatSoManyDoNotExceed) {
+  std::vector<double> ratios;
+  for (int k = 1000; k >= 1; --k) ratios.push_back(k);
+  const Quantiles quantiles = quantiles_of(ratios);
+  EXPECT_EQ(quantiles.median, 500);
+  EXPECT_EQ(quantiles.most, 950);
+  EXPECT_EQ(quantiles.nearly_all, 999);
+  EXPECT_EQ(quantiles.worst, 1000);
+  EXPECT_EQ(quantiles_of({}).worst, 0);
+}
+
+TEST(CertificateCalibration, HoldsWhereErrorsAreWithinTheirClaims) {
+  const std::vector<StepOfScene> steps(100, step_of(1.5e-3, 1e-3));
+  EXPECT_TRUE(broken_bounds(calibrate(steps), {}).empty());
+}
+
+TEST(CertificateCalibration, AFalseClaimIsCaught) {
+  // One step in a hundred claims 1e-3 and is wrong by a tenth: beyond 2 in 99.9 %, beyond 5, beyond 10 asked.
+  std::vector<StepOfScene> steps(99, step_of(5e-4, 1e-3));
+  steps.push_back(step_of(0.1, 1e-3));
+  EXPECT_EQ(broken_bounds(calibrate(steps), {}).size(), 3U);
+  steps.back() = step_of(std::numeric_limits<double>::quiet_NaN(), 1e-3);
+  EXPECT_EQ(broken_bounds(calibrate(steps), {}).size(), 3U);
+  steps.back() = step_of(0.1, 1e-3, false);  // an honest miss, one in a hundred
+  EXPECT_TRUE(broken_bounds(calibrate(steps), {}).empty());
+  for (int k = 0; k < 5; ++k) steps.push_back(step_of(0, 1e-3, false));
+  EXPECT_EQ(broken_bounds(calibrate(steps), {}).size(), 1U);  // more than 3 % missed
+}
+
+TEST(CertificateCalibration, StepsWithoutAnAnswerAreNotMissesAndMustNotBeCertified) {
+  std::vector<StepOfScene> steps(99, step_of(5e-4, 1e-3));
+  for (int k = 0; k < 20; ++k) {
+    steps.push_back(step_of(0, 1e-3, false));
+    steps.back().step.judged = Judged::no_answer;
+    steps.back().step.residual = 0.5;
+  }
+  EXPECT_TRUE(broken_bounds(calibrate(steps), {}).empty());
+  steps.back().step.certified = true;
+  EXPECT_EQ(broken_bounds(calibrate(steps), {}).size(), 1U);
+}
+
+AuditedRun audited(const MadeScene& made, std::int64_t steps,
+                   const std::function<void(io::Scene&)>& change = {}) {
+  io::Scene scene = made.scene;
+  if (change) change(scene);
+  io::place_walls(scene, made.grains);
+  Bodies bodies;
+  append(made.grains, bodies);
+  return audit_run(scene, bodies, {steps, {}});
+}
+
+TEST(CertificateScenes, OneSeedIsOneScene) {
+  std::set<std::string> texts;
+  for (const SceneFamily& family : scene_families())
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const MadeScene one = make_scene(family.name, seed, {}), again = make_scene(family.name, seed, {});
+      EXPECT_EQ(io::resolved_scene(one.scene), io::resolved_scene(again.scene));
+      ASSERT_EQ(one.grains.size(), again.grains.size());
+      EXPECT_TRUE(std::ranges::equal(one.grains.x, again.grains.x));
+      EXPECT_EQ(one.grains.velocity, again.grains.velocity);
+      texts.insert(io::resolved_scene(one.scene));
+    }
+  EXPECT_EQ(texts.size(), 3 * scene_families().size());
+}
+
+TEST(CertificateScenes, OfEveryFamilyAreOfItsSizeAndRun) {
+  for (const SceneFamily& family : scene_families())
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      const MadeScene made = make_scene(family.name, seed, {});
+      EXPECT_GE(made.grains.size(), 1U);
+      EXPECT_LE(made.grains.size(), 200U) << made.name();
+      const AuditedRun run = audited(made, 2);
+      EXPECT_EQ(run.ended, "") << made.name();
+      for (const AuditedStep& step : run.steps)
+        EXPECT_NE(step.judged, Judged::other_problem) << made.name() << ": " << step.why;
+    }
+}
+
+TEST(CertificateScenes, KeptAsFilesAreTheSameScene) {
+  const test::ScratchDirectory scratch;
+  MadeScene made = make_scene("press", 5, {});
+  keep_scene(made, scratch.path());
+  const std::string file = (scratch / (made.scene.name + ".toml")).string();
+  const io::Scene read = io::load_scene(file);
+  const Sample grains = build_sample(read);
+  EXPECT_TRUE(std::ranges::equal(grains.x, made.grains.x));
+  EXPECT_EQ(read.setup.stages.size(), made.scene.setup.stages.size());
+  made.scene.sample.file = read.sample.file;
+  made.scene.output.directory = read.output.directory;
+  EXPECT_EQ(io::resolved_scene(read), io::resolved_scene(made.scene));
+  EXPECT_TRUE(is_certificate_name(made.scene.name + ".toml"));
+  EXPECT_FALSE(is_certificate_name("thesis.toml"));
+}
+
+TEST(CertificateAudit, OfASolverThatStopsAfterOneSweepFindsItFarFromItsAnswer) {
+  // A tolerance of 1 certifies whatever one sweep leaves; held against a claim of 1e-3 it is false.
+  const MadeScene made = make_scene("column", 3, {});
+  const auto careless = [](io::Scene& scene) {
+    scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1;
+    scene.setup.solver.method = SolverMethod::nlgs;
+    scene.setup.solver.max_iterations = 2;
+    scene.setup.solver.check_every = 2;
+  };
+  AuditedRun run = audited(made, 1, careless);
+  ASSERT_EQ(run.steps.size(), 1U);
+  AuditedStep& step = run.steps.front();
+  ASSERT_EQ(step.judged, Judged::yes) << step.why;
+  EXPECT_GT(step.errors.contact_force, 0.1);
+  step.certified = true;
+  step.claimed = step.asked = 1e-3;
+  const std::vector<StepOfScene> steps{{"column", "column", 1e-3, step}};
+  EXPECT_FALSE(broken_bounds(calibrate(steps), {}).empty());
+}
+
+TEST(CertificateAudit, OfASolverThatGoesOnFindsItNearItsAnswer) {
+  int judged = 0;
+  for (const char* family : {"deposition", "flight", "column"})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const AuditedRun run = audited(make_scene(family, seed, {}), 2, [](io::Scene& scene) {
+        scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1e-8;
+        scene.setup.solver.max_iterations = 20000;
+        scene.setup.solver.method = SolverMethod::nncg;
+      });
+      for (const AuditedStep& step : run.steps) {
+        if (!step.certified || step.judged != Judged::yes || step.contacts == 0) continue;
+        ++judged;
+        EXPECT_LT(step.errors.velocity, 1e-5) << family << " " << seed << " step " << step.step;
+      }
+    }
+  EXPECT_GE(judged, 6);
+}
+
+TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {
+  const test::ScratchDirectory scratch;
+  StudyCertificateOptions options;
+  options.scenes = 2;
+  options.steps = 2;
+  options.families = {"wedge", "rows"};
+  options.tolerances = {1e-2, 1e-4};
+  options.subdomains = 2;
+  options.out = (scratch / "made").string();
+  const int code = study_certificate_command(options);
+  EXPECT_TRUE(code == exit_done || code == exit_failure);
+  std::vector<std::filesystem::path> scenes;
+  for (const auto& entry : std::filesystem::directory_iterator(options.out)) {
+    EXPECT_TRUE(is_certificate_name(entry.path().filename().string())) << entry.path();
+    if (entry.path().extension() == ".toml") scenes.push_back(entry.path());
+  }
+  for (const char* name : {"calibration.csv", "steps.csv", "certificate-V.svg", "report.html"})
+    EXPECT_TRUE(std::filesystem::exists(scratch / "made" / name)) << name;
+  ASSERT_FALSE(scenes.empty());
+
+  StudyCertificateOptions again;
+  again.scenes_from = scenes.front().string();
+  again.out = (scratch / "again").string();
+  EXPECT_NE(study_certificate_command(again), exit_bad_input);
+  EXPECT_EQ(study_certificate_command(again), exit_bad_input);  // there is a study already
+}
+
+}  // namespace
+}  // namespace talus::audit
