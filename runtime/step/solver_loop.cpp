@@ -119,6 +119,7 @@ void SolverLoop::plan() {
   const double lightest = problem_.largest_inv_mass();
   state_.single.contacts.unit = lightest > 0 ? unit_of_mass(lightest) : 1;
   work_.plan(decomposition_.balance == BalanceBy::time);
+  positions_.plan();
 }
 
 void SolverLoop::plan_tree() {
@@ -205,7 +206,7 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
   const auto [role, group] = plan_.nodes[node];
   if (role == graph::LoopRole::work) {
     if (schedule_.work(epoch) == Work::position)
-      positions_.run(node, schedule_.position_sweep(epoch));
+      positions_.run(node, schedule_.position_epoch(epoch));
     else
       work_.run(node, epoch);
     // Long messages advance only while somebody calls MPI.
@@ -298,7 +299,7 @@ bool SolverLoop::decide(int epoch) {
   const IterationResult& ended = certificate_.result();
   if (!positions_.wanted() || ended.contacts == 0 || !std::isfinite(ended.error_rms)) return false;
   positions_.begin();
-  schedule_.positions_from(epoch, positions_.sweeps());
+  schedule_.positions_from(epoch, positions_.epochs());
   return true;
 }
 
