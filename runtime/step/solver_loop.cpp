@@ -83,14 +83,6 @@ class StepView final : public MethodView {
 
 }  // namespace
 
-std::size_t memory_used(const StepState& state) {
-  return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) +
-         memory_used(state.contacts) + memory_used(state.decomposition) +
-         (state.free.u.capacity() + state.free.w.capacity()) * sizeof(std::array<double, 3>) +
-         state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
-         memory_used(state.single) + state.copies.capacity() * sizeof(WallCopy);
-}
-
 InstructionSet settled(InstructionSet set, const graph::Communicator& ranks) {
   if (set != InstructionSet::automatic || ranks.ranks() == 1) return set;
   double weakest[1] = {-static_cast<double>(best_instruction_set())};
@@ -296,17 +288,10 @@ bool SolverLoop::decide(int epoch) {
     return false;
   }
   if (decide_on_velocities(epoch)) return true;
-  const IterationResult& ended = certificate_.result();
-  if (!positions_.wanted() || ended.contacts == 0 || !std::isfinite(ended.error_rms)) return false;
+  if (!positions_.wanted() || result().contacts == 0 || !std::isfinite(result().error_rms)) return false;
   positions_.begin();
   schedule_.positions_from(epoch, positions_.epochs());
   return true;
-}
-
-/// False: the velocities of the step stand.
-bool SolverLoop::decide_on_velocities(int epoch) {
-  if (schedule_.restores_at(epoch)) return false;
-  return schedule_.work(epoch) == Work::measure ? measured(epoch) : swept(epoch);
 }
 
 /// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
