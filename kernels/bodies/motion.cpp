@@ -65,10 +65,12 @@ MotionSums finish_with(SlotRange range, std::span<Vec3> x, std::span<Velocity> v
   for (std::size_t s = range.begin; s < range.end; ++s) {
     Velocity& v = velocity[s];
     Vec3 u(v.u[0], v.u[1], v.u[2]);
-    const Vec3 u_free(free.u[s][0], free.u[s][1], free.u[s][2]), change = u - u_free;
+    Vec3 u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
+    const Vec3 change = u - u_free;
     if constexpr (Reflects) {
       reflect(v, free, s, end);
       u = {v.u[0], v.u[1], v.u[2]};
+      u_free += end.reflection * end.gain;  // the loads' whole share
     }
     x[s] += 0.5 * end.time_step * u;
     const double share =

@@ -35,7 +35,7 @@ void begin_positions(const Contacts& contacts, std::span<const Velocity> velocit
 }
 
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
-                   double part, SingleState& single, SweepSteps& steps) {
+                   double part, SingleState& single) {
   const std::size_t begin = index(chunks.begin[chunk]), end = begin + index(contacts.count[chunk]);
   const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &poses.walls[index(chunks.wall[chunk])];
   const bool spheres = wall == nullptr && chunks.kind[chunk] != ChunkKind::blocks;
@@ -50,20 +50,54 @@ void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t c
       gap = touch_of(poses, contacts, k, wall).gap;
     }
     single.contacts.bias[k] = static_cast<float>(gap < 0 ? part * gap : gap);
-    single.contacts.rn[k] = 0;
-    steps.n[k] = 0;
   }
+}
+
+namespace {
+
+/// A wall copy as the body that its contacts see.
+SingleVelocity as_body(const WallCopy& wall, double unit) {
+  SingleVelocity body;
+  for (std::size_t a = 0; a < 3; ++a) body.u[a] = static_cast<float>(wall.velocity[a]);
+  body.inv_mass = static_cast<float>(wall.inv_mass * unit);
+  return body;
+}
+
+void take_displacement(const SingleVelocity& body, WallCopy& wall) {
+  for (std::size_t a = 0; a < 3; ++a) wall.velocity[a] = static_cast<double>(body.u[a]);
+}
+
+}  // namespace
+
+void first_pushes(const Contacts& contacts, ContactRange range, std::span<const float> kept, double part,
+                  SingleState& single, SweepSteps& steps, WallCopy* wall) {
+  SingleContacts& c = single.contacts;
+  const auto stays = static_cast<float>(1 - part);
+  SingleVelocity at_wall = wall ? as_body(*wall, c.unit) : SingleVelocity{};
+  for (std::size_t k = range.begin; k < range.end; ++k) {
+    const float n[3] = {c.nx[k], c.ny[k], c.nz[k]};
+    steps.n[k] = 0;
+    c.rn[k] = stays * kept[index(contacts.candidate[k])];
+    if (c.rn[k] == 0) continue;
+    shift(c.rn[k], n, single.velocity[index(contacts.first[k])]);
+    shift(-c.rn[k], n, wall ? at_wall : single.velocity[index(contacts.second[k])]);
+  }
+  if (wall) take_displacement(at_wall, *wall);
+}
+
+void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const SingleState& single,
+                 std::span<float> kept) {
+  const std::size_t begin = index(chunks.begin[chunk]);
+  std::fill_n(kept.begin() + chunks.begin[chunk], index(chunks.begin[chunk + 1]) - begin, 0.0F);
+  for (std::size_t k = begin; k < begin + index(contacts.count[chunk]); ++k)
+    kept[index(contacts.candidate[k])] = single.contacts.rn[k];
 }
 
 void sweep_displacements(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall,
                          const SweepMomentum& momentum) {
   SingleContacts& c = single.contacts;
   const auto beta = static_cast<float>(momentum.beta), omega = static_cast<float>(momentum.omega);
-  SingleVelocity at_wall;
-  if (wall) {
-    for (std::size_t a = 0; a < 3; ++a) at_wall.u[a] = static_cast<float>(wall->velocity[a]);
-    at_wall.inv_mass = static_cast<float>(wall->inv_mass * c.unit);
-  }
+  SingleVelocity at_wall = wall ? as_body(*wall, c.unit) : SingleVelocity{};
   for (std::size_t k = range.begin; k < range.end; ++k) {
     SingleVelocity& first = single.velocity[index(contacts.first[k])];
     SingleVelocity& second = wall ? at_wall : single.velocity[index(contacts.second[k])];
@@ -76,8 +110,7 @@ void sweep_displacements(const Contacts& contacts, ContactRange range, SingleSta
     momentum.steps.n[k] = push - c.rn[k];
     c.rn[k] = push;
   }
-  if (wall)
-    for (std::size_t a = 0; a < 3; ++a) wall->velocity[a] = static_cast<double>(at_wall.u[a]);
+  if (wall) take_displacement(at_wall, *wall);
 }
 
 void displace(SlotRange range, std::span<const SingleVelocity> displacement, std::span<Vec3> x) {

@@ -24,9 +24,17 @@ namespace talus {
 void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
                      SweepSteps& steps);
 
-/// Normals and b of a chunk from where its bodies are; nothing pushes yet. `part`: c in [0, 1].
+/// Normals and b of a chunk from where its bodies are. `part`: c in [0, 1].
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
-                   double part, SingleState& single, SweepSteps& steps);
+                   double part, SingleState& single);
+
+/// Pushes of the last step, per candidate, which those of a step begin from: overlaps, and with them what it
+/// takes to undo them, fall by the part c in each step. `first_pushes` gives a chunk 1 - c of them, and its
+/// bodies, or the wall copy, the displacements that belong to them; `keep_pushes` is the way back.
+void first_pushes(const Contacts& contacts, ContactRange range, std::span<const float> kept, double part,
+                  SingleState& single, SweepSteps& steps, WallCopy* wall);
+void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const SingleState& single,
+                 std::span<float> kept);
 
 /// One sweep with momentum over a chunk of blocks, which has no groups that could be swept at once; others
 /// have SweepKernels. `wall` is null between bodies.

@@ -41,8 +41,8 @@ class EpochSchedule {
   bool measures_at(int epoch) const { return epoch == segment_ + 1; }
   bool reads_sums_at(int epoch) const { return epoch == read_at_; }
   bool restores_at(int epoch) const { return epoch == restore_at_; }
-  /// Number, from 0, of a sweep of positions; and whether the loop ends behind it.
-  int position_sweep(int epoch) const { return epoch - (position_end_ - positions_); }
+  /// Number, from 0, of an epoch of positions; and whether the loop ends behind it.
+  int position_epoch(int epoch) const { return epoch - (position_end_ - positions_); }
   bool ends_at(int epoch) const { return epoch + 1 == position_end_; }
 
   /// Sweeps done at the last measure, and at the next accumulate.
@@ -69,12 +69,12 @@ class EpochSchedule {
   void sums_read() { read_at_ = never; }
   /// The step ends behind the next epoch, with the impulses of the last measure.
   void restore_after(int epoch) { restore_at_ = epoch + 1; }
-  /// The velocities stand: `sweeps` >= 1 epochs that undo overlaps follow, and nothing else.
-  void positions_from(int epoch, int sweeps) {
+  /// The velocities stand: `epochs` >= 1 that undo overlaps follow, and nothing else.
+  void positions_from(int epoch, int epochs) {
     *this = {};
     segment_ = first_sweep_ = never - 1;
-    positions_ = sweeps;
-    position_end_ = epoch + 1 + sweeps;
+    positions_ = epochs;
+    position_end_ = epoch + 1 + epochs;
   }
 
  private:
@@ -85,7 +85,7 @@ class EpochSchedule {
   int restore_at_ = never;
   int checked_ = 0;
   int planned_ = 0;
-  int position_end_ = never;  ///< epoch behind the last sweep of positions
+  int position_end_ = never;  ///< epoch behind the last one of positions
   int positions_ = 0;
 };
 

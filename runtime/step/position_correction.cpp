@@ -6,31 +6,34 @@ namespace talus {
 
 void PositionCorrection::begin() {
   begin_positions(state_.contacts, state_.bodies.velocity, state_.single, acceleration_.steps);
+  pushes_.resize(state_.candidates.size());
   acceleration_.last_wall_v.resize(state_.chunks.size());
   kept_ = state_.copies;
   for (WallCopy& copy : state_.copies) std::fill_n(copy.velocity, 3, 0.0);
 }
 
-void PositionCorrection::run(std::size_t chunk, int sweep) {
+void PositionCorrection::run(std::size_t chunk, int epoch) {
   const Chunks& chunks = state_.chunks;
   const ContactRange range = work_.range_of(chunk);
+  const double part = settings_.overlap_correction;
   SingleState& single = state_.single;
-  WallCopy& copy = state_.copies[chunk];
-  const bool wall = chunks.wall[chunk] >= 0;
-  if (sweep == 0)
+  WallCopy* const copy = chunks.wall[chunk] >= 0 ? &state_.copies[chunk] : nullptr;
+  if (epoch == 0) {
     find_overlaps(state_.contacts, chunks, chunk,
-                  {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)},
-                  settings_.overlap_correction, single, acceleration_.steps);
-  const double beta = momentum_beta(rule_.momentum, sweep, rule_.momentum.most_without_friction);
-  const SweepMomentum momentum{beta, beta > 0 ? rule_.momentum.over_relaxation : 1, acceleration_.steps};
+                  {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)}, part, single);
+    return first_pushes(state_.contacts, range, pushes_, part, single, acceleration_.steps, copy);
+  }
+  const double beta = momentum_beta(rule_.momentum, epoch - 1, rule_.momentum.most_without_friction);
+  const SweepMomentum momentum{beta, rule_.momentum.over_relaxation, acceleration_.steps};
   carry_velocities(kernels_, beta, work_.owned(chunk), single.velocity, single.last_v);
-  if (wall) carry_wall(Carry::momentum, beta, chunk, copy, acceleration_);
+  if (copy) carry_wall(Carry::momentum, beta, chunk, *copy, acceleration_);
   if (chunks.kind[chunk] == ChunkKind::blocks)
-    sweep_displacements(state_.contacts, range, single, wall ? &copy : nullptr, momentum);
-  else if (wall)
-    kernels_.sweep_wall<false>(state_.contacts, single, range, 0.0, copy, momentum);
+    sweep_displacements(state_.contacts, range, single, copy, momentum);
+  else if (copy)
+    kernels_.sweep_wall<false>(state_.contacts, single, range, 0.0, *copy, momentum);
   else
     kernels_.sweep_grains<false>(state_.contacts, single, range, 0.0, momentum);
+  if (epoch == rule_.sweeps) keep_pushes(state_.contacts, chunks, chunk, single, pushes_);
 }
 
 void PositionCorrection::end() {

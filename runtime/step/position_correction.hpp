@@ -13,9 +13,11 @@ namespace talus {
 
 /// Numbers of the sweeps that undo overlaps.
 struct PositionCorrectionRule {
-  /// Sweeps per step, >= 1. What they leave is left to the next steps: overlaps change slowly.
+  /// Sweeps per step, >= 1. What they leave is left to the next steps, which go on from their pushes.
   int sweeps = 10;
-  MomentumParameters momentum;  ///< as of sweeps without friction
+  /// As of sweeps without friction, but not over-relaxed: what so few sweeps overshoot opens gaps, into which
+  /// grains fall, and a column sank by it.
+  MomentumParameters momentum{.over_relaxation = 1};
 };
 
 /// What chunks do in the epochs behind those of a step that undo overlaps (kernels/sweeps/positions.hpp).
@@ -31,14 +33,17 @@ class PositionCorrection {
 
   /// The scene asks for it.
   bool wanted() const { return settings_.overlap_correction > 0; }
-  int sweeps() const { return rule_.sweeps; }
+  /// How many epochs it takes: one in which bodies move by what the last step's pushes ask, then the sweeps.
+  int epochs() const { return 1 + rule_.sweeps; }
 
+  /// The candidates are new: no pushes are known of them.
+  void plan() { pushes_.clear(); }
   /// Before the iterations of a step: bodies stay where they are.
   void forget() { found_ = false; }
   /// At a gate, behind the iterations.
   void begin();
-  /// Sweep number `sweep`, from 0, of a chunk.
-  void run(std::size_t chunk, int sweep);
+  /// What a chunk does in epoch number `epoch` of these, from 0.
+  void run(std::size_t chunk, int epoch);
   /// At a gate, behind the last sweep: the copies of walls have their velocities again.
   void end();
 
@@ -56,6 +61,7 @@ class PositionCorrection {
   const ChunkWork& work_;
   PositionCorrectionRule rule_;
   AccelerationHistory acceleration_;
+  std::vector<float> pushes_;  ///< per candidate, of the last step; in units of mass x m
   std::vector<WallCopy> kept_, moved_;
   bool found_ = false;
 };

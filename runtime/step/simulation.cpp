@@ -274,7 +274,8 @@ const StepReport& Simulation::step() {
   impl_->load_walls();
   double wall_energy_free = 0;
   for (std::size_t w = 0; w < impl_->state.walls.size(); ++w)
-    wall_energy_free += energy_of(impl_->state.walls[w], impl_->state.wall_states[w].free_velocity);
+    wall_energy_free +=
+        energy_of(impl_->state.walls[w], impl_->state.walls[w].velocity + impl_->state.walls[w].gain);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
   check_for_runaway(outcome, wall_energy_free);

@@ -83,15 +83,6 @@ class StepView final : public MethodView {
 
 }  // namespace
 
-std::size_t memory_used(const StepState& state) {
-  return memory_used(state.bodies) + memory_used(state.candidates) + memory_used(state.chunks) +
-         memory_used(state.contacts) + memory_used(state.decomposition) +
-         (state.free.u.capacity() + state.free.w.capacity()) * sizeof(std::array<double, 3>) +
-         state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * sizeof(double) +
-         memory_used(state.single) + state.copies.capacity() * sizeof(WallCopy) +
-         (state.given_overlaps ? state.given_overlaps->capacity() * sizeof(GivenOverlap) : 0);
-}
-
 InstructionSet settled(InstructionSet set, const graph::Communicator& ranks) {
   if (set != InstructionSet::automatic || ranks.ranks() == 1) return set;
   double weakest[1] = {-static_cast<double>(best_instruction_set())};
@@ -120,6 +111,7 @@ void SolverLoop::plan() {
   const double lightest = problem_.largest_inv_mass();
   state_.single.contacts.unit = lightest > 0 ? unit_of_mass(lightest) : 1;
   work_.plan(decomposition_.balance == BalanceBy::time);
+  positions_.plan();
 }
 
 void SolverLoop::plan_tree() {
@@ -206,7 +198,7 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
   const auto [role, group] = plan_.nodes[node];
   if (role == graph::LoopRole::work) {
     if (schedule_.work(epoch) == Work::position)
-      positions_.run(node, schedule_.position_sweep(epoch));
+      positions_.run(node, schedule_.position_epoch(epoch));
     else
       work_.run(node, epoch);
     // Long messages advance only while somebody calls MPI.
@@ -296,17 +288,10 @@ bool SolverLoop::decide(int epoch) {
     return false;
   }
   if (decide_on_velocities(epoch)) return true;
-  const IterationResult& ended = certificate_.result();
-  if (!positions_.wanted() || ended.contacts == 0 || !std::isfinite(ended.error_rms)) return false;
+  if (!positions_.wanted() || result().contacts == 0 || !std::isfinite(result().error_rms)) return false;
   positions_.begin();
-  schedule_.positions_from(epoch, positions_.sweeps());
+  schedule_.positions_from(epoch, positions_.epochs());
   return true;
-}
-
-/// False: the velocities of the step stand.
-bool SolverLoop::decide_on_velocities(int epoch) {
-  if (schedule_.restores_at(epoch)) return false;
-  return schedule_.work(epoch) == Work::measure ? measured(epoch) : swept(epoch);
 }
 
 /// Behind a measure: the sums are judged, or set out, and the next sweeps planned.

@@ -100,7 +100,11 @@ class SolverLoop {
   Gluing::Mode gluing_mode(int epoch) const;
   void split_walls();
   void take(SubdomainPlace e, int epoch);
-  bool decide_on_velocities(int epoch);
+  /// False: the velocities of the step stand.
+  bool decide_on_velocities(int epoch) {
+    if (schedule_.restores_at(epoch)) return false;
+    return schedule_.work(epoch) == EpochSchedule::Work::measure ? measured(epoch) : swept(epoch);
+  }
   bool measured(int epoch);
   bool swept(int epoch);
   bool judge();

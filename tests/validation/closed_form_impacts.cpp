@@ -21,7 +21,8 @@ Scene oblique(double v_t, double v_n, double mu, double e) {
   return scene;
 }
 
-/// Where it sticks the surface's speed goes from v_t to -e_t v_t: e_t is 0 with Newton's law, e with Moreau's.
+/// Where it sticks the surface's speed goes from v_t to -e_t v_t: e_t is 0 with Newton's law, e with
+/// Moreau's.
 void expect_oblique_impacts(RestitutionLaw law) {
   const double v_n = 2;
   for (double mu : {0.1, 0.3, 0.6})
@@ -66,7 +67,7 @@ Bounces bounce(double height, double e, double time_step, double until) {
   while (run.time() < until) {
     run.step();
     const double now = run.u()[2];
-    if (now > 0 && before < 0) {
+    if (now > 1e-9 && before < -1e-9) {  // [m/s]: rest is known to rounding
       out.speed_ratios.push_back(-now / before);
       highest = 0;
     }

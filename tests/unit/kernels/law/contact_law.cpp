@@ -131,5 +131,24 @@ TEST(GapLaw, LeavesOutPairsThatStayApartAndFollowsTheImpactLawOfFastOnes) {
   EXPECT_FALSE(stays_apart(0.2, -30.0, 0.01, 0.1)) << "closes within the step";
 }
 
+// v = (1 + E) vbar - E v-, where the contact carries and vbar = -b, is what each pair is to rebound with; and
+// b >= 0, by which no contact creates energy.
+TEST(GapLaw, GivesEachPairItsOwnReboundWithMoreausLaw) {
+  const double reflection = 0.8;
+  const auto rebound = [&](double e, double gap, double v_n) {
+    const GapRule rule{
+        .time_step = 0.01, .alert = 0.1, .restitution = e, .slow = 1, .reflection = reflection};
+    const double b = solve_gap(rule, gap, v_n, v_n, e).bias;
+    EXPECT_GE(b, 0);
+    return -(1 + reflection) * b - reflection * v_n;
+  };
+  EXPECT_NEAR(rebound(0.8, -0.05, -2), 1.6, 1e-15);
+  EXPECT_NEAR(rebound(0.5, -0.05, -2), 1, 1e-15);
+  EXPECT_NEAR(rebound(0, -0.05, -2), 0, 1e-15);
+  EXPECT_NEAR(rebound(0.5, -0.05, -0.5), 0, 1e-15) << "slow: at rest";
+  EXPECT_NEAR(rebound(0.5, 0.02, -0.5), -2, 1e-14) << "slow: it may close its gap";
+  EXPECT_NEAR(rebound(0.5, -0.05, 2), -1.6, 1e-15) << "what separates may be pushed back with E";
+}
+
 }  // namespace
 }  // namespace talus

@@ -309,6 +309,36 @@ TEST(Coupling, KeepsTheMomentumOfTwoSpheresThatMeetAtABorder) {
       }
 }
 
+// What undoes overlaps, and what carries velocities on with restitution, is glued: no copy goes its own way.
+TEST(Coupling, KeepsTheCopiesOfABodyInOnePlace) {
+  for (const Coupling coupling : {Coupling::nscdd, Coupling::alternating})
+    for (const ExchangeScheme exchange : exchanges) {
+      talus::Setup setup = pressed_lattice(6, 0.3, 5);
+      setup.stages[0].laws.set_all(&PairLaw::restitution, 0.4);
+      setup.solver.overlap_correction = 0.3;
+      setup.decomposition.coupling = coupling;
+      setup.decomposition.exchange = exchange;
+      setup.decomposition.subdomains = 12;
+      graph::Executor executor({.threads = 1});
+      Simulation simulation(setup, test::jittered_lattice(6, 3), executor);
+      for (int k = 0; k < 5; ++k) simulation.step();
+      const Bodies& bodies = simulation.state().bodies;
+      std::map<BodyId, std::size_t> first;
+      std::size_t copies = 0;
+      for (std::size_t s = 0; s < bodies.size(); ++s) {
+        const auto [at, fresh] = first.emplace(bodies.id[s], s);
+        if (fresh) continue;
+        ++copies;
+        EXPECT_EQ(bodies.x[s], bodies.x[at->second]) << label(setup.decomposition);
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_EQ(bodies.velocity[s].u[c], bodies.velocity[at->second].u[c]) << label(setup.decomposition);
+          EXPECT_EQ(bodies.velocity[s].w[c], bodies.velocity[at->second].w[c]) << label(setup.decomposition);
+        }
+      }
+      EXPECT_GT(copies, 50u);
+    }
+}
+
 TEST(Coupling, HoldsGrainsThatTouchNothingButWalls) {
   // No two grains meet: every subdomain has contacts with the floor and the lid only, and a weight on them.
   talus::Setup setup;

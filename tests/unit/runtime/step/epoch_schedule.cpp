@@ -95,7 +95,7 @@ TEST(EpochSchedule, SweepsOfPositionsAreTheLastThatHappens) {
   schedule.restore_after(2);
   schedule.positions_from(3, 4);
   EXPECT_EQ(works(schedule, 4, 8), "pppp");
-  EXPECT_EQ(schedule.position_sweep(4), 0);
+  EXPECT_EQ(schedule.position_epoch(4), 0);
   for (int epoch = 4; epoch < 8; ++epoch) {
     EXPECT_EQ(schedule.ends_at(epoch), epoch == 7);
     EXPECT_FALSE(schedule.measures_at(epoch) || schedule.reads_sums_at(epoch) || schedule.restores_at(epoch));
