@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -177,7 +178,7 @@ TEST(ChosenTimeStep, GoesOnFromASavedState) {
 
 // Steps are decided from maxima over all ranks: the same steps, and the same bits, on 1 and 3.
 TEST(ChosenTimeStep, IsTheSameOnAnyRanksAndThreads) {
-  talus::Setup setup = test::pressed_setup(test::box_of_walls(-1, 7), 0.3, 12, 1e6, 200);
+  talus::Setup setup = test::pressed_setup(test::box_of_walls(-1, 7), 0.3, 10, 1e3, 200);
   setup.stages[0].chooses_time_step = true;
   setup.stages[0].time_step_max = 0.1;
   setup.solver.max_iterations = 40;
@@ -198,7 +199,8 @@ TEST(ChosenTimeStep, IsTheSameOnAnyRanksAndThreads) {
   };
   Result alone;
   graph::on_pretend_ranks(1, [&](const graph::Communicator& ranks) { alone = run(ranks, 1); });
-  EXPECT_NE(alone.steps.front(), alone.steps.back());
+  EXPECT_LT(*std::ranges::min_element(alone.steps), *std::ranges::max_element(alone.steps))
+      << testing::PrintToString(alone.steps);
   std::mutex comparing;
   const auto expect_same = [&](const Result& result) {
     const std::lock_guard lock(comparing);
