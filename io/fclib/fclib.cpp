@@ -174,11 +174,11 @@ FclibProblem read_fclib_problem(const std::filesystem::path& path) {
 std::vector<FclibFile> fclib_files(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path)) return {{path, path.stem().string()}};
   std::vector<FclibFile> files;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(path)) {
+  for (const auto& entry : std::filesystem::directory_iterator(path)) {
     const auto extension = entry.path().extension();
     if (entry.is_regular_file() && (extension == ".hdf5" || extension == ".h5") &&
         !belongs_to_a_run(entry.path()))
-      files.push_back({entry.path(), entry.path().lexically_relative(path).string()});
+      files.push_back({entry.path(), entry.path().filename().string()});
   }
   if (files.empty())
     throw FileError(path.string(),

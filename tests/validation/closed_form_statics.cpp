@@ -138,6 +138,8 @@ Scene moving_planet(SolverMethod method) {
   scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
   scene.setup.solver = {.tolerance = 1e-2, .balance_tolerance = 1e-2, .max_iterations = 2000};
   scene.setup.solver.method = method;
+  // The grain's velocity is a difference of forces 10^20 times its weight: it may be anything, and its place.
+  scene.setup.solver.overlap_tolerance = 1e300;
   stack(scene, 1);
   Wall& planet = scene.wall("planet", {0, 0, 2 * radius}, -Vec3::UnitZ());
   planet.velocity = {0, 0, -1e-3};

@@ -119,7 +119,7 @@ TEST_F(Warnings, AreNotNeededWhereTheTimeStepIsChosen) {
     least = std::min(least, steps.number(k, "time_step"));
     EXPECT_NEAR(steps.number(k, "time"), time, 1e-12);
   }
-  EXPECT_EQ(steps.number(steps.rows.size() - 1, "time"), 0.02);
+  EXPECT_DOUBLE_EQ(steps.number(steps.rows.size() - 1, "time"), 0.02);
   EXPECT_LT(least, 5e-4);
   EXPECT_EQ(run("run results/scene.resolved.toml --out again").code, 0);
   EXPECT_EQ(summary(at("again")).at("digest"), summary(at("results")).at("digest"));

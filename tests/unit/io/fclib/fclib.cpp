@@ -162,16 +162,6 @@ TEST_F(Fclib, OfOneStemInAFolderHaveNamesOfTheirOwn) {
   EXPECT_EQ(fclib_files(folder / "a.h5").at(0).name, "a");
 }
 
-TEST_F(Fclib, OfFoldersBelowAreFoundToo) {
-  const fs::path folder = path("set");
-  fs::create_directories(folder / "chains" / "long");
-  for (const char* name : {"a.hdf5", "chains/a.hdf5", "chains/long/b.h5"})
-    std::ofstream(folder / name) << "x";
-  std::vector<std::string> names;
-  for (const FclibFile& file : fclib_files(folder)) names.push_back(file.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"a.hdf5", "chains/a.hdf5", "b"}));
-}
-
 TEST_F(Fclib, ProblemsInTheFolderOfARunStandBesideItsOtherFiles) {
   const fs::path folder = path("run");
   fs::create_directory(folder);

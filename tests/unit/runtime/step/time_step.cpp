@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -93,9 +94,9 @@ TEST(ChosenTimeStep, FallsExactlyAndHitsTheEnd) {
     sum += report.time_step;
     EXPECT_NEAR(report.time, sum, 1e-12);
     EXPECT_TRUE(report.converged);
-    EXPECT_NEAR(simulation.state().bodies.x[0][2], 10 - 0.5 * 10 * sum * sum, 1e-12);
+    EXPECT_NEAR(simulation.state().bodies.x[0][2], 10 - 0.5 * 10 * sum * sum, 1e-11);
   }
-  EXPECT_EQ(simulation.report().time, end);
+  EXPECT_DOUBLE_EQ(simulation.report().time, end);
   EXPECT_GT(longest, 3 * shortest) << "a fast grain takes shorter steps";
   EXPECT_LE(longest, std::sqrt(0.05 * radius / 10)) << "a grain at rest falls by 2.5 % of its radius at most";
 }
@@ -117,7 +118,7 @@ std::pair<double, std::int64_t> bounce(Stage stage) {
 TEST(ChosenTimeStep, KeepsImpactsWithinTheOverlapTolerance) {
   Stage fixed = choosing(1);
   fixed.chooses_time_step = false;
-  fixed.time_step = 1e-3;
+  fixed.time_step = 1.25e-3;
   EXPECT_GT(bounce(fixed).first, 0.05);
   const auto [overlap, steps] = bounce(choosing(1, 4e-3));
   EXPECT_LE(overlap, 0.05);
@@ -177,7 +178,7 @@ TEST(ChosenTimeStep, GoesOnFromASavedState) {
 
 // Steps are decided from maxima over all ranks: the same steps, and the same bits, on 1 and 3.
 TEST(ChosenTimeStep, IsTheSameOnAnyRanksAndThreads) {
-  talus::Setup setup = test::pressed_setup(test::box_of_walls(-1, 7), 0.3, 12, 1e6, 200);
+  talus::Setup setup = test::pressed_setup(test::box_of_walls(-1, 7), 0.3, 10, 1e3, 200);
   setup.stages[0].chooses_time_step = true;
   setup.stages[0].time_step_max = 0.1;
   setup.solver.max_iterations = 40;
@@ -198,7 +199,8 @@ TEST(ChosenTimeStep, IsTheSameOnAnyRanksAndThreads) {
   };
   Result alone;
   graph::on_pretend_ranks(1, [&](const graph::Communicator& ranks) { alone = run(ranks, 1); });
-  EXPECT_NE(alone.steps.front(), alone.steps.back());
+  EXPECT_LT(*std::ranges::min_element(alone.steps), *std::ranges::max_element(alone.steps))
+      << testing::PrintToString(alone.steps);
   std::mutex comparing;
   const auto expect_same = [&](const Result& result) {
     const std::lock_guard lock(comparing);
