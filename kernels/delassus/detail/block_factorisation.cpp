@@ -3,6 +3,7 @@
 #include <metis.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace talus::detail {
@@ -63,6 +64,30 @@ double factorisation_cost(const DelassusProblem& problem, std::span<const std::i
     parent.insert(parent.end(), rows.begin() + 1, rows.end());
   }
   return cost;
+}
+
+FactorisedForm::FactorisedForm(const DelassusProblem& problem)
+    : scaled(unit_diagonal(problem)),
+      order(elimination_order(problem)),
+      all_active(detail::factorisation_cost(problem, order)) {}
+
+double FactorisedForm::factorisation_cost(bool definite, double active) const {
+  const bool sparse = scaled.problem.contacts() > dense_contacts;
+  const double each = sparse ? (definite ? 2 : 3) : 0.5;
+  return each * all_active * active * std::sqrt(active) +
+         20 * active * static_cast<double>(9 * scaled.problem.column.size() + 150 * scaled.problem.contacts());
+}
+
+double BlockFactorisation::solve_cost() const {
+  switch (kind_) {
+    case Kind::dense:
+      return static_cast<double>(dense_.rows()) * static_cast<double>(dense_.rows());
+    case Kind::lu:
+      return static_cast<double>(lu_.nnzL()) + static_cast<double>(lu_.nnzU());
+    case Kind::ldlt:
+      break;
+  }
+  return 2.0 * static_cast<double>(ldlt_.matrixL().nestedExpression().nonZeros());
 }
 
 bool BlockFactorisation::factorise(std::size_t rows, std::span<const BlockEntry> entries, bool definite) {
