@@ -88,7 +88,7 @@ void AdmmOnTheWay::begin_from(std::span<const double> r) {
 void AdmmOnTheWay::factorise(BestAnswer& answer) {
   regular_ = matrix_.factorise(rho_);
   ++answer.report().factorisations;
-  progress_.spend(form_.factorisation_cost(matrix_.definite()));
+  progress_.spend(form_.factorisation_cost());
 }
 
 void AdmmOnTheWay::iterate(BestAnswer& answer) {

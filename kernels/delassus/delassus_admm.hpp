@@ -33,7 +33,6 @@ class ShiftedMatrix {
   /// False when the matrix is singular.
   bool factorise(double rho);
   void solve(const Eigen::VectorXd& rhs, Eigen::VectorXd& x);
-  bool definite() const { return definite_; }
   /// In multiplications.
   double solve_cost() const { return factors_.solve_cost() + 60.0 * static_cast<double>(p_.contacts()); }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
@@ -19,36 +18,39 @@ namespace {
 
 constexpr double never = std::numeric_limits<double>::infinity();
 
+/// One of the methods, once it has begun.
+struct Runner {
+  std::function<void()> iterate;
+  std::function<void()> begin_from_best;  ///< of all methods' answers
+  detail::OwnError* own = nullptr;        ///< null: has not begun
+};
+
 class Portfolio {
  public:
   Portfolio(const DelassusProblem& problem, const AutoSettings& settings, BestAnswer& answer)
       : problem_(problem), settings_(settings), answer_(answer), sweep_(sweep_cost(problem)) {
-    start(momentum);
+    begin(momentum);
   }
 
   void run() {
-    const double first = answer_.least();
+    Runner& main = runner_[momentum];
     while (!answer_.over()) {
-      if (progress(momentum).work() < 30 * sweep_) {
-        momentum_->iterate(answer_);
-        continue;
+      const Method next = choose();
+      if (!runner_[next].own) begin(next);
+      Runner& runner = runner_[next];
+      if (answer_.least() < settings_.better * runner.own->least() && stalled(next, next == momentum ? settings_.stall_sweeps : settings_.stall)) {
+      if (getenv("TRACE")) fprintf(stderr, "%c anew at %.1e from %.1e, sweeps %.0f\n", "MCNA"[next], runner.own->least(), answer_.least(), runner.own->work() / sweep_);
+        runner.begin_from_best();
+        runner.own->begin(answer_.least());
       }
-      if (!form_ && factorising_ && progress(momentum).work() > 30 * sweep_) {
-        std::int64_t failed = 0;
-        factorising_ = lawful(problem_, failed);
-      }
-      const std::size_t next = choose();
-      if (!started(next)) start(next);
-      exchange(next);
-      const double until = progress(next).work() + settings_.slice * progress(next).work();
-      do
-        iterate(next);
-      while (!answer_.over() && progress(next).work() < until);
+      const double until = runner.own->work() + settings_.slice * main.own->work();
+      do runner.iterate();
+      while (!answer_.over() && runner.own->work() < until);
     }
     if (getenv("TRACE")) {
-      fprintf(stderr, "first %g least %g:", first, answer_.least());
+      fprintf(stderr, "least %g:", answer_.least());
       for (std::size_t k = 0; k < methods; ++k)
-        if (started(k)) fprintf(stderr, " %c %.0f sweeps (%.1e)", "MCNA"[k], progress(k).work() / sweep_, progress(k).least());
+        if (runner_[k].own) fprintf(stderr, " %c %.0f sweeps (%.1e)", "MCNA"[k], runner_[k].own->work() / sweep_, runner_[k].own->least());
       fprintf(stderr, "\n");
     }
   }
@@ -57,120 +59,102 @@ class Portfolio {
   enum Method : std::size_t { momentum, conjugate, newton, admm };
   static constexpr std::size_t methods = 4;
 
-  bool started(std::size_t k) const {
-    return k == momentum || (k == conjugate && conjugate_) || (k == newton && newton_) || (k == admm && admm_);
+  template <class Solver>
+  void adopt(Method method, Solver& solver) {
+    runner_[method] = {[&] { solver.iterate(answer_); }, [&] { solver.begin_from(answer_.best()); },
+                       &solver.progress()};
+    solver.progress().begin(answer_.least());
   }
-  detail::OwnError& progress(std::size_t k) {
-    switch (k) {
-      case momentum: return momentum_->progress();
-      case conjugate: return conjugate_->progress();
-      case newton: return newton_->progress();
-      default: return admm_->progress();
-    }
-  }
-  void iterate(std::size_t k) {
-    switch (k) {
-      case momentum: return momentum_->iterate(answer_);
-      case conjugate: return conjugate_->iterate(answer_);
-      case newton: return newton_->iterate(answer_);
-      default: return admm_->iterate(answer_);
-    }
-  }
-  void begin_from_best(std::size_t k) {
-    switch (k) {
-      case momentum: momentum_->begin_from(answer_.best()); break;
-      case conjugate: conjugate_->begin_from(answer_.best()); break;
-      case newton: newton_->begin_from(answer_.best()); break;
-      default: admm_->begin_from(answer_.best()); break;
-    }
-    progress(k).begin(answer_.least());
-  }
-  const detail::FactorisedForm& form() {
-    if (!form_) form_.emplace(problem_);
-    return *form_;
-  }
-  void start(std::size_t k) {
+  void begin(Method method) {
     using Start = SweepsOnTheWay::Start;
-    switch (k) {
-      case momentum: momentum_.emplace(problem_, Start::momentum, SweepSettings{}, answer_.best()); break;
-      case conjugate: conjugate_.emplace(problem_, Start::conjugate, SweepSettings{}, answer_.best()); break;
-      case newton: newton_.emplace(form(), NewtonSettings{}, answer_.best()); break;
-      default: admm_.emplace(form(), AdmmSettings{}, answer_.best()); break;
+    const std::span<const double> r = answer_.best();
+    switch (method) {
+      case momentum: return adopt(method, momentum_.emplace(problem_, Start::momentum, SweepSettings{}, r));
+      case conjugate: return adopt(method, conjugate_.emplace(problem_, Start::conjugate, SweepSettings{}, r));
+      case newton: return adopt(method, newton_.emplace(*form_, NewtonSettings{}, r));
+      case admm: return adopt(method, admm_.emplace(*form_, AdmmSettings{}, r));
     }
-    progress(k).begin(answer_.least());
+  }
+  /// The least error was found before the later part of the work.
+  bool stalled(Method method, double part) const {
+    const detail::OwnError& own = *runner_[method].own;
+    return own.work_since_least() > std::max(part * own.work_since_begin(), 0.75 * first(method));
   }
   /// Work that a method needs before anything may be said of it.
-  double prior(std::size_t k) {
-    switch (k) {
+  double first(Method method) const {
+    switch (method) {
       case momentum: return 30 * sweep_;
-      case conjugate: return std::max(40 * sweep_, progress(momentum).work());
-      case newton: return 8 * form().factorisation_cost(false);
-      default: return form().factorisation_cost(true) + 60 * 3 * sweep_;
+      case conjugate: return std::max(40 * sweep_, runner_[momentum].own->work());
+      case newton: return settings_.newton_steps * (form_->factorisation_cost() + 8 * sweep_);
+      case admm: return form_->factorisation_cost() + settings_.admm_steps * 3 * sweep_;
     }
+    return never;
   }
-  double remaining(std::size_t k) {
-    const double first = prior(k);
-    if (!started(k)) return first;
-    detail::OwnError& own = progress(k);
-    const double spent = own.work_since_begin();
-    const double expected = std::max(first - spent, settings_.patience * spent);
-    return std::min(own.remaining(answer_.goal().tolerance), expected);
+  double remaining(Method method) const {
+    const detail::OwnError* own = runner_[method].own;
+    if (!own) return first(method);
+    const double spent = own->work_since_begin();
+    return std::min(own->remaining(answer_.goal().tolerance),
+                    std::max(first(method) - spent, settings_.patience * spent));
   }
-  bool available(std::size_t k) {
-    if (k == momentum || k == conjugate) return true;
-    if (!factorising_) return false;
-    if (k == admm && admm_ && !admm_->regular()) return false;
-    return true;
-  }
-  std::size_t choose() {
-    std::array<double, methods> left{}, weight{};
-    double least = never, most = 0;
-    for (std::size_t k = 0; k < methods; ++k) {
-      left[k] = available(k) ? remaining(k) : never;
-      least = std::min(least, left[k]);
+  /// Whether those that factorise may be asked.
+  bool factorises(double main_left) {
+    if (form_ || !factorising_) return factorising_;
+    const double analysis = detail::analysis_cost(problem_);
+    if (runner_[momentum].own->work() < 2 * analysis || main_left < analysis) return false;
+    std::int64_t failed = 0;
+    factorising_ = lawful(problem_, failed);
+    if (factorising_) {
+      form_.emplace(problem_);
+      analysis_ = analysis;
     }
-    for (std::size_t k = 0; k < methods; ++k) {
-      if (left[k] == never) continue;
-      weight[k] = std::max(settings_.share, least * least / (left[k] * left[k]));
-      most = std::max(most, started(k) ? progress(k).work() : 0.0);
-    }
-    std::size_t next = momentum;
-    double lowest = never;
-    for (std::size_t k = 0; k < methods; ++k) {
-      if (left[k] == never) continue;
-      // One that has not begun is asked for when its share pays for its first steps.
-      const double begins = started(k) ? 0 : prior(k) / 4;
-      const double at = ((started(k) ? progress(k).work() : 0.0) + begins) / weight[k];
-      if (at < lowest) {
-        lowest = at;
-        next = k;
+    return factorising_;
+  }
+  double work(Method method) const { return runner_[method].own ? runner_[method].own->work() : 0.0; }
+
+  Method choose() {
+    const detail::OwnError& main = *runner_[momentum].own;
+    const bool stands = stalled(momentum, settings_.stall);
+    const double main_left = settings_.pessimism * remaining(momentum);
+    const bool factorising = factorises(main_left);
+    Method best = conjugate;
+    double left = stands || runner_[conjugate].own ? remaining(conjugate) : never;
+    for (const Method method : {newton, admm}) {
+      if (!factorising || (method == admm && admm_ && !admm_->regular())) continue;
+      if (const double own = remaining(method); own < left) {
+        left = own;
+        best = method;
       }
     }
-    return next;
-  }
-  void exchange(std::size_t k) {
-    detail::OwnError& own = progress(k);
-    if (answer_.least() < settings_.better * own.least() && remaining(k) > own.work_since_begin())
-      begin_from_best(k);
+    if (left == never) return momentum;
+    const double others = analysis_ + work(conjugate) + work(newton) + work(admm);
+    const double start = runner_[best].own || best == conjugate ? 0 : form_->factorisation_cost();
+    const bool foretold = runner_[best].own && runner_[best].own->remaining(answer_.goal().tolerance) <= left;
+    double most = left < main_left ? (foretold ? settings_.most_foretold : settings_.most) : settings_.least;
+    if (stands) most = settings_.most_stalled;
+    return others + start < most * main.work() ? best : momentum;
   }
 
   const DelassusProblem& problem_;
   const AutoSettings& settings_;
   BestAnswer& answer_;
-  double sweep_;
+  double sweep_, analysis_ = 0;
   bool factorising_ = true;
   std::optional<detail::FactorisedForm> form_;
   std::optional<SweepsOnTheWay> momentum_, conjugate_;
   std::optional<NewtonOnTheWay> newton_;
   std::optional<AdmmOnTheWay> admm_;
+  std::array<Runner, methods> runner_;
 };
 
 }  // namespace
 
-DelassusReport solve_auto(const DelassusProblem& problem, const DelassusGoal& goal, const AutoSettings& settings,
+DelassusReport solve_auto(const DelassusProblem& problem, const DelassusGoal& goal, const AutoSettings& given,
                           std::span<double> r) {
   BestAnswer answer(problem, goal, r);
   if (answer.over()) return answer.hand_back();
+  AutoSettings settings = given;
+  if (const char* e = getenv("AUTO")) sscanf(e, "%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &settings.patience, &settings.most, &settings.most_foretold, &settings.most_stalled, &settings.least, &settings.stall, &settings.stall_sweeps, &settings.newton_steps, &settings.admm_steps,&settings.slice,&settings.pessimism);
   Portfolio(problem, settings, answer).run();
   return answer.hand_back();
 }

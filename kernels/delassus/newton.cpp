@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "kernels/delassus/delassus_sweeps.hpp"
 #include "kernels/delassus/detail/block_factorisation.hpp"
@@ -84,6 +85,7 @@ class ProximalNewton {
 
   /// |F(r)|, and with `linearise` its slopes.
   double residual(const Vector& r, bool linearise) {
+    work_ += check_cost(p_);
     relative_velocity(p_, span_of(r), span_of(u_));
     u_ += alpha_ * (r - centre_);
     for (std::size_t c = 0; c < p_.contacts(); ++c) {
@@ -135,10 +137,13 @@ class ProximalNewton {
   }
 
   const Vector& step() const { return step_; }
+  /// Multiplications of residuals and sweeps since the last call.
+  double take_work() { return std::exchange(work_, 0.0); }
   /// Part of the contacts that the last step took into its matrix.
   double active() const { return static_cast<double>(active_.size()) / static_cast<double>(p_.contacts()); }
 
-  std::int64_t smooth(Vector& r, int sweeps) const {
+  std::int64_t smooth(Vector& r, int sweeps) {
+    work_ += sweeps * sweep_cost(p_);
     std::int64_t failed = 0;
     for (int k = 0; k < sweeps; ++k) failed = sweep_(span_of(centre_), span_of(r));
     return failed;
@@ -153,7 +158,7 @@ class ProximalNewton {
   std::vector<detail::BlockEntry> entries_;
   detail::BlockFactorisation factors_;
   Vector centre_, u_, F_, step_, rhs_;
-  double alpha_ = 0;
+  double alpha_ = 0, work_ = 0;
   ProximalSweep sweep_;
 };
 
@@ -205,6 +210,7 @@ struct NewtonOnTheWay::State {
     for (std::size_t k = 0; k < candidate.size(); ++k)
       candidate[k] = x[static_cast<Eigen::Index>(k)] / form.scaled.root[k / 3];
     answer.offer(answer.report().iterations, candidate);
+    progress.spend(newton.take_work() + check_cost(form.scaled.problem));
     progress.check(answer.last());
   }
   /// The next problem of the proximal point method.
@@ -260,7 +266,7 @@ void NewtonOnTheWay::iterate(BestAnswer& answer) {
   const bool last = answer.count();
   ++answer.report().factorisations;
   const bool found = s.newton.find_step(s.x);
-  s.progress.spend(s.form.factorisation_cost(false, s.newton.active()));
+  s.progress.spend(s.form.factorisation_cost(s.newton.active()));
   if (!found) {
     s.end_outer(true);
     return;

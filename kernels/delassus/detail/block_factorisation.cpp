@@ -71,17 +71,24 @@ FactorisedForm::FactorisedForm(const DelassusProblem& problem)
       order(elimination_order(problem)),
       all_active(detail::factorisation_cost(problem, order)) {}
 
-double FactorisedForm::factorisation_cost(bool definite, double active) const {
+double FactorisedForm::factorisation_cost(double active) const {
   const bool sparse = scaled.problem.contacts() > dense_contacts;
-  const double each = sparse ? (definite ? 2 : 3) : 0.5;
-  return each * all_active * active * std::sqrt(active) +
-         20 * active * static_cast<double>(9 * scaled.problem.column.size() + 150 * scaled.problem.contacts());
+  const auto blocks = static_cast<double>(scaled.problem.column.size());
+  const auto contacts = static_cast<double>(scaled.problem.contacts());
+  return sparse ? 1.3 * all_active * active * std::sqrt(active) + active * (100 * blocks + 2000 * contacts)
+                : 0.4 * all_active * active * active * active + active * (50 * blocks + 750 * contacts);
+}
+
+double analysis_cost(const DelassusProblem& problem) {
+  const auto blocks = static_cast<double>(problem.column.size());
+  const auto contacts = static_cast<double>(problem.contacts());
+  return problem.contacts() > dense_contacts ? 400 * (blocks + 10 * contacts) : 50 * (blocks + contacts);
 }
 
 double BlockFactorisation::solve_cost() const {
   switch (kind_) {
     case Kind::dense:
-      return static_cast<double>(dense_.rows()) * static_cast<double>(dense_.rows());
+      return 0.5 * static_cast<double>(dense_.rows()) * static_cast<double>(dense_.rows());
     case Kind::lu:
       return static_cast<double>(lu_.nnzL()) + static_cast<double>(lu_.nnzU());
     case Kind::ldlt:

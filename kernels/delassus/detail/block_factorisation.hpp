@@ -30,9 +30,13 @@ struct FactorisedForm {
   UnitDiagonal scaled;
   std::vector<std::int32_t> order;  ///< of elimination
   double all_active;                ///< multiplications of an LU of the whole matrix
-  /// Of one factorisation, in multiplications of a sweep: those of a sparse one take longer.
-  double factorisation_cost(bool definite, double active = 1) const;
+  /// Of one factorisation with a part of the contacts, 0 to 1, in multiplications of a sweep. Fitted to measured
+  /// times, within a factor of 2.
+  double factorisation_cost(double active = 1) const;
 };
+
+/// What making a FactorisedForm costs, likewise.
+double analysis_cost(const DelassusProblem& problem);
 
 struct BlockEntry {
   std::int32_t row, column;  ///< places in the order of elimination
