@@ -48,10 +48,11 @@ std::function<void()> fclib_dump(const Simulation& simulation, const std::filesy
   io::FclibInfo info{
       .title =
           fmt::format("Talus {}, stage {}, step {}", io::version(), simulation.stage().name, report.step),
-      .description = fmt::format(
-          "{} grains, {} contacts, time {:.9g} s, time step {:.9g} s; /solution is what "
-          "the step found, error {:.2e}",
-          simulation.state().bodies.size(), step.problem.contacts(), report.time, parameters.time_step, report.error_rms),
+      .description =
+          fmt::format("{} grains, {} contacts, time {:.9g} s, time step {:.9g} s; /solution is what "
+                      "the step found, error {:.2e}",
+                      simulation.state().bodies.size(), step.problem.contacts(), report.time,
+                      parameters.time_step, report.error_rms),
       .math_info =
           "u = W r + q: velocities in m/s at the end of the step, impulses in N s, normal first; q has "
           "the gap and restitution terms in it"};

@@ -122,6 +122,8 @@ struct DelassusReport {
   std::vector<DelassusCheck> history;  ///< at iteration 0 and at every check
   std::int64_t failed_contacts = 0;    ///< contacts whose local law had no solution in the last sweep
   std::int64_t rescues = 0;            ///< times a stalled iteration went back to its best r
+  /// Multiplications, as estimated: what methods are compared by without a clock. One takes 0.3 to 1 ns.
+  double work = 0;
 };
 
 /// Keeps the r of the least error and the history of one solve. All solvers share it.

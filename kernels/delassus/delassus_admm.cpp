@@ -42,8 +42,8 @@ bool detail::ShiftedMatrix::factorise(double rho) {
   entries.reserve(p_.contacts() + p_.column.size());
   for (std::size_t a = 0; a < p_.contacts(); ++a) {
     entries.push_back({place_[a], place_[a], p_.diagonal[a].W + rho * Mat3::Identity()});
-    for (auto k = static_cast<std::size_t>(p_.row_begin[a]); k < static_cast<std::size_t>(p_.row_begin[a + 1]);
-         ++k)
+    for (auto k = static_cast<std::size_t>(p_.row_begin[a]);
+         k < static_cast<std::size_t>(p_.row_begin[a + 1]); ++k)
       entries.push_back({place_[a], place_[static_cast<std::size_t>(p_.column[k])], p_.block[k]});
   }
   return factors_.factorise(p_.contacts(), entries, definite_);
@@ -140,7 +140,13 @@ DelassusReport solve_admm(const DelassusProblem& problem, const DelassusGoal& go
   const detail::FactorisedForm form(problem);
   AdmmOnTheWay admm(form, settings, r);
   while (!answer.over() && admm.regular()) admm.iterate(answer);
+  answer.report().work = detail::analysis_cost(problem) + admm.progress().work();
   return answer.hand_back();
+}
+
+double admm_cost(const DelassusProblem& problem) {
+  const auto n = static_cast<double>(problem.contacts());
+  return n <= static_cast<double>(detail::dense_contacts) ? 4.5 * n * n + 100 * n : 3 * sweep_cost(problem);
 }
 
 }  // namespace talus

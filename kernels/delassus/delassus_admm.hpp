@@ -23,6 +23,9 @@ struct AdmmSettings {
 DelassusReport solve_admm(const DelassusProblem& problem, const DelassusGoal& goal,
                           const AdmmSettings& settings, std::span<double> r);
 
+/// What an iteration costs without factorisation, in multiplications, as far as it is known before the first.
+double admm_cost(const DelassusProblem& problem);
+
 namespace detail {
 
 /// W + rho I, factorised.

@@ -136,7 +136,8 @@ void SweepsOnTheWay::advance_conjugate() {
   double squared = 0;
   for (std::size_t k = 0; k < r_.size(); ++k)
     squared += weight_[k / 3] * (start_[k] - r_[k]) * (start_[k] - r_[k]);
-  const bool anew = !(last_step_ > 0) || squared > last_step_;  // a sweep that changed nothing has no direction
+  const bool anew =
+      !(last_step_ > 0) || squared > last_step_;  // a sweep that changed nothing has no direction
   const double beta = anew ? 0 : squared / last_step_;
   last_step_ = squared;
   for (std::size_t k = 0; k < r_.size(); ++k) {
@@ -151,6 +152,7 @@ DelassusReport solve_nlgs(const DelassusProblem& problem, const DelassusGoal& go
   BestAnswer answer(problem, goal, r);
   SweepsOnTheWay sweeps(problem, SweepsOnTheWay::Start::momentum, settings, r);
   while (!answer.over()) sweeps.iterate(answer);
+  answer.report().work = sweeps.progress().work();
   return answer.hand_back();
 }
 
@@ -159,6 +161,7 @@ DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& go
   BestAnswer answer(problem, goal, r);
   SweepsOnTheWay sweeps(problem, SweepsOnTheWay::Start::conjugate, {.damping = damping}, r);
   while (!answer.over()) sweeps.iterate(answer);
+  answer.report().work = sweeps.progress().work();
   return answer.hand_back();
 }
 

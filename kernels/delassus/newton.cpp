@@ -272,8 +272,7 @@ void NewtonOnTheWay::iterate(BestAnswer& answer) {
     return;
   }
   const double reference = *std::max_element(s.past.begin(), s.past.end());
-  const double now =
-      go_on(s.newton, s.settings.smoothing, reference, s.x, answer.report().failed_contacts);
+  const double now = go_on(s.newton, s.settings.smoothing, reference, s.x, answer.report().failed_contacts);
   const bool failed = !(now < 2 * reference);
   s.past[static_cast<std::size_t>(++s.inner) % s.past.size()] = now;
   s.offer(answer);
@@ -301,6 +300,7 @@ DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& 
   const detail::FactorisedForm form(problem);
   NewtonOnTheWay newton(form, settings, r);
   while (!answer.over()) newton.iterate(answer);
+  answer.report().work = detail::analysis_cost(problem) + newton.progress().work();
   return answer.hand_back();
 }
 

@@ -39,7 +39,8 @@ bool lawful(const DelassusProblem& problem, std::int64_t& failed_contacts);
 class NewtonOnTheWay {
  public:
   /// `form` must outlive this. `r` is the start.
-  NewtonOnTheWay(const detail::FactorisedForm& form, const NewtonSettings& settings, std::span<const double> r);
+  NewtonOnTheWay(const detail::FactorisedForm& form, const NewtonSettings& settings,
+                 std::span<const double> r);
   ~NewtonOnTheWay();
   /// One step; offers what it came to.
   void iterate(BestAnswer& answer);

@@ -88,7 +88,9 @@ inline void add_plate(Problem& made, double ratio) {
                 .mass = ratio * sphere_mass(radius)};
 }
 
-inline Problem deck(Draw& draw) { return deposit_of(draw, draw.between(0, 1), 0, 1); }
+inline Problem deck(Draw& draw) {
+  return deposit_of(draw, draw.between(0, 1), 0, 1);
+}
 
 inline Problem heavy_on_light(Draw& draw) {
   const double ratio = draw.log_between(10, 1e5);
@@ -216,10 +218,11 @@ struct Family {
   const char* name;
   Problem (*build)(Draw&);
 };
-inline constexpr Family families[] = {
-    {"deck", deck},         {"heavy", heavy_on_light}, {"loaded", loaded_deck}, {"tilted", tilted_deck},
-    {"struck", struck_deck}, {"columns", columns},      {"pressed", pressed_box}, {"wedge", wedge},
-    {"chain", chain},       {"arch", arch}};
+inline constexpr Family families[] = {{"deck", deck},           {"heavy", heavy_on_light},
+                                      {"loaded", loaded_deck},  {"tilted", tilted_deck},
+                                      {"struck", struck_deck},  {"columns", columns},
+                                      {"pressed", pressed_box}, {"wedge", wedge},
+                                      {"chain", chain},         {"arch", arch}};
 
 }  // namespace scenes
 
@@ -247,8 +250,8 @@ struct Blocks {
   explicit Blocks(const DelassusProblem& p) : row(p.contacts()) {
     for (std::size_t a = 0; a < p.contacts(); ++a) {
       row[a].emplace_back(a, p.diagonal[a].W);
-      for (auto k = static_cast<std::size_t>(p.row_begin[a]); k < static_cast<std::size_t>(p.row_begin[a + 1]);
-           ++k)
+      for (auto k = static_cast<std::size_t>(p.row_begin[a]);
+           k < static_cast<std::size_t>(p.row_begin[a + 1]); ++k)
         row[a].emplace_back(static_cast<std::size_t>(p.column[k]), p.block[k]);
     }
   }
@@ -323,7 +326,8 @@ inline DelassusProblem pushed(const DelassusProblem& p, Draw& draw) {
   }
   if (!(d2 > 0)) return made;
   const double size = draw.log_between(0.01, 1) * std::sqrt(q2 / d2);
-  for (std::size_t c = 0; c < p.contacts(); ++c) made.q[c] += size * Vec3(u[3 * c], u[3 * c + 1], u[3 * c + 2]);
+  for (std::size_t c = 0; c < p.contacts(); ++c)
+    made.q[c] += size * Vec3(u[3 * c], u[3 * c + 1], u[3 * c + 2]);
   return made;
 }
 

@@ -29,10 +29,9 @@ using bench::cpu_now;
 using bench::NamedProblem;
 
 struct Options {
-  std::map<std::string, std::string> values{{"problems", "200"}, {"seed", "1"},       {"set", ""},
-                                            {"tolerance", "1e-4"}, {"measure", "larger"}, {"seconds", "60"},
-                                            {"repeat", "3"},     {"only", ""},        {"csv", ""},
-                                            {"write", ""}};
+  std::map<std::string, std::string> values{
+      {"problems", "200"}, {"seed", "1"},   {"set", ""},  {"tolerance", "1e-4"}, {"measure", "larger"},
+      {"seconds", "60"},   {"repeat", "3"}, {"only", ""}, {"csv", ""},           {"write", ""}};
   const std::string& operator[](const char* key) const { return values.at(key); }
   double number(const char* key) const { return std::stod(values.at(key)); }
 };
@@ -55,7 +54,8 @@ Time time_of(const DelassusProblem& problem, DelassusMethod method, DelassusGoal
     const double seconds = cpu_now() - begin;
     const DelassusError error = delassus_error(problem, r, u);
     if (report.converged && !(measured(error, goal.measure) <= goal.tolerance))
-      fmt::print("{} says it converged, and its error is {}\n", name_of(method), measured(error, goal.measure));
+      fmt::print("{} says it converged, and its error is {}\n", name_of(method),
+                 measured(error, goal.measure));
     if (k == 0 || seconds < best.seconds)
       best = {report.converged, seconds, measured(error, goal.measure), report.iterations};
     if (!report.converged) break;
@@ -66,7 +66,8 @@ Time time_of(const DelassusProblem& problem, DelassusMethod method, DelassusGoal
 std::vector<NamedProblem> problems_of(const Options& options) {
   std::vector<NamedProblem> given;
   if (!options["set"].empty())
-    for (const auto& file : io::fclib_files(options["set"])) given.push_back({file.name, io::read_fclib(file.path)});
+    for (const auto& file : io::fclib_files(options["set"]))
+      given.push_back({file.name, io::read_fclib(file.path)});
   return bench::race_problems(std::move(given), static_cast<std::size_t>(options.number("problems")),
                               static_cast<std::uint64_t>(options.number("seed")));
 }
@@ -86,7 +87,8 @@ void race(const NamedProblem& named, const Options& options, Summary& summary, s
                                      : measure == "scaled" ? ErrorMeasure::scaled
                                                            : ErrorMeasure::larger};
   const int repeats = static_cast<int>(options.number("repeat"));
-  const Time own = time_of(named.problem, DelassusMethod::automatic, goal, options.number("seconds"), repeats);
+  const Time own =
+      time_of(named.problem, DelassusMethod::automatic, goal, options.number("seconds"), repeats);
   Time best{.seconds = std::numeric_limits<double>::infinity()};
   std::string best_name = "-", all;
   for (const DelassusMethod method : all_delassus_methods) {
@@ -110,11 +112,12 @@ void race(const NamedProblem& named, const Options& options, Summary& summary, s
     summary.worst_name = named.name;
   }
   const char* verdict = !own.solved ? (best.solved ? "MISSED" : "unsolved") : ratio > 1 ? "SLOW" : "";
-  fmt::print("{:<48} {:>5} auto {:9.3f} ms, error {:.1e}, {:>6}; best {:<13} {:9.3f} ms; {:5.2f} {}{}\n", named.name,
-             named.problem.contacts(), 1e3 * own.seconds, own.error, own.iterations, best_name,
+  fmt::print("{:<48} {:>5} auto {:9.3f} ms, error {:.1e}, {:>6}; best {:<13} {:9.3f} ms; {:5.2f} {}{}\n",
+             named.name, named.problem.contacts(), 1e3 * own.seconds, own.error, own.iterations, best_name,
              1e3 * (best.solved ? best.seconds : 0), ratio, verdict, ratio > 1 || !own.solved ? all : "");
   std::fflush(stdout);
-  if (csv) fmt::print(csv, "{},{},{},{},{},{},{}\n", named.name, named.problem.contacts(), own.solved, own.seconds,
+  if (csv)
+    fmt::print(csv, "{},{},{},{},{},{},{}\n", named.name, named.problem.contacts(), own.solved, own.seconds,
                best_name, best.seconds, ratio);
 }
 
@@ -127,7 +130,10 @@ int main(int argc, char** argv) {
     const std::size_t equals = word.find('=');
     const auto known = options.values.find(word.substr(0, equals));
     if (equals == std::string::npos || known == options.values.end()) {
-      fmt::print(stderr, "'{}' is none of problems=, seed=, set=, tolerance=, measure=, seconds=, repeat=, only=, csv=, write=\n", word);
+      fmt::print(stderr,
+                 "'{}' is none of problems=, seed=, set=, tolerance=, measure=, seconds=, repeat=, only=, "
+                 "csv=, write=\n",
+                 word);
       return 2;
     }
     known->second = word.substr(equals + 1);
@@ -142,15 +148,17 @@ int main(int argc, char** argv) {
       race(problems[k], options, summary, csv);
     } else {
       std::filesystem::create_directories(options["write"]);
-      io::write_fclib(problems[k].problem, {}, {.title = problems[k].name, .description = "", .math_info = ""},
-                      std::filesystem::path(options["write"]) / fmt::format("{:04}-{}.hdf5", k, problems[k].name));
+      io::write_fclib(
+          problems[k].problem, {}, {.title = problems[k].name, .description = "", .math_info = ""},
+          std::filesystem::path(options["write"]) / fmt::format("{:04}-{}.hdf5", k, problems[k].name));
     }
   }
   if (csv) std::fclose(csv);
-  fmt::print("tolerance {} by {}: {} problems, auto solved {}, missed {} that a single method solved in its "
-             "time; {} beyond 2 x best + 1 ms, worst {:.2f} of it ({}); best method:",
-             options["tolerance"], options["measure"], summary.raced, summary.solved,
-             summary.missed_though_solvable, summary.beyond, summary.worst, summary.worst_name);
+  fmt::print(
+      "tolerance {} by {}: {} problems, auto solved {}, missed {} that a single method solved in its "
+      "time; {} beyond 2 x best + 1 ms, worst {:.2f} of it ({}); best method:",
+      options["tolerance"], options["measure"], summary.raced, summary.solved, summary.missed_though_solvable,
+      summary.beyond, summary.worst, summary.worst_name);
   for (const auto& [name, count] : summary.best) fmt::print(" {} {}", name, count);
   fmt::print("\n");
   return 0;

@@ -30,8 +30,8 @@ struct FactorisedForm {
   UnitDiagonal scaled;
   std::vector<std::int32_t> order;  ///< of elimination
   double all_active;                ///< multiplications of an LU of the whole matrix
-  /// Of one factorisation with a part of the contacts, 0 to 1, in multiplications of a sweep. Fitted to measured
-  /// times, within a factor of 2.
+  /// Of one factorisation with a part of the contacts, 0 to 1, in multiplications of a sweep. Fitted to
+  /// measured times, within a factor of 2.
   double factorisation_cost(double active = 1) const;
 };
 

@@ -26,8 +26,8 @@ class OwnError {
   double work_since_begin() const { return work_ - records_.front().work; }
   /// Since the least error was found.
   double work_since_least() const { return work_ - records_.back().work; }
-  /// Work until `tolerance`, should the logarithm of the least error go on falling as it has in the later half
-  /// of the work since it began: infinite where it has not fallen.
+  /// Work until `tolerance`, should the logarithm of the least error go on falling as it has in the later
+  /// half of the work since it began: infinite where it has not fallen.
   double remaining(double tolerance) const {
     if (least_ <= tolerance) return 0;
     const double half = 0.5 * work_since_begin(), from = work_ - half;
@@ -38,7 +38,8 @@ class OwnError {
         break;
       }
     const double fallen = std::log(before / least_);
-    return fallen > 0 ? std::log(least_ / tolerance) / fallen * half : std::numeric_limits<double>::infinity();
+    return fallen > 0 ? std::log(least_ / tolerance) / fallen * half
+                      : std::numeric_limits<double>::infinity();
   }
 
  private:
