@@ -25,9 +25,9 @@ struct AutoSettings {
 };
 
 /// Sweeps with momentum, conjugate sweeps, Newton and ADMM in turn, each going on where its own last turn
-/// ended, until one of them reaches the goal. Sweeps with momentum are never denied half of the work for
-/// long, because they are the best method of most problems; the rest goes to the method that is expected to
-/// be through soonest: by how its own error has fallen, or, before that is known, by what such a method
+/// ended, until one of them reaches the goal. Sweeps with momentum are never denied two fifths of the work
+/// for long, because they are the best method of most problems; the rest goes to the method that is expected
+/// to be through soonest: by how its own error has fallen, or, before that is known, by what such a method
 /// usually takes. The others begin where the best answer is. One that stands still loses its turns to the
 /// others, but none is given up while the goal lets the solve go on. All is decided by errors and counted
 /// multiplications: the same input gives the same bits, but for where goal.stop ends it.
