@@ -8,7 +8,6 @@
 
 #include "io/fclib/fclib.hpp"
 #include "io/results/version.hpp"
-#include "kernels/delassus/step_problem.hpp"
 
 namespace talus {
 
@@ -29,26 +28,31 @@ void check_dump(const Setup& setup, int ranks) {
                     setup.decomposition.subdomains));
 }
 
-std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory) {
+StepProblem contact_problem(const Simulation& simulation) {
   const StepState& state = simulation.state();
-  const StepParameters& parameters = simulation.parameters();
-  const StepReport& report = simulation.report();
   std::vector<Vec3> wall_free;
   for (const WallState& wall : state.wall_states) wall_free.push_back(wall.free_velocity);
-  StepProblem step = assemble_step({.bodies = state.bodies.velocity,
-                                    .free = state.free,
-                                    .contacts = state.contacts,
-                                    .chunks = state.chunks,
-                                    .walls = state.walls,
-                                    .wall_free = wall_free,
-                                    .laws = parameters.laws});
+  return assemble_step({.bodies = state.bodies.velocity,
+                        .free = state.free,
+                        .contacts = state.contacts,
+                        .chunks = state.chunks,
+                        .walls = state.walls,
+                        .wall_free = wall_free,
+                        .laws = simulation.parameters().laws});
+}
+
+std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory) {
+  const StepParameters& parameters = simulation.parameters();
+  const StepReport& report = simulation.report();
+  StepProblem step = contact_problem(simulation);
   io::FclibInfo info{
       .title =
           fmt::format("Talus {}, stage {}, step {}", io::version(), simulation.stage().name, report.step),
-      .description = fmt::format(
-          "{} grains, {} contacts, time {:.9g} s, time step {:.9g} s; /solution is what "
-          "the step found, error {:.2e}",
-          state.bodies.size(), step.problem.contacts(), report.time, parameters.time_step, report.error_rms),
+      .description =
+          fmt::format("{} grains, {} contacts, time {:.9g} s, time step {:.9g} s; /solution is what "
+                      "the step found, error {:.2e}",
+                      simulation.state().bodies.size(), step.problem.contacts(), report.time,
+                      parameters.time_step, report.error_rms),
       .math_info =
           parameters.reflection > 0
               ? fmt::format("u = W r + q: velocities in m/s, impulses in N s, normal first; with E = {:g} of "

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "kernels/delassus/step_problem.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -11,10 +12,12 @@ namespace talus {
 /// with several subdomains, where a body's mass is shared by its copies.
 void check_dump(const Setup& setup, int ranks);
 
-/// Assembles the contact problem of the step just done, with the impulses that the step found as its
-/// solution: W = H' M^-1 H, q with the gap and restitution terms in it, mu. What it returns writes it to
-/// fclib_000012.hdf5 in `directory` for step 12, and belongs on the thread that writes files. Throws
-/// io::FileError there.
+/// The contact problem of the step just done, with the impulses that the step found: W = H' M^-1 H, q with
+/// the gap and restitution terms in it, mu. One rank, one subdomain, spheres (check_dump).
+StepProblem contact_problem(const Simulation& simulation);
+
+/// Assembles that problem. What it returns writes it, with the impulses as its solution, to fclib_000012.hdf5
+/// in `directory` for step 12, and belongs on the thread that writes files. Throws io::FileError there.
 std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory);
 
 }  // namespace talus

@@ -190,6 +190,12 @@ BestAnswer::BestAnswer(const DelassusProblem& problem, const DelassusGoal& goal,
   report_.converged = least_ <= goal.tolerance;
 }
 
+bool BestAnswer::count() {
+  ++report_.iterations;
+  report_.stopped = goal_.stop && goal_.stop();
+  return report_.stopped || report_.iterations >= goal_.max_iterations;
+}
+
 bool BestAnswer::offer(std::int64_t iteration, std::span<const double> candidate) {
   const DelassusError error = delassus_error(problem_, candidate, u_);
   report_.history.push_back({iteration, error});

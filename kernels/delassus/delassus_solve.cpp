@@ -1,12 +1,9 @@
 #include "kernels/delassus/delassus_solve.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <utility>
-#include <vector>
 
 #include "kernels/delassus/delassus_admm.hpp"
+#include "kernels/delassus/delassus_auto.hpp"
 #include "kernels/delassus/delassus_sweeps.hpp"
 #include "kernels/delassus/newton.hpp"
 
@@ -17,53 +14,6 @@ constexpr std::pair<DelassusMethod, std::string_view> names[] = {
     {DelassusMethod::nlgs, "nlgs"},     {DelassusMethod::nlgs_momentum, "nlgs+momentum"},
     {DelassusMethod::nncg, "nncg"},     {DelassusMethod::admm, "admm"},
     {DelassusMethod::newton, "newton"}, {DelassusMethod::automatic, "auto"},
-};
-
-/// When the sweeps of `automatic` let Newton try.
-class NewtonTrials {
- public:
-  NewtonTrials(const DelassusProblem& problem, const DelassusGoal& goal) : problem_(problem), goal_(goal) {}
-
-  /// SweepSettings::intervene.
-  bool operator()(BestAnswer& answer) {
-    if (answer.report().failed_contacts > 0) return false;
-    const double sweeps = static_cast<double>(answer.report().iterations);
-    if (sweeps < next_trial_) return false;
-    if (step_cost_ == 0) {
-      // Only now: small tolerances often are met before this is worth finding out.
-      step_cost_ = newton_cost(problem_) / sweep_cost(problem_);
-      next_trial_ = 4 * step_cost_;
-      if (sweeps < next_trial_) return false;
-    }
-    // Sweeps that have not made the error a third while they doubled have stalled.
-    const bool stalled = last_error_ > 0 && answer.least() > 0.3 * last_error_;
-    const bool helped =
-        newton(answer, stalled ? patience_ : 2, static_cast<std::int64_t>(0.5 * sweeps / step_cost_));
-    if (stalled && !helped) patience_ *= 4;
-    last_error_ = answer.least();
-    next_trial_ = 2 * sweeps;
-    return helped;
-  }
-
- private:
-  bool newton(BestAnswer& answer, int patience, std::int64_t steps) {
-    DelassusReport& report = answer.report();
-    DelassusGoal goal = goal_;
-    goal.max_iterations = std::min(steps, goal_.max_iterations - report.iterations);
-    std::vector<double> r(answer.best().begin(), answer.best().end());
-    const DelassusReport part = solve_newton(problem_, goal, {.patience = patience}, r);
-    report.iterations += part.iterations;
-    report.factorisations += part.factorisations;
-    report.stopped = part.stopped;
-    return answer.offer(report.iterations, r);
-  }
-
-  const DelassusProblem& problem_;
-  const DelassusGoal& goal_;
-  double next_trial_ = 40;  ///< [sweeps]
-  double step_cost_ = 0;    ///< of a step of Newton [sweeps]
-  double last_error_ = 0;   ///< after the last trial
-  int patience_ = 6;        ///< with Newton, where sweeps have stalled: its way down may lead up first
 };
 
 }  // namespace
@@ -96,8 +46,7 @@ DelassusReport solve_delassus(const DelassusProblem& problem, DelassusMethod met
     case DelassusMethod::automatic:
       break;
   }
-  NewtonTrials trials(problem, goal);
-  return solve_nlgs(problem, goal, {.intervene = std::ref(trials)}, r);
+  return solve_auto(problem, goal, {}, r);
 }
 
 }  // namespace talus

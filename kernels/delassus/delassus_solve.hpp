@@ -17,7 +17,7 @@ enum class DelassusMethod {
   nncg,           ///< nonsmooth nonlinear conjugate gradients on the sweep
   admm,           ///< ADMM with W + rho I factorised
   newton,         ///< proximal point around semismooth Newton
-  automatic,      ///< sweeps with momentum, and Newton when its time has come
+  automatic,      ///< these methods in turn (delassus_auto.hpp)
 };
 
 inline constexpr std::array<DelassusMethod, 6> all_delassus_methods = {
@@ -29,12 +29,7 @@ std::string_view name_of(DelassusMethod method);
 std::optional<DelassusMethod> delassus_method(std::string_view name);
 
 /// Solves from `r` (3 values per contact) on, and leaves the answer of least error there. Same input, same
-/// bits (but for where goal.stop ends it): `automatic` decides by errors and by counted work, not by clocks.
-/// It sweeps with momentum; when the sweeps have cost four steps of Newton, and then whenever their number
-/// has doubled, it tries Newton from the best r, for at most half of what the sweeps have cost, and gives it
-/// up after two steps that do not help: once the sweeps have found which contacts are open, stick and slide,
-/// one or two such steps reach any tolerance. When the sweeps have not made the error a third since the last
-/// trial, they have stalled, and Newton is given up after six.
+/// bits, but for where goal.stop ends it.
 DelassusReport solve_delassus(const DelassusProblem& problem, DelassusMethod method, const DelassusGoal& goal,
                               std::span<double> r);
 

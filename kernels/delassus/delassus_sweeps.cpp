@@ -31,106 +31,6 @@ std::int64_t check_interval(std::int64_t sweeps) {
   return std::clamp<std::int64_t>(sweeps / 10, 1, 50);
 }
 
-/// The plain sweep and, after the first one, the damped one.
-class DampedSweep {
- public:
-  DampedSweep(const DelassusProblem& problem, std::span<const double> weight, double damping)
-      : problem_(problem), weight_(weight), damping_(damping), sweep_(problem) {}
-  /// r in place; returns the number of contacts whose law had no solution.
-  std::int64_t operator()(std::span<double> r) {
-    // The first sweep is not damped: contacts that do not touch each other are then solved at once.
-    if (++sweeps_ == 2 && damping_ > 0)
-      sweep_ = ProximalSweep(problem_, damping_of({weight_.begin(), weight_.end()}, damping_));
-    return sweep_(r, r);
-  }
-
- private:
-  const DelassusProblem& problem_;
-  std::span<const double> weight_;
-  double damping_;
-  ProximalSweep sweep_;
-  std::int64_t sweeps_ = 0;
-};
-
-/// Sweeps over a problem until its goal is reached, with checks of the error now and then.
-class CheckedSweeps {
- public:
-  /// `answer` has not reached the goal yet.
-  CheckedSweeps(const DelassusProblem& problem, const DelassusGoal& goal, double damping, BestAnswer& answer)
-      : goal_(goal), answer_(answer), weight_(weights_of(problem)), sweep_(problem, weight_, damping) {}
-
-  /// D_c, one per contact.
-  std::span<const double> weight() const { return weight_; }
-  bool done() const {
-    const DelassusReport& report = answer_.report();
-    return report.converged || report.stopped || report.iterations >= goal_.max_iterations;
-  }
-  /// Number of the last sweep that a check found better than all before; 0: none.
-  std::int64_t best_iteration() const { return best_iteration_; }
-
-  /// One sweep, from `start` to `r`; true when its error was checked.
-  bool operator()(std::span<const double> start, std::span<double> r) {
-    DelassusReport& report = answer_.report();
-    std::copy(start.begin(), start.end(), r.begin());
-    report.failed_contacts = sweep_(r);
-    ++report.iterations;
-    report.stopped = goal_.stop && goal_.stop();
-    if (report.iterations < next_check_ && report.iterations != goal_.max_iterations && !report.stopped)
-      return false;
-    next_check_ = report.iterations + check_interval(report.iterations);
-    if (answer_.offer(report.iterations, r)) best_iteration_ = report.iterations;
-    return true;
-  }
-
- private:
-  const DelassusGoal& goal_;
-  BestAnswer& answer_;
-  std::vector<double> weight_;
-  DampedSweep sweep_;
-  std::int64_t next_check_ = 1, best_iteration_ = 0;
-};
-
-/// Nesterov's momentum for a fixed-point iteration, with its two reasons to begin anew.
-class Momentum {
- public:
-  /// Forgets the past; no factor above `limit` from now on.
-  void restart(double limit) {
-    limit_ = limit;
-    t_ = 1;
-    last_step_ = std::numeric_limits<double>::infinity();
-  }
-
-  /// Turns `start` (where the sweep began) into the start of the next one. `r`: what the sweep made of it;
-  /// `previous`: the result of the sweep before, replaced by r. `weight`: D_c, one per contact.
-  void advance(std::span<const double> r, std::span<const double> weight, std::span<double> previous,
-               std::span<double> start) {
-    double turned_back = 0, step = 0;
-    for (std::size_t c = 0; c < weight.size(); ++c) {
-      for (std::size_t k = 3 * c; k < 3 * c + 3; ++k) {
-        const double back = start[k] - r[k];
-        turned_back += weight[c] * back * (r[k] - previous[k]);
-        step += weight[c] * back * back;
-      }
-    }
-    const double t = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
-    double factor = std::min(limit_, (t_ - 1) / t);
-    t_ = t;
-    if (turned_back > 0 || step > 2 * last_step_) {
-      factor = 0;
-      t_ = 1;
-    }
-    last_step_ = step;
-    for (std::size_t k = 0; k < r.size(); ++k) {
-      start[k] = r[k] + factor * (r[k] - previous[k]);
-      previous[k] = r[k];
-    }
-  }
-
- private:
-  double limit_ = 1, t_ = 1;
-  double last_step_ = std::numeric_limits<double>::infinity();  ///< squared
-};
-
 }  // namespace
 
 ProximalSweep::ProximalSweep(const DelassusProblem& problem, std::span<const double> hold)
@@ -157,64 +57,120 @@ std::int64_t ProximalSweep::operator()(std::span<const double> centre, std::span
   return failed;
 }
 
+SweepsOnTheWay::SweepsOnTheWay(const DelassusProblem& problem, Start start, const SweepSettings& settings,
+                               std::span<const double> r)
+    : problem_(problem),
+      kind_(start),
+      settings_(settings),
+      weight_(weights_of(problem)),
+      sweep_(problem),
+      r_(r.begin(), r.end()),
+      limit_(settings.momentum) {
+  begin_from(r);
+}
+
+void SweepsOnTheWay::begin_from(std::span<const double> r) {
+  start_.assign(r.begin(), r.end());
+  t_ = 1;
+  last_step_ = std::numeric_limits<double>::infinity();
+  if (kind_ == Start::momentum)
+    previous_ = start_;
+  else
+    previous_.assign(r.size(), 0.0);
+}
+
+void SweepsOnTheWay::iterate(BestAnswer& answer) {
+  std::copy(start_.begin(), start_.end(), r_.begin());
+  // The first sweep is not damped: contacts that do not touch each other are then solved at once.
+  if (++sweeps_ == 2 && settings_.damping > 0)
+    sweep_ = ProximalSweep(problem_, damping_of(weight_, settings_.damping));
+  answer.report().failed_contacts = sweep_(r_, r_);
+  progress_.spend(sweep_cost(problem_));
+  if (answer.count() || sweeps_ >= next_check_) {
+    next_check_ = sweeps_ + check_interval(sweeps_);
+    if (answer.offer(answer.report().iterations, r_)) best_sweep_ = sweeps_;
+    progress_.spend(check_cost(problem_));
+    progress_.check(answer.last());
+    if (answer.over()) return;
+  }
+  if (kind_ == Start::conjugate)
+    advance_conjugate();
+  else if (sweeps_ - std::max(best_sweep_, rescued_) > std::max<std::int64_t>(1000, best_sweep_))
+    rescue(answer);
+  else
+    advance();
+}
+
+void SweepsOnTheWay::rescue(BestAnswer& answer) {
+  constexpr double limits[] = {1, 0.9, 0};
+  limit_ = std::min(settings_.momentum, limits[++answer.report().rescues % 3]);
+  rescued_ = sweeps_;
+  begin_from(answer.best());
+}
+
+void SweepsOnTheWay::advance() {
+  double turned_back = 0, step = 0;
+  for (std::size_t c = 0; c < weight_.size(); ++c) {
+    for (std::size_t k = 3 * c; k < 3 * c + 3; ++k) {
+      const double back = start_[k] - r_[k];
+      turned_back += weight_[c] * back * (r_[k] - previous_[k]);
+      step += weight_[c] * back * back;
+    }
+  }
+  const double t = 0.5 * (1 + std::sqrt(1 + 4 * t_ * t_));
+  double factor = std::min(limit_, (t_ - 1) / t);
+  t_ = t;
+  if (turned_back > 0 || step > 2 * last_step_) {
+    factor = 0;
+    t_ = 1;
+  }
+  last_step_ = step;
+  for (std::size_t k = 0; k < r_.size(); ++k) {
+    start_[k] = r_[k] + factor * (r_[k] - previous_[k]);
+    previous_[k] = r_[k];
+  }
+}
+
+void SweepsOnTheWay::advance_conjugate() {
+  std::vector<double>& direction = previous_;
+  double squared = 0;
+  for (std::size_t k = 0; k < r_.size(); ++k)
+    squared += weight_[k / 3] * (start_[k] - r_[k]) * (start_[k] - r_[k]);
+  const bool anew =
+      !(last_step_ > 0) || squared > last_step_;  // a sweep that changed nothing has no direction
+  const double beta = anew ? 0 : squared / last_step_;
+  last_step_ = squared;
+  for (std::size_t k = 0; k < r_.size(); ++k) {
+    const double gradient = start_[k] - r_[k];
+    start_[k] = r_[k] + beta * direction[k];
+    direction[k] = anew ? 0 : beta * direction[k] - gradient;
+  }
+}
+
 DelassusReport solve_nlgs(const DelassusProblem& problem, const DelassusGoal& goal,
                           const SweepSettings& settings, std::span<double> r) {
   BestAnswer answer(problem, goal, r);
-  if (answer.done()) return answer.hand_back();
-  DelassusReport& report = answer.report();
-  std::vector<double> start(r.begin(), r.end()), previous(start);
-  CheckedSweeps sweep(problem, goal, settings.damping, answer);
-  Momentum momentum;
-  momentum.restart(settings.momentum);
-  const auto begin_anew = [&](double most_momentum) {
-    momentum.restart(most_momentum);
-    start.assign(answer.best().begin(), answer.best().end());
-    previous = start;
-  };
-  std::int64_t intervened = 0, rescued = 0;  // iterations
-  while (!sweep.done()) {
-    const bool checked = sweep(start, r);
-    if (report.converged || report.stopped) break;
-    if (checked && settings.intervene && settings.intervene(answer)) {
-      intervened = report.iterations;
-      begin_anew(settings.momentum);
-      continue;
-    }
-    const std::int64_t improved = std::max(sweep.best_iteration(), intervened);
-    if (report.iterations - std::max(improved, rescued) > std::max<std::int64_t>(1000, improved)) {
-      constexpr double limits[] = {1, 0.9, 0};
-      begin_anew(std::min(settings.momentum, limits[++report.rescues % 3]));
-      rescued = report.iterations;
-    } else {
-      momentum.advance(r, sweep.weight(), previous, start);
-    }
-  }
+  SweepsOnTheWay sweeps(problem, SweepsOnTheWay::Start::momentum, settings, r);
+  while (!answer.over()) sweeps.iterate(answer);
+  answer.report().work = sweeps.progress().work();
   return answer.hand_back();
 }
 
 DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& goal, double damping,
                           std::span<double> r) {
   BestAnswer answer(problem, goal, r);
-  if (answer.done()) return answer.hand_back();
-  std::vector<double> start(r.begin(), r.end()), direction(r.size(), 0.0);
-  CheckedSweeps sweep(problem, goal, damping, answer);
-  const std::span<const double> weight = sweep.weight();
-  double last = std::numeric_limits<double>::infinity();
-  while (!sweep.done()) {
-    sweep(start, r);
-    double squared = 0;
-    for (std::size_t k = 0; k < r.size(); ++k)
-      squared += weight[k / 3] * (start[k] - r[k]) * (start[k] - r[k]);
-    const bool anew = !(last > 0) || squared > last;  // a sweep that changed nothing has no direction
-    const double beta = anew ? 0 : squared / last;
-    last = squared;
-    for (std::size_t k = 0; k < r.size(); ++k) {
-      const double gradient = start[k] - r[k];
-      start[k] = r[k] + beta * direction[k];
-      direction[k] = anew ? 0 : beta * direction[k] - gradient;
-    }
-  }
+  SweepsOnTheWay sweeps(problem, SweepsOnTheWay::Start::conjugate, {.damping = damping}, r);
+  while (!answer.over()) sweeps.iterate(answer);
+  answer.report().work = sweeps.progress().work();
   return answer.hand_back();
+}
+
+double sweep_cost(const DelassusProblem& problem) {
+  return 9.0 * static_cast<double>(problem.column.size()) + 150.0 * static_cast<double>(problem.contacts());
+}
+
+double check_cost(const DelassusProblem& problem) {
+  return 9.0 * static_cast<double>(problem.column.size()) + 100.0 * static_cast<double>(problem.contacts());
 }
 
 }  // namespace talus

@@ -5,15 +5,30 @@
 #include <span>
 
 #include "kernels/delassus/delassus.hpp"
+#include "kernels/delassus/detail/own_error.hpp"
 
 namespace talus {
+
+/// Sweeps of the proximal problem u = W r + q + hold (r - centre): for solvers that want a smoother.
+class ProximalSweep {
+ public:
+  /// The plain sweep: hold 0. The problem must outlive this.
+  explicit ProximalSweep(const DelassusProblem& problem) : problem_(&problem) {}
+  /// `hold` [1/kg] per contact, >= 0.
+  ProximalSweep(const DelassusProblem& problem, std::span<const double> hold);
+  /// One sweep over r. `centre` may be r: a contact is then held to its impulse before the sweep.
+  /// Returns the number of contacts whose law had no solution.
+  std::int64_t operator()(std::span<const double> centre, std::span<double> r) const;
+
+ private:
+  const DelassusProblem* problem_;
+  std::vector<LocalBlock> block_;  ///< W_cc + hold I; empty: the problem's own
+  std::vector<double> hold_;       ///< empty: 0
+};
 
 struct SweepSettings {
   double damping = 0.03;  ///< 0 to 1: part of trace(W_cc)/3 that holds a contact to its last impulse; 0: none
   double momentum = 1;    ///< 0 to 1: upper limit of the momentum factor; 0: none
-  /// Called after every check that did not end the solve. It may offer a better r of its own; then it returns
-  /// true, and the sweeps go on from the best.
-  std::function<bool(BestAnswer&)> intervene = {};
 };
 
 /// Nonlinear Gauss-Seidel: contact by contact, the exact local law with the newest impulses of all others
@@ -39,21 +54,39 @@ DelassusReport solve_nlgs(const DelassusProblem& problem, const DelassusGoal& go
 DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& goal, double damping,
                           std::span<double> r);
 
-/// Sweeps of the proximal problem u = W r + q + hold (r - centre): for solvers that want a smoother.
-class ProximalSweep {
+/// The sweeps of one solve, to be paused between any two: what `automatic` does with several methods in turn.
+class SweepsOnTheWay {
  public:
-  /// The plain sweep: hold 0. The problem must outlive this.
-  explicit ProximalSweep(const DelassusProblem& problem) : problem_(&problem) {}
-  /// `hold` [1/kg] per contact, >= 0.
-  ProximalSweep(const DelassusProblem& problem, std::span<const double> hold);
-  /// One sweep over r. `centre` may be r: a contact is then held to its impulse before the sweep.
-  /// Returns the number of contacts whose law had no solution.
-  std::int64_t operator()(std::span<const double> centre, std::span<double> r) const;
+  /// How the next sweep begins.
+  enum class Start { momentum, conjugate };
+  /// The problem must outlive this. `r` is the start.
+  SweepsOnTheWay(const DelassusProblem& problem, Start start, const SweepSettings& settings,
+                 std::span<const double> r);
+  /// One sweep; offers what it came to when a check is due or the solve ends.
+  void iterate(BestAnswer& answer);
+  /// Goes on from r, without memory of what was before.
+  void begin_from(std::span<const double> r);
+  const detail::OwnError& progress() const { return progress_; }
+  detail::OwnError& progress() { return progress_; }
 
  private:
-  const DelassusProblem* problem_;
-  std::vector<LocalBlock> block_;  ///< W_cc + hold I; empty: the problem's own
-  std::vector<double> hold_;       ///< empty: 0
+  void advance();
+  void advance_conjugate();
+  void rescue(BestAnswer& answer);
+
+  const DelassusProblem& problem_;
+  Start kind_;
+  SweepSettings settings_;
+  std::vector<double> weight_;  ///< D_c
+  ProximalSweep sweep_;
+  std::vector<double> r_, start_, previous_;  ///< result, start of the next sweep; result before or direction
+  detail::OwnError progress_;
+  std::int64_t sweeps_ = 0, next_check_ = 1, best_sweep_ = 0, rescued_ = 0;
+  double limit_ = 1, t_ = 1, last_step_;  ///< of momentum; last squared step, weighted with D_c
 };
+
+/// What a sweep costs, and the check of an error, in multiplications.
+double sweep_cost(const DelassusProblem& problem);
+double check_cost(const DelassusProblem& problem);
 
 }  // namespace talus

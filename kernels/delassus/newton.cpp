@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "kernels/delassus/delassus_sweeps.hpp"
 #include "kernels/delassus/detail/block_factorisation.hpp"
@@ -65,9 +66,9 @@ Vec3 alart_curnier(const Vec3& r, const Vec3& u, double mu, Linearised* slope) {
 /// The proximal problem u = W r + q + alpha (r - centre), W with unit mean diagonals.
 class ProximalNewton {
  public:
-  explicit ProximalNewton(const DelassusProblem& problem)
+  ProximalNewton(const DelassusProblem& problem, std::span<const std::int32_t> order)
       : p_(problem),
-        order_(detail::elimination_order(problem)),
+        order_(order.begin(), order.end()),
         slope_(problem.contacts()),
         place_(problem.contacts()),
         centre_(first_row(problem.contacts())),
@@ -84,6 +85,7 @@ class ProximalNewton {
 
   /// |F(r)|, and with `linearise` its slopes.
   double residual(const Vector& r, bool linearise) {
+    work_ += check_cost(p_);
     relative_velocity(p_, span_of(r), span_of(u_));
     u_ += alpha_ * (r - centre_);
     for (std::size_t c = 0; c < p_.contacts(); ++c) {
@@ -135,8 +137,13 @@ class ProximalNewton {
   }
 
   const Vector& step() const { return step_; }
+  /// Multiplications of residuals and sweeps since the last call.
+  double take_work() { return std::exchange(work_, 0.0); }
+  /// Part of the contacts that the last step took into its matrix.
+  double active() const { return static_cast<double>(active_.size()) / static_cast<double>(p_.contacts()); }
 
-  std::int64_t smooth(Vector& r, int sweeps) const {
+  std::int64_t smooth(Vector& r, int sweeps) {
+    work_ += sweeps * sweep_cost(p_);
     std::int64_t failed = 0;
     for (int k = 0; k < sweeps; ++k) failed = sweep_(span_of(centre_), span_of(r));
     return failed;
@@ -151,7 +158,7 @@ class ProximalNewton {
   std::vector<detail::BlockEntry> entries_;
   detail::BlockFactorisation factors_;
   Vector centre_, u_, F_, step_, rhs_;
-  double alpha_ = 0;
+  double alpha_ = 0, work_ = 0;
   ProximalSweep sweep_;
 };
 
@@ -189,80 +196,112 @@ double next_proximal(double alpha, int inner, bool lost) {
 
 }  // namespace
 
+struct NewtonOnTheWay::State {
+  State(const detail::FactorisedForm& of, const NewtonSettings& how)
+      : form(of),
+        settings(how),
+        newton(of.scaled.problem, of.order),
+        x(first_row(of.scaled.problem.contacts())),
+        centre(x.size()),
+        candidate(3 * of.scaled.problem.contacts()),
+        alpha(how.proximal) {}
+
+  void offer(BestAnswer& answer) {
+    for (std::size_t k = 0; k < candidate.size(); ++k)
+      candidate[k] = x[static_cast<Eigen::Index>(k)] / form.scaled.root[k / 3];
+    answer.offer(answer.report().iterations, candidate);
+    progress.spend(newton.take_work() + check_cost(form.scaled.problem));
+    progress.check(answer.last());
+  }
+  /// The next problem of the proximal point method.
+  void begin_outer() {
+    centre = x;
+    newton.begin(centre, alpha);
+    first = newton.residual(x, true);
+    past = {first, 0, 0};
+    inner = 0;
+  }
+  void end_outer(bool lost) {
+    if (lost) x = centre;
+    alpha = next_proximal(alpha, inner, lost);
+    inner = -1;
+  }
+
+  const detail::FactorisedForm& form;
+  NewtonSettings settings;
+  ProximalNewton newton;
+  Vector x, centre;
+  std::vector<double> candidate;
+  double alpha, first = 0;
+  std::array<double, 3> past{};
+  int inner = -1;  ///< steps on the present proximal problem; -1: it has not begun
+  detail::OwnError progress;
+};
+
+NewtonOnTheWay::NewtonOnTheWay(const detail::FactorisedForm& form, const NewtonSettings& settings,
+                               std::span<const double> r)
+    : state_(std::make_unique<State>(form, settings)) {
+  begin_from(r);
+}
+NewtonOnTheWay::~NewtonOnTheWay() = default;
+
+const detail::OwnError& NewtonOnTheWay::progress() const {
+  return state_->progress;
+}
+detail::OwnError& NewtonOnTheWay::progress() {
+  return state_->progress;
+}
+
+void NewtonOnTheWay::begin_from(std::span<const double> r) {
+  for (std::size_t k = 0; k < r.size(); ++k)
+    state_->x[static_cast<Eigen::Index>(k)] = r[k] * state_->form.scaled.root[k / 3];
+  state_->inner = -1;
+  state_->alpha = state_->settings.proximal;
+}
+
+void NewtonOnTheWay::iterate(BestAnswer& answer) {
+  State& s = *state_;
+  constexpr int most_inner = 30;
+  if (s.inner < 0) s.begin_outer();
+  const bool last = answer.count();
+  ++answer.report().factorisations;
+  const bool found = s.newton.find_step(s.x);
+  s.progress.spend(s.form.factorisation_cost(s.newton.active()));
+  if (!found) {
+    s.end_outer(true);
+    return;
+  }
+  const double reference = *std::max_element(s.past.begin(), s.past.end());
+  const double now = go_on(s.newton, s.settings.smoothing, reference, s.x, answer.report().failed_contacts);
+  const bool failed = !(now < 2 * reference);
+  s.past[static_cast<std::size_t>(++s.inner) % s.past.size()] = now;
+  s.offer(answer);
+  const bool solved = now <= 0.1 * std::min(1.0, s.alpha) * s.first;
+  if (last || answer.over()) return;
+  if (failed || solved || s.inner >= most_inner)
+    s.end_outer(failed || !solved);
+  else
+    s.newton.residual(s.x, true);
+}
+
+bool lawful(const DelassusProblem& problem, std::int64_t& failed_contacts) {
+  for (const LocalBlock& own : problem.diagonal) {
+    const auto c = static_cast<std::size_t>(&own - problem.diagonal.data());
+    failed_contacts += !(own.W(0, 0) > 0) && problem.q[c][0] < 0;
+  }
+  return failed_contacts == 0;
+}
+
 DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& goal,
                             const NewtonSettings& settings, std::span<double> r) {
   BestAnswer answer(problem, goal, r);
-  if (answer.done() || problem.contacts() == 0) return answer.hand_back();
-  DelassusReport& report = answer.report();
-  for (const LocalBlock& own : problem.diagonal) {
-    const auto c = static_cast<std::size_t>(&own - problem.diagonal.data());
-    report.failed_contacts += !(own.W(0, 0) > 0) && problem.q[c][0] < 0;
-  }
-  if (report.failed_contacts > 0) return answer.hand_back();
-  const UnitDiagonal scaled = unit_diagonal(problem);
-  Vector x(first_row(problem.contacts())), centre(x.size());
-  for (std::size_t k = 0; k < r.size(); ++k) x[static_cast<Eigen::Index>(k)] = r[k] * scaled.root[k / 3];
-  std::vector<double> candidate(r.size());
-  const auto offer = [&](const Vector& of) {
-    for (std::size_t k = 0; k < candidate.size(); ++k)
-      candidate[k] = of[static_cast<Eigen::Index>(k)] / scaled.root[k / 3];
-    answer.offer(report.iterations, candidate);
-  };
-
-  ProximalNewton newton(scaled.problem);
-  double alpha = settings.proximal;
-  constexpr int most_inner = 30;
-  double progress = answer.least();  // error that counted as progress, and when
-  std::int64_t progress_at = 0;
-  const auto over = [&] {
-    if (answer.least() < 0.3 * progress) {
-      progress = answer.least();
-      progress_at = report.iterations;
-    }
-    return report.converged || report.stopped || report.iterations >= goal.max_iterations ||
-           (settings.patience > 0 && report.iterations - progress_at >= settings.patience);
-  };
-  while (!over()) {
-    centre = x;
-    newton.begin(centre, alpha);
-    const double first = newton.residual(x, true);
-    std::array<double, 3> past{first, 0, 0};
-    int inner = 0;
-    bool solved = false, failed = false;
-    while (!solved && !failed && inner < most_inner && !over()) {
-      ++report.iterations;
-      ++report.factorisations;
-      if (!newton.find_step(x)) {
-        failed = true;
-        break;
-      }
-      const double reference = *std::max_element(past.begin(), past.end());
-      const double now = go_on(newton, settings.smoothing, reference, x, report.failed_contacts);
-      failed = !(now < 2 * reference);
-      past[static_cast<std::size_t>(++inner) % past.size()] = now;
-      offer(x);
-      report.stopped = goal.stop && goal.stop();
-      solved = now <= 0.1 * std::min(1.0, alpha) * first;
-      if (!solved && !failed) newton.residual(x, true);
-    }
-    const bool lost = failed || (!solved && inner >= most_inner);
-    if (lost) x = centre;
-    alpha = next_proximal(alpha, inner, lost);
-  }
+  if (answer.over() || problem.contacts() == 0) return answer.hand_back();
+  if (!lawful(problem, answer.report().failed_contacts)) return answer.hand_back();
+  const detail::FactorisedForm form(problem);
+  NewtonOnTheWay newton(form, settings, r);
+  while (!answer.over()) newton.iterate(answer);
+  answer.report().work = detail::analysis_cost(problem) + newton.progress().work();
   return answer.hand_back();
-}
-
-double newton_cost(const DelassusProblem& problem) {
-  // Not all contacts are active, and a multiplication of the sparse LU takes about 6 times as long as one of
-  // the dense LU or of a sweep; beside it assembly, smoothing and checks. Good to a factor of 2 on FCLIB's
-  // problems.
-  const double factor = detail::factorisation_cost(problem, detail::elimination_order(problem));
-  const bool sparse = problem.contacts() > detail::dense_contacts;
-  return (sparse ? 3 : 0.5) * factor + (sparse ? 20 : 10) * sweep_cost(problem);
-}
-
-double sweep_cost(const DelassusProblem& problem) {
-  return 9.0 * static_cast<double>(problem.column.size()) + 150.0 * static_cast<double>(problem.contacts());
 }
 
 }  // namespace talus

@@ -4,17 +4,18 @@
 /// not solve, or not to many digits. Costs a factorisation a step, so for hundreds of contacts, not for
 /// packings.
 
+#include <memory>
 #include <span>
 
 #include "kernels/delassus/delassus.hpp"
+#include "kernels/delassus/detail/block_factorisation.hpp"
+#include "kernels/delassus/detail/own_error.hpp"
 
 namespace talus {
 
 struct NewtonSettings {
   double proximal = 1e-4;  ///< first weight of the proximal term, in units of trace(W_cc)/3; 1e-12 to 10
   int smoothing = 5;       ///< sweeps of the proximal problem after each step, >= 1
-  /// Ends after so many steps in a row that have not brought the error to a third; 0: does not give up.
-  int patience = 0;
 };
 
 /// Proximal point around a semismooth Newton method. Outer: r_k+1 solves the law with u = W r + q + alpha D
@@ -30,9 +31,27 @@ struct NewtonSettings {
 DelassusReport solve_newton(const DelassusProblem& problem, const DelassusGoal& goal,
                             const NewtonSettings& settings, std::span<double> r);
 
-/// What an iteration of solve_newton costs in multiplications, with all contacts active; and a sweep,
-/// likewise.
-double newton_cost(const DelassusProblem& problem);
-double sweep_cost(const DelassusProblem& problem);
+/// Whether every contact that approaches has a positive W_NN; counts the others. Newton's matrices have no
+/// meaning without.
+bool lawful(const DelassusProblem& problem, std::int64_t& failed_contacts);
+
+/// Newton's method on the way, to be paused between any two steps.
+class NewtonOnTheWay {
+ public:
+  /// `form` must outlive this. `r` is the start.
+  NewtonOnTheWay(const detail::FactorisedForm& form, const NewtonSettings& settings,
+                 std::span<const double> r);
+  ~NewtonOnTheWay();
+  /// One step; offers what it came to.
+  void iterate(BestAnswer& answer);
+  /// Goes on from r, with the first proximal weight.
+  void begin_from(std::span<const double> r);
+  const detail::OwnError& progress() const;
+  detail::OwnError& progress();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace talus

@@ -6,12 +6,10 @@
 #include <limits>
 #include <utility>
 
-#include <cstdio>
 #include "kernels/global/balance.hpp"
 #include "kernels/global/clusters.hpp"
+#include "kernels/global/newton_step.hpp"
 #include "kernels/global/step_error.hpp"
-#include "kernels/law/friction_cone.hpp"
-#include "runtime/graph/clock.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -103,26 +101,6 @@ double energy_without(const BodyParts& parts) {
   return all[energy] + all[mass] * all[fastest] * all[fastest];
 }
 
-struct LawDefect { double residual2 = 0, energy = 0; };
-LawDefect law_defect(const BodyParts& parts) {
-  const PartField V = velocities_of(parts, impulses_of(parts));
-  const std::vector<double> sums = parts.total(2, [&](std::size_t p, std::span<double> row) {
-    const BodyProblem& problem = parts[p];
-    for (std::size_t b = 0; b < problem.bodies.size(); ++b)
-      if (problem.counted(b)) row[1] += 0.5 * kinetic2(problem.bodies[b], V[p][b].u, V[p][b].w);
-    for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-      const ContactEquation& c = problem.contacts[k];
-      const Vec3& r = problem.impulse[k];
-      const Vec3 v = constrained(c, relative_velocity(c, V[p]) + c.offset);
-      const double m = effective_mass(problem, c);
-      const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
-      row[0] += (r - project_on_cone(r - m * shifted, c.normal, c.mu)).squaredNorm() / m;
-      row[1] += c.offset.dot(r);
-    }
-  });
-  return {sums[0], sums[1]};
-}
-
 }  // namespace
 
 Admm::Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
@@ -188,10 +166,11 @@ void Admm::find_clusters(int most_direct) {
   const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
   const Clusters clusters = clusters_of(graphs, *link_);
   in_small_ = in_clusters_of(clusters, 1, most_direct);
-  const std::vector<double> rows = rows_of(*link_, graphs.size(), 2, [&](std::size_t p, std::span<double> row) {
-    for (const auto& [first, second] : graphs[p].pairs)
-      row[in_small_[p][static_cast<std::size_t>(first)] != 0 ? 0 : 1] = 1;
-  });
+  const std::vector<double> rows =
+      rows_of(*link_, graphs.size(), 2, [&](std::size_t p, std::span<double> row) {
+        for (const auto& [first, second] : graphs[p].pairs)
+          row[in_small_[p][static_cast<std::size_t>(first)] != 0 ? 0 : 1] = 1;
+      });
   small_ = large_ = false;
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
@@ -218,13 +197,9 @@ std::vector<BodyProblem> Admm::checked(bool small) const {
 double Admm::small_error(double enough, double farthest) {
   const Whole span(*this);
   problems_ = checked(true);
-  const double t0 = graph::seconds_now();
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
   StepError error = step_error(problems_, *link_, {enough, still});
   change_ = std::move(error.correction.impulse);
-  if (std::getenv("TALUS_DEBUG"))
-    std::fprintf(stderr, "check: V %.2e wall %.2e contact %.2e rounds %d linear %d  %.3f ms\n", error.velocity, error.wall,
-                 error.contact, error.correction.rounds, error.correction.linear_iterations, 1e3 * (graph::seconds_now() - t0));
   return error.relative();
 }
 
@@ -234,21 +209,13 @@ double Admm::large_error(double enough) const {
   return velocity_error(problems, *link_, enough).relative;
 }
 
-bool Admm::correct() {
-  const BodyParts parts(problems_, *link_);
-  const PartImpulses before = impulses_of(parts);
-  const LawDefect then = law_defect(parts);
-  for (std::size_t p = 0; p < problems_.size(); ++p)
-    for (std::size_t k = 0; k < problems_[p].contacts.size(); ++k) {
-      const ContactEquation& c = problems_[p].contacts[k];
-      problems_[p].impulse[k] = project_on_cone(problems_[p].impulse[k] + change_[p][k], c.normal, c.mu);
-    }
-  const LawDefect now = law_defect(parts);
-  const bool better = now.residual2 < then.residual2 || (!parameters_.friction && now.energy < then.energy);
-  if (std::getenv("TALUS_DEBUG")) std::fprintf(stderr, "residual %.2e -> %.2e energy %.3e -> %.3e %d\n", std::sqrt(then.residual2), std::sqrt(now.residual2), then.energy, now.energy, better);
-  if (better)
-    for (const BodyProblem& problem : problems_) scatter_impulses(problem, state_.contacts);
-  return better;
+bool Admm::correction_helps() {
+  const Whole span(*this);
+  return take_newton_step(problems_, *link_, change_);
+}
+
+void Admm::correct() {
+  for (const BodyProblem& problem : problems_) scatter_impulses(problem, state_.contacts);
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {

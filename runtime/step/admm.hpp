@@ -38,16 +38,17 @@ class Admm {
   bool large_clusters() const { return large_; }
 
   /// Relative error of what the impulses of the last check give, with several ranks those that the candidates
-  /// keep; what is below `enough` is not told apart. `farthest`: largest coordinate [m], which rounding goes by. In small clusters of velocities and forces
-  /// (kernels/global/step_error.hpp); the Newton step that it was found with is kept for `correct`. In large
-  /// ones of velocities (balance.hpp).
+  /// keep; what is below `enough` is not told apart. `farthest`: largest coordinate [m], which rounding goes
+  /// by. In small clusters of velocities and forces (kernels/global/step_error.hpp); the Newton step that it
+  /// was found with is kept for `correct`. In large ones of velocities (balance.hpp).
   double small_error(double enough, double farthest);
   double large_error(double enough) const;
 
-  /// Replaces the impulses of `state.contacts` in small clusters by those of the last small_error and its Newton
-  /// step, put on the cones, and returns true; but where they are further from the law then, returns false and
-  /// leaves them. Velocities are left to be made afresh.
-  bool correct();
+  /// Whether the Newton step of the last small_error brings its impulses nearer to the law
+  /// (kernels/global/newton_step.hpp). Where it does, `correct` puts them into `state.contacts`; velocities
+  /// are left to be made afresh.
+  bool correction_helps();
+  void correct();
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as

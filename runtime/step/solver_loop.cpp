@@ -308,8 +308,8 @@ bool SolverLoop::measured(int epoch) {
   pending_ = ranks_.start_gather(std::move(rows), lengths);
   if (waits) {
     if (!judge()) return false;
-    if (ask_admm())
-      call_admm(epoch);
+    if (ask_remedy())
+      call_remedy(epoch);
     else
       schedule_.sweep_on(epoch, sweeps_ahead());
     return true;
@@ -327,8 +327,8 @@ bool SolverLoop::swept(int epoch) {
   schedule_.sums_read();
   if (!judge())
     schedule_.restore_after(epoch);
-  else if (ask_admm())
-    call_admm(epoch);
+  else if (ask_remedy())
+    call_remedy(epoch);
   else
     schedule_.stretch(sweeps_ahead());
   return true;
@@ -379,21 +379,25 @@ bool SolverLoop::judge() {
   return true;
 }
 
-bool SolverLoop::ask_admm() {
-  if (certificate_.correctable() && settings_.method == SolverMethod::automatic && admm_.correct()) return true;
+bool SolverLoop::ask_remedy() {
+  corrects_ = method_->corrects() && certificate_.correctable() && admm_.correction_helps();
+  if (corrects_) return true;
   StepView view(certificate_, problem_);
   return method_->calls_admm(view);
 }
 
 /// With several ranks behind the sweep that hid the sums: what it did is dropped.
-void SolverLoop::call_admm(int epoch) {
+void SolverLoop::call_remedy(int epoch) {
   if (ranks_.ranks() > 1) work_.restore();
   gluing_.forget_jumps();
-  if (certificate_.correctable() && settings_.method == SolverMethod::automatic) {
+  if (corrects_) {
+    admm_.correct();
     certificate_.corrected();
-  } else
-  certificate_.solved_by_admm(admm_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
-  // What the last sweeps changed says nothing of where ADMM has gone.
+  } else {
+    certificate_.solved_by_admm(
+        admm_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
+  }
+  // What the last sweeps changed says nothing of where the impulses have gone.
   begin_course(method_->after_admm(courses_.now().plan), schedule_.checked());
   schedule_.again_from(epoch);
 }

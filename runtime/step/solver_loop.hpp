@@ -108,8 +108,8 @@ class SolverLoop {
   bool measured(int epoch);
   bool swept(int epoch);
   bool judge();
-  bool ask_admm();
-  void call_admm(int epoch);
+  bool ask_remedy();
+  void call_remedy(int epoch);
   void turn_conjugate();
   void begin_course(const SweepPlan& plan, int from);
   bool single_will_do(SweepKind kind) const;
@@ -133,6 +133,7 @@ class SolverLoop {
   std::unique_ptr<Method> method_;  ///< of the step
   std::unique_ptr<graph::PendingGather> pending_;
   double imbalance_ = 0;
+  bool corrects_ = false;            ///< the remedy asked for last is the Newton step of the check
   double began_ = 0, measured_ = 0;  ///< clock at begin() and at the last check [s], for the history only
 };
 

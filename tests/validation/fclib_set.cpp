@@ -100,8 +100,8 @@ TEST_F(FclibSet, AutoOrNewtonSolvesEveryProblemOfEveryKindByBothErrorsToEightDig
   for (const char* kind : {"local", "global", "local2d"}) {
     for (const auto& file : files_in(folder / kind)) {
       const DelassusProblem problem = io::read_fclib(file);
-      // Sweeps stand still at 4e-7 on fc2d_granularflowonwall (2020 contacts in the plane), and auto with
-      // them.
+      // Sweeps stand still at 4e-7 on fc2d_granularflowonwall (2020 contacts in the plane), and auto does not
+      // get beyond them within this limit.
       const bool plane = problem.contacts() > 2000;
       const auto method = plane ? DelassusMethod::newton : DelassusMethod::automatic;
       std::vector<double> r(3 * problem.contacts(), 0.0);

@@ -3,6 +3,7 @@
 #include <metis.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace talus::detail {
@@ -63,6 +64,37 @@ double factorisation_cost(const DelassusProblem& problem, std::span<const std::i
     parent.insert(parent.end(), rows.begin() + 1, rows.end());
   }
   return cost;
+}
+
+FactorisedForm::FactorisedForm(const DelassusProblem& problem)
+    : scaled(unit_diagonal(problem)),
+      order(elimination_order(problem)),
+      all_active(detail::factorisation_cost(problem, order)) {}
+
+double FactorisedForm::factorisation_cost(double active) const {
+  const bool sparse = scaled.problem.contacts() > dense_contacts;
+  const auto blocks = static_cast<double>(scaled.problem.column.size());
+  const auto contacts = static_cast<double>(scaled.problem.contacts());
+  return sparse ? 1.3 * all_active * active * std::sqrt(active) + active * (100 * blocks + 2000 * contacts)
+                : 0.4 * all_active * active * active * active + active * (50 * blocks + 750 * contacts);
+}
+
+double analysis_cost(const DelassusProblem& problem) {
+  const auto blocks = static_cast<double>(problem.column.size());
+  const auto contacts = static_cast<double>(problem.contacts());
+  return problem.contacts() > dense_contacts ? 400 * (blocks + 10 * contacts) : 50 * (blocks + contacts);
+}
+
+double BlockFactorisation::solve_cost() const {
+  switch (kind_) {
+    case Kind::dense:
+      return 0.5 * static_cast<double>(dense_.rows()) * static_cast<double>(dense_.rows());
+    case Kind::lu:
+      return static_cast<double>(lu_.nnzL()) + static_cast<double>(lu_.nnzU());
+    case Kind::ldlt:
+      break;
+  }
+  return 2.0 * static_cast<double>(ldlt_.matrixL().nestedExpression().nonZeros());
 }
 
 bool BlockFactorisation::factorise(std::size_t rows, std::span<const BlockEntry> entries, bool definite) {

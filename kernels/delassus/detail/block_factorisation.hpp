@@ -24,6 +24,20 @@ std::vector<std::int32_t> elimination_order(const DelassusProblem& problem);
 /// symbolic elimination of blocks.
 double factorisation_cost(const DelassusProblem& problem, std::span<const std::int32_t> order);
 
+/// What solvers that factorise have in common, made once for all of them.
+struct FactorisedForm {
+  explicit FactorisedForm(const DelassusProblem& problem);
+  UnitDiagonal scaled;
+  std::vector<std::int32_t> order;  ///< of elimination
+  double all_active;                ///< multiplications of an LU of the whole matrix
+  /// Of one factorisation with a part of the contacts, 0 to 1, in multiplications of a sweep. Fitted to
+  /// measured times, within a factor of 2.
+  double factorisation_cost(double active = 1) const;
+};
+
+/// What making a FactorisedForm costs, likewise.
+double analysis_cost(const DelassusProblem& problem);
+
 struct BlockEntry {
   std::int32_t row, column;  ///< places in the order of elimination
   Mat3 block;
@@ -36,6 +50,8 @@ class BlockFactorisation {
   bool factorise(std::size_t rows, std::span<const BlockEntry> entries, bool definite);
   /// Solves in place; 3 values per row.
   void solve(Eigen::VectorXd& x) const;
+  /// Multiplications of a solution.
+  double solve_cost() const;
 
  private:
   enum class Kind { dense, lu, ldlt } kind_ = Kind::dense;

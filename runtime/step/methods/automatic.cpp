@@ -54,6 +54,8 @@ class Automatic : public Method {
     return {now.kind == SweepKind::momentum ? SweepKind::plain : now.kind, now.most};
   }
 
+  bool corrects() const override { return true; }
+
   bool calls_admm(MethodView& view) const override {
     return admm_due(parameters_.calls, view) &&
            (view.sweeps_needed() >= parameters_.stiff ||

@@ -38,7 +38,7 @@ class MethodView {
 ///
 ///   begin()                 before the first sweep
 ///   after_check(), calls_admm()   behind each check that has not ended the step, in this order
-///   after_admm()            where that was called: before the next sweep
+///   after_admm()            where that was called, or a Newton step taken: before the next sweep
 ///   after_stagnation()      behind a check that found stagnation, instead of after_check()
 ///
 /// Methods keep nothing between calls: what is in force comes in as the plan.
@@ -53,6 +53,8 @@ class Method {
   virtual std::optional<SweepPlan> after_stagnation(const SweepPlan& now) const;
   virtual SweepPlan after_admm(const SweepPlan& now) const { return now; }
   virtual bool calls_admm(MethodView& view) const;
+  /// Takes the Newton step with which a check has found small clusters of contacts in error.
+  virtual bool corrects() const { return false; }
 };
 
 inline std::optional<SweepPlan> Method::after_check(const SweepPlan&, double) const {
