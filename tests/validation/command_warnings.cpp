@@ -36,32 +36,32 @@ class Warnings : public testing::Test {
 };
 
 TEST_F(Warnings, AreNoneWhereNothingIsOdd) {
-  EXPECT_EQ(of(column), "");
+  EXPECT_EQ(of(column_scene), "");
   EXPECT_EQ(of(pressed_box), "");
 }
 
 TEST_F(Warnings, OfASceneWithoutWalls) {
-  const std::size_t begin = column.find("[[wall]]"), end = column.find("[[stage]]");
-  EXPECT_NE(of(std::string(column).erase(begin, end - begin)).find("no walls"), std::string::npos);
+  const std::size_t begin = column_scene.find("[[wall]]"), end = column_scene.find("[[stage]]");
+  EXPECT_NE(of(std::string(column_scene).erase(begin, end - begin)).find("no walls"), std::string::npos);
 }
 
 TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
   EXPECT_NE(
-      of(replaced(column, "-9.81", "9.81")).find("gravity of stage 'rest' is (0, 0, 9.81) m/s^2, upwards"),
+      of(replaced(column_scene, "-9.81", "9.81")).find("gravity of stage 'rest' is (0, 0, 9.81) m/s^2, upwards"),
       std::string::npos);
-  EXPECT_NE(of(replaced(column, "[0, 0, -9.81]", "[9.81, 0, 0]")).find("no wall stands against it"),
+  EXPECT_NE(of(replaced(column_scene, "[0, 0, -9.81]", "[9.81, 0, 0]")).find("no wall stands against it"),
             std::string::npos);
 }
 
 TEST_F(Warnings, OfADensityInOtherUnits) {
   EXPECT_NE(
-      of(replaced(column, "2600", "2.6")).find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
+      of(replaced(column_scene, "2600", "2.6")).find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
       std::string::npos);
-  EXPECT_NE(of(replaced(column, "2600", "2.6e6")).find("more than any element"), std::string::npos);
+  EXPECT_NE(of(replaced(column_scene, "2600", "2.6e6")).find("more than any element"), std::string::npos);
 }
 
 TEST_F(Warnings, AreInTheSummaryOfTheRun) {
-  write(at("scene.toml"), replaced(column, "2600", "2.6"));
+  write(at("scene.toml"), replaced(column_scene, "2600", "2.6"));
   ASSERT_EQ(run("run scene.toml --out results").code, 0);
   const auto warnings = summary(at("results")).at("warnings");
   ASSERT_EQ(warnings.size(), 1U);
@@ -70,7 +70,7 @@ TEST_F(Warnings, AreInTheSummaryOfTheRun) {
 
 /// A grain that bounces off the floor at 2 m/s, a fifth of its radius in a step.
 std::string bouncing() {
-  std::string scene = with_bodies(column);
+  std::string scene = with_bodies(column_scene);
   scene.replace(scene.find("[0, 0, -9.81]"), 13, "[0, 0, 0]");
   scene.replace(scene.find("friction = 0.35"), 15, "friction = 0\nrestitution = 0.5");
   scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");

@@ -8,14 +8,14 @@
 namespace talus::io {
 namespace {
 
-std::string scene_with(const std::string& top, const std::string& stages) {
+std::string timed_scene_with(const std::string& top, const std::string& stages) {
   return "box = true\n" + top +
          "\n[material]\ndensity = 2600\n[sample]\nkind = \"lattice\"\ncells = [2, 2, 2]\nradius = 0.01\n" +
          stages;
 }
 
 TEST(TimeStepKey, IsANumberOrAuto) {
-  const std::string text = scene_with("gravity = [0, 0, -9.81]\ntime_step = \"auto\"\ntime_step_max = 1e-3",
+  const std::string text = timed_scene_with("gravity = [0, 0, -9.81]\ntime_step = \"auto\"\ntime_step_max = 1e-3",
                                       "[[stage]]\nname = \"a\"\ntime_step_min = 1e-6\nend = { time = 1 }\n"
                                       "[[stage]]\nname = \"b\"\ntime_step = 1e-4\nend = { time = 1 }\n");
   for (const Scene& scene : {parse_scene(text, "s.toml"),
@@ -28,7 +28,7 @@ TEST(TimeStepKey, IsANumberOrAuto) {
     EXPECT_EQ(b.time_step, 1e-4);
   }
   const Scene fixed = parse_scene(
-      scene_with("gravity = [0, 0, -1]\ntime_step = \"auto\"", "[[stage]]\nend = { steps = 1 }\n"), "s.toml",
+      timed_scene_with("gravity = [0, 0, -1]\ntime_step = \"auto\"", "[[stage]]\nend = { steps = 1 }\n"), "s.toml",
       {"time_step=2e-3"});
   EXPECT_FALSE(fixed.setup.stages[0].chooses_time_step);
   EXPECT_EQ(fixed.setup.stages[0].time_step, 2e-3);
@@ -37,7 +37,7 @@ TEST(TimeStepKey, IsANumberOrAuto) {
 TEST(TimeStepKey, SaysWhatItLacks) {
   const auto message = [](const std::string& top) {
     try {
-      parse_scene(scene_with(top, "[[stage]]\nend = { steps = 1 }\n"), "s.toml");
+      parse_scene(timed_scene_with(top, "[[stage]]\nend = { steps = 1 }\n"), "s.toml");
     } catch (const SceneError& error) {
       return std::string(error.what());
     }

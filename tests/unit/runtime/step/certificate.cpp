@@ -14,14 +14,23 @@
 namespace talus::certificate_test {
 namespace {
 
-/// A problem with known answers. Those of velocity checks are given in turn, the last one again and again.
+/// A problem with known answers, those of checks of large and of small clusters given in turn, the last one
+/// again and again. Without errors of small clusters there are none.
 class KnownProblem : public WholeProblem {
  public:
-  KnownProblem(double plain_sweeps, std::vector<double> velocity_errors)
-      : plain_sweeps_(plain_sweeps), velocity_errors_(std::move(velocity_errors)) {}
+  KnownProblem(double plain_sweeps, std::vector<double> velocity_errors,
+               std::vector<double> small_errors = {})
+      : plain_sweeps_(plain_sweeps),
+        velocity_errors_(std::move(velocity_errors)),
+        small_errors_(std::move(small_errors)) {}
   double plain_sweeps_needed() override { return plain_sweeps_; }
   double speed() const override { return 1; }
-  double velocity_error(double enough) override {
+  bool small_clusters() override { return !small_errors_.empty(); }
+  bool large_clusters() override { return true; }
+  double small_error(double enough) override {
+    return std::max(enough, small_errors_[std::min(small_asked_++, small_errors_.size() - 1)]);
+  }
+  double large_error(double enough) override {
     const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
     return std::max(enough, velocity_errors_[which]);
   }
@@ -29,8 +38,8 @@ class KnownProblem : public WholeProblem {
 
  private:
   double plain_sweeps_;
-  std::vector<double> velocity_errors_;
-  std::size_t asked_ = 0;
+  std::vector<double> velocity_errors_, small_errors_;
+  std::size_t asked_ = 0, small_asked_ = 0;
 };
 
 /// What a check finds: the relative error, and the impulse of the one wall [N s].
@@ -49,6 +58,8 @@ struct Situation {
   std::vector<double> velocity_errors = {0};
   bool plain = true, other_ways = false;
   int admm_behind = -1;  ///< check behind which ADMM is called
+  std::vector<double> small_errors = {};
+  int newton_behind = -1;  ///< check behind which a Newton step is taken
 };
 
 CheckSums sums_of(const Found& found, std::int64_t contacts) {
@@ -64,6 +75,7 @@ struct Outcome {
   Verdict verdict = Verdict::go_on;
   IterationResult result;
   std::size_t velocity_checks = 0;
+  bool correctable = false;  ///< behind the last check
 };
 
 /// Tolerances 1e-3 on the error and 0.05 on the balance; at most 10,000 sweeps.
@@ -72,7 +84,7 @@ Outcome judged(const Situation& given, const CertificateThresholds& thresholds =
   settings.max_iterations = 10000;
   Certificate certificate(settings, thresholds);
   certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
-  KnownProblem problem(given.plain_sweeps, given.velocity_errors);
+  KnownProblem problem(given.plain_sweeps, given.velocity_errors, given.small_errors);
   Outcome outcome;
   for (std::size_t k = 0; k < given.checks.size(); ++k) {
     outcome.verdict = certificate.judge(sums_of(given.checks[k], given.contacts),
@@ -82,6 +94,8 @@ Outcome judged(const Situation& given, const CertificateThresholds& thresholds =
                                          .other_ways = given.other_ways},
                                         problem);
     if (static_cast<int>(k) == given.admm_behind) certificate.solved_by_admm({});
+    if (static_cast<int>(k) == given.newton_behind) certificate.corrected();
+    outcome.correctable = certificate.correctable();
   }
   outcome.result = certificate.result();
   outcome.velocity_checks = problem.asked();
@@ -123,6 +137,18 @@ TEST(Certificate, SaysWhatASituationIs) {
        .verdict = go_on,
        .plain_sweeps = 1e4,
        .velocity_errors = {0.5}},
+      {.what = "a small cluster far from its answer, though nothing else shows it",
+       .checks = {{0, 1}, {10, 1e-4}},
+       .verdict = go_on,
+       .small_errors = {0.5}},
+      {.what = "small clusters near it, but walls still change",
+       .checks = {{0, 1, 1}, {10, 1e-4, 2}},
+       .verdict = go_on,
+       .small_errors = {0}},
+      {.what = "a small cluster without a number",
+       .checks = {{0, 1}, {10, 1e-4}},
+       .verdict = go_on,
+       .small_errors = {nan}},
       {.what = "velocities near it, whatever walls do",
        .checks = {{0, 1, 1}, {10, 1e-4, 2}},
        .verdict = solved,
@@ -167,12 +193,12 @@ TEST(Certificate, EveryThresholdDecidesASituation) {
       {{.what = "first drift", .checks = {{0, 1, 1}, {2, 1e-4, 1.02}}, .verdict = go_on, .plain_sweeps = 1},
        [](T& t) { t.first_drift = 1; },
        solved},
-      {{.what = "tiny",
-        .checks = {{0, 1}, {10, 1e-4}},
+      {{.what = "settling behind a Newton step",
+        .checks = {{0, 1}, {10, 1e-4}, {19, 1e-4}},
         .verdict = go_on,
-        .contacts = 64,
-        .velocity_errors = {1}},
-       [](T& t) { t.tiny = 63; },
+        .small_errors = {1, 0},
+        .newton_behind = 1},
+       [](T& t) { t.settling_newton = 9; },
        solved},
       {named("cost of a velocity check", stiff), [](T& t) { t.velocity_check_cost = 501; }, solved},
       {named("stiffness for a size", stiff), [](T& t) { t.stiff_per_contact = 0.501; }, solved},
@@ -201,6 +227,19 @@ TEST(Certificate, EveryThresholdDecidesASituation) {
     row.change(changed);
     EXPECT_EQ(judged(row.situation, changed).verdict, row.otherwise) << row.situation.what << ", changed";
   }
+}
+
+TEST(Certificate, ANewtonStepIsOfferedAgainOnlyIfTheLastOneHelped) {
+  Situation given{.what = "",
+                  .checks = {{0, 1}, {10, 1e-4}, {20, 1e-4}},
+                  .verdict = Verdict::go_on,
+                  .small_errors = {1, 0.4},
+                  .newton_behind = 1};
+  EXPECT_TRUE(judged(given).correctable);
+  given.small_errors = {1, 0.6};
+  EXPECT_FALSE(judged(given).correctable);
+  given.small_errors = {1, 0.01};
+  EXPECT_FALSE(judged(given).correctable) << "within the tolerance nothing is to be mended";
 }
 
 TEST(Certificate, VelocitiesAreCheckedOnlyWhereTheStepMayEnd) {

@@ -6,7 +6,7 @@
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/step_report.hpp"
 
-namespace talus {
+namespace talus::coordination_test {
 namespace {
 
 /// Frictionless contacts that all carry, between grains, and of grains at one wall.
@@ -66,4 +66,4 @@ TEST(Coordination, WeightHoldsAGrainOnThree) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::coordination_test

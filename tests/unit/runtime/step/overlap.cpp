@@ -9,7 +9,7 @@
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus {
+namespace talus::overlap_test {
 namespace {
 
 constexpr double radius = 0.01, density = 2600, h = 1e-3;
@@ -150,4 +150,4 @@ TEST(Overlap, IsTheSameOnAnyRanks) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::overlap_test

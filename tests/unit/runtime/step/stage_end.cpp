@@ -7,7 +7,7 @@
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus {
+namespace talus::stage_end_test {
 namespace {
 
 constexpr double radius = 0.01, h = 1e-3;
@@ -64,4 +64,4 @@ TEST(Equilibrium, HoldIsPartOfASavedState) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::stage_end_test

@@ -11,7 +11,7 @@
 #include "runtime/step/simulation.hpp"
 #include "tests/unit/dense_sample.hpp"
 
-namespace talus {
+namespace talus::time_step_test {
 namespace {
 
 constexpr double radius = 0.01, density = 2600, infinity = std::numeric_limits<double>::infinity();
@@ -224,4 +224,4 @@ TEST(ChosenTimeStep, NeedsABoundWithoutGravity) {
 }
 
 }  // namespace
-}  // namespace talus
+}  // namespace talus::time_step_test
