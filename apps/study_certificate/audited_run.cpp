@@ -40,6 +40,15 @@ Start start_of(const Simulation& simulation) {
   return {simulation.frame(false), simulation.state().walls, simulation.stage()};
 }
 
+/// With Moreau's law the step's problem is one of mean velocities, (V + E V-)/(1 + E).
+Frame mean_of_impact(double E, const Frame& before, const Frame& after) {
+  Frame mean = after;
+  for (std::size_t k = 0; k < mean.u.size(); ++k) mean.u[k] = (after.u[k] + E * before.u[k]) / (1 + E);
+  for (std::size_t w = 0; w < mean.walls.size(); ++w)
+    mean.walls[w].velocity = (after.walls[w].velocity + E * before.walls[w].velocity) / (1 + E);
+  return mean;
+}
+
 void judge(const StepProblem& problem, const Start& start, const Frame& after, const ReferenceLimits& limits,
            AuditedStep& step) {
   step.contacts = static_cast<std::int64_t>(problem.contacts.size());
@@ -48,7 +57,8 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
   clusters_of(problem, clusters);
   step.clusters = static_cast<std::int64_t>(clusters);
   const RunImpulses run = impulses_of(problem, after);
-  const StepEnd end{after, run.r};
+  const Frame mean = mean_of_impact(problem.reflection, start.before, after);
+  const StepEnd end{mean, run.r};
   const double apart = disagreement(problem, end);
   if (run.unknown > 0 || apart > rounding) {
     step.judged = Judged::other_problem;

@@ -13,9 +13,9 @@ namespace talus::audit {
 
 namespace {
 
-/// Numbers that decide which pairs are contacts.
+/// Numbers that decide which pairs are contacts. E: 0 with Newton's law, else the largest restitution.
 struct GapNumbers {
-  double h, alert, slow, overlap_correction;
+  double h, alert, slow, E;
 };
 
 /// A pair on its way through the step.
@@ -28,11 +28,13 @@ struct Approach {
 /// Whether the pair is a contact; then its bias (docs/theory.md, "Gap term and restitution").
 bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, double& bias) {
   if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
-  bias = (pair.gap > 0 ? pair.gap : numbers.overlap_correction * pair.gap) / numbers.h;
+  bias = std::max(0.0, pair.gap) / numbers.h;
   if (restitution > 0 && std::abs(pair.v_n) > numbers.slow) {
     if (pair.gap > 0) return false;
     bias = restitution * pair.v_n;
   }
+  // Moreau's law: of the mean velocity (v + E v-)/(1 + E).
+  if (numbers.E > 0) bias = std::max(0.0, bias - numbers.E * pair.v_n) / (1 + numbers.E);
   return true;
 }
 
@@ -54,11 +56,16 @@ class Builder {
     double smallest = INFINITY;
     for (double radius : in_.before.radius) smallest = std::min(smallest, radius);
     numbers_ = {h, in_.setup.detection.alert > 0 ? in_.setup.detection.alert : 0.1 * smallest,
-                2 * h * in_.stage.gravity.norm(), in_.setup.solver.overlap_correction};
+                2 * h * in_.stage.gravity.norm(),
+                in_.setup.solver.restitution_law == RestitutionLaw::moreau
+                    ? in_.stage.laws.largest(&PairLaw::restitution)
+                    : 0};
+    acts_ = h / (1 + numbers_.E);
   }
 
   StepProblem build() {
-    made_.time_step = numbers_.h;
+    made_.time_step = acts_;
+    made_.reflection = numbers_.E;
     made_.gravity = in_.stage.gravity;
     take_grains();
     take_walls();
@@ -78,7 +85,7 @@ class Builder {
       const double m = in_.bodies.mass(s), R = in_.before.radius[k];
       made_.mass.push_back(m);
       made_.spin_mobility.push_back(turns ? 2.5 / m : 0);
-      made_.free.u.push_back(in_.before.u[k] + numbers_.h * in_.stage.gravity);
+      made_.free.u.push_back(in_.before.u[k] + acts_ * in_.stage.gravity);
       made_.free.w.push_back(in_.before.omega.empty() ? Vec3::Zero() : Vec3(R * in_.before.omega[k]));
       middle_.push_back(in_.before.x[k] + numbers_.h / 2 * in_.before.u[k]);
       material_.push_back(in_.bodies.material.empty() ? material_of_grains : in_.bodies.material[s]);
@@ -88,7 +95,7 @@ class Builder {
   void take_walls() {
     for (std::size_t w = 0; w < in_.walls.size(); ++w) {
       const Wall& wall = in_.walls[w];
-      const double gain = numbers_.h * in_.loads[w] * wall.inv_mass();
+      const double gain = acts_ * in_.loads[w] * wall.inv_mass();
       made_.wall_normal.push_back(wall.normal);
       made_.wall_inv_mass.push_back(wall.inv_mass());
       made_.wall_load.push_back(in_.loads[w]);
@@ -155,6 +162,7 @@ class Builder {
   const StepInput& in_;
   std::size_t n_;
   GapNumbers numbers_{};
+  double acts_ = 0;  ///< StepProblem::time_step
   StepProblem made_;
   std::vector<Vec3> middle_;
   std::vector<Material> material_;

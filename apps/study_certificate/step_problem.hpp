@@ -34,7 +34,8 @@ struct Motion {
 
 /// n grains in the order of the frame, k walls (planes, which move along their normals only where pushed).
 struct StepProblem {
-  double time_step = 0;               ///< [s]
+  double time_step = 0;               ///< loads act so long on the velocities that are found: h/(1 + E) [s]
+  double reflection = 0;              ///< E of Moreau's law: those are (V + E V-)/(1 + E)
   Vec3 gravity = Vec3::Zero();        ///< [m/s^2]
   std::vector<double> mass;           ///< n [kg]
   std::vector<double> spin_mobility;  ///< n, R^2/I [1/kg]; 0 where a grain does not turn

@@ -6,8 +6,6 @@
 
 namespace talus {
 
-
-
 /// rho H_i H_i^T of one contact of spheres, m = +-n.
 void BodySystem::add_own_block(const Vec3& m, double rho, std::int32_t kind, Matrix6& block) {
   if (kind == slick) {

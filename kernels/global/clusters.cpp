@@ -36,8 +36,8 @@ class DisjointSets {
   std::vector<std::int32_t> parent_;
 };
 
-/// The clusters of one part, numbered by their lowest bodies. Shared bodies may have their contacts elsewhere:
-/// each is in a cluster.
+/// The clusters of one part, numbered by their lowest bodies. Shared bodies may have their contacts
+/// elsewhere: each is in a cluster.
 std::pair<std::vector<std::int32_t>, std::int32_t> clusters_within(const ContactGraph& graph) {
   DisjointSets sets(graph.mass.size());
   std::vector<char> touched(graph.mass.size(), 0);
@@ -62,9 +62,9 @@ std::pair<std::vector<std::int32_t>, std::int32_t> clusters_within(const Contact
 /// Rows of different lengths: padded with `filler` to the longest of all parts.
 std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,
                                   double filler) {
-  const std::vector<double> lengths = rows_of(link, rows.size(), 1, [&](std::size_t p, std::span<double> row) {
-    row[0] = static_cast<double>(rows[p].size());
-  });
+  const std::vector<double> lengths =
+      rows_of(link, rows.size(), 1,
+              [&](std::size_t p, std::span<double> row) { row[0] = static_cast<double>(rows[p].size()); });
   const auto most = static_cast<std::size_t>(*std::max_element(lengths.begin(), lengths.end()));
   if (most == 0) return {};
   return rows_of(link, rows.size(), most, [&](std::size_t p, std::span<double> row) {
@@ -80,7 +80,8 @@ void count_bodies(std::span<const ContactGraph> parts, const PartLink& link, Clu
   link.each(parts.size(), [&](std::size_t p) {
     clusters.bodies[p].assign(at(clusters.count[p]), 0);
     for (std::size_t b = 0; b < clusters.of_body[p].size(); ++b)
-      if (clusters.of_body[p][b] >= 0 && parts[p].counted(b)) ++clusters.bodies[p][at(clusters.of_body[p][b])];
+      if (clusters.of_body[p][b] >= 0 && parts[p].counted(b))
+        ++clusters.bodies[p][at(clusters.of_body[p][b])];
   });
   if (several == 0) return;
   const std::vector<double> sums =
@@ -97,8 +98,8 @@ void count_bodies(std::span<const ContactGraph> parts, const PartLink& link, Clu
 
 /// Which clusters of the parts are one, through bodies that they share: numbers them.
 void join_clusters(std::span<const ContactGraph> parts, const PartLink& link, Clusters& clusters) {
-  // Names of clusters that are unlike in all parts: the subdomain, then the number there. The body that counts
-  // tells its copies the name of its own.
+  // Names of clusters that are unlike in all parts: the subdomain, then the number there. The body that
+  // counts tells its copies the name of its own.
   PartField name(parts.size());
   link.each(parts.size(), [&](std::size_t p) {
     name[p].resize(parts[p].mass.size());
@@ -173,17 +174,18 @@ std::int32_t largest_cluster(const Clusters& clusters, const PartLink& link) {
   return static_cast<std::int32_t>(*std::max_element(rows.begin(), rows.end()));
 }
 
-std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least, std::int32_t most) {
+std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least,
+                                              std::int32_t most) {
   std::vector<std::vector<char>> in(clusters.of_body.size());
   for (std::size_t p = 0; p < in.size(); ++p)
     for (const std::int32_t c : clusters.of_body[p])
-      in[p].push_back(c >= 0 && clusters.bodies[p][at(c)] >= least && clusters.bodies[p][at(c)] <= most ? 1 : 0);
+      in[p].push_back(c >= 0 && clusters.bodies[p][at(c)] >= least && clusters.bodies[p][at(c)] <= most ? 1
+                                                                                                        : 0);
   return in;
 }
 
 ClusterRows rows_of_clusters(const BodyParts& parts, const Clusters& clusters, std::size_t sums,
-                             std::size_t maxima,
-                             const std::function<void(std::size_t, ClusterRows&)>& fill) {
+                             std::size_t maxima, const std::function<void(std::size_t, ClusterRows&)>& fill) {
   ClusterRows result{sums, maxima, std::vector<std::vector<double>>(parts.size())};
   const std::size_t width = result.width(), row = at(clusters.several) * width;
   parts.each([&](std::size_t p) {

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Connected clusters of contacts, and sums over each of them: an error of one chain must not be hidden by the
-/// mean of a large sample.
+/// Connected clusters of contacts, and sums over each of them: an error of one chain must not be hidden by
+/// the mean of a large sample.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace talus {
 
-/// Bodies that are joined by contacts, over any number of parts. Driven and fixed walls join nothing; a wall of
-/// finite mass is a body like others.
+/// Bodies that are joined by contacts, over any number of parts. Driven and fixed walls join nothing; a wall
+/// of finite mass is a body like others.
 struct Clusters {
   std::vector<std::vector<std::int32_t>> of_body;   ///< per part and unknown; -1: no contact there
   std::vector<std::int32_t> count;                  ///< per part
@@ -29,8 +29,8 @@ struct Clusters {
   }
 };
 
-/// Collective: one sum over copies and, with several parts, three gathers, of as many numbers as there are pairs
-/// of clusters that meet at a border.
+/// Collective: one sum over copies and, with several parts, three gathers, of as many numbers as there are
+/// pairs of clusters that meet at a border.
 Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link);
 
 /// Numbers per cluster: per part `count` rows of `sums + maxima` numbers.
@@ -50,15 +50,17 @@ struct ClusterRows {
 /// The largest number of bodies in a cluster; 0 without contacts. Collective.
 std::int32_t largest_cluster(const Clusters& clusters, const PartLink& link);
 /// Per part and unknown, 1 in clusters of at least `least` and at most `most` bodies, else 0.
-std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least, std::int32_t most);
+std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least,
+                                              std::int32_t most);
 
-/// Calls fill(part, rows) to add to the rows of each part, from 0, then adds up (or takes the largest of) what
-/// parts have of a cluster, in order of subdomain: every part that holds some of it gets the same. Collective.
+/// Calls fill(part, rows) to add to the rows of each part, from 0, then adds up (or takes the largest of)
+/// what parts have of a cluster, in order of subdomain: every part that holds some of it gets the same.
+/// Collective.
 ClusterRows rows_of_clusters(const BodyParts& parts, const Clusters& clusters, std::size_t sums,
-                             std::size_t maxima,
-                             const std::function<void(std::size_t, ClusterRows&)>& fill);
+                             std::size_t maxima, const std::function<void(std::size_t, ClusterRows&)>& fill);
 
-/// The largest of value(part, cluster) over all clusters of all parts, at least 0; NaN where one is. Collective.
+/// The largest of value(part, cluster) over all clusters of all parts, at least 0; NaN where one is.
+/// Collective.
 double largest_of_clusters(const BodyParts& parts, const Clusters& clusters,
                            const std::function<double(std::size_t, std::int32_t)>& value);
 

@@ -193,19 +193,20 @@ class Round {
              const PartField& motion, PartField& then, std::vector<std::vector<double>>& before, int k,
              Correction& result) {
     enum { found, change, mass, energy, width };
-    const ClusterRows rows = rows_of_clusters(parts, clusters_, width, 0, [&](std::size_t p, ClusterRows& to) {
-      for (std::size_t b = 0; b < motion[p].size(); ++b) {
-        const std::int32_t cluster = clusters_.of_body[p][b];
-        if (cluster < 0 || !parts[p].counted(b)) continue;
-        const BodyUnknown& body = parts[p].bodies[b];
-        const std::span<double> row = to.of(p, cluster);
-        const Twist &now = motion[p][b], &old = then[p][b];
-        row[found] += body.mass * now.u.norm() + body.spin_mass * now.w.norm();
-        row[change] += body.mass * (now.u - old.u).norm() + body.spin_mass * (now.w - old.w).norm();
-        row[mass] += body.mass;
-        row[energy] += dot(solver.residual()[p][b], solver.preconditioned()[p][b]);
-      }
-    });
+    const ClusterRows rows =
+        rows_of_clusters(parts, clusters_, width, 0, [&](std::size_t p, ClusterRows& to) {
+          for (std::size_t b = 0; b < motion[p].size(); ++b) {
+            const std::int32_t cluster = clusters_.of_body[p][b];
+            if (cluster < 0 || !parts[p].counted(b)) continue;
+            const BodyUnknown& body = parts[p].bodies[b];
+            const std::span<double> row = to.of(p, cluster);
+            const Twist &now = motion[p][b], &old = then[p][b];
+            row[found] += body.mass * now.u.norm() + body.spin_mass * now.w.norm();
+            row[change] += body.mass * (now.u - old.u).norm() + body.spin_mass * (now.w - old.w).norm();
+            row[mass] += body.mass;
+            row[energy] += dot(solver.residual()[p][b], solver.preconditioned()[p][b]);
+          }
+        });
     const double worst = largest_of_clusters(parts, clusters_, [&](std::size_t p, std::int32_t c) {
       const std::span<const double> row = rows.of(p, c);
       const double bound = thresholds_.caution * std::sqrt(row[mass] * std::max(0.0, row[energy]));
@@ -225,21 +226,22 @@ class Round {
   bool take_multipliers(const BodyParts& parts, const PartField& motion,
                         const std::vector<std::vector<double>>& enough, Correction& result) {
     enum { missed, found, width };
-    const ClusterRows rows = rows_of_clusters(parts, clusters_, width, 0, [&](std::size_t p, ClusterRows& to) {
-      for (std::size_t k = 0; k < all_[p].contacts.size(); ++k)
-        if (sets_[p].state[k] == ContactState::open) sets_[p].change[k] = -all_[p].impulse[k];
-      for (std::size_t a = 0; a < active_[p].origin.size(); ++a) {
-        const std::size_t k = active_[p].origin[a];
-        const ContactEquation& c = problems_[p].contacts[a];
-        const Vec3 wish = constrained(c, sets_[p].wish(all_[p], k));
-        const Vec3 rest = wish - constrained(c, relative_velocity(c, motion[p]));
-        sets_[p].change[k] = multiplier(p, a) + rho_[p][a] * rest + sets_[p].known(all_[p], k);
-        to.of(p, clusters_.of_contact(p, c))[missed] += effective_mass(problems_[p], c) * rest.norm();
-      }
-      for (std::size_t b = 0; b < motion[p].size(); ++b)
-        if (const std::int32_t cluster = clusters_.of_body[p][b]; cluster >= 0 && parts[p].counted(b))
-          to.of(p, cluster)[found] += parts[p].bodies[b].mass * motion[p][b].u.norm();
-    });
+    const ClusterRows rows =
+        rows_of_clusters(parts, clusters_, width, 0, [&](std::size_t p, ClusterRows& to) {
+          for (std::size_t k = 0; k < all_[p].contacts.size(); ++k)
+            if (sets_[p].state[k] == ContactState::open) sets_[p].change[k] = -all_[p].impulse[k];
+          for (std::size_t a = 0; a < active_[p].origin.size(); ++a) {
+            const std::size_t k = active_[p].origin[a];
+            const ContactEquation& c = problems_[p].contacts[a];
+            const Vec3 wish = constrained(c, sets_[p].wish(all_[p], k));
+            const Vec3 rest = wish - constrained(c, relative_velocity(c, motion[p]));
+            sets_[p].change[k] = multiplier(p, a) + rho_[p][a] * rest + sets_[p].known(all_[p], k);
+            to.of(p, clusters_.of_contact(p, c))[missed] += effective_mass(problems_[p], c) * rest.norm();
+          }
+          for (std::size_t b = 0; b < motion[p].size(); ++b)
+            if (const std::int32_t cluster = clusters_.of_body[p][b]; cluster >= 0 && parts[p].counted(b))
+              to.of(p, cluster)[found] += parts[p].bodies[b].mass * motion[p][b].u.norm();
+        });
     const double worst = largest_of_clusters(parts, clusters_, [&](std::size_t p, std::int32_t c) {
       const std::span<const double> row = rows.of(p, c);
       result.errors.of(p, c)[Correction::missed] = row[missed];
@@ -321,14 +323,15 @@ Correction correction_of(std::span<const BodyProblem> problems, const PartLink& 
                  ? 1
                  : 0;
     });
+    result.settled = unsettled == 0;
     const double error = worst_error();
     ++since;
-    if (error < least) {
+    if (error < least || result.settled) {
       least = error;
       best = result;
       since = 0;
     }
-    if (unsettled == 0) break;
+    if (result.settled) break;
   }
   best.rounds = result.rounds;
   best.linear_iterations = result.linear_iterations;

@@ -50,6 +50,7 @@ struct Correction {
   enum Row { found, missed, open, left, width };
   ClusterRows errors;
   int rounds = 0, linear_iterations = 0;
+  bool settled = false;  ///< no contact changed its state any more, but for what is small
 
   /// Of a cluster, all of it.
   double error(std::size_t part, std::int32_t cluster) const {

@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/index.hpp"
 #include "kernels/bodies/larger.hpp"
+#include "kernels/global/balance.hpp"
 #include "kernels/global/stiffness.hpp"
 #include "kernels/law/friction_cone.hpp"
 
@@ -42,8 +43,8 @@ ClusterRows measures_of(const BodyParts& parts, const Clusters& clusters, const 
       const std::span<double> row = to.of(p, cluster);
       row[mass] += body.mass;
       row[incoming] += kinetic2(body, body.free.u, body.free.w);
-      row[gained] += body.mass * (V[p][b].u - body.free.u).norm() +
-                     body.spin_mass * (V[p][b].w - body.free.w).norm();
+      row[gained] +=
+          body.mass * (V[p][b].u - body.free.u).norm() + body.spin_mass * (V[p][b].w - body.free.w).norm();
     }
     for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
@@ -70,8 +71,9 @@ double scale_of(std::span<const double> row, const StepErrorThresholds& threshol
 
 /// Of all parts together, from what each has.
 Measures total_measures(const BodyParts& parts, std::span<const Measures> own) {
-  const std::vector<double> rows = parts.rows(
-      measures, [&](std::size_t p, std::span<double> row) { std::copy(own[p].begin(), own[p].end(), row.begin()); });
+  const std::vector<double> rows = parts.rows(measures, [&](std::size_t p, std::span<double> row) {
+    std::copy(own[p].begin(), own[p].end(), row.begin());
+  });
   Measures all{};
   for (std::size_t k = 0; k < rows.size(); ++k) add_measure(all, k % measures, rows[k]);
   return all;
@@ -113,28 +115,33 @@ double wall_error(const BodyParts& parts, const PartImpulses& change) {
   return scale > 0 ? error / scale : 0;
 }
 
-/// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times that
-/// of all, or of what the cluster's bodies exchange.
+/// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times
+/// that of all, or of what the cluster's bodies exchange.
 double contact_error(const BodyParts& parts, const Clusters& clusters, const PartImpulses& changes,
                      const std::vector<std::vector<double>>& scales, double interest) {
   enum { impulse, change, width };
-  const ClusterRows rows =
-      rows_of_clusters(parts, clusters, 0, width, [&](std::size_t p, ClusterRows& to) {
-        for (std::size_t k = 0; k < parts[p].contacts.size(); ++k) {
-          const std::span<double> row = to.of(p, clusters.of_contact(p, parts[p].contacts[k]));
-          const Vec3& by = changes[p][k];
-          row[impulse] = larger(row[impulse], (parts[p].impulse[k] + by).norm());
-          row[change] = larger(row[change], by.norm());
-        }
-      });
-  const double most = largest_of_clusters(parts, clusters, [&](std::size_t p, std::int32_t c) {
-    return rows.of(p, c)[impulse];
+  const ClusterRows rows = rows_of_clusters(parts, clusters, 0, width, [&](std::size_t p, ClusterRows& to) {
+    for (std::size_t k = 0; k < parts[p].contacts.size(); ++k) {
+      const std::span<double> row = to.of(p, clusters.of_contact(p, parts[p].contacts[k]));
+      const Vec3& by = changes[p][k];
+      row[impulse] = larger(row[impulse], (parts[p].impulse[k] + by).norm());
+      row[change] = larger(row[change], by.norm());
+    }
   });
+  const double most = largest_of_clusters(
+      parts, clusters, [&](std::size_t p, std::int32_t c) { return rows.of(p, c)[impulse]; });
   return largest_of_clusters(parts, clusters, [&](std::size_t p, std::int32_t c) {
     const std::span<const double> row = rows.of(p, c);
-    return row[change] > 0 ? row[change] / std::max({row[impulse], interest * most, interest * scales[p][at(c)]})
-                           : 0;
+    return row[change] > 0
+               ? row[change] / std::max({row[impulse], interest * most, interest * scales[p][at(c)]})
+               : 0;
   });
+}
+
+bool has_friction(const BodyParts& parts) {
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    for (const ContactEquation& c : parts[p].contacts) row[0] += c.mu > 0 ? 1 : 0;
+  })[0] > 0;
 }
 
 }  // namespace
@@ -156,8 +163,10 @@ StepError step_error(std::span<const BodyProblem> problems, const PartLink& link
       const std::span<const double> row = rows.of(p, c);
       const double share = all[mass] > 0 ? row[mass] / all[mass] : 0;
       // What rounding makes must pass whatever is asked.
-      const double still = row[mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
-      scales[p].push_back(std::max({scale_of(row, thresholds), thresholds.interest * everywhere * share, still}));
+      const double still =
+          row[mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
+      scales[p].push_back(
+          std::max({scale_of(row, thresholds), thresholds.interest * everywhere * share, still}));
       goals[p].push_back(goal.enough * scales[p].back());
     }
   });
@@ -172,10 +181,16 @@ StepError step_error(std::span<const BodyProblem> problems, const PartLink& link
   const PartImpulses change = admissible_change(parts, error.correction);
   error.wall = wall_error(parts, change);
   error.contact = contact_error(parts, clusters, change, scales, thresholds.interest);
+  if (!error.correction.settled && has_friction(parts)) {
+    std::vector<BodyProblem> used(problems.begin(), problems.end());
+    const double one_solve = velocity_error(used, link, goal.enough).relative;
+    for (double* found : {&error.velocity, &error.wall, &error.contact}) *found = std::min(*found, one_solve);
+  }
   return error;
 }
 
-StepError step_error(const BodyProblem& problem, const ErrorGoal& goal, const StepErrorThresholds& thresholds) {
+StepError step_error(const BodyProblem& problem, const ErrorGoal& goal,
+                     const StepErrorThresholds& thresholds) {
   const PartLink alone;
   return step_error({&problem, 1}, alone, goal, thresholds);
 }

@@ -43,6 +43,10 @@ struct ErrorGoal {
 /// has settled, the velocities are exact but for what the linear solver leaves; elsewhere what is unsettled
 /// counts as error.
 ///
+/// With friction the step may not settle, and what it then finds can be any multiple of the error. There the
+/// estimate of balance.hpp, which asks for one linear solve of the contacts as they are and has no rounds of
+/// states, stands in for all three where it is smaller.
+///
 /// The scale of a cluster is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
 /// it; or the speed of driven walls times its mass, if that is more; where no wall is driven, at least a
 /// hundredth (StepErrorThresholds::interest) of the impulses at walls, as grains pressed at rest gain

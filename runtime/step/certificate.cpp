@@ -102,8 +102,8 @@ bool Certificate::checks_velocities(WholeProblem& whole) const {
                                      whole.plain_sweeps_needed() >= stiff_for(result_.contacts));
 }
 
-/// The last answer where nothing can have changed it, a guess from the residual where that is too large, else a
-/// new one.
+/// The last answer where nothing can have changed it, a guess from the residual where that is too large, else
+/// a new one.
 double Certificate::repeated(WholeCheck& then, const std::function<double(double)>& ask) {
   const double tolerance = settings_.balance_tolerance;
   const int done = result_.iterations;

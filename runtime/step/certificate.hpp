@@ -59,7 +59,8 @@ struct CertificateThresholds {
   int settling_newton = 10;
   /// A Newton step helps when the next check finds less than this part of the error before, in (0, 1).
   double newton_gain = 0.5;
-  /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0, 1).
+  /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0,
+  /// 1).
   double velocity_resolution = 0.2;
   /// It is repeated when the sweeps done have grown by this factor, > 1, if the residual has not fallen far
   /// enough before to promise a balance within the tolerance.
@@ -78,8 +79,8 @@ class WholeProblem {
   /// There are clusters of contacts small enough for a direct solve; others.
   virtual bool small_clusters() = 0;
   virtual bool large_clusters() = 0;
-  /// Relative error of what the impulses of the last check give; what is below `enough` is not told apart. Of the
-  /// worst small cluster, in velocities and forces (kernels/global/step_error.hpp); of the large ones, in
+  /// Relative error of what the impulses of the last check give; what is below `enough` is not told apart. Of
+  /// the worst small cluster, in velocities and forces (kernels/global/step_error.hpp); of the large ones, in
   /// velocities (balance.hpp).
   virtual double small_error(double enough) = 0;
   virtual double large_error(double enough) = 0;
@@ -134,8 +135,8 @@ class Certificate {
     return thresholds_.stiff_per_contact * static_cast<double>(contacts);
   }
 
-  /// The last check has found small clusters in error, and the Newton step that would mend them; the one before
-  /// it, if any was taken in this step, had helped.
+  /// The last check has found small clusters in error, and the Newton step that would mend them; the one
+  /// before it, if any was taken in this step, had helped.
   bool correctable() const;
   /// It was taken: sweeps that follow are a new start.
   void corrected();
@@ -153,7 +154,9 @@ class Certificate {
   /// Per wall, at the last check [N s].
   const std::vector<Vec3>& wall_impulses() const { return wall_impulses_.back(); }
   /// Sweeps done when those that count began: ADMM is a new start.
-  int started_at() const { return result_.stiff_calls + result_.corrections == 0 ? 0 : history_[history_.start()].iterations; }
+  int started_at() const {
+    return result_.stiff_calls + result_.corrections == 0 ? 0 : history_[history_.start()].iterations;
+  }
 
  private:
   void measure(const CheckSums& sums);

@@ -11,8 +11,7 @@ namespace talus {
 class PresentProblem final : public WholeProblem {
  public:
   /// Keeps references.
-  PresentProblem(const StepState& state, Admm& admm, const Courses& courses,
-                 const Certificate& certificate)
+  PresentProblem(const StepState& state, Admm& admm, const Courses& courses, const Certificate& certificate)
       : state_(state), admm_(admm), courses_(courses), certificate_(certificate) {}
 
   /// Collective, where candidates were found anew.
