@@ -181,7 +181,7 @@ StepError step_error(std::span<const BodyProblem> problems, const PartLink& link
   const PartImpulses change = admissible_change(parts, error.correction);
   error.wall = wall_error(parts, change);
   error.contact = contact_error(parts, clusters, change, scales, thresholds.interest);
-  if (!error.correction.settled && has_friction(parts)) {
+  if (!error.correction.settled && !(error.relative() <= thresholds.nonsense) && has_friction(parts)) {
     std::vector<BodyProblem> used(problems.begin(), problems.end());
     const double one_solve = velocity_error(used, link, goal.enough).relative;
     for (double* found : {&error.velocity, &error.wall, &error.contact}) *found = std::min(*found, one_solve);

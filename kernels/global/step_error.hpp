@@ -18,6 +18,8 @@ struct StepErrorThresholds {
   /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them; and
   /// of what all clusters do, per mass; and of the largest impulse of all, for those of its contacts.
   double interest = 1e-2;
+  /// With friction an error above this, > 0, from rounds that have not settled says nothing.
+  double nonsense = 1;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = 1e-12;
 };
@@ -45,7 +47,7 @@ struct ErrorGoal {
 ///
 /// With friction the step may not settle, and what it then finds can be any multiple of the error. There the
 /// estimate of balance.hpp, which asks for one linear solve of the contacts as they are and has no rounds of
-/// states, stands in for all three where it is smaller.
+/// states, stands in for all three where they are above `nonsense`.
 ///
 /// The scale of a cluster is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
 /// it; or the speed of driven walls times its mass, if that is more; where no wall is driven, at least a

@@ -162,6 +162,9 @@ double Admm::sweeps_needed() const {
 }
 
 void Admm::find_clusters(int most_direct) {
+  small_ = false;
+  large_ = true;
+  if (most_direct == 0) return;
   const Whole span(*this);
   const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
   const Clusters clusters = clusters_of(graphs, *link_);
@@ -171,7 +174,7 @@ void Admm::find_clusters(int most_direct) {
         for (const auto& [first, second] : graphs[p].pairs)
           row[in_small_[p][static_cast<std::size_t>(first)] != 0 ? 0 : 1] = 1;
       });
-  small_ = large_ = false;
+  large_ = false;
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
 

@@ -32,7 +32,8 @@ class Admm {
   /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
   double sweeps_needed() const;
 
-  /// Finds the clusters of the step's contacts. Those of at most `most_direct` bodies are small.
+  /// Finds the clusters of the step's contacts. Those of at most `most_direct` bodies are small;
+  /// with 0 none is, and nothing is asked.
   void find_clusters(int most_direct);
   bool small_clusters() const { return small_; }  ///< there are some, in any part
   bool large_clusters() const { return large_; }

@@ -98,6 +98,7 @@ double Certificate::drift() const {
 
 bool Certificate::checks_velocities(WholeProblem& whole) const {
   if (!whole.large_clusters()) return false;
+  if (result_.contacts <= thresholds_.tiny) return result_.contacts > 0;
   return result_.stiff_calls > 0 || (whole.sweeps_needed() >= thresholds_.velocity_check_cost &&
                                      whole.plain_sweeps_needed() >= stiff_for(result_.contacts));
 }

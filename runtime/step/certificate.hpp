@@ -47,7 +47,10 @@ struct CertificateThresholds {
   /// 1. Where a few sweeps follow warm impulses in a pile, up to six times as much is still to come (`talus
   /// study stability`, time-step-pile).
   double first_drift = 4;
-  /// Clusters of at most so many bodies are checked by a direct solve in every step, >= 0.
+  /// In large clusters velocities are checked in problems of at most so many contacts, >= 0, whatever they
+  /// need.
+  std::int64_t tiny = 64;
+  /// Clusters of at most so many bodies are small, >= 0: checked by a direct solve in every step.
   int most_direct = 200;
   /// In larger ones, where at least so many sweeps are needed, > 0: about what a velocity check costs.
   double velocity_check_cost = 100;

@@ -17,7 +17,8 @@ class PresentProblem final : public WholeProblem {
   /// Collective, where candidates were found anew.
   void plan(const graph::Communicator& ranks);
   /// Of each step.
-  void begin() {
+  void begin(bool friction) {
+    friction_ = friction;
     stiffness_.begin_step();
     clusters_known_ = false;
   }
@@ -48,6 +49,7 @@ class PresentProblem final : public WholeProblem {
   const Courses& courses_;
   const Certificate& certificate_;
   StiffnessMemory stiffness_;
+  bool friction_ = false;
   bool clusters_known_ = false;  ///< of this step
   double candidates_ = 0;
   double farthest_ = 0;  ///< largest coordinate of a body [m]

@@ -161,7 +161,7 @@ void SolverLoop::begin() {
   for (const WallState& wall : state_.wall_states)
     scales.wall_pushes.push_back(parameters_.impulse_time() * wall.applied);
   certificate_.begin(std::move(scales));
-  problem_.begin();
+  problem_.begin(parameters_.friction);
   pending_.reset();
   schedule_ = {};
   method_ =

@@ -152,7 +152,7 @@ TEST(StabilityVerdict, KeepsTheErrorThatIsKnownOfAStepThatMissed) {
   // No truth holds behind that step.
   const Outcome outcome = run_scene(named("fast-wall-5"), {});
   ASSERT_EQ(outcome.verdict, Verdict::honest);
-  ASSERT_EQ(outcome.missed, 1);
+  ASSERT_GE(outcome.missed, 1);
   EXPECT_GT(outcome.true_error, 0.1);
 }
 

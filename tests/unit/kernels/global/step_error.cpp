@@ -1,0 +1,131 @@
+// The error of steps in small clusters of contacts, against closed forms, and the Newton step that mends it.
+
+#include "kernels/global/step_error.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "kernels/global/newton_step.hpp"
+
+namespace talus::step_error_test {
+namespace {
+
+constexpr double fall = 9.81e-3;  ///< g h [m/s]
+
+std::int32_t add_grain(BodyProblem& problem, const Vec3& x, double mu) {
+  BodyUnknown body;
+  body.mass = 1;
+  body.spin_mass = mu > 0 ? 0.4 : 0;
+  body.radius = 0.01;
+  body.x = x;
+  body.free.u = Vec3(0, 0, -fall);
+  problem.bodies.push_back(body);
+  problem.grains = problem.bodies.size();
+  return static_cast<std::int32_t>(problem.grains) - 1;
+}
+
+/// `wall`: its number, where `second` is -1.
+void add_contact(BodyProblem& problem, std::int32_t first, std::int32_t second, const Vec3& normal, double mu,
+                 std::int32_t wall = -1) {
+  ContactEquation contact;
+  contact.normal = normal;
+  contact.offset = Vec3::Zero();
+  contact.mu = mu;
+  contact.first = first;
+  contact.second = second;
+  contact.wall = wall;
+  problem.contacts.push_back(contact);
+  problem.impulse.push_back(Vec3::Zero());
+}
+
+/// A grain in a V of half angle `a`: each wall carries m g h/(2 sin a).
+BodyProblem wedge(double a, double mu) {
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), mu);
+  add_contact(problem, grain, -1, Vec3(std::cos(a), 0, std::sin(a)), mu, 0);
+  add_contact(problem, grain, -1, Vec3(-std::cos(a), 0, std::sin(a)), mu, 1);
+  return problem;
+}
+
+/// One grain on the other on a floor, wall 0; impulses `part` of what they carry at rest.
+void add_column(BodyProblem& problem, int grains, double x, double part) {
+  std::int32_t below = -1;
+  for (int k = 0; k < grains; ++k) {
+    const std::int32_t grain = add_grain(problem, Vec3(x, 0, 0.02 * k + 0.01), 0);
+    add_contact(problem, grain, below, Vec3::UnitZ(), 0, below < 0 ? 0 : -1);
+    problem.impulse.back() = Vec3(0, 0, part * (grains - k) * fall);
+    below = grain;
+  }
+}
+
+TEST(StepError, OfAWedgeIsThatOfItsImpulsesHoweverSharpItIs) {
+  for (const double a : {0.5, 1e-2, 1e-3})
+    for (const double part : {0.0, 0.5, 0.9}) {
+      BodyProblem problem = wedge(a, 0);
+      for (std::size_t k = 0; k < 2; ++k)
+        problem.impulse[k] = part * fall / (2 * std::sin(a)) * problem.contacts[k].normal;
+      const StepError error = step_error(problem, {.enough = 1e-4});
+      EXPECT_NEAR(error.wall, 1 - part, 1e-3) << a;
+      EXPECT_NEAR(error.contact, 1 - part, 1e-3) << a;
+      EXPECT_TRUE(error.correction.settled);
+      EXPECT_TRUE(take_newton_step({&problem, 1}, PartLink{}, error.correction.impulse));
+      EXPECT_NEAR(problem.impulse[0].norm(), fall / (2 * std::sin(a)), 1e-3 * fall / a) << a;
+      EXPECT_LT(step_error(problem, {.enough = 1e-4}).relative(), 1e-3) << a;
+    }
+}
+
+TEST(StepError, OfAColumnIsNotHiddenByGrainsAtRestBesideIt) {
+  BodyProblem problem;
+  add_column(problem, 50, 0, 0.7);
+  for (int k = 1; k <= 2000; ++k) add_column(problem, 1, k, 1);
+  const StepError error = step_error(problem, {.enough = 1e-4});
+  EXPECT_NEAR(error.velocity, 0.3 / 0.7, 1e-3) << "momentum missing, over what contacts have exchanged";
+  EXPECT_NEAR(error.contact, 0.3, 1e-6);
+}
+
+TEST(StepError, IsNoneWhereTheLawHoldsAndWhereThereIsNoContact) {
+  BodyProblem problem;
+  add_grain(problem, Vec3::Zero(), 0);
+  EXPECT_EQ(step_error(problem, {.enough = 1e-4}).relative(), 0);
+  problem = {};
+  add_column(problem, 30, 0, 1);
+  EXPECT_LT(step_error(problem, {.enough = 1e-4}).relative(), 1e-9);
+}
+
+/// Pressed apart by more than its weight asks for, a pair has to open: contacts that would pull are let go.
+TEST(StepError, SeesContactsThatHaveToOpen) {
+  BodyProblem problem;
+  add_column(problem, 2, 0, 1);
+  problem.bodies[1].free.u = Vec3(0, 0, 2);  // the upper one leaves
+  problem.impulse[1] = Vec3(0, 0, fall);
+  problem.impulse[0] = Vec3(0, 0, 2 * fall);
+  const StepError error = step_error(problem, {.enough = 1e-6});
+  EXPECT_TRUE(error.correction.settled);
+  EXPECT_NEAR(error.correction.impulse[0][1][2], -fall, 1e-9);
+  EXPECT_NEAR(error.correction.impulse[0][0][2], -fall, 1e-9);
+}
+
+TEST(StepError, WithFrictionASlidingGrainIsWhereCoulombSaysItIs) {
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0.3);
+  problem.bodies[0].free.u = Vec3(1, 0, -0.1);
+  add_contact(problem, grain, -1, Vec3::UnitZ(), 0.3, 0);
+  problem.impulse[0] = Vec3(-0.03, 0, 0.1);  // the answer: r_n = m 0.1, r_t = mu r_n against the slip
+  EXPECT_LT(step_error(problem, {.enough = 1e-4}).relative(), 1e-6);
+  problem.impulse[0] *= 0.8;
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4}).contact, 0.2, 0.02);
+}
+
+TEST(NewtonStep, IsLeftWhereItLeadsAwayFromTheLaw) {
+  BodyProblem problem = wedge(0.3, 0);
+  for (std::size_t k = 0; k < 2; ++k)
+    problem.impulse[k] = fall / (2 * std::sin(0.3)) * problem.contacts[k].normal;
+  const std::vector<Vec3> before = problem.impulse;
+  const PartImpulses away{{problem.impulse[0], -0.5 * problem.impulse[1]}};
+  EXPECT_FALSE(take_newton_step({&problem, 1}, PartLink{}, away));
+  EXPECT_EQ(problem.impulse, before);
+}
+
+}  // namespace
+}  // namespace talus::step_error_test
