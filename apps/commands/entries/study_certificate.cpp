@@ -1,5 +1,5 @@
-#include "apps/commands/commands.hpp"
 #include "apps/study_certificate/study_certificate.hpp"
+#include "apps/commands/commands.hpp"
 
 namespace talus {
 
