@@ -52,6 +52,8 @@ struct CertificateThresholds {
   std::int64_t tiny = 64;
   /// Clusters of at most so many bodies are small, >= 0: checked by a direct solve in every step.
   int most_direct = 200;
+  /// But not where the tolerance on the balance is below this, > 0: rounding of the direct solve may hide it.
+  double finest_direct = 1e-6;
   /// In larger ones, where at least so many sweeps are needed, > 0: about what a velocity check costs.
   double velocity_check_cost = 100;
   /// And at least so many plain sweeps per contact, >= 0: that is stiff for a problem of its size.
@@ -143,7 +145,9 @@ class Certificate {
   bool correctable() const;
   /// It was taken: sweeps that follow are a new start.
   void corrected();
-  int most_direct() const { return thresholds_.most_direct; }
+  int most_direct() const {
+    return settings_.balance_tolerance < thresholds_.finest_direct ? 0 : thresholds_.most_direct;
+  }
 
   /// The impulses of the last check were replaced by those of ADMM.
   void solved_by_admm(const BodyAdmmResult& result);

@@ -28,7 +28,8 @@ class KnownProblem : public WholeProblem {
   bool small_clusters() override { return !small_errors_.empty(); }
   bool large_clusters() override { return true; }
   double small_error(double enough) override {
-    return std::max(enough, small_errors_[std::min(small_asked_++, small_errors_.size() - 1)]);
+    const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
+    return std::isnan(error) ? error : std::max(enough, error);
   }
   double large_error(double enough) override {
     const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
@@ -201,7 +202,7 @@ TEST(Certificate, EveryThresholdDecidesASituation) {
        [](T& t) { t.tiny = 63; },
        solved},
       {{.what = "settling behind a Newton step",
-        .checks = {{0, 1}, {10, 1e-4}, {19, 1e-4}},
+        .checks = {{0, 1}, {10, 1e-4}, {10, 1e-4}, {19, 1e-4}},
         .verdict = go_on,
         .small_errors = {1, 0},
         .newton_behind = 1},
@@ -238,7 +239,7 @@ TEST(Certificate, EveryThresholdDecidesASituation) {
 
 TEST(Certificate, ANewtonStepIsOfferedAgainOnlyIfTheLastOneHelped) {
   Situation given{.what = "",
-                  .checks = {{0, 1}, {10, 1e-4}, {20, 1e-4}},
+                  .checks = {{0, 1}, {10, 1e-4}, {10, 1e-4}, {20, 1e-4}},
                   .verdict = Verdict::go_on,
                   .small_errors = {1, 0.4},
                   .newton_behind = 1};
