@@ -15,9 +15,10 @@ std::string timed_scene_with(const std::string& top, const std::string& stages) 
 }
 
 TEST(TimeStepKey, IsANumberOrAuto) {
-  const std::string text = timed_scene_with("gravity = [0, 0, -9.81]\ntime_step = \"auto\"\ntime_step_max = 1e-3",
-                                      "[[stage]]\nname = \"a\"\ntime_step_min = 1e-6\nend = { time = 1 }\n"
-                                      "[[stage]]\nname = \"b\"\ntime_step = 1e-4\nend = { time = 1 }\n");
+  const std::string text =
+      timed_scene_with("gravity = [0, 0, -9.81]\ntime_step = \"auto\"\ntime_step_max = 1e-3",
+                       "[[stage]]\nname = \"a\"\ntime_step_min = 1e-6\nend = { time = 1 }\n"
+                       "[[stage]]\nname = \"b\"\ntime_step = 1e-4\nend = { time = 1 }\n");
   for (const Scene& scene : {parse_scene(text, "s.toml"),
                              parse_scene(resolved_scene(parse_scene(text, "s.toml")), "resolved.toml")}) {
     const Stage &a = scene.setup.stages[0], &b = scene.setup.stages[1];
@@ -28,8 +29,8 @@ TEST(TimeStepKey, IsANumberOrAuto) {
     EXPECT_EQ(b.time_step, 1e-4);
   }
   const Scene fixed = parse_scene(
-      timed_scene_with("gravity = [0, 0, -1]\ntime_step = \"auto\"", "[[stage]]\nend = { steps = 1 }\n"), "s.toml",
-      {"time_step=2e-3"});
+      timed_scene_with("gravity = [0, 0, -1]\ntime_step = \"auto\"", "[[stage]]\nend = { steps = 1 }\n"),
+      "s.toml", {"time_step=2e-3"});
   EXPECT_FALSE(fixed.setup.stages[0].chooses_time_step);
   EXPECT_EQ(fixed.setup.stages[0].time_step, 2e-3);
 }
