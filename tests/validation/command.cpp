@@ -310,8 +310,8 @@ class StageEnds : public Command {
 };
 
 TEST_F(StageEnds, AreSaidWithHowFarFromRest) {
-  const Outcome outcome =
-      of(column_scene, "steps = 2, equilibrium = 1e-12", "steps = 50, equilibrium = 0.1, equilibrium_hold = 0");
+  const Outcome outcome = of(column_scene, "steps = 2, equilibrium = 1e-12",
+                             "steps = 50, equilibrium = 0.1, equilibrium_hold = 0");
   EXPECT_TRUE(says(outcome, "stage 'rest' ended after 2 steps: steps reached, equilibrium "))
       << outcome.messages;
   EXPECT_TRUE(says(outcome, "(asked 1e-12)")) << outcome.messages;

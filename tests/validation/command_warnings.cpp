@@ -46,17 +46,17 @@ TEST_F(Warnings, OfASceneWithoutWalls) {
 }
 
 TEST_F(Warnings, OfGravityThatNoWallStandsAgainst) {
-  EXPECT_NE(
-      of(replaced(column_scene, "-9.81", "9.81")).find("gravity of stage 'rest' is (0, 0, 9.81) m/s^2, upwards"),
-      std::string::npos);
+  EXPECT_NE(of(replaced(column_scene, "-9.81", "9.81"))
+                .find("gravity of stage 'rest' is (0, 0, 9.81) m/s^2, upwards"),
+            std::string::npos);
   EXPECT_NE(of(replaced(column_scene, "[0, 0, -9.81]", "[9.81, 0, 0]")).find("no wall stands against it"),
             std::string::npos);
 }
 
 TEST_F(Warnings, OfADensityInOtherUnits) {
-  EXPECT_NE(
-      of(replaced(column_scene, "2600", "2.6")).find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
-      std::string::npos);
+  EXPECT_NE(of(replaced(column_scene, "2600", "2.6"))
+                .find("2.6 kg/m^3, less than foam; 2.6 g/cm^3 are 2600 kg/m^3"),
+            std::string::npos);
   EXPECT_NE(of(replaced(column_scene, "2600", "2.6e6")).find("more than any element"), std::string::npos);
 }
 
