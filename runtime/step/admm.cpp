@@ -6,10 +6,9 @@
 #include <limits>
 #include <utility>
 
+#include "kernels/clusters/clusters.hpp"
+#include "kernels/clusters/step_error.hpp"
 #include "kernels/global/balance.hpp"
-#include "kernels/global/clusters.hpp"
-#include "kernels/global/newton_step.hpp"
-#include "kernels/global/step_error.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -197,13 +196,14 @@ std::vector<BodyProblem> Admm::checked(bool small) const {
   return problems;
 }
 
-double Admm::small_error(double enough, double farthest) {
+SmallError Admm::small_error(double enough, double farthest) {
   const Whole span(*this);
   problems_ = checked(true);
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
   StepError error = step_error(problems_, *link_, {enough, still});
-  change_ = std::move(error.correction.impulse);
-  return error.relative();
+  change_ = std::move(error.change);
+  mends_ = error.mends;
+  return {error.relative(), error.solved};
 }
 
 double Admm::large_error(double enough) const {
@@ -212,13 +212,11 @@ double Admm::large_error(double enough) const {
   return velocity_error(problems, *link_, enough).relative;
 }
 
-bool Admm::correction_helps() {
-  const Whole span(*this);
-  return take_newton_step(problems_, *link_, change_);
-}
-
 void Admm::correct() {
-  for (const BodyProblem& problem : problems_) scatter_impulses(problem, state_.contacts);
+  for (std::size_t p = 0; p < problems_.size(); ++p) {
+    for (std::size_t k = 0; k < change_[p].size(); ++k) problems_[p].impulse[k] += change_[p][k];
+    scatter_impulses(problems_[p], state_.contacts);
+  }
 }
 
 BodyAdmmResult Admm::improve(double tolerance, int calls) {

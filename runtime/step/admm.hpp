@@ -6,6 +6,7 @@
 #include "kernels/global/admm.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/crew.hpp"
+#include "runtime/step/certificate.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/trace/trace.hpp"
@@ -40,15 +41,14 @@ class Admm {
 
   /// Relative error of what the impulses of the last check give, with several ranks those that the candidates
   /// keep; what is below `enough` is not told apart. `farthest`: largest coordinate [m], which rounding goes
-  /// by. In small clusters of velocities and forces (kernels/global/step_error.hpp); the Newton step that it
-  /// was found with is kept for `correct`. In large ones of velocities (balance.hpp).
-  double small_error(double enough, double farthest);
+  /// by. In small clusters of velocities and forces (kernels/clusters/step_error.hpp); what would mend them
+  /// is kept for `correct`. In large ones of velocities (balance.hpp).
+  SmallError small_error(double enough, double farthest);
   double large_error(double enough) const;
 
-  /// Whether the Newton step of the last small_error brings its impulses nearer to the law
-  /// (kernels/global/newton_step.hpp). Where it does, `correct` puts them into `state.contacts`; velocities
-  /// are left to be made afresh.
-  bool correction_helps();
+  /// Whether the last small_error has found what mends clusters that are wrong. `correct` puts it into
+  /// `state.contacts`; velocities are left to be made afresh.
+  bool correction_helps() const { return mends_; }
   void correct();
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
@@ -76,6 +76,7 @@ class Admm {
   bool small_ = false, large_ = false;
   std::vector<BodyProblem> problems_;  ///< of the last small_error
   PartImpulses change_;                ///< found there [N s]
+  bool mends_ = false;
 };
 
 }  // namespace talus

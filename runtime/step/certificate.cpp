@@ -17,6 +17,8 @@ void Certificate::begin(Scales scales) {
   wall_impulses_.clear();
   small_check_ = large_check_ = {};
   corrected_from_ = std::numeric_limits<double>::infinity();
+  corrected_at_ = -1;
+  doubts_ = 0;
 }
 
 /// The error and the drift of the wall forces, and where they stand in the history.
@@ -123,16 +125,24 @@ bool Certificate::balanced(WholeProblem& whole) {
   if (result_.contacts == 0) return true;
   const bool last = result_.iterations >= settings_.max_iterations;
   const int since = result_.iterations - started_at();
-  if (!last && ((result_.corrections > 0 && since < thresholds_.settling_newton) ||
-                (result_.stiff_calls > 0 && since < thresholds_.settling))) {
+  if (!last && result_.stiff_calls > 0 && result_.corrections == 0 && since < thresholds_.settling) {
     result_.unbalance = std::numeric_limits<double>::infinity();
     return false;
   }
-  if (whole.small_clusters())
-    result_.unbalance = repeated(small_check_, [&](double enough) { return whole.small_error(enough); });
+  if (whole.small_clusters()) result_.unbalance = small_unbalance(whole);
   if (!(result_.unbalance <= tolerance) && !last) return false;
   if (whole.large_clusters()) result_.unbalance = larger(result_.unbalance, large_unbalance(whole));
   return result_.unbalance <= tolerance;
+}
+
+double Certificate::small_unbalance(WholeProblem& whole) {
+  const bool last = result_.iterations >= settings_.max_iterations;
+  if (doubts_ >= thresholds_.most_doubts && !last) return std::numeric_limits<double>::infinity();
+  return repeated(small_check_, [&](double enough) {
+    const SmallError error = whole.small_error(enough);
+    if (!error.solved) ++doubts_;
+    return error.relative;
+  });
 }
 
 double Certificate::large_unbalance(WholeProblem& whole) {
@@ -145,11 +155,14 @@ double Certificate::large_unbalance(WholeProblem& whole) {
 
 bool Certificate::correctable() const {
   return small_check_.at == result_.iterations && small_check_.error > settings_.balance_tolerance &&
-         small_check_.error <= thresholds_.newton_gain * corrected_from_;
+         result_.corrections < thresholds_.most_corrections &&
+         (result_.iterations > corrected_at_ ||
+          small_check_.error <= thresholds_.correction_gain * corrected_from_);
 }
 
 void Certificate::corrected() {
   corrected_from_ = small_check_.error;
+  corrected_at_ = result_.iterations;
   ++result_.corrections;
   history_.start_anew();
   small_check_ = large_check_ = {};

@@ -25,7 +25,7 @@ struct IterationResult {
   double unbalance = 0;  ///< estimate of the relative error of the forces: Certificate::balanced
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
-  int corrections = 0;  ///< Newton steps taken
+  int corrections = 0;  ///< times that small clusters were put right
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;   ///< the error grows without bound
@@ -60,16 +60,25 @@ struct CertificateThresholds {
   double stiff_per_contact = 0.1;
   /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
   int settling = 50;
-  /// Behind a Newton step, which leaves less to mend, not before so many, >= 0.
-  int settling_newton = 10;
-  /// A Newton step helps when the next check finds less than this part of the error before, in (0, 1).
-  double newton_gain = 0.5;
+  /// Small clusters are put right so often in a step, at most, >= 0: sweeps for others may carry them off
+  /// again.
+  int most_corrections = 10;
+  /// So often small clusters may be found to have no answer, >= 1: from then on only the last check asks.
+  int most_doubts = 2;
+  /// Without sweeps in between only where the error has fallen to this part, in (0, 1).
+  double correction_gain = 0.5;
   /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0,
   /// 1).
   double velocity_resolution = 0.2;
   /// It is repeated when the sweeps done have grown by this factor, > 1, if the residual has not fallen far
   /// enough before to promise a balance within the tolerance.
   double velocity_check_growth = 1.25;
+};
+
+/// Of small clusters, the worst.
+struct SmallError {
+  double relative = 0;  ///< distance of what the impulses of the last check give from an answer
+  bool solved = true;   ///< answers were found for all that are wrong by more than what was asked for
 };
 
 /// Answers about the problem as a whole. Each costs about as much as ten to a hundred sweeps, and is asked
@@ -85,9 +94,9 @@ class WholeProblem {
   virtual bool small_clusters() = 0;
   virtual bool large_clusters() = 0;
   /// Relative error of what the impulses of the last check give; what is below `enough` is not told apart. Of
-  /// the worst small cluster, in velocities and forces (kernels/global/step_error.hpp); of the large ones, in
-  /// velocities (balance.hpp).
-  virtual double small_error(double enough) = 0;
+  /// the worst small cluster, in velocities and forces (kernels/clusters/step_error.hpp); of the large ones,
+  /// in velocities (balance.hpp).
+  virtual SmallError small_error(double enough) = 0;
   virtual double large_error(double enough) = 0;
 
   double sweeps_needed() { return plain_sweeps_needed() / speed(); }
@@ -140,10 +149,9 @@ class Certificate {
     return thresholds_.stiff_per_contact * static_cast<double>(contacts);
   }
 
-  /// The last check has found small clusters in error, and the Newton step that would mend them; the one
-  /// before it, if any was taken in this step, had helped.
+  /// The last check has found small clusters in error, and putting them right may help.
   bool correctable() const;
-  /// It was taken: sweeps that follow are a new start.
+  /// They were: what follows is a new start.
   void corrected();
   int most_direct() const {
     return settings_.balance_tolerance < thresholds_.finest_direct ? 0 : thresholds_.most_direct;
@@ -187,10 +195,13 @@ class Certificate {
     double error_rms = 0, error = 0;
   };
   double repeated(WholeCheck& then, const std::function<double(double)>& ask);
+  double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
 
   WholeCheck small_check_, large_check_;
-  double corrected_from_ = 0;  ///< error before the last Newton step of the step
+  double corrected_from_ = 0;  ///< error before small clusters were last put right in this step
+  int corrected_at_ = -1;      ///< sweeps done then
+  int doubts_ = 0;             ///< times in this step that no answer was found
 };
 
 /// Whether a step whose iterations ended so is to be believed. `momentum_defect`: what the sample gained

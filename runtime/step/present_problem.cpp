@@ -30,10 +30,7 @@ void PresentProblem::plan(const graph::Communicator& ranks) {
 }
 
 void PresentProblem::find_clusters() {
-  // Exact without friction; with it, or in several subdomains, checks are those of large clusters
-  // (docs/decisions/0024-certificate.md).
-  const bool smooth = !friction_ && state_.clumps.empty() && !state_.decomposition.several();
-  const int most = smooth ? certificate_.most_direct() : 0;
+  const int most = certificate_.most_direct();
   if (!std::exchange(clusters_known_, true)) admm_.find_clusters(most);
 }
 

@@ -33,7 +33,7 @@ class PresentProblem final : public WholeProblem {
     find_clusters();
     return admm_.large_clusters();
   }
-  double small_error(double enough) override { return admm_.small_error(enough, farthest_); }
+  SmallError small_error(double enough) override { return admm_.small_error(enough, farthest_); }
   double large_error(double enough) override { return admm_.large_error(enough); }
 
   bool grains_alike() const { return stiffness_.grains_alike(); }

@@ -37,6 +37,7 @@ const std::vector<Room>& rooms() {
        {"kernels/simd", "kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
       {"kernels/global", {"kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
       {"kernels/delassus", {"kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
+      {"kernels/clusters", {"kernels/bodies", "kernels/law", "kernels/global", "kernels/delassus"}},
       {"kernels/samples", {"kernels/bodies", "kernels/shapes"}},
       {"io/files", {}},
       {"io/fclib", {"io/files"}},

@@ -1,4 +1,4 @@
-#include "kernels/global/clusters.hpp"
+#include "kernels/clusters/clusters.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "kernels/bodies/index.hpp"
-#include "kernels/bodies/larger.hpp"
 
 namespace talus {
 
@@ -57,20 +56,6 @@ std::pair<std::vector<std::int32_t>, std::int32_t> clusters_within(const Contact
     number[b] = first;
   }
   return {std::move(number), count};
-}
-
-/// Rows of different lengths: padded with `filler` to the longest of all parts.
-std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,
-                                  double filler) {
-  const std::vector<double> lengths =
-      rows_of(link, rows.size(), 1,
-              [&](std::size_t p, std::span<double> row) { row[0] = static_cast<double>(rows[p].size()); });
-  const auto most = static_cast<std::size_t>(*std::max_element(lengths.begin(), lengths.end()));
-  if (most == 0) return {};
-  return rows_of(link, rows.size(), most, [&](std::size_t p, std::span<double> row) {
-    std::fill(row.begin(), row.end(), filler);
-    std::copy(rows[p].begin(), rows[p].end(), row.begin());
-  });
 }
 
 /// Bodies per cluster, each once.
@@ -166,14 +151,6 @@ Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link) 
   return clusters;
 }
 
-std::int32_t largest_cluster(const Clusters& clusters, const PartLink& link) {
-  const std::vector<double> rows =
-      rows_of(link, clusters.bodies.size(), 1, [&](std::size_t p, std::span<double> row) {
-        for (const std::int32_t bodies : clusters.bodies[p]) row[0] = std::max<double>(row[0], bodies);
-      });
-  return static_cast<std::int32_t>(*std::max_element(rows.begin(), rows.end()));
-}
-
 std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least,
                                               std::int32_t most) {
   std::vector<std::vector<char>> in(clusters.of_body.size());
@@ -184,47 +161,17 @@ std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int
   return in;
 }
 
-ClusterRows rows_of_clusters(const BodyParts& parts, const Clusters& clusters, std::size_t sums,
-                             std::size_t maxima, const std::function<void(std::size_t, ClusterRows&)>& fill) {
-  ClusterRows result{sums, maxima, std::vector<std::vector<double>>(parts.size())};
-  const std::size_t width = result.width(), row = at(clusters.several) * width;
-  parts.each([&](std::size_t p) {
-    result.rows[p].assign(at(clusters.count[p]) * width, 0.0);
-    fill(p, result);
+std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,
+                                  double filler) {
+  const std::vector<double> lengths =
+      rows_of(link, rows.size(), 1,
+              [&](std::size_t p, std::span<double> row) { row[0] = static_cast<double>(rows[p].size()); });
+  const auto most = static_cast<std::size_t>(*std::max_element(lengths.begin(), lengths.end()));
+  if (most == 0) return {};
+  return rows_of(link, rows.size(), most, [&](std::size_t p, std::span<double> row) {
+    std::fill(row.begin(), row.end(), filler);
+    std::copy(rows[p].begin(), rows[p].end(), row.begin());
   });
-  if (clusters.several == 0) return result;
-  const std::vector<double> shares = parts.rows(row, [&](std::size_t p, std::span<double> own) {
-    for (std::int32_t c = 0; c < clusters.count[p]; ++c) {
-      const std::int32_t number = clusters.spanning[p][at(c)];
-      if (number < 0) continue;
-      // Two clusters of a part may be one through others.
-      for (std::size_t k = 0; k < width; ++k) {
-        double& sum = own[at(number) * width + k];
-        sum = k < sums ? sum + result.of(p, c)[k] : larger(sum, result.of(p, c)[k]);
-      }
-    }
-  });
-  std::vector<double> total(row, 0.0);
-  for (std::size_t k = 0; k < shares.size(); ++k) {
-    double& sum = total[k % row];
-    sum = k % width < sums ? sum + shares[k] : larger(sum, shares[k]);
-  }
-  for (std::size_t p = 0; p < parts.size(); ++p)
-    for (std::int32_t c = 0; c < clusters.count[p]; ++c)
-      if (const std::int32_t number = clusters.spanning[p][at(c)]; number >= 0)
-        std::copy_n(total.begin() + static_cast<std::ptrdiff_t>(at(number) * width), width,
-                    result.of(p, c).begin());
-  return result;
-}
-
-double largest_of_clusters(const BodyParts& parts, const Clusters& clusters,
-                           const std::function<double(std::size_t, std::int32_t)>& value) {
-  const std::vector<double> rows = parts.rows(1, [&](std::size_t p, std::span<double> row) {
-    for (std::int32_t c = 0; c < clusters.count[p]; ++c) row[0] = larger(row[0], value(p, c));
-  });
-  double most = 0;
-  for (const double row : rows) most = larger(most, row);
-  return most;
 }
 
 }  // namespace talus

@@ -1,15 +1,12 @@
 #pragma once
 
-/// How far the impulses of a step are from those that solve it: one step of an active-set Newton method over
-/// all bodies, by linear solves that see through chains where sweeps do not
+/// How far the impulses of a cluster are from those that solve it: rounds of an active-set Newton method over
+/// all its bodies, by linear solves that see through chains where sweeps do not
 /// (docs/decisions/0024-certificate.md).
 
-#include <cstdint>
-#include <span>
 #include <vector>
 
-#include "kernels/global/body_parts.hpp"
-#include "kernels/global/clusters.hpp"
+#include "kernels/global/body_problem.hpp"
 
 namespace talus {
 
@@ -19,12 +16,15 @@ struct CorrectionThresholds {
   double firmness = 1e9;
   /// Updates of the multipliers in a round, at most, >= 1.
   int most_updates = 8;
-  /// What a part may leave: this part of what was found, or of what need not be known more exactly, in (0,
-  /// 1).
-  double tolerance = 0.1;
+  /// What may be left: this part of what need not be known more exactly, or of this part of what was found,
+  /// both in (0, 1).
+  double tolerance = 0.1, sharpness = 0.01;
   /// Conjugate gradients of a linear system, at most, >= 1. They only mend what rounding leaves of the direct
   /// solve, and walls of finite mass on single grains.
   int most_linear = 16;
+  /// Impulses that leave less than this part of what need not be known, in (0, 1), are exact: what
+  /// multipliers still say of them is rounding, firmness times as large.
+  double exact = 1e-6;
   /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
   int few_linear = 8;
   /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
@@ -40,27 +40,25 @@ struct CorrectionThresholds {
 
 /// What would set all contacts right, and how well that is known. Momenta are sum m |u| + (I/R^2) |w|.
 struct Correction {
-  PartField velocity;    ///< V(r) of the impulses as they are [m/s]
-  PartField motion;      ///< change of V [m/s]
-  PartImpulses impulse;  ///< change of r, per part and contact [N s]
-  Clusters clusters;
-  /// Per cluster [N s]: `found`, momentum of the motion; `missed`, wishes of contacts that the motion does
-  /// not grant; `open`, impulses that would pull and approaches that the last round has left; `left`, what
-  /// the linear solver has.
-  enum Row { found, missed, open, left, width };
-  ClusterRows errors;
-  int rounds = 0, linear_iterations = 0;
+  std::vector<Twist> motion;  ///< per unknown: change of V [m/s]
+  std::vector<Vec3> impulse;  ///< per contact: change of r [N s]
+  double found = 0;           ///< momentum of the motion [N s]
+  double missed = 0;          ///< wishes of contacts that the motion does not grant [N s]
+  double open = 0;            ///< what the natural map still finds wrong behind the last round [N s]
+  double left = 0;            ///< what the linear solver has left [N s]
+  double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
+  double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
+  int rounds = 0;
   bool settled = false;  ///< no contact changed its state any more, but for what is small
 
-  /// Of a cluster, all of it.
-  double error(std::size_t part, std::int32_t cluster) const {
-    const std::span<const double> row = errors.of(part, cluster);
-    return row[found] + row[missed] + row[open] + row[left];
-  }
+  /// All of it [N s].
+  double error() const { return found + uncertain(); }
+  /// What is not known of it [N s].
+  double uncertain() const { return missed + open + left; }
 };
 
-/// The Newton step from the impulses of `parts`. `enough`: per part and cluster the momentum [N s] below
-/// which an error need not be known.
+/// The Newton step from the impulses of `problem`. `enough`: momentum [N s] below which an error need not be
+/// known.
 ///
 /// Each contact is put where the natural map sees it: open, sliding along a given direction, or sticking.
 /// With the wishes w = y - v of those that carry (y = 0 where b = 0; without friction along the normal only)
@@ -71,12 +69,12 @@ struct Correction {
 /// is solved by augmented Lagrangians: (M + H rho H^T) d = k + H (rho w + s), s += rho (w - H^T d). Contacts
 /// whose impulse would pull then open, and open ones that d closes join, and it is solved again. When no
 /// contact changes any more, and without friction, V + d is the exact solution of the step, since it and r +
-/// change satisfy all its conditions. With friction the direction of sliding is that of the last velocities.
-Correction correction_of(std::span<const BodyProblem> parts, const PartLink& link,
-                         const std::vector<std::vector<double>>& enough, const Clusters& clusters,
+/// change satisfy all its conditions. With friction the direction of sliding is that of the last velocities:
+/// there it has settled when two rounds, one after the other, agree besides.
+Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
 
-/// Sum m |u| + (I/R^2) |w| of a field per cluster: column 0 of the rows [N s].
-ClusterRows momentum_of_clusters(const BodyParts& parts, const Clusters& clusters, const PartField& motion);
+/// Sum m |u| + (I/R^2) |w| over the unknowns [N s].
+double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion);
 
 }  // namespace talus

@@ -1,0 +1,26 @@
+#pragma once
+
+/// A problem over bodies as one of relative velocities and a stored matrix, u = W r + q
+/// (kernels/delassus/delassus.hpp): for solvers that want W.
+
+#include <vector>
+
+#include "kernels/delassus/delassus.hpp"
+#include "kernels/global/body_problem.hpp"
+
+namespace talus {
+
+/// The problem and its impulses, in frames (normal, tangent 1, tangent 2) of the contacts.
+struct ClusterMatrix {
+  DelassusProblem problem;
+  std::vector<double> r;     ///< 3 per contact [N s]
+  std::vector<Mat3> frames;  ///< per contact: columns n, t, s
+
+  /// Impulses in space, one per contact [N s].
+  std::vector<Vec3> impulses() const;
+};
+
+/// Of a whole problem, in one part. Bodies that do not turn have no spin mass.
+ClusterMatrix matrix_of(const BodyProblem& problem);
+
+}  // namespace talus

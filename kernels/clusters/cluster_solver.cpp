@@ -1,0 +1,132 @@
+#include "kernels/clusters/cluster_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "kernels/clusters/cluster_matrix.hpp"
+#include "kernels/delassus/delassus_auto.hpp"
+#include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
+
+namespace talus {
+
+namespace {
+
+bool finite(const BodyProblem& problem) {
+  double sum = 0;
+  for (const BodyUnknown& body : problem.bodies)
+    sum += body.free.u.sum() + body.free.w.sum() + body.mass + body.spin_mass;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k)
+    sum += problem.contacts[k].offset.sum() + problem.contacts[k].normal.sum() + problem.impulse[k].sum();
+  return std::isfinite(sum);
+}
+
+/// How far impulses are from the law.
+struct LawDefect {
+  double residual2 = 0;  ///< sum of |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)|^2 W_nn over the contacts [J]
+  double energy = 0;     ///< dual objective 1/2 |V(r)|_M^2 + r.offset, which the answer makes least without
+                         ///< friction [J]
+};
+LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impulse) {
+  const std::vector<Twist> V = velocities_of(problem, impulse);
+  LawDefect defect;
+  for (std::size_t b = 0; b < V.size(); ++b)
+    defect.energy += 0.5 * kinetic2(problem.bodies[b], V[b].u, V[b].w);
+  for (std::size_t k = 0; k < impulse.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
+    const double m = effective_mass(problem, c);
+    const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
+    defect.residual2 +=
+        (impulse[k] - project_on_cone(impulse[k] - m * shifted, c.normal, c.mu)).squaredNorm() / m;
+    defect.energy += c.offset.dot(impulse[k]);
+  }
+  return defect;
+}
+
+/// Puts the changed impulses on the cones, and asks whether they are nearer to the law: by the residual, or
+/// without friction by the dual objective, which falls also where rounds have not settled.
+void admit(const BodyProblem& problem, bool friction, ClusterAnswer& answer) {
+  std::vector<Vec3> changed(problem.impulse);
+  for (std::size_t k = 0; k < changed.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    changed[k] = project_on_cone(changed[k] + answer.impulse[k], c.normal, c.mu);
+    answer.impulse[k] = changed[k] - problem.impulse[k];
+  }
+  const LawDefect then = law_defect(problem, problem.impulse), now = law_defect(problem, changed);
+  // Comparisons are false for NaN.
+  answer.helps = now.residual2 < then.residual2 || (!friction && now.energy < then.energy);
+}
+
+/// What a correction of `now` means for the impulses of `from`, which has the same contacts.
+ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, Correction correction) {
+  ClusterAnswer answer;
+  answer.solved = correction.settled;
+  if (&from == &now) {
+    answer.error = correction.error();
+    answer.impulse = std::move(correction.impulse);
+    answer.motion = std::move(correction.motion);
+    return answer;
+  }
+  const std::vector<Twist> then = velocities_of(from, from.impulse), since = velocities_of(now, now.impulse);
+  answer.impulse = std::move(correction.impulse);
+  for (std::size_t k = 0; k < answer.impulse.size(); ++k)
+    answer.impulse[k] += now.impulse[k] - from.impulse[k];
+  answer.motion = std::move(correction.motion);
+  for (std::size_t b = 0; b < answer.motion.size(); ++b) {
+    answer.motion[b].u += since[b].u - then[b].u;
+    answer.motion[b].w += since[b].w - then[b].w;
+  }
+  answer.error = momentum_of(from, answer.motion) + correction.uncertain();
+  return answer;
+}
+
+/// Rounds may carry impulses off that are exact already: what multipliers say of them is rounding, firmness
+/// times as large.
+void keep_if_exact(const BodyProblem& now, double enough, const ClusterThresholds& thresholds,
+                   Correction& correction) {
+  if (!(correction.at_first <= thresholds.correction.tolerance * enough)) return;
+  correction = {};
+  correction.impulse.assign(now.contacts.size(), Vec3::Zero());
+  correction.motion.resize(now.bodies.size());
+  correction.settled = true;
+}
+
+}  // namespace
+
+ClusterAnswer solve_cluster(const BodyProblem& problem, double enough, const ClusterThresholds& thresholds) {
+  ClusterAnswer answer;
+  if (!finite(problem)) {
+    answer.impulse.assign(problem.contacts.size(), Vec3::Zero());
+    answer.motion.resize(problem.bodies.size());
+    answer.error = std::numeric_limits<double>::quiet_NaN();
+    return answer;
+  }
+  answer = answer_of(problem, problem, correction_of(problem, enough, thresholds.correction));
+  const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
+                                    [](const ContactEquation& c) { return c.mu > 0; });
+  if (answer.solved) {
+    admit(problem, friction, answer);
+    return answer;
+  }
+  ClusterMatrix matrix = matrix_of(problem);
+  for (const ClusterThresholds::Turn& turn : thresholds.turns) {
+    const DelassusGoal goal{
+        .tolerance = turn.residual, .measure = ErrorMeasure::scaled, .max_iterations = turn.most_iterations};
+    const bool last = &turn == &thresholds.turns.back();
+    const DelassusReport report = solve_auto(matrix.problem, goal, {}, matrix.r);
+    if (report.iterations == 0 && !last) continue;
+    BodyProblem now = problem;
+    now.impulse = matrix.impulses();
+    Correction correction = correction_of(now, enough, thresholds.correction);
+    if (!correction.settled && last && report.converged) keep_if_exact(now, enough, thresholds, correction);
+    answer = answer_of(problem, now, std::move(correction));
+    if (answer.solved) break;
+  }
+  admit(problem, friction, answer);
+  return answer;
+}
+
+}  // namespace talus

@@ -1,0 +1,42 @@
+#pragma once
+
+/// Connected clusters of contacts: an error of one chain must not be hidden by the mean of a large sample.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/global/body_parts.hpp"
+
+namespace talus {
+
+/// Bodies that are joined by contacts, over any number of parts. Driven and fixed walls join nothing; a wall
+/// of finite mass is a body like others.
+struct Clusters {
+  std::vector<std::vector<std::int32_t>> of_body;   ///< per part and unknown; -1: no contact there
+  std::vector<std::int32_t> count;                  ///< per part
+  std::vector<std::vector<std::int32_t>> spanning;  ///< per part and cluster: its number among those that lie
+                                                    ///< in several parts; -1: in this part only
+  std::int32_t several = 0;                         ///< clusters that lie in several parts
+
+  std::vector<std::vector<std::int32_t>> bodies;  ///< per part and cluster: of all parts, each body once
+
+  std::int32_t of_contact(std::size_t part, const ContactEquation& c) const {
+    return of_body[part][static_cast<std::size_t>(c.first)];
+  }
+};
+
+/// Collective: one sum over copies and, with several parts, three gathers, of as many numbers as there are
+/// pairs of clusters that meet at a border.
+Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link);
+
+/// Per part and unknown, 1 in clusters of at least `least` and at most `most` bodies, else 0.
+std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least,
+                                              std::int32_t most);
+
+/// Rows of any lengths, one per part: padded with `filler` to the longest of all, and gathered in order of
+/// subdomain. Collective.
+std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,
+                                  double filler);
+
+}  // namespace talus

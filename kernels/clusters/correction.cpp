@@ -1,0 +1,279 @@
+#include "kernels/clusters/correction.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "kernels/bodies/index.hpp"
+#include "kernels/global/balance.hpp"
+#include "kernels/global/body_parts.hpp"
+#include "kernels/global/body_solver.hpp"
+#include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
+
+namespace talus {
+
+namespace {
+
+enum class ContactState : char { open, sliding, sticking };
+
+/// The contacts: where they stand, what they ask for and what they get.
+struct ActiveSet {
+  std::vector<ContactState> state;
+  std::vector<Vec3> velocity;   ///< v + offset before the correction [m/s]
+  std::vector<Vec3> direction;  ///< of the impulse of those that slide, unit, on the edge of the cone
+  std::vector<double> shift;    ///< mu |v_t| of the last velocities [m/s]
+  std::vector<Vec3> change;     ///< of r: known, and the multiplier [N s]
+
+  /// Known part of the change of r: all of it where open, across the direction where sliding.
+  Vec3 known(const BodyProblem& problem, std::size_t k) const {
+    const Vec3& r = problem.impulse[k];
+    if (state[k] == ContactState::open) return -r;
+    if (state[k] == ContactState::sticking) return Vec3::Zero();
+    return direction[k].dot(r) * direction[k] - r;
+  }
+  /// The change of the relative velocity that is asked for: of those that slide along their direction.
+  Vec3 wish(const BodyProblem& problem, std::size_t k) const {
+    if (state[k] == ContactState::sticking) return -velocity[k];
+    const Vec3 shifted = velocity[k] + shift[k] * problem.contacts[k].normal;
+    return -direction[k].dot(shifted) * direction[k];
+  }
+};
+
+ActiveSet empty_set(const BodyProblem& problem) {
+  const std::size_t n = problem.contacts.size();
+  ActiveSet set{std::vector(n, ContactState::open), std::vector<Vec3>(n), std::vector(n, Vec3(Vec3::Zero())),
+                std::vector<double>(n, 0.0), std::vector(n, Vec3(Vec3::Zero()))};
+  const std::vector<Twist> V = velocities_of(problem, problem.impulse);
+  for (std::size_t k = 0; k < n; ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    set.velocity[k] = constrained(c, relative_velocity(c, V) + c.offset);
+  }
+  return set;
+}
+
+/// States as the natural map sees them behind the motion and the change of impulses so far. Returns what
+/// contacts do wrong until then, sum |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)| [N s].
+double see_states(const BodyProblem& problem, std::span<const Twist> motion, ActiveSet& set) {
+  double wrong = 0;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const Vec3 r = problem.impulse[k] + set.change[k];
+    const Vec3 v = set.velocity[k] + constrained(c, relative_velocity(c, motion));
+    const double m = effective_mass(problem, c);
+    set.shift[k] = c.mu * tangential(c, v).norm();
+    const Vec3 aim = r - m * (v + set.shift[k] * c.normal);
+    const Vec3 carried = project_on_cone(aim, c.normal, c.mu);
+    wrong += (r - carried).norm();
+    if (carried == Vec3::Zero()) {
+      set.state[k] = ContactState::open;
+    } else if (c.mu > 0 && carried == aim) {
+      set.state[k] = ContactState::sticking;
+    } else {
+      set.state[k] = ContactState::sliding;
+      set.direction[k] = carried.normalized();
+    }
+  }
+  return wrong;
+}
+
+/// The part of a problem whose contacts are not open, for the linear system. `origin`: their places in all.
+struct ActiveProblem {
+  BodyProblem problem;
+  std::vector<std::size_t> origin;
+  std::vector<Levers> levers;  ///< of frictional contacts that slide: they push along the edge of their cones
+};
+
+ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
+  ActiveProblem active;
+  BodyProblem& problem = active.problem;
+  problem.bodies = all.bodies;
+  problem.grains = all.grains;
+  active.levers.reserve(all.contacts.size());
+  for (std::size_t k = 0; k < all.contacts.size(); ++k) {
+    if (set.state[k] == ContactState::open) continue;
+    active.origin.push_back(k);
+    problem.contacts.push_back(all.contacts[k]);
+    problem.impulse.push_back(Vec3::Zero());
+    ContactEquation& c = problem.contacts.back();
+    if (set.state[k] == ContactState::sticking || c.mu == 0) continue;
+    if (c.levers == nullptr) {
+      const Mat3 N = cross_matrix(c.normal);
+      active.levers.push_back({N, -N});
+      c.levers = &active.levers.back();
+    }
+    c.normal = set.direction[k];
+    c.mu = 0;
+  }
+  return active;
+}
+
+/// What may be left of a momentum [N s].
+double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
+  return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
+}
+
+/// One round: the linear system of the present states, solved by augmented Lagrangians.
+class Round {
+ public:
+  Round(const BodyProblem& all, ActiveSet& set, double enough, const CorrectionThresholds& thresholds)
+      : all_(all), set_(set), enough_(enough), thresholds_(thresholds), active_(active_part(all, set)) {
+    for (const ContactEquation& c : active_.problem.contacts)
+      rho_[0].push_back(thresholds.firmness * effective_mass(active_.problem, c));
+  }
+
+  /// Improves `motion`; the multipliers go to the set's `change`, what is missed and left to `result`.
+  void solve(PartField& motion, Correction& result) {
+    const PartLink alone;
+    const BodyParts parts({&active_.problem, 1}, alone);
+    BodySolver solver(parts, rho_, 1);
+    for (int update = 0; update < thresholds_.most_updates; ++update) {
+      gradients(solver, {force()}, motion, result);
+      if (take_multipliers(motion[0], result)) break;
+    }
+  }
+
+ private:
+  /// k + H (rho w + s), the forces of contacts that carry and of those whose change is known.
+  std::vector<Twist> force() const {
+    std::vector<Twist> force(all_.bodies.size());
+    for (std::size_t k = 0; k < all_.contacts.size(); ++k)
+      if (const Vec3 known = set_.known(all_, k); known != Vec3::Zero())
+        add_force(all_.contacts[k], known, force);
+    for (std::size_t a = 0; a < active_.origin.size(); ++a) {
+      const ContactEquation& c = active_.problem.contacts[a];
+      add_force(c, multiplier(a) + rho_[0][a] * constrained(c, set_.wish(all_, active_.origin[a])), force);
+    }
+    for (std::size_t b = 0; b < force.size(); ++b) restrict_to_freedoms(all_.bodies[b], force[b]);
+    return force;
+  }
+  Vec3 multiplier(std::size_t a) const {
+    return constrained(active_.problem.contacts[a], set_.change[active_.origin[a]]);
+  }
+  bool small(double part, double found) const { return part <= goal_of(found, enough_, thresholds_); }
+
+  /// Until what they leave is small beside what they have found.
+  void gradients(BodySolver& solver, const PartField& force, PartField& motion, Correction& result) {
+    solver.begin(force, motion);
+    std::vector<Twist> then = motion[0];
+    double before = std::numeric_limits<double>::infinity();
+    // One at least: multipliers are rho times what the wishes have not got, and rho is large.
+    int k = 0;
+    for (bool goes = true;;) {
+      const bool looks =
+          !goes || std::has_single_bit(static_cast<unsigned>(k)) || k >= thresholds_.most_linear;
+      if (looks && settled(solver, motion[0], then, before, k, result)) return;
+      if (!goes || k >= thresholds_.most_linear) return;
+      ++k;
+      goes = solver.iterate(motion) > 0;
+    }
+  }
+  bool settled(const BodySolver& solver, const std::vector<Twist>& motion, std::vector<Twist>& then,
+               double& before, int k, Correction& result) const {
+    double found = 0, change = 0, mass = 0, energy = 0;
+    for (std::size_t b = 0; b < motion.size(); ++b) {
+      const BodyUnknown& body = all_.bodies[b];
+      found += body.mass * motion[b].u.norm() + body.spin_mass * motion[b].w.norm();
+      change +=
+          body.mass * (motion[b].u - then[b].u).norm() + body.spin_mass * (motion[b].w - then[b].w).norm();
+      mass += body.mass;
+      energy += dot(solver.residual()[0][b], solver.preconditioned()[0][b]);
+    }
+    result.left = thresholds_.caution * std::sqrt(mass * std::max(0.0, energy));
+    if (k >= thresholds_.few_linear)
+      result.left = std::min(result.left, left_over(change, before, thresholds_.unsettled));
+    if (k > 0) before = change;
+    then = motion;
+    return small(result.left, found);
+  }
+
+  /// s += rho (w - H^T d). True when the wishes are granted but for what is small.
+  bool take_multipliers(const std::vector<Twist>& motion, Correction& result) {
+    for (std::size_t k = 0; k < all_.contacts.size(); ++k)
+      if (set_.state[k] == ContactState::open) set_.change[k] = -all_.impulse[k];
+    result.missed = 0;
+    for (std::size_t a = 0; a < active_.origin.size(); ++a) {
+      const std::size_t k = active_.origin[a];
+      const ContactEquation& c = active_.problem.contacts[a];
+      const Vec3 rest = constrained(c, set_.wish(all_, k)) - constrained(c, relative_velocity(c, motion));
+      set_.change[k] = multiplier(a) + rho_[0][a] * rest + set_.known(all_, k);
+      result.missed += effective_mass(active_.problem, c) * rest.norm();
+    }
+    return small(result.missed, momentum_of(all_, motion));
+  }
+
+  const BodyProblem& all_;
+  ActiveSet& set_;
+  double enough_;
+  const CorrectionThresholds& thresholds_;
+  ActiveProblem active_;
+  std::vector<std::vector<double>> rho_{1};
+};
+
+double difference(const BodyProblem& problem, const std::vector<Twist>& a, const std::vector<Twist>& b) {
+  std::vector<Twist> by(a.size());
+  for (std::size_t k = 0; k < a.size(); ++k) by[k] = {a[k].u - b[k].u, a[k].w - b[k].w};
+  return momentum_of(problem, by);
+}
+
+/// Of impulses that are an answer themselves.
+Correction unchanged(const BodyProblem& problem, double at_first) {
+  Correction none;
+  none.impulse.assign(problem.contacts.size(), Vec3::Zero());
+  none.motion.resize(problem.bodies.size());
+  none.open = none.at_first = at_first;
+  none.rounds = 1;
+  none.settled = true;
+  return none;
+}
+
+}  // namespace
+
+double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion) {
+  double sum = 0;
+  for (std::size_t b = 0; b < motion.size(); ++b)
+    sum += problem.bodies[b].mass * motion[b].u.norm() + problem.bodies[b].spin_mass * motion[b].w.norm();
+  return sum;
+}
+
+Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds) {
+  const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
+                                    [](const ContactEquation& c) { return c.mu > 0; });
+  PartField motion(1, std::vector<Twist>(problem.bodies.size()));
+  ActiveSet set = empty_set(problem);
+  const double wrong = see_states(problem, motion[0], set);
+  // Rounds that do not settle may carry the motion off: the best one counts.
+  Correction best;
+  double least = std::numeric_limits<double>::infinity();
+  int rounds = 0;
+  double at_first = 0;
+  for (int since = 0; rounds < thresholds.most_rounds && since < thresholds.patience; ++since) {
+    ++rounds;
+    Correction now;
+    const std::vector<Twist> before = motion[0];
+    Round(problem, set, enough, thresholds).solve(motion, now);
+    now.impulse = set.change;
+    now.motion = motion[0];
+    now.found = momentum_of(problem, motion[0]);
+    now.open = see_states(problem, motion[0], set);
+    now.moved = difference(problem, motion[0], before);
+    if (rounds == 1) at_first = std::max(wrong, now.found + now.missed + now.left);
+    if (at_first <= thresholds.exact * enough) return unchanged(problem, at_first);
+    const double goal = goal_of(now.found, enough, thresholds);
+    now.settled = now.open <= goal && (!friction || (rounds > 1 && now.moved <= goal));
+    if (now.settled || now.error() < least) {
+      least = now.error();
+      best = std::move(now);
+      since = -1;
+    }
+    if (best.settled) break;
+  }
+  best.rounds = rounds;
+  best.at_first = at_first;
+  return best;
+}
+
+}  // namespace talus
