@@ -49,13 +49,9 @@ constexpr Column<StepReport> steps_columns[] = {
     {"penetration_max", [](std::string& t, const StepReport& r) { put(t, r.penetration_max); }},
     {"overlap", [](std::string& t, const StepReport& r) { put(t, r.overlap); }},
     {"overlap_body",
-     [](std::string& t, const StepReport& r) {
-       if (r.overlapping) put(t, r.overlapping->body);
-     }},
+     [](std::string& t, const StepReport& r) { put(t, r.overlapping ? r.overlapping->body : -1); }},
     {"overlap_with",
-     [](std::string& t, const StepReport& r) {
-       if (r.overlapping) put(t, r.overlapping->with);
-     }},
+     [](std::string& t, const StepReport& r) { put(t, r.overlapping ? r.overlapping->with : -1); }},
     {"kinetic_translation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_translation); }},
     {"kinetic_rotation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_rotation); }},
     {"solid_fraction", [](std::string& t, const StepReport& r) { put(t, r.solid_fraction); }},

@@ -60,38 +60,27 @@ void admit(const BodyProblem& problem, bool friction, ClusterAnswer& answer) {
   answer.helps = now.residual2 < then.residual2 || (!friction && now.energy < then.energy);
 }
 
-/// What a correction of `now` means for the impulses of `from`, which has the same contacts.
-ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, Correction correction) {
+/// What a correction of `now` means for the impulses of `from`, which has the same contacts. Changes of
+/// rounds that have not settled are not taken: all that they have found counts as uncertain.
+ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const Correction& correction) {
   ClusterAnswer answer;
   answer.solved = correction.settled;
-  if (&from == &now) {
-    answer.error = correction.error();
-    answer.impulse = std::move(correction.impulse);
-    answer.motion = std::move(correction.motion);
-    return answer;
-  }
   const std::vector<Twist> then = velocities_of(from, from.impulse), since = velocities_of(now, now.impulse);
-  answer.impulse = std::move(correction.impulse);
-  for (std::size_t k = 0; k < answer.impulse.size(); ++k)
-    answer.impulse[k] += now.impulse[k] - from.impulse[k];
-  answer.motion = std::move(correction.motion);
-  for (std::size_t b = 0; b < answer.motion.size(); ++b) {
-    answer.motion[b].u += since[b].u - then[b].u;
-    answer.motion[b].w += since[b].w - then[b].w;
+  for (std::size_t k = 0; k < from.contacts.size(); ++k) {
+    const Vec3 change = now.impulse[k] - from.impulse[k];
+    answer.impulse.push_back(answer.solved ? Vec3(change + correction.impulse[k]) : change);
   }
-  answer.error = momentum_of(from, answer.motion) + correction.uncertain();
+  for (std::size_t b = 0; b < then.size(); ++b) {
+    Twist motion{since[b].u - then[b].u, since[b].w - then[b].w};
+    if (answer.solved) {
+      motion.u += correction.motion[b].u;
+      motion.w += correction.motion[b].w;
+    }
+    answer.motion.push_back(motion);
+  }
+  answer.error =
+      momentum_of(from, answer.motion) + (answer.solved ? correction.uncertain() : correction.error());
   return answer;
-}
-
-/// Rounds may carry impulses off that are exact already: what multipliers say of them is rounding, firmness
-/// times as large.
-void keep_if_exact(const BodyProblem& now, double enough, const ClusterThresholds& thresholds,
-                   Correction& correction) {
-  if (!(correction.at_first <= thresholds.correction.tolerance * enough)) return;
-  correction = {};
-  correction.impulse.assign(now.contacts.size(), Vec3::Zero());
-  correction.motion.resize(now.bodies.size());
-  correction.settled = true;
 }
 
 }  // namespace
@@ -120,9 +109,7 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, double enough, const Clu
     if (report.iterations == 0 && !last) continue;
     BodyProblem now = problem;
     now.impulse = matrix.impulses();
-    Correction correction = correction_of(now, enough, thresholds.correction);
-    if (!correction.settled && last && report.converged) keep_if_exact(now, enough, thresholds, correction);
-    answer = answer_of(problem, now, std::move(correction));
+    answer = answer_of(problem, now, correction_of(now, enough, thresholds.correction));
     if (answer.solved) break;
   }
   admit(problem, friction, answer);

@@ -271,6 +271,8 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     }
     if (best.settled) break;
   }
+  if (friction && !best.settled && at_first <= thresholds.exact_with_friction * enough)
+    return unchanged(problem, at_first);
   best.rounds = rounds;
   best.at_first = at_first;
   return best;

@@ -23,8 +23,9 @@ struct CorrectionThresholds {
   /// solve, and walls of finite mass on single grains.
   int most_linear = 16;
   /// Impulses that leave less than this part of what need not be known, in (0, 1), are exact: what
-  /// multipliers still say of them is rounding, firmness times as large.
-  double exact = 1e-6;
+  /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
+  /// settle.
+  double exact = 1e-6, exact_with_friction = 0.05;
   /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
   int few_linear = 8;
   /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
@@ -70,7 +71,9 @@ struct Correction {
 /// whose impulse would pull then open, and open ones that d closes join, and it is solved again. When no
 /// contact changes any more, and without friction, V + d is the exact solution of the step, since it and r +
 /// change satisfy all its conditions. With friction the direction of sliding is that of the last velocities:
-/// there it has settled when two rounds, one after the other, agree besides.
+/// there it has settled when two rounds, one after the other, agree besides; where contacts carry more than
+/// they must, as in a jammed wedge, they may never do, and impulses stay whose first round finds next to
+/// nothing.
 Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
 

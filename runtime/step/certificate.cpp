@@ -173,6 +173,7 @@ void Certificate::solved_by_admm(const BodyAdmmResult& result) {
   ++result_.stiff_calls;
   history_.start_anew();
   small_check_ = large_check_ = {};
+  doubts_ = 0;
 }
 
 void Certificate::forgive() {
