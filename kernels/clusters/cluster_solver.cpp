@@ -109,7 +109,9 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, double enough, const Clu
     if (report.iterations == 0 && !last) continue;
     BodyProblem now = problem;
     now.impulse = matrix.impulses();
-    answer = answer_of(problem, now, correction_of(now, enough, thresholds.correction));
+    ClusterAnswer other = answer_of(problem, now, correction_of(now, enough, thresholds.correction));
+    // Of answers that are none the nearest says most.
+    if (other.solved || other.error < answer.error) answer = std::move(other);
     if (answer.solved) break;
   }
   admit(problem, friction, answer);

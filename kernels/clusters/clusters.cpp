@@ -145,8 +145,7 @@ Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link) 
     std::tie(clusters.of_body[p], clusters.count[p]) = clusters_within(parts[p]);
     clusters.spanning[p].assign(at(clusters.count[p]), -1);
   });
-  // A part that is all there is has no counts (body_problem.hpp).
-  if (!parts[0].counts.empty()) join_clusters(parts, link, clusters);
+  if (link.several()) join_clusters(parts, link, clusters);
   count_bodies(parts, link, clusters);
   return clusters;
 }

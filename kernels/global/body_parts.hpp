@@ -23,6 +23,9 @@ class PartLink {
  public:
   virtual ~PartLink() = default;
 
+  /// There are other parts, here or elsewhere, that copies of a body may lie in.
+  virtual bool several() const { return false; }
+
   /// Calls work(p) for each of the `parts` parts here, possibly in parallel.
   virtual void each(std::size_t parts, const std::function<void(std::size_t)>& work) const;
 

@@ -23,6 +23,8 @@ class StepLink final : public PartLink {
            trace::Meetings& rounds)
       : state_(state), gluing_(gluing), ranks_(ranks), crew_(crew), rounds_(rounds) {}
 
+  bool several() const override { return state_.decomposition.several(); }
+
   void each(std::size_t parts, const std::function<void(std::size_t)>& work) const override {
     crew_.share(parts, work);
   }
