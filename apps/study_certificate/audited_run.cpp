@@ -99,6 +99,7 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       step.run_seconds = seconds_since(run_start);
       step.step = report.step;
       step.certified = report.converged;
+      step.overlapping = !(report.overlap <= scene.setup.solver.overlap_tolerance);
       step.error_rms = report.error_rms;
       step.balance = report.balance;
       step.iterations = report.iterations;

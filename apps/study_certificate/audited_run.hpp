@@ -26,6 +26,7 @@ struct AuditedStep {
   std::int64_t contacts = 0, clusters = 0;
   bool smooth = true;
   bool certified = false;
+  bool overlapping = false;  ///< beyond the tolerance on overlaps: the time step is too long for the scene
   double error_rms = 0, balance = 0;
   double claimed = 0;  ///< the largest of error_rms, balance and the tolerance
   double asked = 0;    ///< the larger of tolerance and balance_tolerance

@@ -38,7 +38,8 @@ CalibrationRow row_of(std::span<const StepOfScene> steps, double tolerance, std:
     const AuditedStep& step = one.step;
     ++row.steps;
     row.unsolvable += step.judged == Judged::no_answer ? 1 : 0;
-    row.missed += !step.certified && step.judged != Judged::no_answer ? 1 : 0;
+    row.overlapping += step.overlapping ? 1 : 0;
+    row.missed += !step.certified && !step.overlapping && step.judged != Judged::no_answer ? 1 : 0;
     if (!step.certified) continue;
     ++row.certified;
     row.disputed += step.judged == Judged::no_answer && step.residual > step.claimed ? 1 : 0;
@@ -68,7 +69,7 @@ std::span<const Measure> measures() {
 }
 
 double CalibrationRow::missed_share() const {
-  return steps > unsolvable ? static_cast<double>(missed) / static_cast<double>(steps - unsolvable) : 0;
+  return steps > 0 ? static_cast<double>(missed) / static_cast<double>(steps) : 0;
 }
 
 Quantiles quantiles_of(std::vector<double> ratios) {

@@ -42,9 +42,10 @@ struct CalibrationRow {
   std::string_view measure;
   bool bounded = false;
   std::int64_t steps = 0, certified = 0, judged = 0;
-  std::int64_t missed = 0;      ///< steps that have an answer and were not certified
-  std::int64_t unjudged = 0;    ///< certified steps without a reference
-  std::int64_t unsolvable = 0;  ///< steps that have no answer
+  std::int64_t missed = 0;       ///< steps that have an answer and were not certified, overlaps aside
+  std::int64_t overlapping = 0;  ///< steps beyond the tolerance on overlaps: none of them is certified
+  std::int64_t unjudged = 0;     ///< certified steps without a reference
+  std::int64_t unsolvable = 0;   ///< steps that have no answer
   /// Certified steps whose contacts or velocities are not those of the scene, or in which grains approach by
   /// more than is claimed whatever their velocities.
   std::int64_t disputed = 0;

@@ -36,26 +36,28 @@ std::string_view word_of(Judged judged) {
 }
 
 std::string calibration_csv(std::span<const CalibrationRow> rows) {
-  io::CsvTable table({"tolerance", "family", "measure", "steps", "certified", "judged", "unjudged",
-                      "unsolvable", "disputed", "missed_share", "claimed_50", "claimed_95", "claimed_999",
-                      "claimed_worst", "asked_50", "asked_95", "asked_999", "asked_worst", "worst"});
+  io::CsvTable table({"tolerance",    "family",     "measure",    "steps",       "certified",
+                      "judged",       "unjudged",   "unsolvable", "overlapping", "disputed",
+                      "missed_share", "claimed_50", "claimed_95", "claimed_999", "claimed_worst",
+                      "asked_50",     "asked_95",   "asked_999",  "asked_worst", "worst"});
   for (const CalibrationRow& row : rows)
     table.row(row.tolerance, row.family, row.measure, row.steps, row.certified, row.judged, row.unjudged,
-              row.unsolvable, row.disputed, row.missed_share(), row.claimed.median, row.claimed.most,
-              row.claimed.nearly_all, row.claimed.worst, row.asked.median, row.asked.most,
+              row.unsolvable, row.overlapping, row.disputed, row.missed_share(), row.claimed.median,
+              row.claimed.most, row.claimed.nearly_all, row.claimed.worst, row.asked.median, row.asked.most,
               row.asked.nearly_all, row.asked.worst, row.worst);
   return table.text();
 }
 
 std::string steps_csv(std::span<const StepOfScene> steps) {
-  io::CsvTable table({"scene",    "family",      "tolerance",  "step",        "contacts",      "clusters",
-                      "smooth",   "certified",   "error_rms",  "balance",     "claimed",       "asked",
-                      "judged",   "V",           "wf",         "cf",          "cluster",       "energy",
-                      "residual", "uncertainty", "iterations", "run_seconds", "audit_seconds", "why"});
+  io::CsvTable table({"scene",       "family",     "tolerance",   "step",          "contacts",
+                      "clusters",    "smooth",     "certified",   "overlapping",   "error_rms",
+                      "balance",     "claimed",    "asked",       "judged",        "V",
+                      "wf",          "cf",         "cluster",     "energy",        "residual",
+                      "uncertainty", "iterations", "run_seconds", "audit_seconds", "why"});
   for (const StepOfScene& one : steps) {
     const AuditedStep& s = one.step;
     table.row(one.scene, one.family, one.tolerance, s.step, s.contacts, s.clusters, s.smooth, s.certified,
-              s.error_rms, s.balance, s.claimed, s.asked, word_of(s.judged), s.errors.velocity,
+              s.overlapping, s.error_rms, s.balance, s.claimed, s.asked, word_of(s.judged), s.errors.velocity,
               s.errors.wall_force, s.errors.contact_force, s.errors.cluster, s.errors.energy, s.residual,
               s.uncertainty, s.iterations, s.run_seconds, s.audit_seconds, s.why);
   }
@@ -79,8 +81,8 @@ io::ChartSeries curve_of(std::span<const StepOfScene> steps, double tolerance, c
 }
 
 const std::vector<std::string> columns{
-    "tolerance", "family", "measure", "steps",  "missed", "judged",        "no reference", "no answer",
-    "disputed",  "median", "95 %",    "99.9 %", "worst",  "worst / asked", "worst step"};
+    "tolerance", "family",   "measure", "steps", "missed", "judged", "no reference",  "no answer",
+    "overlaps",  "disputed", "median",  "95 %",  "99.9 %", "worst",  "worst / asked", "worst step"};
 
 std::vector<std::string> cells_of(const CalibrationRow& row) {
   const auto number = [](double value) { return fmt::format("{:.2g}", value); };
@@ -92,6 +94,7 @@ std::vector<std::string> cells_of(const CalibrationRow& row) {
           fmt::format("{}", row.judged),
           fmt::format("{}", row.unjudged),
           fmt::format("{}", row.unsolvable),
+          fmt::format("{}", row.overlapping),
           fmt::format("{}", row.disputed),
           number(row.claimed.median),
           number(row.claimed.most),

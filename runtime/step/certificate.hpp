@@ -64,7 +64,7 @@ struct CertificateThresholds {
   /// again.
   int most_corrections = 10;
   /// So often small clusters may be found to have no answer, >= 1: from then on only the last check asks.
-  int most_doubts = 2;
+  int most_doubts = 3;
   /// Without sweeps in between only where the error has fallen to this part, in (0, 1).
   double correction_gain = 0.5;
   /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0,

@@ -1,0 +1,155 @@
+// Small clusters of contacts: the same problems and the same answers, wherever their parts lie.
+
+#include "kernels/clusters/cluster_problem.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "kernels/bodies/index.hpp"
+#include "kernels/clusters/cluster_matrix.hpp"
+#include "kernels/clusters/step_error.hpp"
+#include "tests/unit/kernels/global/cut_problem.hpp"
+
+namespace talus::cluster_problem_test {
+namespace {
+
+constexpr double radius = 0.01, fall = -0.01;
+
+/// Loose heaps of 1 to 12 grains on a floor, wall 0, far from one another; every other contact carries
+/// something. With `plate` a wall of that mass lies on the first heap.
+BodyProblem heaps(int count, double mu, double plate, std::uint32_t seed) {
+  std::mt19937 draw(seed);
+  const auto unit = [&] { return static_cast<double>(draw()) / static_cast<double>(std::mt19937::max()); };
+  BodyProblem problem;
+  std::vector<std::int32_t> lid;
+  for (int heap = 0; heap < count; ++heap) {
+    const auto first = static_cast<std::int32_t>(problem.bodies.size());
+    const int grains = 1 + static_cast<int>(12 * unit());
+    for (int g = 0; g < grains; ++g) {
+      BodyUnknown body;
+      body.mass = 1 + unit();
+      body.spin_mass = mu > 0 ? 0.4 * body.mass : 0;
+      body.radius = radius;
+      body.x = Vec3(heap, 0.02 * (g % 3), 0.018 * (g / 3) + 0.01);
+      body.free.u = Vec3(0.002 * (unit() - 0.5), 0.002 * (unit() - 0.5), fall * (1 + unit()));
+      problem.bodies.push_back(body);
+    }
+    const auto touch = [&](std::int32_t a, std::int32_t b, const Vec3& n) {
+      ContactEquation c;
+      c.normal = n;
+      c.offset = Vec3::Zero();
+      c.mu = mu;
+      c.first = a;
+      c.second = b;
+      c.wall = b < 0 ? 0 : -1;
+      problem.contacts.push_back(c);
+      problem.impulse.push_back(problem.contacts.size() % 2 == 0 ? Vec3(0.3 * n * std::abs(fall))
+                                                                 : Vec3::Zero());
+    };
+    for (std::int32_t a = first; a < first + grains; ++a) {
+      if (problem.bodies[at(a)].x[2] < 0.011) touch(a, -1, Vec3::UnitZ());
+      for (std::int32_t b = first; b < a; ++b) {
+        const Vec3 to = problem.bodies[at(a)].x - problem.bodies[at(b)].x;
+        if (to.norm() < 0.03) touch(a, b, to.normalized());
+      }
+    }
+    if (heap == 0) lid = {first, first + grains - 1};
+  }
+  problem.grains = problem.bodies.size();
+  if (plate > 0) {
+    BodyUnknown wall;
+    wall.mass = plate;
+    wall.wall = true;
+    wall.axis = -Vec3::UnitZ();
+    wall.free.u = Vec3(0, 0, fall);
+    problem.bodies.push_back(wall);
+    ContactEquation c;
+    c.normal = -Vec3::UnitZ();
+    c.offset = Vec3::Zero();
+    c.mu = mu;
+    c.first = lid.back();
+    c.second = static_cast<std::int32_t>(problem.grains);
+    c.wall = 1;
+    problem.contacts.push_back(c);
+    problem.impulse.push_back(Vec3::Zero());
+  }
+  return problem;
+}
+
+/// Every contact in one of `count` parts, none in the first: parts may be empty.
+std::vector<std::int32_t> dealt(const BodyProblem& problem, int count, std::uint32_t seed) {
+  std::mt19937 draw(seed);
+  std::vector<std::int32_t> part;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k)
+    part.push_back(1 + static_cast<std::int32_t>(draw() % static_cast<unsigned>(count - 1)));
+  return part;
+}
+
+TEST(ClusterProblem, IsTheSameWhereverItsContactsLie) {
+  for (const double mu : {0.0, 0.4})
+    for (const double plate : {0.0, 30.0})
+      for (const std::uint32_t seed : {1u, 2u, 3u, 4u}) {
+        const BodyProblem whole = heaps(6, mu, plate, seed);
+        const test::Cut cut(whole, dealt(whole, 5, seed), 5);
+        const ErrorGoal goal{.enough = 1e-4};
+        const StepError one = step_error(whole, goal), parts = step_error(cut.parts, cut, goal);
+        const auto what = [&] {
+          return ::testing::Message() << "mu " << mu << ", plate " << plate << ", seed " << seed;
+        };
+        ASSERT_GT(one.velocity, 0.01) << what();
+        EXPECT_NEAR(parts.velocity, one.velocity, 1e-3 * one.velocity) << what();
+        EXPECT_NEAR(parts.wall, one.wall, 1e-3 * one.wall) << what();
+        EXPECT_TRUE(parts.mends && parts.solved) << what();
+        // What it mends is mended in every part.
+        test::Cut mended = cut;
+        for (std::size_t p = 0; p < mended.parts.size(); ++p)
+          for (std::size_t k = 0; k < parts.change[p].size(); ++k)
+            mended.parts[p].impulse[k] += parts.change[p][k];
+        EXPECT_LT(step_error(mended.parts, mended, goal).velocity, 1e-3) << what();
+      }
+}
+
+TEST(ClusterProblem, HasEachBodyAndContactOnce) {
+  const BodyProblem whole = heaps(6, 0.4, 30, 7);
+  const test::Cut cut(whole, dealt(whole, 4, 7), 4);
+  const BodyParts parts(cut.parts, cut);
+  std::vector<ContactGraph> graphs;
+  for (const BodyProblem& part : cut.parts) graphs.push_back(graph_of(part));
+  std::size_t contacts = 0, walls = 0;
+  double mass = 0;
+  for (const ClusterProblem& cluster : cluster_problems(parts, clusters_of(graphs, cut))) {
+    contacts += cluster.contacts.size();
+    for (const BodyUnknown& body : cluster.problem.bodies) {
+      mass += body.mass;
+      walls += body.wall ? 1 : 0;
+    }
+    EXPECT_LE(cluster.problem.grains, cluster.problem.bodies.size());
+    for (std::size_t b = 0; b < cluster.problem.bodies.size(); ++b)
+      EXPECT_EQ(cluster.problem.bodies[b].wall, b >= cluster.problem.grains) << "walls stand behind grains";
+  }
+  double all = 0;
+  for (const BodyUnknown& body : whole.bodies) all += body.mass;
+  EXPECT_EQ(contacts, whole.contacts.size());
+  EXPECT_EQ(walls, 1u);
+  EXPECT_NEAR(mass, all, 1e-12 * all);
+}
+
+TEST(ClusterMatrix, GivesTheVelocitiesOfTheBodies) {
+  BodyProblem problem = heaps(3, 0.4, 30, 11);
+  const ClusterMatrix matrix = matrix_of(problem);
+  std::vector<double> u(matrix.r.size());
+  relative_velocity(matrix.problem, matrix.r, u);
+  const std::vector<Twist> V = velocities_of(problem, problem.impulse);
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const Vec3 v = relative_velocity(c, V) + c.offset;
+    EXPECT_LT((matrix.frames[k] * Eigen::Map<const Vec3>(&u[3 * k]) - v).norm(), 1e-12) << k;
+    EXPECT_LT((matrix.impulses()[k] - problem.impulse[k]).norm(), 1e-15) << k;
+  }
+}
+
+}  // namespace
+}  // namespace talus::cluster_problem_test
