@@ -32,7 +32,7 @@ void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t c
 /// takes to undo them, fall by the part c in each step. `first_pushes` gives a chunk 1 - c of them, and its
 /// bodies, or the wall copy, the displacements that belong to them; `keep_pushes` is the way back.
 void first_pushes(const Contacts& contacts, ContactRange range, std::span<const float> kept, double part,
-                  SingleState& single, SweepSteps& steps, WallCopy* wall);
+                  SingleState& single, WallCopy* wall);
 void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const SingleState& single,
                  std::span<float> kept);
 
