@@ -12,7 +12,7 @@ std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-/// What one contact has of `push` on its bodies.
+/// Displaces a body by the push of one contact along its normal.
 void shift(float push, const float (&n)[3], SingleVelocity& body) {
   for (std::size_t c = 0; c < 3; ++c) body.u[c] += body.inv_mass * push * n[c];
 }
