@@ -10,6 +10,7 @@ std::unique_ptr<Method> make_automatic(const MethodContext& context);
 std::unique_ptr<Method> make_nlgs(const MethodContext& context);
 std::unique_ptr<Method> make_momentum(const MethodContext& context);
 std::unique_ptr<Method> make_nncg(const MethodContext& context);
+std::unique_ptr<Method> make_adaptive(const MethodContext& context);
 std::unique_ptr<Method> make_admm(const MethodContext& context);
 
 /// The next plan after a check of sweeps with momentum; none if the error has fallen. If it has grown,
