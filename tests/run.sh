@@ -2,7 +2,8 @@
 # Every test: installs what is missing, checks the format of the sources, builds preset `ci` (warnings are errors), runs ctest.
 # Further arguments go to ctest, e.g. -L unit. With CI_LONG=1 the command is built for simulated ranks as well, whose tests are
 # skipped otherwise; tests of units and of several ranks run again under the address and undefined-behaviour sanitizers, those of
-# graph, executor, communicator and step under the thread sanitizer, in a build by clang. Exit code 0 only if all of it passed.
+# graph, executor, communicator and step under the thread sanitizer, in a build by clang; and the benchmarks are built, which no
+# test runs. Exit code 0 only if all of it passed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -27,6 +28,7 @@ if [ "${CI_LONG:-0}" = 1 ]; then
 fi
 cmake --preset ci
 cmake --build --preset ci
+if [ "${CI_LONG:-0}" = 1 ]; then cmake --build --preset ci --target benches; fi
 ctest --preset ci -j2 "$@" || status=$?
 
 if [ "${CI_LONG:-0}" = 1 ]; then

@@ -72,7 +72,8 @@ void sort_by_key(std::vector<Entry>& entries) {
   }
 }
 
-/// Appends pairs to a list whose length is known at the end only: testing takes no jump.
+/// Appends pairs without a branch: each pair tested is written, and the next one overwrites it unless it was
+/// near enough. The length of the list is known at the end only.
 class PairList {
  public:
   explicit PairList(std::vector<GrainPair>& pairs) : pairs_(pairs), size_(pairs.size()) {}
@@ -80,7 +81,7 @@ class PairList {
   PairList(const PairList&) = delete;
   PairList& operator=(const PairList&) = delete;
 
-  /// Those of body a of `grid` with its bodies [begin, end) that are near enough.
+  /// Appends the pairs of body a with bodies [begin, end) of `grid` that are near enough.
   void add(const CellGrid& grid, std::size_t a, std::size_t begin, std::size_t end) {
     if (size_ + (end - begin) > pairs_.size()) pairs_.resize(2 * (size_ + end - begin));
     const CellGrid::Member one = grid.members[a];
@@ -102,12 +103,12 @@ class PairList {
   std::size_t size_;
 };
 
-/// Bodies side by side.
+/// Bodies [begin, end) of a grid, all those of three cells in a row.
 struct Row {
   std::size_t begin = 0, end = 0;
 };
-/// Those of the cells whose keys are within 1 of `key`. `cell` is the first of these cells, or any before it,
-/// and becomes the first.
+/// The bodies of the cells whose keys are within 1 of `key`. `cell` may be any cell up to the first of these,
+/// and is moved on to the first.
 Row row_at(const CellGrid& grid, std::uint64_t key, std::size_t& cell) {
   while (cell < grid.cells.size() && grid.cells[cell].key + 1 < key) ++cell;
   std::size_t last = cell;

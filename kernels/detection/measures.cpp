@@ -34,12 +34,12 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
   const bool cohesive = !contacts.cohesion.empty();
   double penetration = 0, moment[9] = {}, normal_impulse = 0;  // apart, so that they stay in registers
   const auto add = [&](std::size_t k, const Vec3& branch, double gap, double smaller_radius) {
-    // Without a jump: nobody can predict which contacts overlap.
+    // Without a branch: which contacts overlap cannot be predicted.
     const double overlap = std::max(0.0, -gap);
     sums.overlapping += gap < 0 ? 1 : 0;
     penetration += overlap;
     sums.penetration_max = std::max(sums.penetration_max, overlap);
-    // A jump that is hardly ever taken costs less than a division for each contact.
+    // A branch that is hardly ever taken costs less than a division for each contact.
     if (overlap > sums.deepest * smaller_radius) sums.deepest = overlap / smaller_radius;
     const Vec3 r = cohesive ? contact_impulse(contacts, k) : law_impulse(contacts, k);
     for (Eigen::Index c = 0; c < 9; ++c) moment[c] += r[c % 3] * branch[c / 3];
@@ -82,21 +82,16 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
   return sums;
 }
 
-std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks,
-                                       std::span<const char> left_out) {
-  std::vector<std::int32_t> touching(left_out.size(), 0);
+std::vector<std::array<Slot, 2>> active_pairs(const Contacts& contacts, const Chunks& chunks) {
+  std::vector<std::array<Slot, 2>> pairs;
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const auto begin = static_cast<std::size_t>(chunks.begin[c]);
     for (std::size_t k = begin; k < begin + static_cast<std::size_t>(contacts.count[c]); ++k) {
-      if (!is_active(contacts, k)) continue;
-      const auto first = static_cast<std::size_t>(contacts.first[k]),
-                 second = contacts.second[k] >= 0 ? static_cast<std::size_t>(contacts.second[k]) : first;
-      if (left_out[first] != 0 || left_out[second] != 0) continue;
-      ++touching[first];
-      if (second != first) ++touching[second];
+      const Slot first = contacts.first[k], second = contacts.second[k];
+      if (is_active(contacts, k)) pairs.push_back({first, second >= 0 ? second : first});
     }
   }
-  return touching;
+  return pairs;
 }
 
 }  // namespace talus

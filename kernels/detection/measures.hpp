@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -67,9 +68,7 @@ inline bool is_active(const Contacts& contacts, std::size_t k) {
   return law_impulse(contacts, k).dot(contact_normal(contacts, k)) > 0;
 }
 
-/// Active contacts of each grain but those with a grain that is `left_out`, which has none: one entry per
-/// slot.
-std::vector<std::int32_t> count_active(const Contacts& contacts, const Chunks& chunks,
-                                       std::span<const char> left_out);
+/// The bodies of each active contact; of one at a wall its body twice.
+std::vector<std::array<Slot, 2>> active_pairs(const Contacts& contacts, const Chunks& chunks);
 
 }  // namespace talus

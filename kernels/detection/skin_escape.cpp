@@ -17,13 +17,13 @@ double need_of(const Bodies& bodies, std::size_t s, const Margins& margins) {
 
 constexpr double rounding = 1e-12;
 
-/// Escapes near some bodies.
+/// The escaped grains that may be near the bodies of a block.
 struct NearEscapes {
   std::span<const Escape* const> all;
-  double widest;  ///< what they need at most [m]
+  double widest;  ///< largest Escape::need among them [m]
 };
 
-/// Body s with the escapes. True when it is one of them.
+/// Appends the contacts of body s with the escaped grains to `needed`. True when s is one of these grains.
 bool compare(const NearEscapes& escapes, const Bodies& bodies, std::size_t s, const Margins& margins,
              std::vector<Encounter>& needed) {
   bool left = false;

@@ -56,11 +56,11 @@ void carry_velocities(const SweepKernels& kernels, double beta, std::span<const 
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy,
                 AccelerationHistory& acceleration);
 
-/// When velocities are made afresh from the impulses, what drifted from them is gone at once, but not from
-/// what the acceleration remembers: the rule would take the difference for motion, and carry it on beta/(1 -
-/// beta) times as large, at every refresh. So the acceleration goes along: `loosen` before the velocities are
-/// reset, `fasten` when they stand. Of the slots; `last` is that of the acceleration, in the precision of the
-/// velocities.
+/// Making velocities afresh from the impulses removes their rounding drift. The velocities that the
+/// acceleration remembers still contain it; the rule would take the difference for motion and amplify it by
+/// beta/(1 - beta), at every refresh. So the remembered velocities are shifted by the same difference: call
+/// `loosen` before the velocities are reset and `fasten` once they are made. Both act on the slots; `last` is
+/// that of the acceleration, in the precision of the velocities.
 template <class Number>
 void loosen(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
             std::vector<VelocityOf<Number>>& last);

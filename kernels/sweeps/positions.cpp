@@ -12,7 +12,7 @@ std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
 }
 
-/// What one contact has of `push` on its bodies.
+/// Displaces a body by the push of one contact along its normal.
 void shift(float push, const float (&n)[3], SingleVelocity& body) {
   for (std::size_t c = 0; c < 3; ++c) body.u[c] += body.inv_mass * push * n[c];
 }
@@ -70,13 +70,12 @@ void take_displacement(const SingleVelocity& body, WallCopy& wall) {
 }  // namespace
 
 void first_pushes(const Contacts& contacts, ContactRange range, std::span<const float> kept, double part,
-                  SingleState& single, SweepSteps& steps, WallCopy* wall) {
+                  SingleState& single, WallCopy* wall) {
   SingleContacts& c = single.contacts;
   const auto stays = static_cast<float>(1 - part);
   SingleVelocity at_wall = wall ? as_body(*wall, c.unit) : SingleVelocity{};
   for (std::size_t k = range.begin; k < range.end; ++k) {
     const float n[3] = {c.nx[k], c.ny[k], c.nz[k]};
-    steps.n[k] = 0;
     c.rn[k] = stays * kept[index(contacts.candidate[k])];
     if (c.rn[k] == 0) continue;
     shift(c.rn[k], n, single.velocity[index(contacts.first[k])]);

@@ -28,11 +28,12 @@ void begin_positions(const Contacts& contacts, std::span<const Velocity> velocit
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
                    double part, SingleState& single);
 
-/// Pushes of the last step, per candidate, which those of a step begin from: overlaps, and with them what it
-/// takes to undo them, fall by the part c in each step. `first_pushes` gives a chunk 1 - c of them, and its
-/// bodies, or the wall copy, the displacements that belong to them; `keep_pushes` is the way back.
+/// Warm start: `kept` has the pushes of the last step, per candidate. Overlaps, and with them the pushes that
+/// undo them, fall by the part c in each step, so `first_pushes` starts a chunk from 1 - c times the pushes
+/// of the last step, and applies these to its bodies, or to the wall copy. `keep_pushes` stores those of the
+/// chunk for the next step.
 void first_pushes(const Contacts& contacts, ContactRange range, std::span<const float> kept, double part,
-                  SingleState& single, SweepSteps& steps, WallCopy* wall);
+                  SingleState& single, WallCopy* wall);
 void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const SingleState& single,
                  std::span<float> kept);
 

@@ -12,7 +12,7 @@ namespace talus::graph {
 inline constexpr bool simulated_ranks = true;
 
 /// Time of the simulated machine: what ranks have computed, as measured, and what messages took, as modelled.
-/// The other clocks of the standard library show what the simulation takes.
+/// The clocks of the standard library measure the time that the simulation itself takes.
 struct Clock {
   using duration = std::chrono::nanoseconds;
   using rep = duration::rep;
@@ -22,9 +22,10 @@ struct Clock {
   static time_point now() noexcept;
 };
 
-/// As long as it lives, what the rank does takes `seconds` on the simulated machine, whatever the host needs
-/// for it: at the first message that the rank sends meanwhile, or at the end; what is taken comes before. One
-/// within another counts apart.
+/// While an object of this class lives, the rank's work takes `seconds` on the simulated machine, whatever
+/// the host needs for it. The time passes before the first message that the rank sends meanwhile, or at the
+/// end of the object's life if it sends none; messages that it takes before are taken without this delay.
+/// The times of nested objects add up.
 class GivenTime {
  public:
   explicit GivenTime(double seconds);

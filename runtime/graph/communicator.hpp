@@ -5,10 +5,12 @@
 ///
 ///   OneRank             one_rank.hpp           a rank alone: nothing is sent, MPI is not called
 ///   make_communicator   mpi_communicator.hpp   the ranks of mpirun
-///   PretendRanks        pretend_ranks.hpp      threads of one process that take each other for ranks, for
-///   tests DelayedMessages     delayed_messages.hpp   a decorator: messages of any other arrive later
-///   simulated_time()    simulated_time.hpp     a decorator: calls of any other take time of a simulated
-///   machine
+///   PretendRanks        pretend_ranks.hpp      for tests: threads of one process in the place of ranks
+///
+/// Decorators, around any of these:
+///
+///   DelayedMessages     delayed_messages.hpp   messages arrive later
+///   simulated_time()    simulated_time.hpp     calls take the time of a simulated machine
 
 #include <algorithm>
 #include <cstddef>
@@ -98,19 +100,20 @@ class Communicator {
   int largest_tag() const noexcept { return properties_.largest_tag; }
   int ranks_on_node() const noexcept { return properties_.ranks_on_node; }
   const RankProperties& properties() const noexcept { return properties_; }
-  /// Collective calls leave spans in `trace` from now on; null: no more. It must outlive them. Those of
-  /// channels are left by who uses them. Calls of one rank, which do nothing, leave theirs too (start_gather
-  /// none): replay counts them for many. Exchanges and gathers are two calls, the first of lengths. Only
-  /// threads of the recorder's team may make calls then.
+  /// From now on collective calls record spans in `trace`, which must outlive them; null ends that. Messages
+  /// of channels are recorded by their users. A rank alone records its calls, too, though they do nothing
+  /// (but not start_gather): a replay on more ranks needs their number. An exchange or a gather counts as two
+  /// calls, the first of which sends the lengths. While this records, only threads of the recorder's team may
+  /// make calls.
   virtual void record_to(trace::Recorder* trace) const { trace_ = trace; }
   trace::Recorder* trace() const noexcept { return trace_; }
 
   // Collective: every rank calls, in the same order.
-  /// Sends to[r] to rank r. `room(r, bytes)` gives the place for what rank r sends here, and is not asked for
-  /// this rank itself, whose own part is nobody's message. One part per rank, each below 2 GiB.
+  /// Sends to[r] to rank r, one part per rank, each below 2 GiB. `room(r, bytes)` returns the buffer for what
+  /// rank r sends here. It is not called for this rank itself: to[rank()] is not sent.
   virtual void exchange(std::span<const std::span<const std::byte>> to,
                         const std::function<std::byte*(std::size_t, std::size_t)>& room) const = 0;
-  /// Of each value over all ranks, in place; all bring as many.
+  /// Sum, or maximum, of each value over all ranks, in place; all ranks pass equally many values.
   virtual void sum(std::span<std::int64_t> values) const = 0;
   virtual void max(std::span<double> values) const = 0;
   /// The parts of all ranks in order of rank.

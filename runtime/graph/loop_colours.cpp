@@ -7,7 +7,7 @@ namespace talus::graph {
 
 namespace {
 
-/// What a rank goes through one after the other. Group colour t is phase first_colour + t.
+/// Phases of an epoch, in their order. The phase of groups of colour t is first_colour + t.
 enum Phase : std::uint32_t {
   telling,
   inside_of_later,
@@ -17,10 +17,10 @@ enum Phase : std::uint32_t {
   last_glue
 };
 
-/// Of a group, within a phase.
+/// Order of what a group does within a phase.
 enum Part : std::uint32_t { early, tell, inner, take, border, publish, inner_behind };
 
-/// What comes first, by its numbers from the left: phase, group, part, colour within the part.
+/// Sort key of a node: phase, group, part, colour within the part. Nodes run in ascending order of it.
 using Position = std::array<std::uint32_t, 4>;
 
 std::vector<Position> sorted(std::vector<Position> positions) {
@@ -33,7 +33,8 @@ std::uint32_t rank_in(const std::vector<Position>& order, const Position& positi
   return static_cast<std::uint32_t>(std::lower_bound(order.begin(), order.end(), position) - order.begin());
 }
 
-/// Colours that count from 0 in each part of a group, groups alike.
+/// Lets groups run side by side: the group leaves the key, and in each part of each group colours count from
+/// 0 without gaps.
 void go_abreast(std::vector<Position>& positions) {
   const std::vector<Position> order = sorted(positions);
   for (Position& position : positions)
@@ -41,13 +42,13 @@ void go_abreast(std::vector<Position>& positions) {
                 rank_in(order, position) - rank_in(order, {position[0], position[1], position[2], 0})};
 }
 
-/// Where the nodes of a rank stand.
+/// Sort keys of the nodes of a rank.
 class Positions {
  public:
   Positions(const LoopSpec& spec, bool alone) : spec_(spec), alone_(alone) {
     const bool later = std::ranges::any_of(spec.groups, [](const LoopGroup& g) { return g.colour > 0; });
-    // One group after another as a whole, but where others wait for all publishes of a rank that has nothing
-    // else to do in between.
+    // The inside of a group directly follows its border, while the group is in the cache. The exception is a
+    // rank that only has groups of the first colour: other ranks wait for all its publishes.
     const bool whole = spec.overlap && spec.threads == 1 && (alone || later || !spec.in_colours);
     behind_ = whole ? first_colour : inside_of_first;
   }

@@ -112,7 +112,7 @@ class Planner {
     }
   }
 
-  /// Work goes by its place; what is exchanged of a group to who has its first work.
+  /// Work is shared out in order of place; the exchanges of a group go to the thread of its first work.
   void find_owners() {
     const std::size_t count = spec_.work.size();
     std::vector<std::uint32_t> order(count), weight(count), group(count), owner(count);

@@ -11,9 +11,10 @@ namespace talus::graph {
 
 namespace {
 
-/// From when a message is begun until it can be handed on, in what a message costs a rank.
+/// Time from the start of a message until its receiver can forward it, in units of what a message costs its
+/// sender (0.3 us).
 constexpr int under_way = 7;
-/// 16 messages there and back are what the ranks with the least work have time for.
+/// Eight messages to children and eight back: the ranks with the least work have time for no more.
 constexpr std::size_t most_children = 8;
 
 }  // namespace

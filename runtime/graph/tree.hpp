@@ -11,8 +11,8 @@ namespace talus::graph {
 struct Tree {
   std::vector<int> parent;                 ///< per rank; -1 of the top
   std::vector<std::vector<int>> children;  ///< per rank, in the order in which they are told
-  std::vector<int> told;                   ///< per rank: when what goes down reaches it, in messages' costs
-  std::vector<int> order;                  ///< of all ranks, parents before their children
+  std::vector<int> told;   ///< per rank: when what goes down reaches it, in costs of a message
+  std::vector<int> order;  ///< of all ranks, parents before their children
 
   int top() const { return order.front(); }
   int last() const { return told[static_cast<std::size_t>(order.back())]; }

@@ -184,9 +184,9 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
     changes_[c] = change_squared(range, contacts, velocity, copy.inv_mass, acceleration_);
 }
 
-/// Brings a chunk's contacts, and the bodies that it is the first to write, to where its sweep looks for
-/// them. Behind a check velocities and impulses are in double precision; what goes on with momentum changes
-/// behind the sweep that follows the check, and takes it along.
+/// Converts a chunk's contacts, and the bodies that it is the first to write, to the precision of the coming
+/// sweep. After a check velocities and impulses are in double precision. A course with momentum that goes on
+/// through the check changes precision after the first sweep behind it, and converts its history, too.
 void ChunkWork::change_precision(std::size_t c, int epoch) {
   const bool before = single_before(epoch);
   if (course(epoch).single)

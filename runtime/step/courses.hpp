@@ -5,7 +5,7 @@
 
 namespace talus {
 
-/// A plan of sweeps in force.
+/// A plan of sweeps, and since when it has been in force.
 struct Course {
   SweepPlan plan;
   int from = 0;         ///< its first sweep in the step

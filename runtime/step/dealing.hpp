@@ -11,10 +11,10 @@
 
 namespace talus {
 
-/// Collective. The bodies of this rank: those whose centres lie in its subdomains, cut as the settings say.
-/// The sample is that of rank 0, all others pass an empty one; it leaves in pieces of a few thousand grains
-/// and is let go of, so that no rank ever holds the bodies of another. Throws std::invalid_argument when
-/// there are more ranks than subdomains, or a centre is not finite.
+/// Collective. Returns the bodies of this rank: those whose centres lie in its subdomains, cut as the
+/// settings say. Rank 0 passes the whole sample, all others an empty one. It is sent in pieces of a few
+/// thousand grains and freed, so that no other rank ever holds more than its own bodies. Throws
+/// std::invalid_argument when there are more ranks than subdomains, or a centre is not finite.
 Bodies deal_out(Sample sample, const DecompositionSettings& settings, const graph::Communicator& ranks);
 
 /// Of the bodies of all ranks.

@@ -83,7 +83,7 @@ PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& 
   return points;
 }
 
-/// Who makes up the surroundings of a rank: slots of its own, and what came from others.
+/// The bodies of a rank's surroundings: slots of its own, and bodies that other ranks sent.
 struct Gathered {
   std::vector<Slot> own;
   std::vector<BodyRecord> come;

@@ -32,8 +32,8 @@ Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3>
   return Domain{}.midpoint(x[at(pair.first)], x[at(pair.second)]);
 }
 
-/// The impulses of the last steps, in slots of the surroundings. Those whose point has come to a subdomain of
-/// another rank go there; `candidates` are let go of.
+/// The impulses of the last step, with slots of the surroundings. Those whose point of contact now lies in a
+/// subdomain of another rank are sent there; `candidates` are freed.
 Candidates collect_impulses(const Decomposition& decomposition, const graph::Communicator& ranks,
                             const Surroundings& around, const Bodies& bodies, Candidates candidates) {
   const std::size_t grains = candidates.grain_pairs.size();
@@ -191,7 +191,7 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
     }
 }
 
-/// What the groups of candidates depend on beside the candidates.
+/// What the groups depend on, besides the candidates themselves.
 struct GroupRules {
   const Per<SubdomainId, std::int64_t>& load;  ///< candidates
   std::int64_t all;                            ///< their sum

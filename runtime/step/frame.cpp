@@ -32,7 +32,7 @@ Vec3 vector_of(const double* from) {
   return {from[0], from[1], from[2]};
 }
 
-/// Rows on the way at a time, of one sender to all.
+/// Rows that one rank sends to all others at a time: bounds the memory of the buffers.
 constexpr std::size_t piece = 8192;
 
 BodyRow body_row(const StepState& state, std::size_t s) {

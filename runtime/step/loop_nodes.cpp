@@ -6,7 +6,7 @@ namespace talus {
 
 namespace {
 
-/// Where nothing is told, chunks at glued walls are of the border.
+/// Where a subdomain sends nothing to the root, its chunks at glued walls belong to the border.
 graph::LoopWork::Side side_of(ChunkSide side, bool tells) {
   using enum graph::LoopWork::Side;
   switch (side) {

@@ -23,7 +23,7 @@ struct OverlapPair {
   auto operator<=>(const OverlapPair&) const = default;
 };
 
-/// What a pair overlaps by that no step has made [m].
+/// Depth by which a pair overlapped before the first step [m], as far as it has not opened since.
 struct GivenOverlap {
   OverlapPair pair;
   double depth = 0;

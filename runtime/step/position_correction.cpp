@@ -21,7 +21,8 @@ void PositionCorrection::run(std::size_t chunk, int epoch) {
   if (epoch == 0) {
     find_overlaps(state_.contacts, chunks, chunk,
                   {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)}, part, single);
-    return first_pushes(state_.contacts, range, pushes_, part, single, acceleration_.steps, copy);
+    for (std::size_t k = range.begin; k < range.end; ++k) acceleration_.steps.n[k] = 0;
+    return first_pushes(state_.contacts, range, pushes_, part, single, copy);
   }
   const double beta = momentum_beta(rule_.momentum, epoch - 1, rule_.momentum.most_without_friction);
   const SweepMomentum momentum{beta, rule_.momentum.over_relaxation, acceleration_.steps};

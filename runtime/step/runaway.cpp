@@ -20,7 +20,8 @@ std::string describe(const Bodies& bodies, Slot slot) {
       v.w[0], v.w[1], v.w[2]);
 }
 
-/// Walls do not feel one another: two that face each other have run through when nothing between held them.
+/// Walls do not collide with one another: two that face each other pass through each other if no grain
+/// between them holds them.
 void check_walls_apart(const std::vector<Wall>& walls, const StepName& step) {
   for (const Wall& moving : walls)
     for (const Wall& other : walls)

@@ -16,8 +16,8 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Area that the pressure on wall `w` acts on [m^2], of a stage that began with a box. When it is none any
-/// more, walls have run through one another: throws RunawayError.
+/// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws RunawayError
+/// when there is no such area any more, because walls have run through one another.
 double pressed_area(const std::vector<Wall>& walls, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,

@@ -112,8 +112,9 @@ inline constexpr int most_subdomains = 65535;
 /// How subdomains act on one another.
 enum class Coupling {
   nscdd,  ///< copies carry M/m and are glued to the mean of their velocities (Visseq et al. 2013, (7)-(15))
-  alternating,  ///< likewise, but turn by turn: a copy carries M over the number of those that act at a time,
-                ///< and begins with what earlier turns have left (docs/decisions/0007-couplings.md)
+  alternating,  ///< likewise, but one subdomain colour after another: a copy carries M over the number of
+                ///< copies of its colour, and begins with the velocity that the colours before it have left
+                ///< (docs/decisions/0007-couplings.md)
   schwarz,      ///< copies carry M and add up what each gained (the paper's (16)-(27))
 };
 

@@ -1,16 +1,14 @@
 #include "runtime/step/simulation.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "kernels/detection/domain.hpp"
-#include "kernels/shapes/clump_motion.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
+#include "runtime/step/first_state.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/stage_end.hpp"
 #include "runtime/step/step_report.hpp"
@@ -31,7 +29,7 @@ struct Simulation::Implementation {
   Implementation(Setup given, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks_)
       : setup(std::move(given)),
         ranks(ranks_),
-        state(start(setup, std::move(bodies), ranks_)),
+        state(first_state(setup, std::move(bodies), ranks_)),
         size(measure_sample(state.bodies, ranks_, setup.clumps)),
         graph(state, parameters, setup, size.bodies, executor, ranks_) {
     state.decomposition.orientation = size.orientation;
@@ -59,46 +57,6 @@ struct Simulation::Implementation {
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
     lengths_at_start = from.lengths_of_box;
-  }
-
-  /// Of the materials that bodies have.
-  static void demand_laws(const Setup& setup, const Bodies& bodies) {
-    for (const Stage& stage : setup.stages)
-      for (const Material material : bodies.material)
-        if (!stage.laws.knows(material))
-          throw std::invalid_argument(
-              fmt::format("stage '{}': its laws do not have material {}, of which there are bodies",
-                          stage.name, material));
-  }
-
-  static StepState start(const Setup& setup, Bodies bodies, const graph::Communicator& ranks) {
-    validate(setup);
-    validate(bodies);
-    validate_shapes(bodies, setup.clumps);
-    demand_laws(setup, bodies);
-    StepState state;
-    state.decomposition = make_decomposition(setup.decomposition, ranks);
-    state.bodies = std::move(bodies);
-    if (state.decomposition.several())  // until the first step deals them out; shares go by subdomain
-      std::fill(state.decomposition.slot_begin.begin() + 1, state.decomposition.slot_begin.end(),
-                state.bodies.size());
-    else
-      reorder(state.bodies, morton_order(state.bodies));
-    if (!setup.rotation)
-      for (Velocity& v : state.bodies.velocity) {
-        v.spin_mobility = 0;
-        std::fill(std::begin(v.w), std::end(v.w), 0.0);
-      }
-    // Alike on all ranks, whoever has a clump.
-    if (!setup.clumps.empty() && state.bodies.shape.empty())
-      state.bodies.shape.assign(state.bodies.size(), 0);
-    if ((setup.orientation || !setup.clumps.empty()) && state.bodies.orientation.empty())
-      state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});
-    state.walls = setup.walls;
-    state.clumps = setup.clumps;
-    state.wall_states.resize(state.walls.size());
-    state.free.u.resize(state.bodies.size());
-    return state;
   }
 
   const Stage& stage() const { return setup.stages[stage_index]; }

@@ -40,8 +40,9 @@ struct SavedState {
 ///   Simulation simulation(setup, std::move(bodies), executor);
 ///   while (!simulation.finished()) {
 ///     const StepReport& report = simulation.step();
-///     if (wanted(report.step)) executor.submit_background("output", [frame = simulation.frame()] {
-///     write(frame); }); simulation.begin_next_stage();
+///     if (wanted(report.step))
+///       executor.submit_background("output", [frame = simulation.frame()] { write(frame); });
+///     simulation.begin_next_stage();
 ///   }
 ///
 /// On several ranks all call the same functions; those marked collective must be called by all. With the same

@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "kernels/sweeps/fetch_lines.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/check_spacing.hpp"
 #include "runtime/step/check_sums.hpp"
@@ -246,40 +245,6 @@ std::optional<trace::Kind> SolverLoop::kind(std::uint32_t node, int epoch) const
 std::optional<std::size_t> SolverLoop::subdomain_of(std::uint32_t node) const {
   const std::uint32_t group = plan_.nodes[node].group;
   return group == graph::LoopPlan::none ? std::nullopt : std::optional<std::size_t>(group);
-}
-
-void SolverLoop::fetch(std::size_t subdomain) const {
-  const auto fetch = [](std::size_t begin, std::size_t end, const auto&... columns) {
-    // A column that this scene has not got is empty.
-    (fetch_lines(std::span(std::as_const(columns))
-                     .subspan(std::min(begin, columns.size()), columns.size() < end ? 0 : end - begin)),
-     ...);
-  };
-  const AccelerationHistory& acceleration = work_.acceleration();
-  const Contacts& contacts = state_.contacts;
-  const SingleContacts& single = state_.single.contacts;
-  const Decomposition& all = state_.decomposition;
-  const SubdomainPlace own(subdomain);
-  const std::size_t first = all.several() ? all.slots_of(own).begin : 0,
-                    last = all.several() ? all.slots_of(own).end : state_.bodies.size();
-  // What single sweeps want comes last, and is nearest then.
-  fetch(first, last, state_.free.u, state_.free.w, state_.bodies.velocity, acceleration.last_v,
-        acceleration.step_v);
-  for (const bool in_single : {false, true})
-    for (std::size_t c = 0; c < state_.chunks.size(); ++c) {
-      if (static_cast<std::size_t>(state_.chunks.subdomain[c]) != subdomain) continue;
-      const auto begin = static_cast<std::size_t>(state_.chunks.begin[c]);
-      const std::size_t end = begin + static_cast<std::size_t>(contacts.count[c]);
-      if (in_single)
-        fetch(begin, end, single.nx, single.ny, single.nz, single.bias, single.rx, single.ry, single.rz,
-              single.rn, single.mu, acceleration.steps.x, acceleration.steps.y, acceleration.steps.z,
-              acceleration.steps.n, contacts.first_record, contacts.second_record, contacts.group);
-      else
-        fetch(begin, end, contacts.nx, contacts.ny, contacts.nz, contacts.bias, contacts.rx, contacts.ry,
-              contacts.rz, contacts.rn, contacts.mu);
-    }
-  fetch(first, last, state_.single.velocity, state_.single.last_v);
-  gluing_.fetch(own);
 }
 
 bool SolverLoop::decide(int epoch) {

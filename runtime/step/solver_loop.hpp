@@ -12,6 +12,7 @@
 #include "runtime/step/chunk_work.hpp"
 #include "runtime/step/courses.hpp"
 #include "runtime/step/epoch_schedule.hpp"
+#include "runtime/step/fetch_subdomain.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/methods/method.hpp"
 #include "runtime/step/position_correction.hpp"
@@ -65,7 +66,10 @@ class SolverLoop {
   /// Subdomain here that the node works on; none: the root.
   std::optional<std::size_t> subdomain_of(std::uint32_t node) const;
   /// Brings all that the loop reads and writes of a subdomain here into the cache of the core that calls.
-  void fetch(std::size_t subdomain) const;
+  void fetch(std::size_t subdomain) const {
+    fetch_subdomain(state_, work_.acceleration(), SubdomainPlace(subdomain));
+    gluing_.fetch(SubdomainPlace(subdomain));
+  }
 
   /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
   void begin();

@@ -67,7 +67,7 @@ struct StepState {
   SingleState single;             ///< c rooms and n, or empty
   std::vector<WallCopy> copies;   ///< k; used by chunks at walls
   bool candidates_valid = false;  ///< false: the next step begins with a broad phase
-  /// What pairs overlap by that no step has made, the same on all ranks; nothing before the first step.
+  /// Overlaps that the sample began with (overlap.hpp), the same on all ranks; none before the first step.
   std::optional<std::vector<GivenOverlap>> given_overlaps;
 };
 

@@ -39,8 +39,8 @@ void StepGraph::predict_share(std::uint32_t share) {
     find_skin_escapes(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[share]);
 }
 
-/// How near a grain can come to a wall for what the grain's own margin does not count: the wall's way, and
-/// what gravity adds to the grain's speed within a step, and the wall's load to its own.
+/// Margin of a wall: what brings a grain nearer to it and is not in the grain's own margin. That is the way
+/// of the wall, what gravity adds to the grain's speed within a step, and what the load adds to the wall's.
 double StepGraph::margin_of(const Wall& wall) const {
   const double h = parameters_.time_step;
   return contact_margin(wall.velocity.norm(), h, parameters_.alert) +
@@ -78,7 +78,7 @@ bool StepGraph::candidates_hold() const {
   if (skin_escapes.size() > few) return false;
   for (const Escape& escape : skin_escapes) {
     if (!std::isfinite(escape.need + escape.x[0] + escape.x[1] + escape.x[2])) return false;  // a runaway
-    // It may have passed a grain that it is beyond by now, and that only a candidate would tell of.
+    // It may have passed through a grain within the step; only a candidate would have shown that.
     const double speed = std::hypot(escape.u[0], escape.u[1], escape.u[2]);
     if (parameters_.time_step * speed > 0.5 * escape.radius) return false;
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <unordered_map>
@@ -122,9 +123,17 @@ void sum_over_copies(const StepState& state, const graph::Communicator& ranks,
 }  // namespace
 
 double coordination(const StepState& state, const graph::Communicator& ranks, std::int32_t hold) {
+  const auto at = [](Slot slot) { return static_cast<std::size_t>(slot); };
   std::vector<char> rattles(state.bodies.size(), 0);
+  std::vector<std::int32_t> here(state.bodies.size(), 0);  // contacts on this rank with no rattler
+  std::vector<std::array<Slot, 2>> pairs = active_pairs(state.contacts, state.chunks);
+  const auto add = [&](const std::array<Slot, 2>& pair, std::int32_t count) {
+    here[at(pair[0])] += count;
+    if (pair[1] != pair[0]) here[at(pair[1])] += count;
+  };
+  for (const auto& pair : pairs) add(pair, 1);
   for (;;) {
-    std::vector<std::int32_t> touching = count_active(state.contacts, state.chunks, rattles);
+    std::vector<std::int32_t> touching = here;
     sum_over_copies(state, ranks, touching);
     std::int64_t sums[3] = {0, 0, 0};  // grains, their contacts, rattlers found
     for (std::size_t s = 0; s < touching.size(); ++s) {
@@ -139,6 +148,11 @@ double coordination(const StepState& state, const graph::Communicator& ranks, st
     }
     ranks.sum(sums);
     if (sums[2] == 0) return sums[0] > 0 ? static_cast<double>(sums[1]) / static_cast<double>(sums[0]) : 0;
+    std::erase_if(pairs, [&](const std::array<Slot, 2>& pair) {
+      const bool lost = rattles[at(pair[0])] != 0 || rattles[at(pair[1])] != 0;
+      if (lost) add(pair, -1);
+      return lost;
+    });
   }
 }
 

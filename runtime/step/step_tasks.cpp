@@ -28,9 +28,9 @@ bool StepGraph::partition_due() const {
   return steps_ - partitioned_ >= decomposition_.repartition_every || out_of_balance();
 }
 
-/// Not where it has not been much less since the last cut: the sample may not be divisible any better; nor
-/// where contacts are so few that their places are chance. What was cut before there were candidates is cut
-/// again when there are.
+/// Whether space is to be cut anew because of the imbalance. Not if the imbalance has never been much smaller
+/// since the last cut, as the sample may not be divisible any better; nor if contacts are so few that their
+/// places are chance. A partition made before candidates were known is always replaced once they are.
 bool StepGraph::out_of_balance() const {
   constexpr std::int64_t few = 16;
   if (!state_.decomposition.several()) return false;

@@ -80,7 +80,7 @@ void StepGraph::note_plan(const graph::LoopPlan& loop) {
   if (executor_.trace()) executor_.trace()->plan(std::move(plan));
 }
 
-/// What is not asked for is not there: without trace and order the loop runs on the program itself.
+/// Without a trace or a recorded order the loop runs the program itself, so that neither costs anything then.
 void StepGraph::iterate(graph::Worker& worker) {
   trace::Recorder* const trace =
       executor_.trace() && executor_.trace()->active() ? executor_.trace() : nullptr;

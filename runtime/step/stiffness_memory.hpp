@@ -6,14 +6,16 @@
 
 namespace talus {
 
-/// When the stiffness that an earlier step has found goes for this one, too.
+/// When the stiffness found in an earlier step may be used for this one.
 struct StiffnessReuse {
   /// Grains are alike when the heaviest has less than so many times the mass of the lightest, > 1: none would
   /// change everything where it lands.
   double alike = 1000;
-  /// Renewals of the candidates after which all have moved on and nothing is known, >= 0.
+  /// Number of times that candidates are found anew after which too much has moved: the answer is dropped,
+  /// >= 0.
   int most_renewals = 10;
-  /// The problem was far from stiff: so many times its sweeps are less than makes it stiff, >= 1.
+  /// Only a problem that was far from stiff: this multiple of its sweeps is below the number that makes a
+  /// problem stiff, >= 1.
   double margin = 2;
   /// The number of contacts has changed by at most one in so many, >= 1.
   std::int64_t same_contacts = 20;

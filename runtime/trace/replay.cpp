@@ -193,9 +193,9 @@ class Player {
     now = play_tasks(stage_, {tasks_, timed, none, loop}, now);
     if (const std::vector<SimEpoch> epochs = epochs_of(index); !epochs.empty()) {
       const std::vector<double> begun = now;
-      now = machine_.schedule == Schedule::list || machine_.unbounded
-                ? play_list(stage_, index, layout_, epochs, begun)
-                : play_fixed(stage_, index, layout_, epochs, begun);
+      const LoopRun run{stage_, index, layout_, epochs};
+      now = machine_.schedule == Schedule::list || machine_.unbounded ? play_list(run, begun)
+                                                                      : play_fixed(run, begun);
       for (std::uint32_t r = 0; r < ranks; ++r)
         for (std::uint32_t t = 0; t < static_cast<std::uint32_t>(machine_.threads); ++t)
           stage_.log.span(stage_.log.worker(r, t), begun[r], now[r],

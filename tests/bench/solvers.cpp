@@ -31,16 +31,17 @@ constexpr Case cases[] = {{"triaxial", false, 0.35, 1e-3},
                           {"triaxial", false, 0.1, 1e-6},
                           {"triaxial", false, 0, 1e-6}};
 
-struct Method {
+/// A method of the settings, under the name of its rows.
+struct Contender {
   const char* name;
   SolverMethod method;
   Precision precision = Precision::full;
 };
-constexpr Method methods[] = {{"NLGS", SolverMethod::nlgs},
-                              {"momentum", SolverMethod::momentum},
-                              {"NNCG", SolverMethod::nncg},
-                              {"auto, double", SolverMethod::automatic},
-                              {"auto", SolverMethod::automatic, Precision::mixed}};
+constexpr Contender contenders[] = {{"NLGS", SolverMethod::nlgs},
+                                    {"momentum", SolverMethod::momentum},
+                                    {"NNCG", SolverMethod::nncg},
+                                    {"auto, double", SolverMethod::automatic},
+                                    {"auto", SolverMethod::automatic, Precision::mixed}};
 
 struct Outcome {
   int sweeps = 0;
@@ -54,7 +55,7 @@ struct Cut {
   int subdomains = 1;
 };
 
-Outcome solve(const bench::Packing& packing, const Case& problem, const Method& method, const Cut& cut) {
+Outcome solve(const bench::Packing& packing, const Case& problem, const Contender& method, const Cut& cut) {
   Setup setup = bench::packed_scene(packing, problem.pile, problem.tolerance, problem.mu);
   setup.solver.method = method.method;
   setup.solver.precision = method.precision;
@@ -100,7 +101,7 @@ int main(int argc, char** argv) {
     fmt::print("| --- | ---: | ---: | ---: | ---: | ---: |\n");
     double baseline = 0;
     for (const int count : subdomains)
-      for (const Method& method : methods) {
+      for (const Contender& method : contenders) {
         std::vector<Outcome> runs;
         for (int run = 0; run < 3; ++run)
           runs.push_back(solve(packing, problem, method, {cut.partitioner, cut.coupling, count}));

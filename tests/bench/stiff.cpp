@@ -43,6 +43,7 @@ struct Scene {
   std::vector<WallMotion> walls;
   std::vector<WallCopy> copies;
   std::vector<std::vector<std::int32_t>> copies_of;  ///< per wall
+  PairTable laws = laws_of_one_material(mu, mu, 0);
   double time_step = 1e-3;
 
   void prepare(double alert, bool closed) {
@@ -126,8 +127,7 @@ struct Scene {
                            walls,
                            sample.chunks,
                            sample.contacts,
-                           mu,
-                           mu,
+                           laws,
                            {}});
   }
 };

@@ -27,7 +27,7 @@ template <class V>
   sums.active += error.r_n > 0 ? V{} + 1.0 : V{};
 }
 
-/// With what the error of a chunk is measured.
+/// What the error of a chunk is measured with.
 template <class Mu>
 struct ErrorRule {
   Mu friction;

@@ -13,8 +13,9 @@ namespace talus::detail {
 
 namespace {
 
-/// By how many the mass of a body is divided for its copy in this subdomain: by all copies that act on it
-/// without knowing of one another. Hubs are glued once a sweep, whosever subdomain colour it is.
+/// Divisor of the mass of a body for its copy in this subdomain: the number of copies that are swept between
+/// two exchanges of it. With subdomain colours those are the copies of one colour; hubs, which are glued once
+/// a sweep, are divided by the number of all their copies.
 std::int32_t parts_of(const Decomposition& decomposition, Coupling coupling,
                       std::span<const SubdomainId> standings, SubdomainId subdomain, std::int32_t hubs) {
   const auto m = static_cast<std::int32_t>(standings.size());

@@ -9,9 +9,9 @@
 
 namespace talus::detail {
 
-/// Grains are hubs from this multiplicity on, glued once a sweep through one rank. By then those of all
-/// subdomain colours must have been swept, and what waits for them cannot be hidden: where there is one,
-/// there are no subdomain colours.
+/// Grains of this multiplicity or a higher one are hubs: they are glued once a sweep, through one rank.
+/// Gluing a hub has to wait for the sweeps of all subdomain colours, and no other work hides that wait; so a
+/// single hub disables subdomain colours.
 std::int32_t hubs_from(const DecompositionSettings& settings);
 
 /// From the interfaces, which hold the bodies of the surroundings: multiplicities of the copies, their parts

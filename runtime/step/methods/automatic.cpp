@@ -8,15 +8,15 @@ namespace {
 struct AutomaticParameters {
   /// With a smaller largest beta, in (0, 1), conjugate gradients are faster than momentum.
   double least_momentum = 0.85;
-  /// Plain sweeps below which no problem is stiff, > 0: sweeps see through it, and ADMM is not called before
-  /// as many were done.
+  /// A problem that needs fewer plain sweeps is not stiff, > 0: sweeps alone solve it, and ADMM is not called
+  /// before as many were done.
   double stiff = 1000;
   AdmmCalls calls;
 };
 
-/// Momentum, as long as it makes the error smaller; conjugate gradients where it has to be slowed down too
-/// much; plain sweeps where both fail; ADMM when sweeps leave the forces out of balance in a problem that
-/// takes them longer than ADMM.
+/// Sweeps with momentum, as long as they reduce the error; conjugate gradients where beta has become too
+/// small; plain sweeps where both fail. ADMM is called when sweeps leave the forces out of balance in a
+/// problem that ADMM solves faster than they do.
 class Automatic : public Method {
  public:
   explicit Automatic(const MethodContext& context)

@@ -1,8 +1,8 @@
 #pragma once
 
-/// What makes of sweeps a solver. A method says how sweeps go on and when ADMM takes over; that a step is
-/// solved is for the certificate to say. One file per method beside this one; methods/registry.cpp lists
-/// them.
+/// Methods: how sweeps go on from one to the next, and when ADMM takes over. Whether a step is solved is not
+/// their decision but the certificate's. Each method has a file of its own beside this one;
+/// methods/registry.cpp lists them.
 
 #include <memory>
 #include <optional>
@@ -17,8 +17,8 @@ namespace talus {
 struct MethodContext {
   const SolverSettings& settings;
   bool friction = false;
-  /// Sweeps whose changes cannot be carried on: damped Schwarz is no descent, and moments of rolling
-  /// resistance and contacts of clumps have no history.
+  /// True where sweeps cannot be accelerated: damped Schwarz does not decrease the energy, and no history is
+  /// kept of moments of rolling resistance and of contacts of clumps.
   bool plain = false;
 };
 
@@ -69,12 +69,12 @@ inline bool Method::calls_admm(MethodView&) const {
 
 /// When sweeps hand over to ADMM.
 struct AdmmCalls {
-  /// Sweeps that have their chance before the first call, >= 0; four times as many before each further one.
+  /// Sweeps done before the first call, >= 0; four times as many before each further one.
   int chance = 50;
   /// Calls in a step, at most, >= 1. Whatever ADMM leaves undone it is asked for again.
   int most = 3;
 };
-/// Sweeps have had their chance since the last call, and there is one left.
+/// Enough sweeps were done since the last call of ADMM, and another call is allowed in this step.
 bool admm_due(const AdmmCalls& calls, const MethodView& view);
 
 using MethodMaker = std::unique_ptr<Method> (*)(const MethodContext&);

@@ -9,6 +9,7 @@ constexpr Entry<SolverMethod, MethodMaker> entries[] = {
                         make_automatic),
     named<SolverMethod>("nlgs", "sweeps as they are", make_nlgs),
     named<SolverMethod>("nlgs+momentum", "each sweep begins beyond where the last one ended", make_momentum),
+    named<SolverMethod>("nlgs+adaptive", "momentum as large as the error bears", make_adaptive),
     named<SolverMethod>("nncg", "nonsmooth conjugate gradients", make_nncg),
     named<SolverMethod>("admm", "for long chains and heavy bodies, then sweeps", make_admm),
 };

@@ -20,8 +20,7 @@ struct StartedNode {
 
 class LoopEvents {
  public:
-  LoopEvents(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-             const std::vector<SimEpoch>& epochs);
+  explicit LoopEvents(const LoopRun& run);
 
   /// Plays until no event is left and returns the times at which the ranks left the loop [ns]. The schedule's
   /// part is done by `loop`:
@@ -77,7 +76,7 @@ class LoopEvents {
     return arrived_[inbox(node, epoch)];
   }
   bool all_arrived(std::uint32_t node, std::uint32_t epoch) const {
-    return arrived(node, epoch) == layout_.incoming[node];
+    return arrived(node, epoch) == run_.layout.incoming[node];
   }
   /// The messages that the node waited for are its own.
   StartedNode start_node(std::uint32_t node, std::uint32_t epoch);
@@ -93,8 +92,8 @@ class LoopEvents {
            const LastMessage& last);
   /// True when the node sends in an epoch that exchanges.
   bool sends(std::uint32_t node) const {
-    return layout_.send_begin[node + 1] > layout_.send_begin[node] ||
-           (layout_.nodes[node].tells && layout_.to_root[layout_.nodes[node].rank].bytes > 0);
+    return run_.layout.send_begin[node + 1] > run_.layout.send_begin[node] ||
+           (run_.layout.nodes[node].tells && run_.layout.to_root[run_.layout.nodes[node].rank].bytes > 0);
   }
   /// At the end of a node in an epoch that exchanges: the last of a leaf of the tree that tells sends for
   /// all.
@@ -116,12 +115,12 @@ class LoopEvents {
   };
 
   std::size_t inbox(std::uint32_t node, std::size_t epoch) const {
-    return 2 * node + epochs_[epoch].exchanges_before % 2;
+    return 2 * node + run_.epochs[epoch].exchanges_before % 2;
   }
   /// Those of `sends`, then those to the root.
   const SimMessage& message(std::size_t number) const {
-    return number < layout_.sends.size() ? layout_.sends[number]
-                                         : layout_.to_root[number - layout_.sends.size()];
+    return number < run_.layout.sends.size() ? run_.layout.sends[number]
+                                             : run_.layout.to_root[number - run_.layout.sends.size()];
   }
   /// Its messages leave one after the other, from the end of its work, `worked`.
   void send(std::uint32_t node, std::uint32_t worker, std::uint32_t epoch, double worked);
@@ -131,10 +130,7 @@ class LoopEvents {
   bool open_gate(std::uint32_t r, std::uint32_t e, double now);
   std::vector<double> ends() const;
 
-  Stage& stage_;
-  const StepIndex& index_;
-  const LoopLayout& layout_;
-  const std::vector<SimEpoch>& epochs_;
+  const LoopRun run_;
   Agenda agenda_;
   std::vector<Rank> ranks_;
   std::vector<Round> rounds_;

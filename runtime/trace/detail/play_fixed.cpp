@@ -15,23 +15,20 @@ constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
 class FixedLoop {
  public:
-  FixedLoop(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-            const std::vector<SimEpoch>& epochs, const std::vector<double>& start)
-      : stage_(stage),
-        layout_(layout),
-        epochs_(epochs),
-        threads_(static_cast<std::uint32_t>(stage.machine.threads)),
-        events_(stage, index, layout, epochs),
-        workers_(layout.walk_begin.size() - 1),
+  FixedLoop(const LoopRun& run, const std::vector<double>& start)
+      : run_(run),
+        threads_(static_cast<std::uint32_t>(run.stage.machine.threads)),
+        events_(run),
+        workers_(run.layout.walk_begin.size() - 1),
         ranks_(start.size()),
-        finished_(layout.nodes.size(), 0),
-        first_waiter_(layout.nodes.size(), none),
-        pending_(layout.nodes.size(), none) {
+        finished_(run.layout.nodes.size(), 0),
+        first_waiter_(run.layout.nodes.size(), none),
+        pending_(run.layout.nodes.size(), none) {
     find_foreign();
     for (std::uint32_t w = 0; w < workers_.size(); ++w) {
       workers_[w].rank = w / threads_;
       workers_[w].time = start[workers_[w].rank];
-      workers_[w].at = layout.walk_begin[w];
+      workers_[w].at = run.layout.walk_begin[w];
     }
   }
 
@@ -42,7 +39,7 @@ class FixedLoop {
 
   void node_ended(std::uint32_t node, std::uint32_t w, double now) {
     Worker& me = workers_[w];
-    if (epochs_[me.epoch].exchange) events_.send_up(node, w, me.epoch, now);
+    if (run_.epochs[me.epoch].exchange) events_.send_up(node, w, me.epoch, now);
     ++finished_[node];
     ++me.at;
     std::uint32_t waiter = std::exchange(first_waiter_[node], none);
@@ -64,7 +61,7 @@ class FixedLoop {
       me.taken = me.waited_to = now;
       me.last_name = came.name;
     }
-    me.taken += stage_.network.overhead();
+    me.taken += run_.stage.network.overhead();
     if (!events_.all_arrived(node, epoch)) return;
     pending_[node] = none;
     if (start(w, node)) advance(w, now);
@@ -75,7 +72,7 @@ class FixedLoop {
     ranks_[r] = {0, now};
     for (std::uint32_t w = first; w < first + threads_; ++w) {
       ++workers_[w].epoch;
-      workers_[w].at = layout_.walk_begin[w];
+      workers_[w].at = run_.layout.walk_begin[w];
     }
     for (std::uint32_t w = first; w < first + threads_; ++w) advance(w, now);
   }
@@ -99,11 +96,11 @@ class FixedLoop {
   /// Only what other threads of the rank own must be looked at; a walk knows its own nodes done.
   void find_foreign() {
     foreign_begin_.push_back(0);
-    watched_.resize(layout_.nodes.size(), 0);
-    for (std::uint32_t n = 0; n < layout_.nodes.size(); ++n) {
-      for (std::uint32_t other : layout_.neighbours(n)) {
-        if (layout_.nodes[other].worker == layout_.nodes[n].worker) continue;
-        foreign_.push_back({other, layout_.nodes[other].colour > layout_.nodes[n].colour ? 0U : 1U});
+    watched_.resize(run_.layout.nodes.size(), 0);
+    for (std::uint32_t n = 0; n < run_.layout.nodes.size(); ++n) {
+      for (std::uint32_t other : run_.layout.neighbours(n)) {
+        if (run_.layout.nodes[other].worker == run_.layout.nodes[n].worker) continue;
+        foreign_.push_back({other, run_.layout.nodes[other].colour > run_.layout.nodes[n].colour ? 0U : 1U});
         watched_[other] = 1;
       }
       foreign_begin_.push_back(static_cast<std::uint32_t>(foreign_.size()));
@@ -121,26 +118,26 @@ class FixedLoop {
     Worker& me = workers_[w];
     me.time = std::max(me.time, now);
     for (;;) {
-      if (me.at == layout_.walk_begin[w + 1]) {
-        if (epochs_[me.epoch].gate) {
+      if (me.at == run_.layout.walk_begin[w + 1]) {
+        if (run_.epochs[me.epoch].gate) {
           Rank& rank = ranks_[me.rank];
           rank.time = std::max(rank.time, me.time);
           if (++rank.at_gate == threads_) events_.reach_gate(me.rank, me.epoch, rank.time);
           return;
         }
         ++me.epoch;
-        me.at = layout_.walk_begin[w];
+        me.at = run_.layout.walk_begin[w];
         continue;
       }
-      const std::uint32_t node = layout_.walk[me.at];
+      const std::uint32_t node = run_.layout.walk[me.at];
       if (const std::uint32_t before = unmet(node, me.epoch); before != none) {
         me.next_waiter = first_waiter_[before];
         first_waiter_[before] = w;
         return;
       }
       me.taken = me.waited_to = me.time;
-      if (epochs_[me.epoch].exchange) {
-        me.taken += events_.arrived(node, me.epoch) * stage_.network.overhead();
+      if (run_.epochs[me.epoch].exchange) {
+        me.taken += events_.arrived(node, me.epoch) * run_.stage.network.overhead();
         if (!events_.all_arrived(node, me.epoch)) {
           pending_[node] = w;
           return;
@@ -159,8 +156,8 @@ class FixedLoop {
         me.waited_to > me.time ? std::max(0.0, me.taken - me.time - started.exchange.takes) : 0;
     const double end = events_.work(started, w, me.taken);
     events_.log(started, w, {me.time, end, waited}, {me.last_name, me.waited_to});
-    me.time = end + (started.recorded.recorded ? stage_.dispatch : 0);
-    if (watched_[node] || (epochs_[me.epoch].exchange && events_.sends(node))) {
+    me.time = end + (started.recorded.recorded ? run_.stage.dispatch : 0);
+    if (watched_[node] || (run_.epochs[me.epoch].exchange && events_.sends(node))) {
       events_.end_node(node, w, end);
       return false;
     }
@@ -174,9 +171,7 @@ class FixedLoop {
     std::uint32_t more;  ///< 1: must have ended this epoch, 0: the one before
   };
 
-  Stage& stage_;
-  const LoopLayout& layout_;
-  const std::vector<SimEpoch>& epochs_;
+  const LoopRun run_;
   const std::uint32_t threads_;
   LoopEvents events_;
   std::vector<Worker> workers_;
@@ -191,9 +186,8 @@ class FixedLoop {
 
 }  // namespace
 
-std::vector<double> play_fixed(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-                               const std::vector<SimEpoch>& epochs, const std::vector<double>& start) {
-  return FixedLoop(stage, index, layout, epochs, start).run();
+std::vector<double> play_fixed(const LoopRun& run, const std::vector<double>& start) {
+  return FixedLoop(run, start).run();
 }
 
 }  // namespace talus::trace::detail

@@ -13,24 +13,22 @@ namespace {
 
 class ListLoop {
  public:
-  ListLoop(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-           const std::vector<SimEpoch>& epochs, const std::vector<double>& start)
-      : stage_(stage),
-        layout_(layout),
-        epochs_(epochs),
-        threads_(static_cast<std::uint32_t>(stage.machine.threads)),
-        events_(stage, index, layout, epochs),
+  ListLoop(const LoopRun& run, const std::vector<double>& start)
+      : run_(run),
+        threads_(static_cast<std::uint32_t>(run.stage.machine.threads)),
+        events_(run),
         ranks_(start.size()),
-        missing_(layout.nodes.size(), 0),
-        epoch_(layout.nodes.size(), 0),
-        ready_(layout.nodes.size(), never) {
+        missing_(run.layout.nodes.size(), 0),
+        epoch_(run.layout.nodes.size(), 0),
+        ready_(run.layout.nodes.size(), never) {
     for (std::uint32_t r = 0; r < ranks_.size(); ++r) {
-      for (std::uint32_t t = threads_; t-- > 0;) ranks_[r].idle.push_back({stage.log.worker(r, t), start[r]});
+      for (std::uint32_t t = threads_; t-- > 0;)
+        ranks_[r].idle.push_back({run.stage.log.worker(r, t), start[r]});
       ranks_[r].allowed = last_before_gate(0);
     }
-    for (std::uint32_t n = 0; n < layout.nodes.size(); ++n)
-      for (std::uint32_t other : layout.neighbours(n))
-        if (layout.nodes[other].colour < layout.nodes[n].colour) ++missing_[n];
+    for (std::uint32_t n = 0; n < run.layout.nodes.size(); ++n)
+      for (std::uint32_t other : run.layout.neighbours(n))
+        if (run.layout.nodes[other].colour < run.layout.nodes[n].colour) ++missing_[n];
   }
 
   std::vector<double> run(const std::vector<double>& start) {
@@ -39,17 +37,17 @@ class ListLoop {
   }
 
   void node_ended(std::uint32_t n, std::uint32_t worker, double now) {
-    const SimNode& node = layout_.nodes[n];
+    const SimNode& node = run_.layout.nodes[n];
     Rank& rank = ranks_[node.rank];
     const std::uint32_t e = epoch_[n];
-    if (epochs_[e].exchange) events_.send_up(n, worker, e, now);
+    if (run_.epochs[e].exchange) events_.send_up(n, worker, e, now);
     // From now on everything that conflicts must end once more before this node runs again.
     ++epoch_[n];
-    missing_[n] = static_cast<std::uint32_t>(layout_.neighbours(n).size());
-    if (missing_[n] == 0 && epoch_[n] < epochs_.size()) offer(n, now);
-    for (std::uint32_t other : layout_.neighbours(n))
-      if (--missing_[other] == 0 && epoch_[other] < epochs_.size()) offer(other, now);
-    const std::size_t nodes = layout_.rank_begin[node.rank + 1] - layout_.rank_begin[node.rank];
+    missing_[n] = static_cast<std::uint32_t>(run_.layout.neighbours(n).size());
+    if (missing_[n] == 0 && epoch_[n] < run_.epochs.size()) offer(n, now);
+    for (std::uint32_t other : run_.layout.neighbours(n))
+      if (--missing_[other] == 0 && epoch_[other] < run_.epochs.size()) offer(other, now);
+    const std::size_t nodes = run_.layout.rank_begin[node.rank + 1] - run_.layout.rank_begin[node.rank];
     if (e == rank.allowed && ++rank.ended == nodes) events_.reach_gate(node.rank, e, now);
     dispatch(node.rank, now);
   }
@@ -63,7 +61,7 @@ class ListLoop {
   void message_came(const SimMessage& came, std::uint32_t, double now) {
     last_name_ = came.name;
     offer(came.to, now);
-    dispatch(layout_.nodes[came.to].rank, now);
+    dispatch(run_.layout.nodes[came.to].rank, now);
   }
 
   void goes_on(std::uint32_t r, double now) {
@@ -88,37 +86,37 @@ class ListLoop {
   };
 
   std::uint32_t last_before_gate(std::uint32_t epoch) const {
-    while (!epochs_[epoch].gate) ++epoch;
+    while (!run_.epochs[epoch].gate) ++epoch;
     return epoch;
   }
   /// From when the rank may work on the epochs up to the next gate.
   void begin_epochs(std::uint32_t r, double now) {
-    if (layout_.rank_begin[r] == layout_.rank_begin[r + 1]) {
+    if (run_.layout.rank_begin[r] == run_.layout.rank_begin[r + 1]) {
       events_.reach_gate(r, ranks_[r].allowed, now);  // nothing to do until the next gate
       return;
     }
-    for (std::uint32_t n = layout_.rank_begin[r]; n < layout_.rank_begin[r + 1]; ++n) offer(n, now);
+    for (std::uint32_t n = run_.layout.rank_begin[r]; n < run_.layout.rank_begin[r + 1]; ++n) offer(n, now);
     dispatch(r, now);
   }
 
   /// Puts the node among the ready ones if it is.
   void offer(std::uint32_t n, double now) {
-    Rank& rank = ranks_[layout_.nodes[n].rank];
+    Rank& rank = ranks_[run_.layout.nodes[n].rank];
     const std::uint32_t e = epoch_[n];
     if (missing_[n] > 0 || e > rank.allowed) return;
     ready_[n] = std::min(ready_[n], now);
-    if (epochs_[e].exchange && !events_.all_arrived(n, e)) return;
-    rank.ready.push({e, layout_.nodes[n].colour, n});
+    if (run_.epochs[e].exchange && !events_.all_arrived(n, e)) return;
+    rank.ready.push({e, run_.layout.nodes[n].colour, n});
     ++missing_[n];  // taken: what comes later must not offer it again
   }
 
   void dispatch(std::uint32_t r, double now) {
     Rank& rank = ranks_[r];
-    const bool unbounded = stage_.machine.unbounded;
+    const bool unbounded = run_.stage.machine.unbounded;
     while (!rank.ready.empty() && (unbounded || !rank.idle.empty())) {
       const std::uint32_t n = std::get<2>(rank.ready.top());
       rank.ready.pop();
-      Idle thread{stage_.log.worker(r, 0), now};
+      Idle thread{run_.stage.log.worker(r, 0), now};
       if (!unbounded) {
         thread = rank.idle.back();
         rank.idle.pop_back();
@@ -132,20 +130,18 @@ class ListLoop {
     const StartedNode started = events_.start_node(n, e);
     double takes = started.exchange.takes;
     // A thread that has nothing else to do takes each message as it comes; the last one is left.
-    if (stage_.machine.unbounded) takes = std::min(takes, stage_.network.overhead());
+    if (run_.stage.machine.unbounded) takes = std::min(takes, run_.stage.network.overhead());
     const double end = events_.work(started, thread.worker, now + takes);
     // A thread without work lacked the node's last message only.
     const double waited = now - std::max(thread.since, ready_[n]);
     events_.log(started, thread.worker, {now - waited, end, waited}, {last_name_, now});
     ready_[n] = never;
     events_.end_node(n, thread.worker, end);
-    if (!stage_.machine.unbounded)
-      events_.free_thread(thread.worker, end + (started.recorded.recorded ? stage_.dispatch : 0));
+    if (!run_.stage.machine.unbounded)
+      events_.free_thread(thread.worker, end + (started.recorded.recorded ? run_.stage.dispatch : 0));
   }
 
-  Stage& stage_;
-  const LoopLayout& layout_;
-  const std::vector<SimEpoch>& epochs_;
+  const LoopRun run_;
   const std::uint32_t threads_;
   LoopEvents events_;
   std::vector<Rank> ranks_;
@@ -159,9 +155,8 @@ class ListLoop {
 
 }  // namespace
 
-std::vector<double> play_list(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-                              const std::vector<SimEpoch>& epochs, const std::vector<double>& start) {
-  return ListLoop(stage, index, layout, epochs, start).run(start);
+std::vector<double> play_list(const LoopRun& run, const std::vector<double>& start) {
+  return ListLoop(run, start).run(start);
 }
 
 }  // namespace talus::trace::detail

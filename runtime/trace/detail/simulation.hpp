@@ -107,11 +107,17 @@ struct SimEpoch {
   std::size_t exchanges_before = 0;
 };
 
-/// The loop of one step: epochs of `layout` from `start` [ns], per rank; returns when each rank has left it.
-std::vector<double> play_fixed(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-                               const std::vector<SimEpoch>& epochs, const std::vector<double>& start);
-std::vector<double> play_list(Stage& stage, const StepIndex& index, const LoopLayout& layout,
-                              const std::vector<SimEpoch>& epochs, const std::vector<double>& start);
+/// The loop of one step as it is to be played. All of it must outlive the playing.
+struct LoopRun {
+  Stage& stage;
+  const StepIndex& index;
+  const LoopLayout& layout;
+  const std::vector<SimEpoch>& epochs;
+};
+
+/// Plays it from `start` [ns], per rank; returns when each rank has left the loop.
+std::vector<double> play_fixed(const LoopRun& run, const std::vector<double>& start);
+std::vector<double> play_list(const LoopRun& run, const std::vector<double>& start);
 
 /// A task of the step on a rank.
 struct TimedTask {

@@ -6,61 +6,18 @@
 #include <bit>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <set>
 #include <span>
 #include <utility>
 
 #include "runtime/graph/one_rank.hpp"
-#include "runtime/step/runaway.hpp"
 #include "runtime/step/task_kinds.hpp"
-#include "tests/unit/dense_sample.hpp"
+#include "tests/unit/runtime/step/loose_scenes.hpp"
 
 namespace talus::simulation_test {
 namespace {
 
-using test::Random;
-using test::uniform;
-
 // Inside a TEST, Setup is a private name of GoogleTest: there it is spelled talus::Setup.
-
-constexpr double radius = 0.01, density = 2600;
-
-/// edge_x x edge_y x edge_z spheres of 8-10 mm on a cubic lattice of 21 mm in a box, ids in lattice order.
-Bodies loose_sample(int edge_x, int edge_y, int edge_z, std::uint64_t seed) {
-  Random random(seed);
-  Bodies bodies;
-  for (int k = 0; k < edge_x * edge_y * edge_z; ++k) {
-    const Vec3 site(k % edge_x + 0.5, k / edge_x % edge_y + 0.5, k / (edge_x * edge_y) + 0.5);
-    add_sphere(bodies, BodyId{k}, 2.1 * radius * site + test::uniform_vector(random, -0.04, 0.04) * radius,
-               radius * uniform(random, 0.8, 1), density);
-  }
-  return bodies;
-}
-
-std::vector<Wall> box(double x, double y, double z) {
-  std::vector<Wall> walls = test::box_of_walls(0, 0);
-  walls[1].point = Vec3(x, 0, 0);
-  walls[3].point = Vec3(0, y, 0);
-  walls[5].point = Vec3(0, 0, z);
-  return walls;
-}
-
-WallLoad pressed(double pressure) {
-  WallLoad load;
-  load.drive = WallDrive::pressure;
-  load.pressure = pressure;
-  load.mass = 1;
-  return load;
-}
-
-Stage stage(std::string name, std::int64_t steps) {
-  Stage stage;
-  stage.name = std::move(name);
-  stage.time_step = 1e-3;
-  stage.end.steps = steps;
-  return stage;
-}
 
 /// 576 grains between three fixed and three pressed walls: squeezed without friction, held with it, then
 /// sheared by the top wall; few iterations, so that the bits also are those of an unfinished solution.
@@ -168,15 +125,6 @@ TEST(Simulation, DoesNotDependOnTheOrderInWhichBodiesAreGiven) {
   EXPECT_EQ(run(setup, shuffled, {}).state, run(setup, loose_sample(8, 8, 9, 3), {}).state);
 }
 
-// ---- stages
-
-Setup falling(std::int64_t steps) {
-  talus::Setup setup;
-  setup.stages = {stage("fall", steps)};
-  setup.stages[0].gravity = Vec3(0, 0, -10);
-  return setup;
-}
-
 TEST(Simulation, OfNoBodiesRunsItsSteps) {
   graph::Executor executor({.threads = 2});
   talus::Setup setup = falling(3);
@@ -266,53 +214,6 @@ TEST(Simulation, OfAPerfectlyElasticBallKeepsItsEnergy) {
     ASSERT_NEAR(energy, mass * 10, 1e-9 * mass * 10) << "step " << simulation.report().step;
   }
   EXPECT_GT(bounces, 15);
-}
-
-TEST(Stages, EndByStepsByTimeAndByStrain) {
-  graph::Executor executor({});
-  talus::Setup setup;
-  setup.walls = box(1, 1, 1);
-  Stage by_steps = stage("steps", 7), by_time = stage("time", 0), by_strain = stage("strain", 1000);
-  by_time.end = {};
-  by_time.end.time = 0.013;
-  by_strain.end.strain = 0.05;
-  by_strain.end.strain_axis = 1;
-  WallLoad squeeze;
-  squeeze.drive = WallDrive::velocity;
-  squeeze.velocity = Vec3(0, -2, 0);
-  by_strain.loads = {{"y+", squeeze}};
-  setup.stages = {by_steps, by_time, by_strain, stage("nothing", 0), stage("last", 2)};
-  Simulation simulation(setup, Bodies{}, executor);
-  std::vector<std::int64_t> steps(setup.stages.size(), 0);
-  int begun = 0;
-  while (!simulation.finished()) {
-    ++steps[simulation.stage_index()];
-    simulation.step();
-    begun += simulation.begin_next_stage();
-  }
-  // ln(1 - 0.002 k) <= -0.05 first holds for k = 25.
-  EXPECT_EQ(steps, (std::vector<std::int64_t>{7, 13, 25, 0, 2}));
-  EXPECT_EQ(begun, 3) << "the empty stage is passed over";
-  EXPECT_NEAR(simulation.report().time, 47e-3, 1e-12);
-}
-
-TEST(Stages, EndAtEquilibriumOnceThePileRests) {
-  graph::Executor executor({});
-  talus::Setup setup = falling(5000);
-  setup.walls = box(2.1 * radius, 2.1 * radius, 1);
-  setup.stages[0].end.equilibrium = 1e-6;
-  setup.solver.tolerance = 1e-6;
-  setup.solver.balance_tolerance = 1e-6;
-  Simulation simulation(setup, loose_sample(1, 1, 4, 1), executor);
-  while (!simulation.finished()) {
-    simulation.step();
-    simulation.begin_next_stage();
-  }
-  EXPECT_GT(simulation.report().step, 5);
-  EXPECT_LT(simulation.report().step, 5000);
-  double weight = 0;
-  for (std::size_t s = 0; s < 4; ++s) weight += 10 * simulation.state().bodies.mass(s);
-  EXPECT_NEAR(simulation.walls()[4].force[2], weight, 1e-5 * weight);
 }
 
 // ---- certificate
@@ -407,72 +308,6 @@ TEST(Simulation, WithoutFrictionHasNoTangentialArrays) {
   }
 }
 
-// ---- runaway
-
-std::string runaway_message(const Setup& setup, Bodies bodies, int threads) {
-  graph::Executor executor({.threads = threads});
-  Simulation simulation(setup, std::move(bodies), executor);
-  try {
-    while (!simulation.finished()) {
-      simulation.step();
-      simulation.begin_next_stage();
-    }
-  } catch (const RunawayError& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-TEST(Simulation, RefusesABodyThatIsNotFinite) {
-  graph::Executor executor({.threads = 1});
-  Bodies bodies = loose_sample(4, 4, 4, 1);
-  bodies.velocity[37].u[1] = std::numeric_limits<double>::quiet_NaN();
-  try {
-    Simulation simulation(falling(5), bodies, executor);
-    FAIL() << "taken";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("body 37"), std::string::npos) << error.what();
-  }
-}
-
-TEST(Runaway, OfAnOverflowStopsWithItsStepStageAndBody) {
-  for (int threads : {1, 2}) {
-    Bodies bodies = loose_sample(4, 4, 4, 1);
-    bodies.velocity[37].u[1] = 1e200;
-    const std::string message = runaway_message(falling(5), bodies, threads);
-    EXPECT_NE(message.find("step 1 "), std::string::npos) << message;
-    EXPECT_NE(message.find("'fall'"), std::string::npos) << message;
-    EXPECT_NE(message.find("body 37:"), std::string::npos) << message;
-  }
-}
-
-TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
-  talus::Setup setup;
-  setup.stages = {stage("release", 1)};
-  Bodies one;
-  add_sphere(one, BodyId{5}, Vec3::Zero(), radius, density);
-  one.velocity[0].u[0] = 1;
-  graph::Executor executor({.threads = 1});
-  Simulation simulation(setup, one, executor);
-  simulation.step();
-  StepSums sums = simulation.sums();
-  SampleSize size;
-  const StepOutcome outcome{{1, "release"},          simulation.setup(), size,
-                            simulation.parameters(), simulation.state(), sums,
-                            simulation.iterations()};
-  EXPECT_NO_THROW(check_for_runaway(outcome, 0));
-  sums.motion.energy_free /= 1000;  // as if a step had made that much of it
-  try {
-    check_for_runaway(outcome, 0);
-    FAIL() << "went on";
-  } catch (const RunawayError& error) {
-    const std::string message = error.what();
-    EXPECT_NE(message.find("kinetic energy"), std::string::npos) << message;
-    EXPECT_NE(message.find("'release'"), std::string::npos) << message;
-    EXPECT_NE(message.find("body 5"), std::string::npos) << message;
-  }
-}
-
 // ---- overlaps
 
 /// A free row, and one that stands at a wall: what opens its overlaps is no motion.
@@ -513,47 +348,6 @@ TEST(Simulation, RoundingIsNoErrorOfASolver) {
   const StepReport& report = simulation.step();
   EXPECT_GT(report.contacts, 0);
   EXPECT_TRUE(report.converged) << report.error_rms << " after " << report.iterations;
-}
-
-TEST(Simulation, RefusesSettingsThatMakeNoSense) {
-  const auto refused = [](const auto& change) {
-    talus::Setup setup;
-    setup.stages = {stage("fall", 1)};
-    validate(setup);
-    change(setup);
-    EXPECT_THROW(validate(setup), std::invalid_argument);
-  };
-  refused([](talus::Setup& s) { s.solver.overlap_correction = 1.1; });
-  refused([](talus::Setup& s) { s.solver.overlap_correction = std::numeric_limits<double>::quiet_NaN(); });
-  refused([](talus::Setup& s) { s.solver.check_every = 1; });
-  refused([](talus::Setup& s) { s.decomposition.repartition_every = 0; });
-  refused([](talus::Setup& s) {
-    s.decomposition.coupling = Coupling::nscdd;
-    s.decomposition.sweeps_per_exchange = 0;
-  });
-}
-
-TEST(Simulation, RefusesMomentumOnSchwarz) {
-  talus::Setup setup;
-  setup.stages = {stage("fall", 1)};
-  setup.solver.method = SolverMethod::momentum;
-  EXPECT_NO_THROW(validate(setup));
-  setup.decomposition.coupling = Coupling::schwarz;
-  EXPECT_THROW(validate(setup), std::invalid_argument);
-}
-
-TEST(Stages, TooShortForAStepAreRefused) {
-  talus::Setup setup;
-  setup.stages = {stage("blink", 1)};
-  setup.stages[0].end.steps.reset();
-  for (const double part : {0.4, 0.5}) {
-    setup.stages[0].end.time = part * setup.stages[0].time_step;
-    EXPECT_THROW(validate(setup), std::invalid_argument) << part;
-  }
-  setup.stages[0].end.time = 0.51 * setup.stages[0].time_step;
-  EXPECT_NO_THROW(validate(setup));
-  graph::Executor executor({.threads = 1});
-  EXPECT_FALSE(Simulation(setup, Bodies{}, executor).finished()) << "a step is to be made";
 }
 
 }  // namespace

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "kernels/bodies/bodies.hpp"
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/setup.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// What the first step of a simulation finds: the bodies of this rank, sorted where there is one subdomain
+/// (several are dealt out by that step), walls and clumps of the setup, and room for what steps write. Throws
+/// std::invalid_argument when setup and bodies make no sense together. Collective.
+StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicator& ranks);
+
+}  // namespace talus

@@ -1,0 +1,111 @@
+/// What a simulation refuses to begin with, and what it stops at.
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "runtime/step/runaway.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/runtime/step/loose_scenes.hpp"
+
+namespace talus::simulation_test {
+namespace {
+
+// Inside a TEST, Setup is a private name of GoogleTest: there it is spelled talus::Setup.
+
+TEST(Simulation, RefusesSettingsThatMakeNoSense) {
+  const auto refused = [](const auto& change) {
+    talus::Setup setup;
+    setup.stages = {stage("fall", 1)};
+    validate(setup);
+    change(setup);
+    EXPECT_THROW(validate(setup), std::invalid_argument);
+  };
+  refused([](talus::Setup& s) { s.solver.overlap_correction = 1.1; });
+  refused([](talus::Setup& s) { s.solver.overlap_correction = std::numeric_limits<double>::quiet_NaN(); });
+  refused([](talus::Setup& s) { s.solver.check_every = 1; });
+  refused([](talus::Setup& s) { s.decomposition.repartition_every = 0; });
+  refused([](talus::Setup& s) {
+    s.decomposition.coupling = Coupling::nscdd;
+    s.decomposition.sweeps_per_exchange = 0;
+  });
+}
+
+TEST(Simulation, RefusesMomentumOnSchwarz) {
+  talus::Setup setup;
+  setup.stages = {stage("fall", 1)};
+  setup.solver.method = SolverMethod::momentum;
+  EXPECT_NO_THROW(validate(setup));
+  setup.decomposition.coupling = Coupling::schwarz;
+  EXPECT_THROW(validate(setup), std::invalid_argument);
+}
+
+std::string runaway_message(const Setup& setup, Bodies bodies, int threads) {
+  graph::Executor executor({.threads = threads});
+  Simulation simulation(setup, std::move(bodies), executor);
+  try {
+    while (!simulation.finished()) {
+      simulation.step();
+      simulation.begin_next_stage();
+    }
+  } catch (const RunawayError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Simulation, RefusesABodyThatIsNotFinite) {
+  graph::Executor executor({.threads = 1});
+  Bodies bodies = loose_sample(4, 4, 4, 1);
+  bodies.velocity[37].u[1] = std::numeric_limits<double>::quiet_NaN();
+  try {
+    Simulation simulation(falling(5), bodies, executor);
+    FAIL() << "taken";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("body 37"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Runaway, OfAnOverflowStopsWithItsStepStageAndBody) {
+  for (int threads : {1, 2}) {
+    Bodies bodies = loose_sample(4, 4, 4, 1);
+    bodies.velocity[37].u[1] = 1e200;
+    const std::string message = runaway_message(falling(5), bodies, threads);
+    EXPECT_NE(message.find("step 1 "), std::string::npos) << message;
+    EXPECT_NE(message.find("'fall'"), std::string::npos) << message;
+    EXPECT_NE(message.find("body 37:"), std::string::npos) << message;
+  }
+}
+
+TEST(Runaway, OfEnergyThatNothingSuppliedStopsWithItsStepAndBody) {
+  talus::Setup setup;
+  setup.stages = {stage("release", 1)};
+  Bodies one;
+  add_sphere(one, BodyId{5}, Vec3::Zero(), radius, density);
+  one.velocity[0].u[0] = 1;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, one, executor);
+  simulation.step();
+  StepSums sums = simulation.sums();
+  SampleSize size;
+  const StepOutcome outcome{{1, "release"},          simulation.setup(), size,
+                            simulation.parameters(), simulation.state(), sums,
+                            simulation.iterations()};
+  EXPECT_NO_THROW(check_for_runaway(outcome, 0));
+  sums.motion.energy_free /= 1000;  // as if a step had made that much of it
+  try {
+    check_for_runaway(outcome, 0);
+    FAIL() << "went on";
+  } catch (const RunawayError& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("kinetic energy"), std::string::npos) << message;
+    EXPECT_NE(message.find("'release'"), std::string::npos) << message;
+    EXPECT_NE(message.find("body 5"), std::string::npos) << message;
+  }
+}
+
+}  // namespace
+}  // namespace talus::simulation_test
