@@ -177,7 +177,6 @@ Met met_by(const Dual& dual, const Vector& s) {
 bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough, Vector& s) {
   std::vector<char> carry;
   for (const Real value : s) carry.push_back(value > 0);
-  const Vector start = s;
   Vector next;
   Real shift = first_shift, residual = met_by(dual, s).residual;
   for (int step = 0; step < limits.proximal_steps && residual > enough; ++step) {
@@ -186,11 +185,6 @@ bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough,
     s = next.cwiseMax(Real{0});
     residual = met_by(dual, s).residual;
     shift = std::max(least_shift, shift / 100);
-  }
-  // Of the answers that redundant contacts leave the one next to the start: a last step that begins there.
-  if (Pivots(dual.W, dual.q - least_shift * start, least_shift, limits.pivots).solve(carry, next)) {
-    next = next.cwiseMax(Real{0}).eval();
-    if (met_by(dual, next).residual <= enough) s = next;
   }
   return true;
 }

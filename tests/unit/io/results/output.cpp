@@ -178,7 +178,7 @@ TEST(Csv, StepsRowHoldsEveryValueInItsColumn) {
                12.5, 0.75, {},   13.5, 14.5, 15.5, 19.5, 16,  17.5, 18.5, true};
   std::string row;
   append_steps_row(row, r);
-  EXPECT_EQ(row, "1,2.5,0.25,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,0.75,,,13.5,14.5,15.5,19.5,16,17.5,18.5,1\n");
+  EXPECT_EQ(row, "1,2.5,0.25,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,16,17.5,18.5,1\n");
   r.overlapping = {7, -2};
   row.clear();
   append_steps_row(row, r);

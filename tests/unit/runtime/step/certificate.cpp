@@ -203,7 +203,7 @@ TEST(Certificate, EveryThresholdDecidesASituation) {
        [](T& t) { t.tiny = 63; },
        solved},
       {{.what = "doubts",
-        .checks = {{0, 1}, {10, 1e-4}, {20, 1e-4}, {30, 1e-4}},
+        .checks = {{0, 1}, {10, 1e-4}, {20, 1e-4}, {30, 1e-4}, {40, 1e-4}},
         .verdict = go_on,
         .small_errors = {infinity, infinity, infinity, 0}},
        [](T& t) { t.most_doubts = 4; },
