@@ -37,9 +37,7 @@ struct Simulation::Implementation {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
     state.decomposition.shapes = !setup.clumps.empty();
-    const double unit = smallest_radius();
-    parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
-    parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
+    choose_distances();
     begin_stage();
   }
 
@@ -59,6 +57,67 @@ struct Simulation::Implementation {
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
     lengths_at_start = from.lengths_of_box;
+  }
+
+  Implementation(Setup given, const Checkpoint& from, graph::Executor& executor,
+                 const graph::Communicator& ranks_)
+      : setup(std::move(given)),
+        ranks(ranks_),
+        state(restored(setup, from, ranks_)),
+        size(from.head.size),
+        report(from.head.report),
+        graph(state, parameters, setup, size.bodies, executor, ranks_) {
+    choose_distances();
+    const CheckpointHead& head = from.head;
+    stage_index = static_cast<std::size_t>(head.stage_index);
+    prescribe();
+    parameters.time_step = head.time_step;
+    clock = head.clock;
+    if (stage().chooses_time_step) clock.move_end(stage().end.time);
+    stage_steps = head.stage_steps;
+    held = head.held;
+    lengths_at_start = head.lengths_at_start;
+    for (std::size_t w = 0; w < state.walls.size(); ++w) {
+      const std::vector<double> load = numbers_of(state.walls[w].load);
+      if (std::equal(load.begin(), load.end(), head.wall_loads.begin() + static_cast<std::ptrdiff_t>(7 * w)))
+        continue;
+      put_load(state.walls[w]);
+      state.candidates_valid = false;  // a wall that is free now has chunks of another kind
+    }
+    graph.restore(from);
+  }
+
+  static StepState restored(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks) {
+    validate(setup);
+    StepState state = restore_state(setup, from, ranks);
+    demand_laws(setup, state.bodies);
+    for (std::size_t k = 0; k <= static_cast<std::size_t>(from.head.stage_index); ++k)
+      take_loads(setup.stages.at(k), state.walls);
+    return state;
+  }
+
+  Checkpoint checkpoint() const {
+    Checkpoint to;
+    save_state(state, to);
+    graph.save(to);
+    CheckpointHead& head = to.head;
+    head.size = size;
+    head.stage_index = static_cast<std::int64_t>(stage_index);
+    head.stage_steps = stage_steps;
+    head.over = over;
+    head.held = held;
+    head.time_step = parameters.time_step;
+    head.lengths_at_start = lengths_at_start;
+    head.clock = clock;
+    head.report = report;
+    return to;
+  }
+
+  /// Alert distance and skin.
+  void choose_distances() {
+    const double unit = smallest_radius();
+    parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
+    parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
   }
 
   /// Of the materials that bodies have.
@@ -123,27 +182,39 @@ struct Simulation::Implementation {
 
   double smallest_radius() const { return size.bodies > 0 ? size.smallest : 1; }
 
-  void begin_stage() {
-    for (const auto& [name, load] : stage().loads)
-      for (Wall& wall : state.walls)
+  static void take_loads(const Stage& stage, std::vector<Wall>& walls) {
+    for (const auto& [name, load] : stage.loads)
+      for (Wall& wall : walls)
         if (wall.name == name) wall.load = load;
-    for (Wall& wall : state.walls) {
-      if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
-      if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
-      if (wall.load.pushed()) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
-      if (wall.load.drive == WallDrive::pressure)
-        face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
-    }
-    wind_clock();
+  }
+
+  /// The velocity that a wall has when its load comes into force.
+  void put_load(Wall& wall) const {
+    if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
+    if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
+    if (wall.load.pushed()) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+    if (wall.load.drive == WallDrive::pressure)
+      face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
+  }
+
+  /// What the stage prescribes, but for its loads and its time step.
+  void prescribe() {
     parameters.gravity = stage().gravity;
     parameters.laws = stage().laws;
-    const double last_reflection = parameters.reflection;
     parameters.reflection = reflection_of(setup.solver.restitution_law, parameters.laws);
     parameters.clumps = !setup.clumps.empty();
     parameters.friction = parameters.clumps || stage().laws.largest(&PairLaw::friction) > 0;
     parameters.rotates = parameters.friction && setup.rotation;
     parameters.rolls = parameters.rotates && stage().laws.largest(&PairLaw::rolling_resistance) > 0;
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
+  }
+
+  void begin_stage() {
+    take_loads(stage(), state.walls);
+    for (Wall& wall : state.walls) put_load(wall);
+    wind_clock();
+    const double last_reflection = parameters.reflection;
+    prescribe();
     if (state.candidates_valid && !state.decomposition.several()) {
       // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt
       // out.
@@ -229,8 +300,8 @@ struct Simulation::Implementation {
   StepState state;
   SampleSize size;
   StepParameters parameters;
-  StepGraph graph;
   StepReport report;
+  StepGraph graph;
   StageClock clock;  ///< of a stage that chooses its time steps
   double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
@@ -254,6 +325,12 @@ Simulation::Simulation(Setup setup, const SavedState& from, graph::Executor& exe
   impl_->pass_ended_stages();
 }
 
+Simulation::Simulation(Setup setup, const Checkpoint& from, graph::Executor& executor,
+                       const graph::Communicator& ranks)
+    : impl_(std::make_unique<Implementation>(std::move(setup), from, executor, ranks)) {
+  impl_->pass_ended_stages();
+}
+
 Simulation::~Simulation() = default;
 
 void Simulation::follow(trace::Order* order) {
@@ -266,6 +343,10 @@ SavedState Simulation::save() const {
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
           impl_->clock,        impl_->held};
+}
+
+Checkpoint Simulation::checkpoint() const {
+  return impl_->checkpoint();
 }
 
 const StepReport& Simulation::step() {

@@ -94,7 +94,7 @@ bool StepGraph::candidates_hold() const {
 void StepGraph::make_cells() {
   const double h = parameters_.time_step;
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
-  if (steps_ == partitioned_ + 1 || loop_.imbalance() < imbalance_then_) imbalance_then_ = loop_.imbalance();
+  if (steps_ == partitioned_ + 1 || imbalance_before_ < imbalance_then_) imbalance_then_ = imbalance_before_;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   Bodies& bodies = state_.bodies;
@@ -177,12 +177,7 @@ void StepGraph::make_chunks() {
     const auto all = static_cast<std::int64_t>(state_.candidates.size());
     groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(all, all));
   }
-  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
-  note_kinds(clumps_of(state_), state_.chunks);
-  note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
-  allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
-  if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
-    state_.contacts.cohesion.resize(state_.candidates.size());
+  set_up_chunks(groups);
   const double planning = graph::seconds_now();
   loop_.plan();
   if (several) sums_.times.dealing += graph::seconds_now() - planning;
@@ -191,6 +186,16 @@ void StepGraph::make_chunks() {
   all_candidates_ = candidates[0];
   state_.candidates_valid = true;
   planned_ = false;
+}
+
+/// Chunks of the groups, and rooms for their contacts.
+void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
+  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
+  note_kinds(clumps_of(state_), state_.chunks);
+  note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
+  allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
+    state_.contacts.cohesion.resize(state_.candidates.size());
 }
 
 /// What is kept per slot follows the copies to their new places.
