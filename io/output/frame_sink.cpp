@@ -14,6 +14,9 @@ class FrameSink : public OutputSink {
   }
 
   void open() override { results_.emplace(path_, wall_names_, ranks_); }
+  void resume(const OutputMark& mark) override {
+    results_.emplace(path_, wall_names_, ranks_, shared_writing(), mark.frame_times.size());
+  }
   void frame(const Frame& part) override { results_->append(part); }
 
  private:

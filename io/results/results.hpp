@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,8 +48,10 @@ class ResultsWriter {
   /// Replaces a file of that name. Throws FileError. `ranks` must outlive the writer.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names);
   /// Collective, as are the frames.
+  /// With `kept` the file is there: its first frames stay, as many, the others are removed, and it goes on.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
-                const graph::Communicator& ranks, SharedWriting way = shared_writing());
+                const graph::Communicator& ranks, SharedWriting way = shared_writing(),
+                std::optional<std::size_t> kept = {});
 
   /// Appends a frame, of which each rank has its part; frame.walls are those of the constructor, in the same
   /// order. Throws FileError, with parallel writing on all ranks when one cannot write;

@@ -34,7 +34,8 @@ class SceneReader {
   Scene read() && {
     read_table(
         root_, "", keys_.top,
-        {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
+        {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition", "output",
+         "checkpoint"},
         scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
@@ -45,6 +46,7 @@ class SceneReader {
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
     read_decomposition();
     read_table(table_at(root_, "output"), "output", keys_.output, {}, scene_.output);
+    read_table(table_at(root_, "checkpoint"), "checkpoint", keys_.checkpoint, {}, scene_.checkpoint);
     if (scene_.output.directory.empty()) scene_.output.directory = "out/" + scene_.name;
     return std::move(scene_);
   }

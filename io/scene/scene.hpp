@@ -54,6 +54,15 @@ struct OutputSpec {
   std::set<std::string> sinks = default_sinks();
 };
 
+/// When a run is written down, so that it can go on from there.
+struct CheckpointSpec {
+  double every_wall = 600;                  ///< elapsed [s]; 0: never for that
+  std::optional<double> every;              ///< simulated [s]
+  std::optional<std::int64_t> every_steps;  ///< steps
+  int keep = 2;                             ///< of the last ones
+  std::optional<std::int64_t> archive_every;  ///< each of so many is kept for good
+};
+
 /// A [[material]].
 struct MaterialSpec {
   std::string name;
@@ -92,6 +101,7 @@ struct Scene {
                  ///< not used
   Setup setup;
   OutputSpec output;
+  CheckpointSpec checkpoint;
   std::string source_file;
 };
 

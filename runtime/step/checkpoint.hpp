@@ -195,10 +195,10 @@ void each_member(Head& head, const Visit& visit) {
   visit("simd", head.simd);
 }
 
-/// `parts`: those of this rank, in the order of Decomposition::here.
 struct Checkpoint {
   CheckpointHead head;
-  std::vector<CheckpointPart> parts;
+  std::vector<std::int32_t> here;     ///< subdomains of this rank, ascending
+  std::vector<CheckpointPart> parts;  ///< of each
 };
 
 /// Where the walls stand at first and what they weigh, also in the loads of stages: what a setup has from its

@@ -226,6 +226,7 @@ void save_state(const StepState& state, Checkpoint& to) {
     }
   to.parts.resize(all.here.size());
   for (const SubdomainPlace e : all.here.indices()) {
+    to.here.push_back(all.here[e].value());
     save_bodies(state, e, to.parts[e.at()]);
     if (all.several() && !all.interfaces.empty()) save_interface(all.interfaces[e], to.parts[e.at()]);
   }

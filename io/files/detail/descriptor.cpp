@@ -35,6 +35,20 @@ void Descriptor::write(std::string_view bytes) {
   }
 }
 
+void Descriptor::cut(std::int64_t bytes) {
+  const off_t length = ::lseek(descriptor_, 0, SEEK_END);
+  if (length < bytes)
+    throw FileError(path_.string(), "is shorter than the checkpoint says; begin anew in another directory");
+  if (length > bytes && ::ftruncate(descriptor_, bytes) != 0)
+    throw FileError(path_.string(), "cannot be cut back: " + last_error());
+}
+
+void Descriptor::sync() {
+  // Pipes and the like cannot be synchronised, and say EINVAL.
+  if (::fsync(descriptor_) != 0 && errno != EINVAL)
+    throw FileError(path_.string(), "cannot be completed: " + last_error());
+}
+
 void Descriptor::close() {
   if (descriptor_ < 0) return;
   if (::close(std::exchange(descriptor_, -1)) != 0) {

@@ -186,13 +186,29 @@ Section<OutputSpec> output_keys() {
           std::move(keys)};
 }
 
+Section<CheckpointSpec> checkpoint_keys() {
+  using C = CheckpointSpec;
+  return {"[checkpoint]",
+          "When the run is written down, for `talus run --resume` ([checkpoints.md](checkpoints.md)): at the "
+          "first of `every_wall`, `every` and `every_steps`, and when it is stopped.",
+          {key<C>("every_wall", "s", not_negative, "Elapsed time between checkpoints; 0: never for that.",
+                  &C::every_wall),
+           key<C>("every", "s", positive, "Simulated time between checkpoints.", &C::every),
+           key<C>("every_steps", "", at_least_one, "Steps between checkpoints.", &C::every_steps),
+           key<C>("keep", "", countable, "How many of the last checkpoints are kept.", &C::keep),
+           key<C>("archive_every", "", at_least_one,
+                  "Each of so many checkpoints is kept for good, under a name of its own.",
+                  &C::archive_every)}};
+}
+
 }  // namespace
 
 const SceneKeys& scene_keys() {
   static const SceneKeys keys = {
       top_keys(),       material_keys(), named_material_keys(), pair_keys(),       sample_keys(),
       wall_keys(),      stage_keys(),    stage_end_keys(),      stage_load_keys(), stage_pair_keys(),
-      detection_keys(), solver_keys(),   decomposition_keys(),  output_keys()};
+      detection_keys(), solver_keys(),   decomposition_keys(),  output_keys(),
+      checkpoint_keys()};
   return keys;
 }
 
