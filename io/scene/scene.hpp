@@ -56,10 +56,10 @@ struct OutputSpec {
 
 /// When a run is written down, so that it can go on from there.
 struct CheckpointSpec {
-  double every_wall = 600;                  ///< elapsed [s]; 0: never for that
-  std::optional<double> every;              ///< simulated [s]
-  std::optional<std::int64_t> every_steps;  ///< steps
-  int keep = 2;                             ///< of the last ones
+  double every_wall = 600;                    ///< elapsed [s]; 0: never for that
+  std::optional<double> every;                ///< simulated [s]
+  std::optional<std::int64_t> every_steps;    ///< steps
+  int keep = 2;                               ///< of the last ones
   std::optional<std::int64_t> archive_every;  ///< each of so many is kept for good
 };
 
@@ -121,6 +121,13 @@ Scene parse_scene(const std::string& text, const std::string& file,
 /// - a pushed wall, also in the loads of the stages, without mass (0) gets a tenth of the mass of the grains.
 /// Throws SceneError when there are no grains, walls cross, or the centre of a grain lies behind a wall.
 void place_walls(Scene& scene, const Sample& grains);
+
+/// What place_walls gives to a pushed wall without mass [kg].
+double automatic_wall_mass(const Sample& grains);
+
+/// The same of a run that goes on, whose grains are not at hand: points of the walls [m], 3 numbers each, and
+/// the mass [kg], as they were placed at first. Throws SceneError when the walls are others.
+void place_walls_again(Scene& scene, const std::vector<double>& points, double mass);
 
 /// The scene as TOML with every default spelled out; parse_scene gives the same scene back.
 std::string resolved_scene(const Scene& scene);

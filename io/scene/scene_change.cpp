@@ -47,7 +47,8 @@ Leaves leaves_of(const std::string& scene) {
 
 bool may_change(const std::string& key) {
   for (const std::string_view front :
-       {"output.", "checkpoint.", "decomposition.mapping", "description", "name", "allow_unconverged"})
+       {"output.", "checkpoint.", "decomposition.mapping", "decomposition.overlap", "solver.simd",
+        "description", "name", "allow_unconverged"})
     if (key.starts_with(front)) return true;
   if (key.starts_with("stage."))
     return key.find(".end.") != std::string::npos || key.find(".load.") != std::string::npos;

@@ -13,7 +13,7 @@ struct SceneChange {
   std::string key;      ///< as --set names it, "stage.shear.end.strain"
   std::string was, is;  ///< as TOML; "" where there is none
   /// What a run that goes on may get anew: ends and loads of stages, loads of walls, output, checkpoints,
-  /// which subdomain is on which rank, and what is said of the scene.
+  /// what changes no bit (instruction set, mapping), and what is said of the scene.
   bool allowed = false;
 };
 

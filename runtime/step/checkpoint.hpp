@@ -39,11 +39,12 @@ struct CheckpointPart {
   std::vector<std::array<std::int32_t, 2>> grain_pairs;  ///< slots
   std::vector<std::array<std::int32_t, 3>> wall_pairs;   ///< wall, slot, feature
   std::vector<std::uint16_t> balls;                      ///< per grain pair, or none
-  std::vector<std::uint8_t> acts;   ///< c: the row of impulses is kept, not all of its bits being 0
-  std::vector<double> impulses;     ///< the rows kept [N s]
-  std::vector<float> pushes;        ///< c or none: PositionCorrection
-  std::vector<std::uint16_t> order; ///< per grain pair, or none: candidate in this place, from the chunk's first
-  std::vector<std::uint8_t> groups; ///< of the contacts between grains, chunk after chunk, or none
+  std::vector<std::uint8_t> acts;  ///< c: the row of impulses is kept, not all of its bits being 0
+  std::vector<double> impulses;    ///< the rows kept [N s]
+  std::vector<float> pushes;       ///< c or none: PositionCorrection
+  std::vector<std::uint16_t>
+      order;  ///< per grain pair, or none: candidate in this place, from the chunk's first
+  std::vector<std::uint8_t> groups;  ///< of the contacts between grains, chunk after chunk, or none
   std::vector<std::array<std::int32_t, 4>> chunks;  ///< k: candidates, wall or -1, ChunkSide, contacts
 
   // SubdomainInterface, under its names.
@@ -110,8 +111,7 @@ struct CheckpointHead {
   std::vector<double> wall_points, wall_velocities, wall_then;  ///< 3 each
   std::vector<double> wall_impulses;                            ///< 3 each
   std::vector<double> wall_applied, wall_margins;
-  std::vector<double> wall_loads;    ///< drive, velocity, pressure, force, mass of each, in force: 7 numbers
-  std::vector<double> placed_walls;  ///< numbers_of_walls() of the setup
+  std::vector<double> wall_loads;  ///< numbers_of(load) of each, in force
 
   bool candidates_valid = false;
   std::int64_t impulse_kind = 3;
@@ -135,7 +135,6 @@ struct CheckpointHead {
   double imbalance_before = 0;
   double farthest = 0;
   StiffnessMemory stiffness;
-  std::int64_t simd = 0;  ///< InstructionSet that the sweeps had: others round otherwise
 };
 
 /// visit(name, member) for each member of a head that is a number, a text, a Vec3, or a vector of numbers.
@@ -171,7 +170,6 @@ void each_member(Head& head, const Visit& visit) {
   visit("wall_applied", head.wall_applied);
   visit("wall_margins", head.wall_margins);
   visit("wall_loads", head.wall_loads);
-  visit("placed_walls", head.placed_walls);
   visit("candidates_valid", head.candidates_valid);
   visit("impulse_kind", head.impulse_kind);
   visit("overlaps_given", head.overlaps_given);
@@ -192,7 +190,6 @@ void each_member(Head& head, const Visit& visit) {
   visit("imbalance_before", head.imbalance_before);
   visit("farthest", head.farthest);
   head.stiffness.each_number(visit);
-  visit("simd", head.simd);
 }
 
 struct Checkpoint {
@@ -201,11 +198,7 @@ struct Checkpoint {
   std::vector<CheckpointPart> parts;  ///< of each
 };
 
-/// Where the walls stand at first and what they weigh, also in the loads of stages: what a setup has from its
-/// sample. Pointers into `setup`, in a fixed order.
-std::vector<double*> numbers_of_walls(Setup& setup);
-
-/// A load as numbers: drive, velocity, pressure, force, mass.
+/// A load as 7 numbers: drive, velocity, pressure, force, mass.
 std::vector<double> numbers_of(const WallLoad& load);
 
 /// The state as a part of a checkpoint: all but what StepGraph keeps.

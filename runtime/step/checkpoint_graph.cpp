@@ -18,7 +18,6 @@ void StepGraph::save(Checkpoint& to) const {
   head.imbalance_before = imbalance_before_;
   head.farthest = loop_.problem().farthest();
   head.stiffness = loop_.problem().stiffness();
-  head.simd = static_cast<std::int64_t>(loop_.kernels().set());
   const std::vector<float>& pushes = loop_.positions().pushes();
   if (pushes.empty() || !state_.candidates_valid) return;
   for (std::size_t c = 0; c < state_.chunks.size(); ++c) {

@@ -63,10 +63,9 @@ void restore_partition(const CheckpointHead& head, Decomposition& all) {
   partition.kind = partition_kind(head.partitioner);
   partition.frame = {head.frame_low, head.frame_lengths, head.frame_scale};
   for (std::size_t k = 0; k + 4 <= head.cuts.size(); k += 4)
-    partition.tree.cuts.push_back({static_cast<std::int32_t>(head.cuts[k]),
-                                   static_cast<std::uint64_t>(head.cuts[k + 1]),
-                                   static_cast<std::int32_t>(head.cuts[k + 2]),
-                                   static_cast<std::int32_t>(head.cuts[k + 3])});
+    partition.tree.cuts.push_back(
+        {static_cast<std::int32_t>(head.cuts[k]), static_cast<std::uint64_t>(head.cuts[k + 1]),
+         static_cast<std::int32_t>(head.cuts[k + 2]), static_cast<std::int32_t>(head.cuts[k + 3])});
   demand(head.table_cells.size() == 3, "table_cells");
   for (std::size_t k = 0; k < 3; ++k)
     partition.table.cells[k] = static_cast<std::int32_t>(head.table_cells[k]);
@@ -195,19 +194,13 @@ void save_chunk(const StepState& state, std::size_t c, Slot first_slot, Checkpoi
 }  // namespace
 
 std::vector<double> numbers_of(const WallLoad& load) {
-  return {static_cast<double>(load.drive), load.velocity[0], load.velocity[1], load.velocity[2],
-          load.pressure, load.force, load.mass};
-}
-
-std::vector<double*> numbers_of_walls(Setup& setup) {
-  std::vector<double*> numbers;
-  for (Wall& wall : setup.walls) {
-    for (Eigen::Index k = 0; k < 3; ++k) numbers.push_back(&wall.point[k]);
-    numbers.push_back(&wall.load.mass);
-  }
-  for (Stage& stage : setup.stages)
-    for (auto& [name, load] : stage.loads) numbers.push_back(&load.mass);
-  return numbers;
+  return {static_cast<double>(load.drive),
+          load.velocity[0],
+          load.velocity[1],
+          load.velocity[2],
+          load.pressure,
+          load.force,
+          load.mass};
 }
 
 void save_state(const StepState& state, Checkpoint& to) {
@@ -367,8 +360,8 @@ std::vector<CandidateGroup> restored_groups(const StepState& state, const Checkp
     const auto& [length, wall, side, contacts] = from.parts[e].chunks[cursor.chunk++];
     demand(length > 0, "a chunk without candidates");
     // A group of its own, which is cut no further.
-    groups.push_back({begin, begin + length, wall, static_cast<std::int32_t>(e),
-                      static_cast<ChunkSide>(side), length});
+    groups.push_back(
+        {begin, begin + length, wall, static_cast<std::int32_t>(e), static_cast<ChunkSide>(side), length});
     begin += length;
   });
   return groups;
