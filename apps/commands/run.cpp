@@ -95,17 +95,14 @@ void read_recordings(const RunOptions& options, const graph::Communicator& ranks
 }
 
 /// Where the run goes on, if it does. Collective, but for what it throws.
-void look_for_checkpoint(const RunOptions& options, const graph::Communicator& ranks,
-                         const Terminal& terminal, Prepared& run) {
+void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& terminal, Prepared& run) {
   run.point = find_resume_point(run.directory, run.scene, ranks, terminal);
   const EarlierRun earlier = earlier_run(run.directory);
   if (run.point) {
     compare_scenes(run.scene, run.resolved, *run.point);
-    if (earlier.status == "done" && run.point->changes.empty() && !run.point->file.state.head.over &&
-        !options.steps)
-      run.nothing_left = earlier.exit_code;
+    if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
     take_over(*run.point, run.scene);
-  } else if (earlier.status == "done") {
+  } else if (earlier.complete) {
     run.nothing_left = earlier.exit_code;
   }
 }
@@ -150,7 +147,7 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
       run.lock.emplace(run.directory);
   });
   if (!loaded) return false;
-  if (options.resume && !agreed([&] { look_for_checkpoint(options, ranks, terminal, run); })) return false;
+  if (options.resume && !agreed([&] { look_for_checkpoint(ranks, terminal, run); })) return false;
   if (run.point || run.nothing_left) return true;
   return agreed([&] {
     if (ranks.rank() == 0) make_sample(options, terminal, run);

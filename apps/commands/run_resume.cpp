@@ -107,7 +107,7 @@ EarlierRun earlier_run(const std::filesystem::path& directory) {
   const nlohmann::json read = nlohmann::json::parse(file, nullptr, false);
   if (!read.is_object() || !read.contains("summary")) return run;
   const nlohmann::json& summary = read["summary"];
-  run.status = summary.value("status", "");
+  run.complete = summary.value("complete", false);
   run.exit_code = summary.value("exit_code", 0);
   return run;
 }

@@ -37,9 +37,9 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
 /// first.
 void take_over(const ResumePoint& point, io::Scene& scene);
 
-/// Of run.json in a directory: `status` of the summary, and its exit code; "" without such a file.
+/// What run.json in a directory says: whether the last stage of the scene has ended, and the exit code.
 struct EarlierRun {
-  std::string status;
+  bool complete = false;
   int exit_code = 0;
 };
 EarlierRun earlier_run(const std::filesystem::path& directory);

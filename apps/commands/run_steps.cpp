@@ -143,7 +143,8 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   const bool due = keeper.due(report);
   const bool stage_ends = simulation.stage_fraction() >= 1;
   const bool last = options.steps && report.step >= *options.steps;
-  if (all.frames.due(report) || ((stage_ends || last) && run.scene.output.stage_frames)) all.write_frame();
+  const bool written = all.frames.due(report) || (stage_ends && run.scene.output.stage_frames);
+  if (written) all.write_frame();
   lines.update(simulation);
   if (stage_ends) {
     lines.finish();
@@ -153,8 +154,8 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   stop.asked = simulation.finished() ? Asked{} : asked;
   const bool ends = simulation.finished() || last || stop.asked.ends();
   if (due || asked.save || stop.asked.ends() || (ends && options.resume)) stop.saved = all.save(all.mark());
-  // Of a run that stops here for good: one that goes on cuts it off again.
-  if (stop.asked.ends() && !stage_ends && run.scene.output.stage_frames) all.write_frame();
+  // Where a run stops for good; one that goes on cuts this frame off again.
+  if (ends && !written && run.scene.output.stage_frames) all.write_frame();
   if (all.status) all.status->update(simulation, memory.tally, keeper, now);
   return ends;
 }
@@ -186,9 +187,9 @@ void warn_of_unreached(const Terminal& terminal, const RunOptions& options, std:
 }
 
 /// A run that is done may have left something undone: what was asked for, or more that the scene has.
-void add_undone(const RunOptions& options, bool scene_ended, io::Summary& summary) {
+void add_undone(const RunOptions& options, io::Summary& summary) {
   std::vector<std::string> undone;
-  if (!scene_ended)
+  if (!summary.complete)
     undone.push_back(fmt::format("stopped after {} by --steps; the scene has more",
                                  counted(static_cast<std::size_t>(summary.steps), "step")));
   for (const std::int64_t step : options.dump_fclib)
@@ -292,7 +293,8 @@ void run_steps(const PreparedRun& run, Sample sample, io::Recorder& recorder, io
   if (summary.status == "done") {
     if (tally.unconverged > 0 && !scene.setup.allow_unconverged) summary.exit_code = exit_tolerance_missed;
     const bool last_stage = simulation.stage_index() + 1 == scene.setup.stages.size();
-    add_undone(options, last_stage && simulation.stage_fraction() >= 1, summary);
+    summary.complete = last_stage && simulation.stage_fraction() >= 1;
+    add_undone(options, summary);
     if (ranks.rank() == 0) warn_of_unreached(terminal, options, summary.steps);
   }
   summary.digest = simulation.digest();

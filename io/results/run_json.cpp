@@ -92,6 +92,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"status", s.status},
       {"message", s.message},
       {"exit_code", s.exit_code},
+      {"complete", s.complete},
       {"steps", s.steps},
       {"time", s.time},
       {"digest", digest},

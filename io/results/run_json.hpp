@@ -50,6 +50,7 @@ struct Summary {
   std::string status = "running";  ///< "running", "done", "failed" or "stopped"
   std::string message;             ///< why it failed or stopped, or what was left undone
   int exit_code = 0;
+  bool complete = false;  ///< the last stage has ended
   std::int64_t steps = 0;
   double time = 0;                      ///< [s] simulated
   std::optional<std::uint64_t> digest;  ///< talus::digest of the final state, as 16 hexadecimal digits
