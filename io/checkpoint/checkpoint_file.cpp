@@ -2,11 +2,9 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <span>
@@ -124,8 +122,9 @@ Hdf5Object create(Place place, const std::string& name, hid_t type, std::size_t 
   const Hdf5Object creation = hold(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, place.file, action);
   demand(H5Pset_fill_time(creation.id(), H5D_FILL_TIME_NEVER), place.file, action);
   demand(H5Pset_alloc_time(creation.id(), H5D_ALLOC_TIME_EARLY), place.file, action);
-  return hold(H5Dcreate2(place.group, name.c_str(), type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
-              H5Dclose, place.file, action);
+  return hold(
+      H5Dcreate2(place.group, name.c_str(), type, space.id(), H5P_DEFAULT, creation.id(), H5P_DEFAULT),
+      H5Dclose, place.file, action);
 }
 
 /// A text as bytes: strings of any length are what damaged files hang readers with.
@@ -138,7 +137,18 @@ void write_bytes(Place place, const std::string& name, const std::string& text) 
                           std::bit_cast<std::int64_t>(checksum(bytes_of(text))));
 }
 
+/// Throws FileError when a dataset claims more than the file holds: its length is one of the bits that may
+/// have flipped.
+void demand_room(Place place, const std::string& name, std::size_t columns, std::size_t row_bytes) {
+  const Hdf5Object dataset =
+      hold(H5Dopen2(place.group, name.c_str(), H5P_DEFAULT), H5Dclose, place.file, "opening " + name);
+  const std::size_t rows = detail::row_count(dataset.id(), columns, place.file, name);
+  if (rows > std::filesystem::file_size(place.file) / row_bytes)
+    throw FileError(place.file, name + " is longer than the file: it is damaged");
+}
+
 std::string read_bytes(Place place, const std::string& name) {
+  demand_room(place, name, 1, 1);
   const std::vector<std::uint8_t> bytes = detail::read_array<std::uint8_t>(place, name);
   std::string text(bytes.begin(), bytes.end());
   const Hdf5Object dataset =
@@ -179,7 +189,8 @@ std::vector<std::int64_t> lay_out(const std::string& path, const CheckpointFile&
     write_bytes(root, "rows_sum", fmt::format("{}", checksum(std::as_bytes(std::span(table)))));
     const Hdf5Object parts = detail::create_group(root, "parts");
     std::vector<std::size_t> count(layout().size(), 0);
-    for (const RowCount& row : rows) count[static_cast<std::size_t>(row.column)] += static_cast<std::size_t>(row.rows);
+    for (const RowCount& row : rows)
+      count[static_cast<std::size_t>(row.column)] += static_cast<std::size_t>(row.rows);
     std::size_t column = 0;
     for (const ColumnLayout& of : layout()) {
       const Hdf5Object dataset = create({parts.id(), path}, of.name, of.type, count[column], of.columns);
@@ -191,40 +202,9 @@ std::vector<std::int64_t> lay_out(const std::string& path, const CheckpointFile&
   return begin;
 }
 
-void write_at(int descriptor, const std::string& path, std::span<const std::byte> bytes, std::int64_t offset) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::pwrite(descriptor, bytes.data(), bytes.size(), offset);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw FileError(path, "cannot be written: " + detail::last_error());
-    bytes = bytes.subspan(static_cast<std::size_t>(written));
-    offset += written;
-  }
-}
-
-/// An open file of this rank.
-class OpenFile {
- public:
-  OpenFile(const std::string& path, int flags) : path_(path), descriptor_(::open(path.c_str(), flags | O_CLOEXEC)) {
-    if (descriptor_ < 0) throw FileError(path_, "cannot be opened: " + detail::last_error());
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  ~OpenFile() { ::close(descriptor_); }
-  int descriptor() const { return descriptor_; }
-  void sync() const {
-    // What cannot be synchronised (a folder on some network file systems) says EINVAL.
-    if (::fsync(descriptor_) != 0 && errno != EINVAL)
-      throw FileError(path_, "cannot be completed: " + detail::last_error());
-  }
-
- private:
-  std::string path_;
-  int descriptor_;
-};
-
 void write_own_rows(const std::string& path, const Checkpoint& state, const std::vector<std::int32_t>& here,
                     const std::vector<RowCount>& rows, const std::vector<std::int64_t>& begin) {
-  const OpenFile file(path, O_WRONLY);
+  detail::Descriptor file(path, O_WRONLY);
   const std::size_t columns = begin.size();
   for (std::size_t e = 0; e < here.size(); ++e) {
     std::size_t number = 0;
@@ -233,12 +213,13 @@ void write_own_rows(const std::string& path, const Checkpoint& state, const std:
       std::int64_t before = 0;
       for (std::size_t s = 0; s < at(here[e]); ++s) before += rows[s * columns + number].rows;
       if (!column.empty())
-        write_at(file.descriptor(), path, std::as_bytes(std::span(column)),
-                 begin[number] + before * static_cast<std::int64_t>(sizeof(Row)));
+        file.write_at(begin[number] + before * static_cast<std::int64_t>(sizeof(Row)),
+                      {reinterpret_cast<const char*>(column.data()), column.size() * sizeof(Row)});
       ++number;
     });
   }
   file.sync();
+  file.close();
 }
 
 /// Runs `work` where `mine`; all ranks throw when it fails on one.
@@ -275,7 +256,7 @@ std::int64_t write_checkpoint(const std::filesystem::path& path, const Checkpoin
       bytes = static_cast<std::int64_t>(std::filesystem::file_size(unfinished));
       std::filesystem::rename(unfinished, path);
       const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-      OpenFile(folder.string(), O_RDONLY | O_DIRECTORY).sync();
+      detail::Descriptor(folder, O_RDONLY | O_DIRECTORY).sync();
     });
   } catch (...) {
     std::error_code ignored;
@@ -298,8 +279,8 @@ Hdf5Object open_checkpoint(const std::string& path) {
 }
 
 std::vector<std::array<std::int64_t, 4>> read_rows(Place place) {
-  const auto rows =
-      detail::read_array<std::array<std::int64_t, 4>>(place, "rows", H5T_NATIVE_INT64, 4);
+  demand_room(place, "rows", 4, sizeof(std::array<std::int64_t, 4>));
+  const auto rows = detail::read_array<std::array<std::int64_t, 4>>(place, "rows", H5T_NATIVE_INT64, 4);
   if (fmt::format("{}", checksum(std::as_bytes(std::span(rows)))) != read_bytes(place, "rows_sum"))
     throw FileError(place.file, "rows has another checksum: the file is damaged");
   return rows;
@@ -321,7 +302,8 @@ std::vector<Row> read_rows_of(Place place, const std::string& name, std::size_t 
   const std::string action = "reading " + name;
   const Hdf5Object there = hold(H5Dget_space(dataset.id()), H5Sclose, place.file, action);
   const Hdf5Object space = hold(H5Screate_simple(dimensions, extent, nullptr), H5Sclose, place.file, action);
-  demand(H5Sselect_hyperslab(there.id(), H5S_SELECT_SET, start, nullptr, extent, nullptr), place.file, action);
+  demand(H5Sselect_hyperslab(there.id(), H5S_SELECT_SET, start, nullptr, extent, nullptr), place.file,
+         action);
   demand(H5Dread(dataset.id(), types_of(static_cast<const Number*>(nullptr)).memory, space.id(), there.id(),
                  H5P_DEFAULT, rows.data()),
          place.file, action);

@@ -10,6 +10,7 @@
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/hdf5_write.hpp"
 #include "io/files/error.hpp"
+#include "io/results/detail/directory_undo.hpp"
 #include "io/results/version.hpp"
 #include "runtime/graph/one_rank.hpp"
 
@@ -220,6 +221,8 @@ namespace {
 /// given back, as far as they were its last.
 void cut_frames(const std::string& path, std::size_t kept) {
   const detail::QuietHdf5 quiet;
+  detail::bring_back_directory(path);
+  detail::keep_directory(path);
   const Hdf5Object access = file_access(path, false);
   Hdf5Object file =
       hold(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path, "opening the file");
@@ -235,6 +238,7 @@ void cut_frames(const std::string& path, std::size_t kept) {
              "removing frame " + names.back());
   }
   close_file(file, path);
+  detail::drop_directory(path);
 }
 
 }  // namespace
@@ -292,8 +296,10 @@ void ResultsWriter::append(const Frame& part) {
   const std::int64_t own[row_counts] = {
       static_cast<std::int64_t>(part.id.size()), static_cast<std::int64_t>(part.contact_bodies.size()),
       !part.omega.empty(), !part.orientation.empty(), !part.material.empty()};
+  if (ranks_.rank() == 0) detail::keep_directory(path_);
   const std::vector<std::int64_t> rows = ranks_.gather_records(std::span<const std::int64_t>(own));
   append_here(part, rows);
+  if (ranks_.rank() == 0) detail::drop_directory(path_);
   ++frames_;
 }
 

@@ -41,8 +41,9 @@ SharedWriting shared_writing();
 
 /// Writes results.h5 frame by frame; one file, of the same content for any number of ranks.
 /// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame
-/// gets its name last, when all of it is there: after a kill the file holds the frames before, unless the
-/// kill hit the few milliseconds in which the file's directory is written.
+/// gets its name last, when all of it is there: after a kill the file holds the frames before. A kill in the
+/// few milliseconds in which the file's directory is written leaves results.h5.undo as well, which a run that
+/// goes on brings back.
 class ResultsWriter {
  public:
   /// Replaces a file of that name. Throws FileError. `ranks` must outlive the writer.

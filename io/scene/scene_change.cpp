@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <sstream>
@@ -23,6 +24,19 @@ std::string name_in(const toml::array& array, std::size_t k) {
   return std::to_string(k);
 }
 
+/// As scenes write it.
+std::string text_of(const toml::node& node) {
+  if (const auto* real = node.as_floating_point()) return fmt::format("{}", real->get());
+  std::ostringstream text;
+  if (const toml::array* list = node.as_array()) {
+    for (const toml::node& entry : *list) text << (text.tellp() > 0 ? ", " : "[") << text_of(entry);
+    text << ']';
+  } else {
+    node.visit([&](const auto& value) { text << value; });
+  }
+  return text.str();
+}
+
 void collect(const toml::node& node, const std::string& path, Leaves& leaves) {
   const auto below = [&](const std::string& key) { return path.empty() ? key : path + "." + key; };
   if (const toml::table* table = node.as_table()) {
@@ -34,9 +48,7 @@ void collect(const toml::node& node, const std::string& path, Leaves& leaves) {
     for (std::size_t k = 0; k < array->size(); ++k) collect((*array)[k], below(name_in(*array, k)), leaves);
     return;
   }
-  std::ostringstream text;
-  node.visit([&](const auto& value) { text << value; });
-  leaves[path] = text.str();
+  leaves[path] = text_of(node);
 }
 
 Leaves leaves_of(const std::string& scene) {
