@@ -22,6 +22,7 @@
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/scene_warnings.hpp"
+#include "apps/shared/state_sample.hpp"
 #include "apps/shared/trace_feed.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
@@ -55,6 +56,7 @@ trace::Trace order_of(const RunOptions& options, const graph::Communicator& rank
 struct Prepared {
   io::Scene scene;
   Sample sample;
+  std::vector<GivenForce> forces;
   Recordings recordings;
   std::vector<std::string> warnings;
   std::string directory;
@@ -109,7 +111,14 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
 
 /// The sample, on rank 0, and what is to be said of it.
 void make_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
-  run.sample = build_sample(run.scene);
+  if (run.scene.sample.kind == io::SampleSpec::Kind::state) {
+    StateSample state = read_state(run.scene);
+    run.sample = completed(run.scene, std::move(state.sample));
+    run.forces = std::move(state.forces);
+    place_walls_of(state.walls, run.scene);
+  } else {
+    run.sample = build_sample(run.scene);
+  }
   io::place_walls(run.scene, run.sample);
   run.wall_mass = io::automatic_wall_mass(run.sample);
   run.warnings = scene_warnings(run.scene, run.sample);
@@ -218,7 +227,7 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
                              run.resolved, run.wall_mass, began,
                              run.granted,  run.directory, provenance,
                              run.warnings};
-  const io::Summary summary = simulate(prepared, std::move(run.sample));
+  const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
   if (ranks.rank() == 0)
     print_end(terminal, summary, scene.setup.solver, run.directory);
   else if (summary.status == "failed")

@@ -218,11 +218,13 @@ void note_stop(const Stop& stop, std::int64_t step, io::Summary& summary) {
 
 /// At its first step, or where the checkpoint has it.
 std::unique_ptr<Simulation> make_simulation(const PreparedRun& run, Sample sample,
-                                            graph::Executor& executor) {
+                                            std::vector<GivenForce> forces, graph::Executor& executor) {
   const Setup& setup = run.scene.setup;
   if (run.resume) return std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
-  return std::make_unique<Simulation>(setup, deal_out(std::move(sample), setup.decomposition, run.ranks),
-                                      executor, run.ranks);
+  auto simulation = std::make_unique<Simulation>(
+      setup, deal_out(std::move(sample), setup.decomposition, run.ranks), executor, run.ranks);
+  if (run.scene.sample.kind == io::SampleSpec::Kind::state) simulation->begin_from(std::move(forces));
+  return simulation;
 }
 
 /// What the command remembers at its start.
@@ -237,7 +239,8 @@ RunMemory first_memory(const PreparedRun& run) {
 
 /// Takes the run to its end, or to what breaks it off; the summary says which. Throws what the beginning and
 /// the end of a run throw.
-void run_steps(const PreparedRun& run, Sample sample, io::Recorder& recorder, io::Summary& summary) {
+void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces, io::Recorder& recorder,
+               io::Summary& summary) {
   const RunOptions& options = run.options;
   const io::Scene& scene = run.scene;
   const Recordings& recordings = run.recordings;
@@ -251,7 +254,8 @@ void run_steps(const PreparedRun& run, Sample sample, io::Recorder& recorder, io
                             .trace = trace ? &trace->recorder() : nullptr,
                             .times = recordings.times.get()});
   if (trace) trace->start(executor);
-  const std::unique_ptr<Simulation> made = make_simulation(run, std::move(sample), executor);
+  const std::unique_ptr<Simulation> made =
+      make_simulation(run, std::move(sample), std::move(forces), executor);
   Simulation& simulation = *made;
   if (recordings.order) simulation.follow(recordings.order.get());
   RecorderFeed feed(executor, recorder, ranks,
@@ -302,7 +306,7 @@ void run_steps(const PreparedRun& run, Sample sample, io::Recorder& recorder, io
 
 }  // namespace
 
-io::Summary simulate(const PreparedRun& run, Sample sample) {
+io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces) {
   io::Summary summary;
   summary.bodies =
       run.resume ? static_cast<std::size_t>(run.resume->file.state.head.size.bodies) : sample.size();
@@ -326,7 +330,7 @@ io::Summary simulate(const PreparedRun& run, Sample sample) {
       recorder.resume(run.resume->memory.mark);
     else
       recorder.open();
-    run_steps(run, std::move(sample), recorder, summary);
+    run_steps(run, std::move(sample), std::move(forces), recorder, summary);
     recorder.close();
   });
   summary.wall_s += graph::seconds_now() - run.began;

@@ -32,11 +32,10 @@ class SceneReader {
   }
 
   Scene read() && {
-    read_table(
-        root_, "", keys_.top,
-        {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition", "output",
-         "checkpoint"},
-        scene_);
+    read_table(root_, "", keys_.top,
+               {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition",
+                "output", "checkpoint"},
+               scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
     read_sample();
@@ -91,12 +90,12 @@ class SceneReader {
     if (radii.min > radii.max)
       fail_at(*table.get("radius_min"), "sample.radius_min",
               fmt::format("must not exceed radius_max: {} > {}", radii.min, radii.max));
-    if (sample.kind != SampleSpec::Kind::bodies)
+    if (!sample.from_file())
       for (const double side : sample.base)
         if (on_base && side < 2 * radii.max)
           fail_at(*table.get("base"), "sample.base",
                   fmt::format("a side of {} m is less than the largest diameter, {} m", side, 2 * radii.max));
-    if (sample.kind == SampleSpec::Kind::bodies) {
+    if (sample.from_file()) {
       const std::filesystem::path file = (folder_ / sample.file).lexically_normal();
       if (!std::filesystem::is_regular_file(file))
         fail_at(*table.get("file"), "sample.file", fmt::format("no such file: {}", file.string()));

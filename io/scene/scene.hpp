@@ -26,6 +26,7 @@ struct SampleSpec {
                  ///< sides of `base`
     lattice,     ///< simple cubic, not touching unless spacing is 1
     bodies,      ///< read from `file` (io/scene/bodies_file.hpp)
+    state,       ///< where an earlier run was: a checkpoint, or a frame of a results.h5, in `file`
   };
   Kind kind = Kind::deposition;
   std::int64_t count = 0;  ///< grains; 0 for a lattice given by `cells`
@@ -35,9 +36,11 @@ struct SampleSpec {
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
   BodyShape shape = BodyShape::sphere;  ///< of the grains; their radius is that of Clump
   SizeDistribution radii;
-  std::string file;      ///< absolute path
+  std::string file;                   ///< absolute path
+  std::optional<std::int64_t> frame;  ///< of a results.h5, from 0; none: the last
   std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names
 
+  bool from_file() const { return kind == Kind::bodies || kind == Kind::state; }
   /// Grains of a deposition or a lattice.
   std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
 };

@@ -94,7 +94,7 @@ std::string describe(const SceneChange& change) {
 
 std::vector<std::string> input_files(const Scene& scene) {
   std::vector<std::string> files;
-  if (!scene.sample.file.empty()) files.push_back(scene.sample.file);
+  if (scene.sample.kind == SampleSpec::Kind::bodies) files.push_back(scene.sample.file);
   for (const Wall& wall : scene.setup.walls)
     if (!wall.shape.values.file.empty()) files.push_back(wall.shape.values.file);
   return files;

@@ -23,7 +23,8 @@ std::vector<SceneChange> scene_changes(const std::string& was, const std::string
 /// "stage.shear.friction was 0.35 and is 0.5".
 std::string describe(const SceneChange& change);
 
-/// Absolute paths of the files that a scene reads.
+/// Absolute paths of the files that a scene reads, but for the state that its sample was: that is as large as
+/// a checkpoint itself, and not needed any more.
 std::vector<std::string> input_files(const Scene& scene);
 
 }  // namespace talus::io

@@ -124,6 +124,7 @@ struct CheckpointHead {
   bool over = false;
   double held = 0;
   double time_step = 0;
+  double impulse_time = 0;  ///< of the last step [s]: forces are impulses over it
   Vec3 lengths_at_start = Vec3::Zero();
   StageClock clock;
   StepReport report;
@@ -180,6 +181,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("over", head.over);
   visit("held", head.held);
   visit("time_step", head.time_step);
+  visit("impulse_time", head.impulse_time);
   visit("lengths_at_start", head.lengths_at_start);
   head.clock.each_number(visit);
   each_number(head.report, visit);

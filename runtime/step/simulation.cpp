@@ -107,6 +107,7 @@ struct Simulation::Implementation {
     head.over = over;
     head.held = held;
     head.time_step = parameters.time_step;
+    head.impulse_time = parameters.impulse_time();
     head.lengths_at_start = lengths_at_start;
     head.clock = clock;
     head.report = report;
@@ -343,6 +344,13 @@ SavedState Simulation::save() const {
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
           impl_->clock,        impl_->held};
+}
+
+void Simulation::begin_from(std::vector<GivenForce> forces) {
+  double any[1] = {forces.empty() ? 0.0 : 1.0};
+  impl_->ranks.max(any);
+  impl_->state.forces_given = any[0] > 0;
+  impl_->state.given_forces = std::move(forces);
 }
 
 Checkpoint Simulation::checkpoint() const {

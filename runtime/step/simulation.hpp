@@ -66,6 +66,9 @@ class Simulation {
              const graph::Communicator& ranks);
   ~Simulation();
 
+  /// Before the first step: it begins from these forces, where contacts are those of the bodies named. Each
+  /// rank passes any part of all. Collective.
+  void begin_from(std::vector<GivenForce> forces);
   /// Steps go by a recorded order, see StepGraph::follow.
   void follow(trace::Order* order);
   /// Does one time step. Collective. Throws RunawayError, or graph::TaskError when a task failed. Not to be

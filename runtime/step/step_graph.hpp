@@ -82,6 +82,7 @@ class StepGraph {
   void make_cells();
   void find_pairs_of_share(std::uint32_t share);
   void make_chunks();
+  Candidates take_given_forces();
   void set_up_chunks(std::span<const CandidateGroup> groups);
   void renew_slots();
   void narrow_share(std::uint32_t share);

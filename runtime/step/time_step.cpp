@@ -88,7 +88,8 @@ void StageClock::choose(double longest) {
 
 void StageClock::move_end(std::optional<double> end) {
   const double tick = std::ldexp(longest_, -levels_);
-  last_ = end ? std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(*end / tick * (1 - 1e-12)))) : 0;
+  last_ =
+      end ? std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(*end / tick * (1 - 1e-12)))) : 0;
 }
 
 double StageClock::step() const {

@@ -61,6 +61,8 @@ class Resumed : public OnRanks {
              name.starts_with("checkpoint_");
     });
     results["steps.csv"] = without(results.at("steps.csv"), "wall_s");
+    if (results.contains("error_history.csv"))
+      results["error_history.csv"] = without(results["error_history.csv"], "seconds");
     nlohmann::json end = summary(folder);
     end.erase("wall_s");
     results["summary"] = end.dump();
