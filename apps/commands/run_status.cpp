@@ -70,8 +70,9 @@ void StatusFile::update(const Simulation& simulation, const Tally& tally, const 
   if (fraction > stage_fraction_)
     status["stage_eta_s"] = (now - stage_began_) * (1 - fraction) / (fraction - stage_fraction_);
   if (keeper.last_step())
-    status["checkpoint"] = {
-        {"step", *keeper.last_step()}, {"age_s", now - keeper.last_save()}, {"seconds", keeper.seconds()}};
+    status["checkpoint"] = {{"step", *keeper.last_step()},
+                            {"age_s", graph::seconds_now() - keeper.last_save()},
+                            {"seconds", keeper.seconds()}};
   write(path_, std::move(status));
 }
 

@@ -40,9 +40,9 @@ struct PreparedRun {
   std::vector<std::string> warnings = {};  ///< of the scene; rank 0's
 };
 
-/// Collective. Runs from the first file of the results to the last; rank 0 has the sample, and the forces that
-/// it begins from. What breaks the run off is in the summary. Throws what the constructor of io::Recorder
-/// throws.
+/// Collective. Runs from the first file of the results to the last; rank 0 has the sample, and the forces
+/// that it begins from. What breaks the run off is in the summary. Throws what the constructor of
+/// io::Recorder throws.
 io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces);
 
 }  // namespace talus

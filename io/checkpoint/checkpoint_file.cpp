@@ -2,9 +2,11 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <cstring>
 #include <exception>
 #include <span>
@@ -159,9 +161,32 @@ std::string read_bytes(Place place, const std::string& name) {
   return text;
 }
 
+/// Throws FileError where the disk has no room for so many bytes. Asked before HDF5 begins: a file whose
+/// closing has failed stays open in the library, and crashes it at exit.
+void demand_disk(const std::string& path, std::int64_t bytes) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file < 0) throw FileError(path, "cannot be opened for writing: " + detail::last_error());
+  const bool refused = ::fallocate(file, 0, 0, bytes) != 0 && errno != EOPNOTSUPP && errno != ENOSYS;
+  const std::string why = refused ? detail::last_error() : "";
+  ::close(file);
+  if (refused) throw FileError(path, fmt::format("cannot get its {} bytes of the disk: {}", bytes, why));
+}
+
+/// Of a file with these rows, and at least of what HDF5 puts around them.
+std::int64_t expected_bytes(const CheckpointFile& content, const std::vector<RowCount>& rows) {
+  constexpr std::int64_t around = 1 << 16;
+  auto bytes = around + static_cast<std::int64_t>(content.run.size() + sizeof(RowCount) * rows.size());
+  for (const auto& [name, text] : content.texts) bytes += static_cast<std::int64_t>(text.size());
+  const std::vector<ColumnLayout> columns = layout();
+  for (const RowCount& row : rows)
+    bytes += row.rows * static_cast<std::int64_t>(columns[static_cast<std::size_t>(row.column)].row_bytes);
+  return bytes;
+}
+
 /// Rank 0's part of the file. Returns where each column begins [byte]; -1 for one without rows.
 std::vector<std::int64_t> lay_out(const std::string& path, const CheckpointFile& content,
                                   const std::vector<RowCount>& rows) {
+  demand_disk(path, expected_bytes(content, rows));
   const detail::QuietHdf5 quiet;
   const Hdf5Object access = detail::file_access(path);
   Hdf5Object file =

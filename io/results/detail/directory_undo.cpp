@@ -3,13 +3,13 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <optional>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -48,19 +48,17 @@ class DirectoryWalk {
     leaf_ = 2 * number<std::uint16_t>(block, 16);
     internal_ = 2 * number<std::uint16_t>(block, 18);
     ranges_ = {{0, superblock}};
-    if (number<std::uint32_t>(block, 72) != 1) return {};  // the root's tree and heap are not in the block
-    const std::uint64_t tree = number<std::uint64_t>(block, 80), heap = number<std::uint64_t>(block, 88);
+    const auto [tree, heap] = group_at(number<std::uint64_t>(block, 64));
     const std::string names = heap_data(heap, false);
-    std::optional<std::array<std::uint64_t, 2>> frames;
+    std::uint64_t frames = 0;
     walk(tree, [&](const std::string& leaf, std::size_t entry) {
       const std::uint64_t name = number<std::uint64_t>(leaf, entry);
-      if (name < names.size() && std::string_view(names.c_str() + name) == "frames" &&
-          number<std::uint32_t>(leaf, entry + 16) == 1)
-        frames = {number<std::uint64_t>(leaf, entry + 24), number<std::uint64_t>(leaf, entry + 32)};
+      if (name < names.size() && std::string_view(names.c_str() + name) == "frames")
+        frames = number<std::uint64_t>(leaf, entry + 8);
     });
-    if (!frames) return {};
-    heap_data((*frames)[1], true);
-    walk((*frames)[0], [](const std::string&, std::size_t) {});
+    const auto [frames_tree, frames_heap] = group_at(frames);
+    heap_data(frames_heap, true);
+    walk(frames_tree, [](const std::string&, std::size_t) {});
     return sound_ ? ranges_ : std::vector<Range>();
   }
 
@@ -81,6 +79,29 @@ class DirectoryWalk {
     if (at + sizeof(value) <= from.size()) std::memcpy(&value, from.data() + at, sizeof(value));
     return value;
   }
+  /// Tree and heap of the group whose object header is there: its message 17. Messages go on in further
+  /// blocks (message 16) where there are attributes.
+  std::array<std::uint64_t, 2> group_at(std::uint64_t at) {
+    constexpr std::uint64_t prefix = 16, message_prefix = 8, most = 1 << 16;
+    constexpr std::uint16_t continuation = 16, symbol_table = 17;
+    const std::string head = bytes(at, prefix);
+    std::vector<Range> blocks{{at + prefix, number<std::uint32_t>(head, 8)}};
+    if (head[0] != 1) sound_ = false;
+    for (std::size_t b = 0; sound_ && b < blocks.size() && blocks.size() < most; ++b) {
+      const std::uint64_t size = std::min(blocks[b].size, most);
+      const std::string messages = bytes(blocks[b].begin, size);
+      std::uint64_t k = 0;
+      for (; k + message_prefix + 16 <= size; k += message_prefix + number<std::uint16_t>(messages, k + 2)) {
+        const std::uint16_t type = number<std::uint16_t>(messages, k);
+        const auto first = number<std::uint64_t>(messages, k + message_prefix),
+                   second = number<std::uint64_t>(messages, k + message_prefix + 8);
+        if (type == symbol_table) return {first, second};
+        if (type == continuation) blocks.push_back({first, second});
+      }
+    }
+    sound_ = false;
+    return {0, 0};
+  }
   std::string heap_data(std::uint64_t at, bool kept) {
     constexpr std::uint64_t header = 32, most = 1 << 28;
     const std::string heap = bytes(at, header);
@@ -96,22 +117,22 @@ class DirectoryWalk {
   template <class Visit>
   void walk(std::uint64_t at, const Visit& visit) {
     if (!sound_ || !seen_.insert(at).second) return;
-    const std::uint64_t size = 24 + 8 * (2 * internal_ + 1);
-    const std::string node = bytes(at, size);
-    if (node.compare(0, 4, "SNOD") == 0) {
-      const std::uint64_t leaf_size = 8 + 40 * leaf_;
-      const std::string leaf = bytes(at, leaf_size);
-      ranges_.push_back({at, leaf_size});
-      for (std::size_t k = 0; k < number<std::uint16_t>(leaf, 6); ++k) visit(leaf, 8 + 40 * k);
-      return;
-    }
-    if (node.compare(0, 4, "TREE") != 0) {
+    // A leaf may be the last of the file: no more is read than there is.
+    const std::string signature = bytes(at, 4);
+    const bool leaf = signature == "SNOD";
+    if (!leaf && signature != "TREE") {
       sound_ = false;
       return;
     }
+    const std::uint64_t size = leaf ? 8 + 40 * leaf_ : 24 + 8 * (2 * internal_ + 1);
+    const std::string node = bytes(at, size);
     ranges_.push_back({at, size});
-    for (std::size_t k = 0; k < number<std::uint16_t>(node, 6); ++k)
-      walk(number<std::uint64_t>(node, 32 + 16 * k), visit);
+    for (std::size_t k = 0; k < number<std::uint16_t>(node, 6); ++k) {
+      if (leaf)
+        visit(node, 8 + 40 * k);
+      else
+        walk(number<std::uint64_t>(node, 32 + 16 * k), visit);
+    }
   }
 
   std::ifstream file_;
