@@ -36,10 +36,8 @@ class NumberWriter {
     for (const double x : value) put(x);
   }
   template <class T>
-    requires std::is_integral_v<T>
-  void put(T value) const {
-    put(static_cast<std::int64_t>(value));
-  }
+  requires std::is_integral_v<T>
+  void put(T value) const { put(static_cast<std::int64_t>(value)); }
   template <class T>
   void put(const std::vector<T>& values) const {
     for (const T& value : values) put(value);
@@ -60,7 +58,8 @@ class NumberReader {
       value.clear();
       for (const std::string& word : words) take(name, word, value.emplace_back());
     } else if constexpr (std::is_same_v<T, Vec3>) {
-      for (Eigen::Index k = 0; k < 3; ++k) take(name, word_at(name, words, static_cast<std::size_t>(k)), value[k]);
+      for (Eigen::Index k = 0; k < 3; ++k)
+        take(name, word_at(name, words, static_cast<std::size_t>(k)), value[k]);
     } else if constexpr (std::is_same_v<T, std::string>) {
       value.clear();
       for (const std::string& word : words) value += (value.empty() ? "" : " ") + word;
@@ -76,7 +75,7 @@ class NumberReader {
   void take(const char* name, const std::string& word, std::int64_t& value) const;
   void take(const char*, const std::string& word, std::string& value) const { value = word; }
   template <class T>
-    requires std::is_integral_v<T>
+  requires std::is_integral_v<T>
   void take(const char* name, const std::string& word, T& value) const {
     std::int64_t read = 0;
     take(name, word, read);

@@ -28,10 +28,11 @@ class FrameSink : public OutputSink {
 
 }  // namespace
 
-const SinkKind frame_sink{SinkUse::always,
-                          [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
-                            return std::make_unique<FrameSink>(context);
-                          },
-                          [](const std::string& name) { return name == "results.h5" || name == "results.h5.undo"; }};
+const SinkKind frame_sink{
+    SinkUse::always,
+    [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+      return std::make_unique<FrameSink>(context);
+    },
+    [](const std::string& name) { return name == "results.h5" || name == "results.h5.undo"; }};
 
 }  // namespace talus::io

@@ -16,7 +16,8 @@ class PictureSink : public OutputSink {
   /// The curve is in triaxial.csv, which is cut back already: every number reads back to the same bits.
   void resume(const OutputMark&) override {
     if (context_.ranks.rank() != 0) return;
-    for (const TriaxialReport& report : read_triaxial(context_.directory / "triaxial.csv")) curve_.add(report);
+    for (const TriaxialReport& report : read_triaxial(context_.directory / "triaxial.csv"))
+      curve_.add(report);
   }
   void step(const StepRecord& record) override {
     if (record.triaxial) curve_.add(*record.triaxial);

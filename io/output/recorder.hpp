@@ -59,7 +59,9 @@ class Recorder {
   /// Says what came of the run, also where a call before failed.
   void end(const Summary& summary);
 
-  std::size_t frames() const { return frame_times_.size(); }  ///< recorded, those before a resumption among them
+  std::size_t frames() const {
+    return frame_times_.size();
+  }  ///< recorded, those before a resumption among them
 
  private:
   OutputContext context_;

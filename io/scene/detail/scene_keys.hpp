@@ -32,8 +32,8 @@ void for_each_section(Keys&& keys, F&& f) {
   f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output), f(keys.checkpoint);
 }
 
-/// Top, sample, output and checkpoint from scene_keys.cpp, materials from material_keys.cpp, walls and stages from
-/// loading_keys.cpp, detection, solver and decomposition from solver_keys.cpp.
+/// Top, sample, output and checkpoint from scene_keys.cpp, materials from material_keys.cpp, walls and stages
+/// from loading_keys.cpp, detection, solver and decomposition from solver_keys.cpp.
 const SceneKeys& scene_keys();
 
 }  // namespace talus::io::detail
