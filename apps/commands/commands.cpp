@@ -5,6 +5,7 @@ namespace talus {
 std::vector<Command> commands() {
   return {
       run_entry(),
+      status_entry(),
       plan_entry(),
       partition_entry(),
       solve_entry(),

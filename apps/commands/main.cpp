@@ -74,9 +74,10 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "talus " + io::version());
   app.require_subcommand(1);
   app.footer(
-      "Exit codes: 0 done; 1 failed, or stopped by a signal; 2 bad input, nothing was written; 3 done, but "
-      "a\n"
-      "step or problem missed its tolerance. First run: docs/tutorial.md; files it leaves: docs/formats.md");
+      "Exit codes: 0 done; 1 failed; 2 bad input, nothing was written; 3 done, but a step or problem missed "
+      "its\n"
+      "tolerance; 75 stopped, and --resume goes on from there. First run: docs/tutorial.md; files it leaves: "
+      "docs/formats.md");
   app.failure_message(failure_message);
 
   std::vector<AddedCommand> added;

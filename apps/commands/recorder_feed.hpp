@@ -33,6 +33,11 @@ class RecorderFeed {
   void later(const char* name, std::function<void()> work);
 
   void flush();
+  /// The same, and waits until all of it is with the recorder. Throws what a write has thrown.
+  void drain() {
+    flush();
+    executor_.drain();
+  }
 
  private:
   graph::Executor& executor_;

@@ -4,19 +4,25 @@
 #include <omp.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "apps/commands/dump_fclib.hpp"
+#include "apps/commands/run_limit.hpp"
 #include "apps/commands/run_messages.hpp"
 #include "apps/commands/run_ranks.hpp"
+#include "apps/commands/run_resume.hpp"
+#include "apps/commands/run_signals.hpp"
+#include "apps/commands/run_status.hpp"
 #include "apps/commands/run_steps.hpp"
 #include "apps/commands/step_list.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/scene_warnings.hpp"
+#include "apps/shared/state_sample.hpp"
 #include "apps/shared/trace_feed.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
@@ -46,38 +52,186 @@ trace::Trace order_of(const RunOptions& options, const graph::Communicator& rank
   return recorded;
 }
 
-/// Fills in the directory and the provenance of `run`, and runs.
-int run_scene(PreparedRun run, Sample sample) {
-  const RunOptions& options = run.options;
-  const io::Scene& scene = run.scene;
-  const graph::Communicator& ranks = run.ranks;
-  run.directory = options.out.empty() ? scene.output.directory : options.out;
-  run.provenance = io::collect_provenance();
-  run.provenance.threads = threads_of(options);
-  run.provenance.simd = name_of(SweepKernels(settled(scene.setup.solver.simd, ranks)).set());
-  run.provenance.command_line = options.command_line;
-  run.provenance.seed = scene.setup.seed;
-  run.provenance.scene_file = scene.source_file;
-  std::string refused;
-  std::optional<io::DirectoryLock> lock;
-  if (ranks.rank() == 0) {
+/// What a run is made of once the ranks agree that it can begin.
+struct Prepared {
+  io::Scene scene;
+  Sample sample;
+  std::vector<GivenForce> forces;
+  Recordings recordings;
+  std::vector<std::string> warnings;
+  std::string directory;
+  std::string resolved;  ///< the scene as it was loaded
+  double wall_mass = 0;
+  std::optional<double> granted;
+  std::optional<io::DirectoryLock> lock;  ///< of a run that goes on: rank 0's, from before it reads
+  std::optional<ResumePoint> point;
+  std::optional<int> nothing_left;  ///< exit code of the run that has been done
+};
+
+void check_options(const RunOptions& options, const graph::Communicator& ranks) {
+  if (options.threads < 0)
+    throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
+  if (graph::simulated_ranks && options.threads > 1)
+    throw std::invalid_argument(
+        fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
+  graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads_of(options));
+  if (options.steps && *options.steps < 1)
+    throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
+  if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
+  if (options.trace_own_caches && (ranks.ranks() > 1 || threads_of(options) > 1))
+    throw std::invalid_argument(
+        "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
+        "with --threads 1");
+  if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
+  if (options.resume && options.force)
+    throw std::invalid_argument(
+        "--resume goes on with the results that --force removes: give one of the two");
+}
+
+void read_recordings(const RunOptions& options, const graph::Communicator& ranks, Recordings& recordings) {
+  if (!options.replay_order.empty())
+    recordings.order = std::make_unique<trace::Order>(order_of(options, ranks), ranks.rank());
+  if (!options.task_times.empty())
+    recordings.times =
+        std::make_unique<trace::TaskTimes>(io::read_trace(options.task_times), ranks.ranks(), ranks.rank());
+}
+
+/// Where the run goes on, if it does. Collective, but for what it throws.
+void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& terminal, Prepared& run) {
+  run.point = find_resume_point(run.directory, run.scene, ranks, terminal);
+  const EarlierRun earlier = earlier_run(run.directory);
+  if (run.point) {
+    compare_scenes(run.scene, run.resolved, *run.point);
+    if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
+    take_over(*run.point, run.scene);
+  } else if (earlier.complete) {
+    run.nothing_left = earlier.exit_code;
+  }
+}
+
+/// The sample, on rank 0, and what is to be said of it.
+void make_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
+  if (run.scene.sample.kind == io::SampleSpec::Kind::state) {
+    StateSample state = read_state(run.scene);
+    run.sample = completed(run.scene, std::move(state.sample));
+    run.forces = std::move(state.forces);
+    place_walls_of(state.walls, run.scene);
+  } else {
+    run.sample = build_sample(run.scene);
+  }
+  io::place_walls(run.scene, run.sample);
+  run.wall_mass = io::automatic_wall_mass(run.sample);
+  run.warnings = scene_warnings(run.scene, run.sample);
+  for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);
+  if (!options.dry_run) return;
+  fmt::print("{}", io::resolved_scene(run.scene));
+  fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n", options.scene,
+             contents(run.scene, run.sample.size()));
+}
+
+/// Collective: false when any rank refuses, which has been said.
+bool prepare(const RunOptions& options, const graph::Communicator& ranks, const Terminal& terminal,
+             Prepared& run) {
+  const auto agreed = [&](const auto& work) {
+    std::string refused;
     try {
-      lock.emplace(io::prepare_output_directory(run.directory, options.force, io::is_output_name));
+      work();
+    } catch (const std::exception& error) {
+      refused = error.what();
+    }
+    return !any_refused(refused, ranks);
+  };
+  const bool loaded = agreed([&] {
+    check_options(options, ranks);
+    read_recordings(options, ranks, run.recordings);
+    std::optional<double> given;
+    if (!options.max_walltime.empty()) given = parse_duration(options.max_walltime);
+    run.granted = time_granted(given);
+    run.scene = io::load_scene(options.scene, options.overrides);
+    run.resolved = io::resolved_scene(run.scene);
+    run.directory = options.out.empty() ? run.scene.output.directory : options.out;
+    if (!options.dump_fclib.empty()) check_dump(run.scene.setup, ranks.ranks());
+    make_decomposition(run.scene.setup.decomposition, ranks);  // refuses what does not fit the ranks
+    if (options.resume && ranks.rank() == 0 && std::filesystem::is_directory(run.directory))
+      run.lock.emplace(run.directory);
+  });
+  if (!loaded) return false;
+  if (options.resume && !agreed([&] { look_for_checkpoint(ranks, terminal, run); })) return false;
+  if (run.point || run.nothing_left) return true;
+  return agreed([&] {
+    if (ranks.rank() == 0) make_sample(options, terminal, run);
+  });
+}
+
+/// The results are those of a run from here on: a directory of its own, or the one that it goes on in.
+bool take_directory(const RunOptions& options, const graph::Communicator& ranks, Prepared& run) {
+  std::string refused;
+  if (ranks.rank() == 0 && !run.point) {
+    try {
+      run.lock.reset();
+      run.lock.emplace(
+          io::prepare_output_directory(run.directory, options.force || options.resume, io::is_output_name));
     } catch (const io::FileError& error) {
       refused = error.what();
     }
   }
-  if (any_refused(refused, ranks)) return exit_bad_input;
+  return !any_refused(refused, ranks);
+}
+
+io::Provenance provenance_of(const RunOptions& options, const graph::Communicator& ranks,
+                             const Prepared& run) {
+  const io::Scene& scene = run.scene;
+  io::Provenance provenance = io::collect_provenance();
+  provenance.threads = threads_of(options);
+  provenance.simd = name_of(SweepKernels(settled(scene.setup.solver.simd, ranks)).set());
+  provenance.command_line = options.command_line;
+  provenance.seed = scene.setup.seed;
+  provenance.scene_file = scene.source_file;
+  if (!run.point) return provenance;
+  provenance.resumed = io::resumptions_in(run.directory + "/run.json");
+  io::Resumption now{provenance.date_utc,
+                     provenance.host,
+                     ranks.ranks(),
+                     provenance.threads,
+                     run.point->file.state.head.report.step,
+                     {}};
+  for (const io::SceneChange& change : run.point->changes) now.changes.push_back(io::describe(change));
+  provenance.resumed.push_back(std::move(now));
+  return provenance;
+}
+
+void print_resumption(const Terminal& terminal, const ResumePoint& point) {
+  const CheckpointHead& head = point.file.state.head;
+  terminal.say("goes on behind step {}, {:.6g} s simulated, from {}", head.report.step, head.report.time,
+               point.path.string());
+  for (const io::SceneChange& change : point.changes) terminal.say("from here on {}", io::describe(change));
+}
+
+/// Fills in the provenance of the run, and runs.
+int run_scene(const RunOptions& options, const graph::Communicator& ranks, Terminal& terminal, Prepared run,
+              double began) {
+  if (!take_directory(options, ranks, run)) return exit_bad_input;
+  const io::Scene& scene = run.scene;
+  const io::Provenance provenance = provenance_of(options, ranks, run);
   if (ranks.rank() == 0) {
+    terminal.keep_in(run.directory + "/run.log", run.point.has_value());
     io::write_whole(run.directory + "/scene.resolved.toml", io::resolved_scene(scene));
-    print_start(scene, sample.size(), run.provenance.threads, ranks);
+    StatusFile(run.directory).begin();
+    const std::size_t grains =
+        run.point ? static_cast<std::size_t>(run.point->file.state.head.size.bodies) : run.sample.size();
+    print_start(terminal, scene, grains, provenance.threads, ranks);
+    if (run.point) print_resumption(terminal, *run.point);
   }
-  const io::Summary summary = simulate(run, std::move(sample));
-  if (ranks.rank() == 0) {
-    print_end(summary, scene.setup.solver, run.directory);
-  } else if (summary.status == "failed") {
-    fmt::print(stderr, "talus: rank {}: {}\n", ranks.rank(), summary.message);
-  }
+  const PreparedRun prepared{options,      scene,         run.recordings,
+                             ranks,        terminal,      run.point ? &*run.point : nullptr,
+                             run.resolved, run.wall_mass, began,
+                             run.granted,  run.directory, provenance,
+                             run.warnings};
+  const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
+  if (ranks.rank() == 0)
+    print_end(terminal, summary, scene.setup.solver, run.directory);
+  else if (summary.status == "failed")
+    terminal.warn("rank {}: {}", ranks.rank(), summary.message);
   if (summary.status == "failed" && ranks.ranks() > 1) end_all(summary.exit_code, ranks);
   return summary.exit_code;
 }
@@ -85,56 +239,23 @@ int run_scene(PreparedRun run, Sample sample) {
 }  // namespace
 
 int run_command(const RunOptions& options, const graph::Communicator& ranks) {
-  io::Scene scene;
-  Sample sample;
-  Recordings recordings;
-  std::vector<std::string> warnings;
-  std::string refused;
-  try {
-    if (options.threads < 0)
-      throw std::invalid_argument(fmt::format("--threads must be at least 1, got {}", options.threads));
-    if (graph::simulated_ranks && options.threads > 1)
-      throw std::invalid_argument(
-          fmt::format("--threads {}: simulated ranks have one thread each", options.threads));
-    graph::demand_thread_level(ranks.thread_level(), ranks.ranks(), threads_of(options));
-    if (!options.replay_order.empty())
-      recordings.order = std::make_unique<trace::Order>(order_of(options, ranks), ranks.rank());
-    if (!options.task_times.empty())
-      recordings.times =
-          std::make_unique<trace::TaskTimes>(io::read_trace(options.task_times), ranks.ranks(), ranks.rank());
-    if (options.steps && *options.steps < 1)
-      throw std::invalid_argument(fmt::format("--steps must be at least 1, got {}", *options.steps));
-    if (!options.trace_steps.empty()) parse_steps(options.trace_steps);
-    if (options.trace_own_caches && (ranks.ranks() > 1 || threads_of(options) > 1))
-      throw std::invalid_argument(
-          "--trace-own-caches: other threads and ranks would wait for what is brought in; record on one rank "
-          "with --threads 1");
-    if (!options.error_history.empty()) StepList(options.error_history);  // refuses what is none
-    scene = io::load_scene(options.scene, options.overrides);
-    if (!options.dump_fclib.empty()) check_dump(scene.setup, ranks.ranks());
-    make_decomposition(scene.setup.decomposition, ranks);  // refuses what does not fit the ranks
-    if (ranks.rank() == 0) {
-      sample = build_sample(scene);
-      io::place_walls(scene, sample);
-      warnings = scene_warnings(scene, sample);
-      for (const std::string& warning : warnings) fmt::print(stderr, "talus: warning: {}\n", warning);
-    }
-    if (options.dry_run && ranks.rank() == 0) {
-      fmt::print("{}", io::resolved_scene(scene));
-      fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n",
-                 options.scene, contents(scene, sample.size()));
-    }
-  } catch (const std::exception& error) {
-    refused = error.what();
-  }
-  if (any_refused(refused, ranks)) return exit_bad_input;
+  const double began = graph::seconds_now();
+  Terminal terminal(options.quiet);
+  Prepared run;
+  if (!prepare(options, ranks, terminal, run)) return exit_bad_input;
   if (options.dry_run) return exit_done;
-  share_walls(scene.setup, ranks);
-  stop_on_signals();
+  if (run.nothing_left) {
+    if (ranks.rank() == 0)
+      terminal.say("the run in {} is done; to go on beyond its end, give its stage another one with --set",
+                   run.directory);
+    return *run.nothing_left;
+  }
+  share_walls(run.scene.setup, ranks);
+  catch_signals();
   try {
-    return run_scene({options, scene, recordings, ranks, {}, {}, std::move(warnings)}, std::move(sample));
+    return run_scene(options, ranks, terminal, std::move(run), began);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    terminal.warn("error: {}", error.what());
     if (ranks.ranks() > 1) end_all(exit_failure, ranks);
     return exit_failure;
   }

@@ -23,6 +23,9 @@ struct RunOptions {
   bool trace_own_caches = false;          ///< trace::RecorderOptions::own_caches; of one rank and thread
   std::string replay_order;               ///< a trace whose order of tasks is to be followed; empty: none
   std::string task_times;                 ///< a trace by which tasks take their time; simulated ranks only
+  bool resume = false;                    ///< go on from the last checkpoint in `out`, or begin
+  std::string max_walltime;               ///< "3:50:00"; empty: none but that of the batch system
+  bool quiet = false;                     ///< warnings and errors alone go to stderr
   bool dry_run = false;                   ///< read, build, place and check; write nothing
   std::vector<std::string> command_line;  ///< for run.json
 };

@@ -67,32 +67,33 @@ std::string contents(const io::Scene& scene, std::size_t grains) {
                      counted(scene.setup.stages.size(), "stage"));
 }
 
-void print_start(const io::Scene& scene, std::size_t grains, int threads, const graph::Communicator& ranks) {
-  fmt::print(stderr, "talus: {}, {}\n", scene.name, contents(scene, grains));
+void print_start(const Terminal& terminal, const io::Scene& scene, std::size_t grains, int threads,
+                 const graph::Communicator& ranks) {
+  terminal.say("{}, {}", scene.name, contents(scene, grains));
   const auto count = [](int n, const char* what) { return counted(static_cast<std::size_t>(n), what); };
   const int cores = omp_get_num_procs();
-  fmt::print(stderr, "talus: {}, {} each, {} for this process, MPI threads: {}\n",
-             count(ranks.ranks(), "rank"), count(threads, "thread"), count(cores, "core"),
-             ranks.thread_level());
+  terminal.say("{}, {} each, {} for this process, MPI threads: {}", count(ranks.ranks(), "rank"),
+               count(threads, "thread"), count(cores, "core"), ranks.thread_level());
   if (scene.setup.decomposition.subdomains > 1 || ranks.ranks() > 1)
-    fmt::print(stderr, "talus: {} by {}, {}, {}\n",
-               count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
-               name_of(scene.setup.decomposition.partitioner),
-               couplings().of(scene.setup.decomposition.coupling).name,
-               scene.setup.decomposition.exchange == ExchangeScheme::dcs ? "DCS" : "CCS");
+    terminal.say("{} by {}, {}, {}",
+                 count(std::max(scene.setup.decomposition.subdomains, ranks.ranks()), "subdomain"),
+                 name_of(scene.setup.decomposition.partitioner),
+                 couplings().of(scene.setup.decomposition.coupling).name,
+                 scene.setup.decomposition.exchange == ExchangeScheme::dcs ? "DCS" : "CCS");
   // Ranks that are bound have cores of their own; unbound ones share those of the machine.
   const bool bound = cores < io::collect_provenance().cores_online;
   if (threads * (bound ? 1 : ranks.ranks_on_node()) > cores)
-    fmt::print(stderr, "talus: warning: more threads than cores; results are the same, the run is slower\n");
+    terminal.warn("warning: more threads than cores; results are the same, the run is slower");
 }
 
-void print_stage_end(const Simulation& simulation) {
+void print_stage_end(const Terminal& terminal, const Simulation& simulation) {
   const StageEnd& end = simulation.stage().end;
-  fmt::print(stderr, "talus: stage '{}' ended after {}: {} reached{}\n", simulation.stage().name,
-             counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"), simulation.end_reached(),
-             end.equilibrium ? fmt::format(", equilibrium {:.2g} (asked {:.2g})",
-                                           simulation.report().equilibrium, *end.equilibrium)
-                             : "");
+  terminal.say("stage '{}' ended after {}: {} reached{}", simulation.stage().name,
+               counted(static_cast<std::size_t>(simulation.steps_of_stage()), "step"),
+               simulation.end_reached(),
+               end.equilibrium ? fmt::format(", equilibrium {:.2g} (asked {:.2g})",
+                                             simulation.report().equilibrium, *end.equilibrium)
+                               : "");
 }
 
 std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls) {
@@ -102,25 +103,24 @@ std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls) {
   return fmt::format("bodies {} and {}", pair.body, pair.with);
 }
 
-void print_notes(const Simulation& simulation, const Tally& tally) {
+void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally) {
   const MessageCount& messages = simulation.messages();
   if (messages.messages > 0)
-    fmt::print(stderr,
-               "talus: an exchange: {} messages of {} bytes between subdomains, {} of {} between ranks; "
-               "waiting for them took {:.1f} % of the iterations on rank 0\n",
-               messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
-               tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
+    terminal.say(
+        "an exchange: {} messages of {} bytes between subdomains, {} of {} between ranks; "
+        "waiting for them took {:.1f} % of the iterations on rank 0",
+        messages.messages, messages.bytes, messages.between_ranks, messages.bytes_between_ranks,
+        tally.iterating > 0 ? 100 * tally.exposed / tally.iterating : 0.0);
   if (tally.passed > 0)
-    fmt::print(stderr,
-               "talus: warning: {} times a grain went through what it met, or deep into it, within one step; "
-               "these steps count as unconverged. Reduce time_step\n",
-               tally.passed);
+    terminal.warn(
+        "warning: {} times a grain went through what it met, or deep into it, within one step; "
+        "these steps count as unconverged. Reduce time_step",
+        tally.passed);
   if (tally.overlapped > 0)
-    fmt::print(
-        stderr,
-        "talus: warning: {} ended with overlaps beyond solver.overlap_tolerance = {:.2g}: the deepest, "
+    terminal.warn(
+        "warning: {} ended with overlaps beyond solver.overlap_tolerance = {:.2g}: the deepest, "
         "{:.2g} of the smaller radius, of {} in step {}; overlap_body and overlap_with in steps.csv "
-        "name one of each step{}\n",
+        "name one of each step{}",
         counted(static_cast<std::size_t>(tally.overlapped), "step"),
         simulation.setup().solver.overlap_tolerance, tally.deepest.overlap,
         name_of(*tally.deepest.overlapping, simulation.setup().walls), tally.deepest.step,
@@ -128,34 +128,36 @@ void print_notes(const Simulation& simulation, const Tally& tally) {
             ? fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step)
             : "");
   if (tally.stagnated > 0)
-    fmt::print(stderr,
-               "talus: warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
-               "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
-               "time_step, or try another solver.method\n",
-               tally.stagnated, tally.floor);
+    terminal.warn(
+        "warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "
+        "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
+        "time_step, or try another solver.method",
+        tally.stagnated, tally.floor);
 }
 
-void print_end(const io::Summary& summary, const SolverSettings& solver, const std::string& directory) {
-  if (!summary.message.empty())
-    fmt::print(stderr, "talus: {}{}\n",
-               summary.exit_code != exit_failure ? ""
-               : summary.status == "stopped"     ? "stopped: "
-                                                 : "error: ",
-               summary.message);
+void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,
+               const std::string& directory) {
+  if (!summary.message.empty()) {
+    if (summary.status == "stopped")
+      terminal.warn("stopped: {}", summary.message);
+    else if (summary.exit_code == exit_failure)
+      terminal.warn("error: {}", summary.message);
+    else
+      terminal.say("{}", summary.message);
+  }
   const std::string digest = summary.digest ? fmt::format(", digest {:016x}", *summary.digest) : "";
-  fmt::print(stderr, "talus: {}, {:.6g} s simulated in {:.1f} s, {} sweeps{}\n",
-             counted(static_cast<std::size_t>(summary.steps), "step"), summary.time, summary.wall_s,
-             summary.iterations, digest);
+  terminal.say("{}, {:.6g} s simulated in {:.1f} s, {} sweeps{}",
+               counted(static_cast<std::size_t>(summary.steps), "step"), summary.time, summary.wall_s,
+               summary.iterations, digest);
   if (summary.unconverged_steps > 0)
-    fmt::print(
-        stderr,
-        "talus: {} of {} steps missed the tolerance: worst error {:.2e} (allowed {:.2g}), worst balance "
+    terminal.say(
+        "{} of {} steps missed the tolerance: worst error {:.2e} (allowed {:.2g}), worst balance "
         "{:.2e} (allowed {:.2g}), worst overlap {:.2g} (allowed {:.2g}); `converged` in steps.csv says "
         "which. Raise solver.max_iterations, reduce time_step, or accept them with allow_unconverged = "
-        "true\n",
+        "true",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
         summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance);
-  fmt::print(stderr, "talus: results in {}\n", directory);
+  terminal.say("results in {}", directory);
 }
 
 }  // namespace talus

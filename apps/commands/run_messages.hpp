@@ -1,12 +1,13 @@
 #pragma once
 
-/// What `talus run` says on stderr, by rank 0 alone.
+/// What `talus run` says, by rank 0 alone.
 
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "apps/shared/terminal.hpp"
 #include "io/results/run_json.hpp"
 #include "io/scene/scene.hpp"
 #include "runtime/graph/communicator.hpp"
@@ -46,19 +47,21 @@ std::string counted(std::size_t count, const char* what);
 std::string contents(const io::Scene& scene, std::size_t grains);
 
 /// Contents, ranks, threads and subdomains of a run that begins.
-void print_start(const io::Scene& scene, std::size_t grains, int threads, const graph::Communicator& ranks);
+void print_start(const Terminal& terminal, const io::Scene& scene, std::size_t grains, int threads,
+                 const graph::Communicator& ranks);
 
 /// Which of its conditions a stage has come to, and how far it was from rest where that was one.
-void print_stage_end(const Simulation& simulation);
+void print_stage_end(const Terminal& terminal, const Simulation& simulation);
 
 /// "bodies 3 and 17", "body 3 and wall 'floor'".
 std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls);
 
 /// Messages of an exchange, and warnings of steps that grains passed through one another in, that ended with
 /// overlaps, or whose error stood still.
-void print_notes(const Simulation& simulation, const Tally& tally);
+void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally);
 
 /// What came of the run, of which the results are in `directory`.
-void print_end(const io::Summary& summary, const SolverSettings& solver, const std::string& directory);
+void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,
+               const std::string& directory);
 
 }  // namespace talus

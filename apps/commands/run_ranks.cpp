@@ -13,7 +13,8 @@ namespace talus {
 void share_walls(Setup& setup, const graph::Communicator& ranks) {
   std::vector<double*> values;
   for (Wall& wall : setup.walls) {
-    for (Eigen::Index k = 0; k < 3; ++k) values.push_back(&wall.point[k]);
+    for (Vec3* vector : {&wall.point, &wall.velocity})
+      for (double& number : *vector) values.push_back(&number);
     values.push_back(&wall.load.mass);
   }
   for (Stage& stage : setup.stages)

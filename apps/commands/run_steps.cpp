@@ -4,17 +4,20 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <exception>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "apps/commands/dump_fclib.hpp"
 #include "apps/commands/recorder_feed.hpp"
+#include "apps/commands/run_checkpoints.hpp"
+#include "apps/commands/run_limit.hpp"
 #include "apps/commands/run_messages.hpp"
+#include "apps/commands/run_signals.hpp"
+#include "apps/commands/run_status.hpp"
 #include "apps/commands/step_list.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/trace_feed.hpp"
@@ -29,18 +32,11 @@ namespace talus {
 
 namespace {
 
-/// Set by SIGINT and SIGTERM: the run ends after the step it is in, with all its files whole.
-std::atomic<int> stop_signal{0};
-static_assert(std::atomic<int>::is_always_lock_free);
-
-extern "C" void request_stop(int signal) {
-  stop_signal.store(signal);
-}
-
 /// When the next frame is due.
 class FrameClock {
  public:
-  explicit FrameClock(const io::OutputSpec& output) : output_(output) {}
+  FrameClock(const io::OutputSpec& output, std::int64_t passed) : output_(output), passed_(passed) {}
+  std::int64_t passed() const { return passed_; }
 
   bool due(const StepReport& report) {
     bool now = false;
@@ -55,56 +51,132 @@ class FrameClock {
 
  private:
   const io::OutputSpec& output_;
-  std::int64_t passed_ = 0;
+  std::int64_t passed_;
 };
 
-/// The signal that any of the ranks received, or 0.
-int signal_of(const graph::Communicator& ranks) {
-  double signal[1] = {static_cast<double>(stop_signal.load())};
-  ranks.max(signal);
-  return static_cast<int>(signal[0]);
+/// What is asked of a run between two steps, the same on all ranks.
+struct Asked {
+  int signal = 0;      ///< to end, by a signal
+  bool limit = false;  ///< to end, as its time is up
+  bool save = false;   ///< for a checkpoint
+  bool ends() const { return signal != 0 || limit; }
+};
+
+/// Whichever rank got a signal; the clock is that of rank 0. One reduction, of what comes in one message.
+Asked agree(const graph::Communicator& ranks, bool limit, bool save) {
+  double asked[3] = {static_cast<double>(stop_signal()), limit ? 1.0 : 0.0,
+                     save || save_was_asked() ? 1.0 : 0.0};
+  ranks.max(asked);
+  return {static_cast<int>(asked[0]), asked[1] > 0, asked[2] > 0};
 }
 
-/// Runs the steps; returns the signal that stopped them, or 0.
-int advance(const PreparedRun& run, Simulation& simulation, RecorderFeed& feed, Tally& tally) {
-  const io::OutputSpec& output = run.scene.output;
-  const RunOptions& options = run.options;
-  std::optional<io::Progress> progress;
-  if (run.ranks.rank() == 0) progress.emplace(io::progress_on_stderr());
-  FrameClock clock(output);
-  const auto write_frame = [&] { feed.frame(simulation.frame(output.contacts)); };
-  if (output.stage_frames) write_frame();
-  while (!simulation.finished()) {
-    const StepReport& report = simulation.step();
-    tally.add(simulation);
-    feed.row(simulation, simulation.triaxial());
-    if (std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
-      feed.later("dump of a contact problem", fclib_dump(simulation, run.directory));
-    const bool stage_ends = simulation.stage_fraction() >= 1;
-    const bool last = options.steps && report.step >= *options.steps;
-    const int signal = signal_of(run.ranks);
-    const bool ends = stage_ends || last || signal != 0;
-    if (clock.due(report) || (ends && output.stage_frames)) write_frame();
-    if (progress) progress->update(report, simulation.stage().name, simulation.stage_fraction());
-    if (progress && stage_ends) {
-      progress->finish();
-      print_stage_end(simulation);
-    }
-    if (signal != 0) {
-      if (progress) progress->finish();
-      return signal;
-    }
-    if (last) break;
-    simulation.begin_next_stage();
+/// The progress on stderr and in run.log.
+class Lines {
+ public:
+  explicit Lines(const PreparedRun& run) {
+    if (run.ranks.rank() != 0) return;
+    if (!run.terminal.quiet()) lines_.push_back(io::progress_on_stderr());
+    if (std::FILE* log = run.terminal.log()) lines_.emplace_back(log, false, std::size_t{0});
   }
-  if (progress) progress->finish();
-  return 0;
+  void update(const Simulation& simulation) {
+    for (io::Progress& line : lines_)
+      line.update(simulation.report(), simulation.stage().name, simulation.stage_fraction());
+  }
+  void finish() {
+    for (io::Progress& line : lines_) line.finish();
+  }
+
+ private:
+  std::vector<io::Progress> lines_;
+};
+
+/// The parts of a run that its steps feed.
+struct Advance {
+  const PreparedRun& run;
+  Simulation& simulation;
+  RecorderFeed& feed;
+  io::Recorder& recorder;
+  CheckpointKeeper& keeper;
+  RunMemory memory;
+  FrameClock frames;
+  WallLimit limit;
+  std::optional<StatusFile> status;  ///< rank 0's
+
+  void write_frame() { feed.frame(simulation.frame(run.scene.output.contacts)); }
+
+  /// Where the files of the results are, behind all that steps have given them.
+  io::OutputMark mark() {
+    feed.drain();
+    return recorder.mark();
+  }
+  bool save(io::OutputMark mark) {
+    RunMemory now = memory;
+    now.mark = std::move(mark);
+    now.frames_passed = frames.passed();
+    now.wall_s += graph::seconds_now() - run.began;
+    const bool saved = keeper.save(simulation, std::move(now));
+    limit.took_save(keeper.seconds());
+    return saved;
+  }
+};
+
+/// How the steps of a run ended.
+struct Stop {
+  Asked asked;
+  bool saved = false;  ///< a checkpoint of this step is there
+};
+
+/// A step, its rows, and what follows from what is asked behind it. True: the run ends here.
+bool advance_step(Advance& all, Lines& lines, Stop& stop) {
+  const auto& [run, simulation, feed, recorder, keeper, memory, frames, limit, status] = all;
+  const RunOptions& options = run.options;
+  const double before = graph::seconds_now();
+  const StepReport& report = simulation.step();
+  all.memory.tally.add(simulation);
+  feed.row(simulation, simulation.triaxial());
+  if (std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
+    feed.later("dump of a contact problem", fclib_dump(simulation, run.directory));
+  const double now = graph::seconds_now();
+  all.limit.took_step(now - before);
+  const bool first = run.ranks.rank() == 0;
+  const Asked asked = agree(run.ranks, first && limit.reached(now), first && keeper.wall_due(now));
+  const bool due = keeper.due(report);
+  const bool stage_ends = simulation.stage_fraction() >= 1;
+  const bool last = options.steps && report.step >= *options.steps;
+  const bool written = all.frames.due(report) || (stage_ends && run.scene.output.stage_frames);
+  if (written) all.write_frame();
+  lines.update(simulation);
+  if (stage_ends) {
+    lines.finish();
+    if (first) print_stage_end(run.terminal, simulation);
+  }
+  simulation.begin_next_stage();
+  stop.asked = simulation.finished() ? Asked{} : asked;
+  const bool ends = simulation.finished() || last || stop.asked.ends();
+  if (due || asked.save || stop.asked.ends() || (ends && options.resume)) stop.saved = all.save(all.mark());
+  // Where a run stops for good; one that goes on cuts this frame off again.
+  if (ends && !written && run.scene.output.stage_frames) all.write_frame();
+  if (all.status) all.status->update(simulation, memory.tally, keeper, now);
+  return ends;
+}
+
+/// Runs the steps.
+Stop advance(Advance& all) {
+  Lines lines(all.run);
+  if (!all.run.resume && all.run.scene.output.stage_frames) all.write_frame();
+  Stop stop;
+  while (!all.simulation.finished()) {
+    stop = {};
+    if (advance_step(all, lines, stop)) break;
+  }
+  lines.finish();
+  return stop;
 }
 
 /// What was asked of steps that a run did not come to, and did not need to end well.
-void warn_of_unreached(const RunOptions& options, std::int64_t steps) {
+void warn_of_unreached(const Terminal& terminal, const RunOptions& options, std::int64_t steps) {
   const auto warn = [&](const char* option, const std::string& asked) {
-    fmt::print(stderr, "talus: warning: {} {}: the run ended after step {}\n", option, asked, steps);
+    terminal.warn("warning: {} {}: the run ended after step {}", option, asked, steps);
   };
   if (!options.error_history.empty() && StepList(options.error_history).last() > steps)
     warn("--error-history", options.error_history);
@@ -115,9 +187,9 @@ void warn_of_unreached(const RunOptions& options, std::int64_t steps) {
 }
 
 /// A run that is done may have left something undone: what was asked for, or more that the scene has.
-void add_undone(const RunOptions& options, bool scene_ended, io::Summary& summary) {
+void add_undone(const RunOptions& options, io::Summary& summary) {
   std::vector<std::string> undone;
-  if (!scene_ended)
+  if (!summary.complete)
     undone.push_back(fmt::format("stopped after {} by --steps; the scene has more",
                                  counted(static_cast<std::size_t>(summary.steps), "step")));
   for (const std::int64_t step : options.dump_fclib)
@@ -135,65 +207,109 @@ void fail(io::Summary& summary, const std::exception& error) {
   summary.digest.reset();
 }
 
+/// The run was stopped: by whom, and whether it can go on.
+void note_stop(const Stop& stop, std::int64_t step, io::Summary& summary) {
+  summary.status = "stopped";
+  summary.message = fmt::format(
+      "{} after step {}{}", stop.asked.signal != 0 ? signal_name(stop.asked.signal) : "the time is up", step,
+      stop.saved ? "; --resume goes on from there" : ", and no checkpoint could be written");
+  summary.exit_code = stop.saved ? exit_stopped : exit_failure;
+}
+
+/// At its first step, or where the checkpoint has it.
+std::unique_ptr<Simulation> make_simulation(const PreparedRun& run, Sample sample,
+                                            std::vector<GivenForce> forces, graph::Executor& executor) {
+  const Setup& setup = run.scene.setup;
+  if (run.resume) return std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
+  auto simulation = std::make_unique<Simulation>(
+      setup, deal_out(std::move(sample), setup.decomposition, run.ranks), executor, run.ranks);
+  if (run.scene.sample.kind == io::SampleSpec::Kind::state) simulation->begin_from(std::move(forces));
+  return simulation;
+}
+
+/// What the command remembers at its start.
+RunMemory first_memory(const PreparedRun& run) {
+  if (run.resume) return run.resume->memory;
+  RunMemory memory;
+  for (const Wall& wall : run.scene.setup.walls)
+    memory.wall_points.insert(memory.wall_points.end(), wall.point.begin(), wall.point.end());
+  memory.wall_mass = run.wall_mass;
+  return memory;
+}
+
 /// Takes the run to its end, or to what breaks it off; the summary says which. Throws what the beginning and
 /// the end of a run throw.
-void run_steps(const PreparedRun& run, Sample sample, io::Recorder& recorder, io::Summary& summary) {
-  const auto& [options, scene, recordings, ranks, directory, provenance, warnings] = run;
-  Tally tally;
+void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces, io::Recorder& recorder,
+               io::Summary& summary) {
+  const RunOptions& options = run.options;
+  const io::Scene& scene = run.scene;
+  const Recordings& recordings = run.recordings;
+  const graph::Communicator& ranks = run.ranks;
+  const Terminal& terminal = run.terminal;
   std::optional<TraceFeed> trace;
   if (options.trace)
-    trace.emplace(directory, parse_steps(options.trace_steps), options.trace_own_caches, provenance.threads,
-                  ranks);
-  graph::Executor executor({.threads = provenance.threads,
+    trace.emplace(run.directory, parse_steps(options.trace_steps), options.trace_own_caches,
+                  run.provenance.threads, ranks);
+  graph::Executor executor({.threads = run.provenance.threads,
                             .trace = trace ? &trace->recorder() : nullptr,
                             .times = recordings.times.get()});
   if (trace) trace->start(executor);
-  Simulation simulation(scene.setup, deal_out(std::move(sample), scene.setup.decomposition, ranks), executor,
-                        ranks);
+  const std::unique_ptr<Simulation> made =
+      make_simulation(run, std::move(sample), std::move(forces), executor);
+  Simulation& simulation = *made;
   if (recordings.order) simulation.follow(recordings.order.get());
   RecorderFeed feed(executor, recorder, ranks,
                     options.error_history.empty() ? StepList() : StepList(options.error_history));
+  CheckpointKeeper keeper(scene.checkpoint, run.directory,
+                          ranks.rank() == 0 ? texts_of(scene, run.resolved, options.overrides)
+                                            : std::map<std::string, std::string>(),
+                          ranks, terminal);
+  const RunMemory memory = first_memory(run);
+  keeper.start(memory);
+  Advance all{run,
+              simulation,
+              feed,
+              recorder,
+              keeper,
+              memory,
+              FrameClock(scene.output, memory.frames_passed),
+              WallLimit(run.granted ? std::optional(run.began + *run.granted) : std::nullopt),
+              {}};
+  if (ranks.rank() == 0) all.status.emplace(run.directory);
   summary.status = "done";
   try {
-    if (const int signal = advance(run, simulation, feed, tally); signal != 0) {
-      summary.status = "stopped";
-      summary.message = fmt::format("signal {} after step {}", signal, simulation.report().step);
-      summary.exit_code = exit_failure;
-    }
+    if (const Stop stop = advance(all); stop.asked.ends()) note_stop(stop, simulation.report().step, summary);
   } catch (const std::exception& error) {
     fail(summary, error);
   }
   try {
-    feed.flush();
-    executor.drain();
+    feed.drain();
   } catch (const std::exception& error) {
     fail(summary, error);
   }
+  const Tally& tally = all.memory.tally;
   tally.sum_up(simulation.report(), summary);
+  summary.wall_s = memory.wall_s;
   // The other ranks may wait for what will not come: the caller ends them when the files are whole.
   if (summary.status == "failed") return;
   if (trace) trace->finish(executor);
-  if (ranks.rank() == 0) print_notes(simulation, tally);
+  if (ranks.rank() == 0) print_notes(terminal, simulation, tally);
   if (summary.status == "done") {
     if (tally.unconverged > 0 && !scene.setup.allow_unconverged) summary.exit_code = exit_tolerance_missed;
     const bool last_stage = simulation.stage_index() + 1 == scene.setup.stages.size();
-    add_undone(options, last_stage && simulation.stage_fraction() >= 1, summary);
-    if (ranks.rank() == 0) warn_of_unreached(options, summary.steps);
+    summary.complete = last_stage && simulation.stage_fraction() >= 1;
+    add_undone(options, summary);
+    if (ranks.rank() == 0) warn_of_unreached(terminal, options, summary.steps);
   }
   summary.digest = simulation.digest();
 }
 
 }  // namespace
 
-void stop_on_signals() {
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
-}
-
-io::Summary simulate(const PreparedRun& run, Sample sample) {
-  const double begin = graph::seconds_now();
+io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces) {
   io::Summary summary;
-  summary.bodies = sample.size();
+  summary.bodies =
+      run.resume ? static_cast<std::size_t>(run.resume->file.state.head.size.bodies) : sample.size();
   summary.warnings = run.warnings;
   // Of one rank it writes on the background thread, from where a trace must hear of no call.
   io::OutputContext context = io::output_context(run.directory, run.scene.setup,
@@ -210,11 +326,14 @@ io::Summary simulate(const PreparedRun& run, Sample sample) {
     }
   };
   attempt([&] {
-    recorder.open();
-    run_steps(run, std::move(sample), recorder, summary);
+    if (run.resume)
+      recorder.resume(run.resume->memory.mark);
+    else
+      recorder.open();
+    run_steps(run, std::move(sample), std::move(forces), recorder, summary);
     recorder.close();
   });
-  summary.wall_s = graph::seconds_now() - begin;
+  summary.wall_s += graph::seconds_now() - run.began;
   summary.frames = recorder.frames();
   attempt([&] { recorder.end(summary); });
   return summary;

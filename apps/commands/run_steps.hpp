@@ -1,10 +1,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/commands/run.hpp"
+#include "apps/commands/run_resume.hpp"
+#include "apps/shared/terminal.hpp"
 #include "io/results/run_json.hpp"
 #include "io/scene/scene.hpp"
 #include "kernels/samples/sample.hpp"
@@ -26,16 +29,20 @@ struct PreparedRun {
   const io::Scene& scene;
   const Recordings& recordings;
   const graph::Communicator& ranks;
+  const Terminal& terminal;
+  const ResumePoint* resume = nullptr;     ///< null: from the beginning
+  std::string resolved = {};               ///< the scene as it was loaded, before its walls were placed
+  double wall_mass = 0;                    ///< io::automatic_wall_mass of the sample [kg]; rank 0's
+  double began = 0;                        ///< clock when the process began (graph::seconds_now)
+  std::optional<double> granted = {};      ///< time from then to when it must have ended [s]
   std::string directory;                   ///< of the results
   io::Provenance provenance;               ///< with the number of threads
   std::vector<std::string> warnings = {};  ///< of the scene; rank 0's
 };
 
-/// From now on SIGINT and SIGTERM end a run after the step it is in, with all its files whole.
-void stop_on_signals();
-
-/// Collective. Runs from the first file of the results to the last; rank 0 has the sample. What breaks the
-/// run off is in the summary. Throws what the constructor of io::Recorder throws.
-io::Summary simulate(const PreparedRun& run, Sample sample);
+/// Collective. Runs from the first file of the results to the last; rank 0 has the sample, and the forces
+/// that it begins from. What breaks the run off is in the summary. Throws what the constructor of
+/// io::Recorder throws.
+io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces);
 
 }  // namespace talus

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "apps/shared/patience.hpp"
+#include "apps/shared/state_sample.hpp"
 #include "io/scene/bodies_file.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -29,6 +30,7 @@ Sample make_sample(const io::Scene& scene) {
   const io::SampleSpec& spec = scene.sample;
   if (spec.kind == io::SampleSpec::Kind::bodies)
     return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
+  if (spec.kind == io::SampleSpec::Kind::state) return read_state(scene).sample;
 
   Sample sample;
   sample.density = scene.density;
@@ -49,8 +51,7 @@ Sample make_sample(const io::Scene& scene) {
 
 /// What Simulation would refuse (validate of Bodies), while the file that says it is at hand.
 void check(const io::Scene& scene, const Sample& sample) {
-  const std::string& file =
-      scene.sample.kind == io::SampleSpec::Kind::bodies ? scene.sample.file : scene.source_file;
+  const std::string& file = scene.sample.from_file() ? scene.sample.file : scene.source_file;
   for (std::size_t k = 0; k < sample.size(); ++k) {
     const auto refuse = [&](const std::string& what) {
       throw io::SceneError(file, 0, "",
@@ -105,7 +106,10 @@ void put_materials(const io::Scene& scene, Sample& sample) {
 }
 
 Sample build_sample(const io::Scene& scene) {
-  Sample sample = make_sample(scene);
+  return completed(scene, make_sample(scene));
+}
+
+Sample completed(const io::Scene& scene, Sample sample) {
   put_materials(scene, sample);
   check(scene, sample);
   return sample;
@@ -115,7 +119,7 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   Overlaps overlaps;
   const auto id = [&](std::size_t k) { return static_cast<std::int64_t>(sample.id_of(k)); };
   // Samples that are made have none between grains.
-  if (scene.sample.kind == io::SampleSpec::Kind::bodies) {
+  if (scene.sample.from_file()) {
     const CellGrid grid = build_cells(sample.x, sample.radius);
     std::vector<GrainPair> pairs;
     find_pairs(grid, 0, grid.cells.size(), pairs);

@@ -12,6 +12,9 @@ namespace talus {
 /// is finite, std::invalid_argument when grains do not fit their base.
 Sample build_sample(const io::Scene& scene);
 
+/// A sample that was made otherwise, with the materials of the scene, and checked likewise.
+Sample completed(const io::Scene& scene, Sample sample);
+
 /// Where materials have names: gives the grains that have none that of the scene's sample, and all their
 /// densities.
 void put_materials(const io::Scene& scene, Sample& sample);

@@ -105,7 +105,7 @@ std::string range_of_radii(const Sample& grains) {
 
 std::string other_sample(const io::Scene& scene, const Sample& grains) {
   const io::SampleSpec& spec = scene.sample;
-  if (spec.kind == io::SampleSpec::Kind::bodies) return "";
+  if (spec.from_file()) return "";
   if (const auto there = static_cast<std::int64_t>(grains.size()); there != spec.grains())
     return fmt::format("{} grains where the scene's sample has {}", there, spec.grains());
   const SizeDistribution& radii = spec.radii;
@@ -119,7 +119,7 @@ std::string other_sample(const io::Scene& scene, const Sample& grains) {
 }
 
 std::string why_not_weak(const io::Scene& scene) {
-  if (scene.sample.kind == io::SampleSpec::Kind::bodies) return "its grains are read from a file";
+  if (scene.sample.from_file()) return "its grains are read from a file";
   if (scene.sample.count == 0) return "its lattice is given by cells";
   for (const Wall& wall : scene.setup.walls)
     if (wall.point.allFinite())  // others wait for the grains

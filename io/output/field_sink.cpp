@@ -28,25 +28,56 @@ class FieldSink : public OutputSink {
     if (error) throw FileError((directory_ / "fields").string(), "cannot be created: " + error.message());
   }
 
-  void frame(const Frame& part) override {
-    const std::string grains = fmt::format("grains_{:06}.vtp", frames_);
-    write(grains, [&](const WriteText& out) { write_grains_vtp(part, ranks_, out); });
-    grain_files_.push_back({part.time, 0, grains});
-    collect(collections[0], grain_files_);
-    if (contacts_) {
-      const std::string forces = fmt::format("forces_{:06}.vtp", frames_);
-      write(forces, [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
-      force_files_.push_back({part.time, 0, forces});
-      collect(collections[1], force_files_);
+  void resume(const OutputMark& mark) override {
+    open();
+    for (const double time : mark.frame_times) note_frame(time);
+    if (ranks_.rank() != 0) return;
+    // Where fields, or contacts, are asked for with the resumption, earlier frames have none.
+    const auto missing = [&](const FieldFile& file) {
+      return !std::filesystem::exists(directory_ / "fields" / file.path);
+    };
+    std::erase_if(grain_files_, missing);
+    std::erase_if(force_files_, missing);
+    std::error_code ignored;
+    for (std::size_t later = frames_; remove_frame(later); ++later) {
     }
+    for (const std::string_view name : collections) std::filesystem::remove(directory_ / name, ignored);
+    if (frames_ > 0) write_collections();
+  }
+
+  void frame(const Frame& part) override {
+    write(grains_name(frames_), [&](const WriteText& out) { write_grains_vtp(part, ranks_, out); });
+    if (contacts_)
+      write(forces_name(frames_), [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
+    note_frame(part.time);
+    write_collections();
+  }
+
+ private:
+  static std::string grains_name(std::size_t frame) { return fmt::format("grains_{:06}.vtp", frame); }
+  static std::string forces_name(std::size_t frame) { return fmt::format("forces_{:06}.vtp", frame); }
+
+  void note_frame(double time) {
+    grain_files_.push_back({time, 0, grains_name(frames_)});
+    if (contacts_) force_files_.push_back({time, 0, forces_name(frames_)});
+    ++frames_;
+  }
+  /// False where there is none of that number.
+  bool remove_frame(std::size_t frame) const {
+    std::error_code ignored;
+    const bool grains = std::filesystem::remove(directory_ / "fields" / grains_name(frame), ignored);
+    const bool forces = std::filesystem::remove(directory_ / "fields" / forces_name(frame), ignored);
+    return grains || forces;
+  }
+  void write_collections() const {
+    collect(collections[0], grain_files_);
+    if (contacts_) collect(collections[1], force_files_);
     std::vector<FieldFile> all;
     for (const FieldFile& file : grain_files_) all.push_back({file.time, 0, "fields/" + file.path});
     for (const FieldFile& file : force_files_) all.push_back({file.time, 1, "fields/" + file.path});
     collect(collections[2], all);
-    ++frames_;
   }
 
- private:
   /// Made of the parts of all ranks; rank 0 writes.
   void write(const std::string& name, const std::function<void(const WriteText&)>& make) const {
     if (ranks_.rank() == 0)

@@ -14,6 +14,9 @@ class FrameSink : public OutputSink {
   }
 
   void open() override { results_.emplace(path_, wall_names_, ranks_); }
+  void resume(const OutputMark& mark) override {
+    results_.emplace(path_, wall_names_, ranks_, shared_writing(), mark.frame_times.size());
+  }
   void frame(const Frame& part) override { results_->append(part); }
 
  private:
@@ -25,10 +28,11 @@ class FrameSink : public OutputSink {
 
 }  // namespace
 
-const SinkKind frame_sink{SinkUse::always,
-                          [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
-                            return std::make_unique<FrameSink>(context);
-                          },
-                          [](const std::string& name) { return name == "results.h5"; }};
+const SinkKind frame_sink{
+    SinkUse::always,
+    [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+      return std::make_unique<FrameSink>(context);
+    },
+    [](const std::string& name) { return name == "results.h5" || name == "results.h5.undo"; }};
 
 }  // namespace talus::io

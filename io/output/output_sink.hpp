@@ -6,9 +6,11 @@
 /// Calls come one after the other, never at the same time, though from different threads (recorder.hpp):
 ///
 ///     sink->open();                  // on every rank: the files are there, as of a run that has begun
+///     sink->resume(mark);            // instead: the files are cut back to a mark, and go on from there
 ///     sink->step(step);              // on rank 0, after every step
 ///     sink->flush();                 // on rank 0, now and then: lines so far go to the system
 ///     sink->frame(part);             // on every rank, each with its part of the state
+///     sink->mark(mark);              // on rank 0, behind flush(): where the files are now, on the disk
 ///     sink->close();                 // on rank 0: the files are complete
 ///     sink->end(summary);            // on rank 0, however the run ended, also where a call above failed
 ///
@@ -49,10 +51,18 @@ struct StepRecord {
   std::vector<ErrorCheck> errors = {};          ///< checks of the error, where asked for
 };
 
+/// How far the files of a run are: a checkpoint keeps it.
+struct OutputMark {
+  std::map<std::string, std::int64_t> bytes = {};  ///< of files that grow, by their names in the directory
+  std::vector<double> frame_times = {};            ///< [s] of the frames
+};
+
 class OutputSink {
  public:
   virtual ~OutputSink() = default;
   virtual void open() {}
+  virtual void resume(const OutputMark&) { open(); }
+  virtual void mark(OutputMark&) {}
   virtual void step(const StepRecord&) {}
   virtual void flush() {}
   virtual void frame(const Frame&) {}

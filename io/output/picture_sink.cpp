@@ -4,6 +4,7 @@
 #include "io/output/sinks.hpp"
 #include "io/output/thinned_curve.hpp"
 #include "io/pictures/picture.hpp"
+#include "io/results/csv_reader.hpp"
 
 namespace talus::io {
 namespace {
@@ -12,6 +13,12 @@ class PictureSink : public OutputSink {
  public:
   explicit PictureSink(const OutputContext& context) : context_(context) {}
 
+  /// The curve is in triaxial.csv, which is cut back already: every number reads back to the same bits.
+  void resume(const OutputMark&) override {
+    if (context_.ranks.rank() != 0) return;
+    for (const TriaxialReport& report : read_triaxial(context_.directory / "triaxial.csv"))
+      curve_.add(report);
+  }
   void step(const StepRecord& record) override {
     if (record.triaxial) curve_.add(*record.triaxial);
   }

@@ -35,6 +35,19 @@ void Recorder::open() {
   for (const auto& sink : sinks_) sink->open();
 }
 
+void Recorder::resume(const OutputMark& mark) {
+  frame_times_ = mark.frame_times;
+  for (const auto& sink : sinks_) sink->resume(mark);
+}
+
+OutputMark Recorder::mark() {
+  OutputMark mark{.frame_times = frame_times_};
+  if (context_.ranks.rank() != 0) return mark;
+  flush();
+  for (const auto& sink : sinks_) sink->mark(mark);
+  return mark;
+}
+
 void Recorder::record_step(const StepRecord& record) {
   if (context_.ranks.rank() != 0) return;
   for (const auto& sink : sinks_) sink->step(record);
@@ -53,7 +66,7 @@ void Recorder::record_frame(Frame&& frame) {
   }();
   validate(state);
   for (const auto& sink : sinks_) sink->frame(state);
-  ++frames_;
+  frame_times_.push_back(state.time);
 }
 
 void Recorder::close() {

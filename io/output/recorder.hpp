@@ -4,6 +4,7 @@
 ///
 ///     Recorder recorder(output_context(directory, setup), default_sinks());
 ///     recorder.open();                          // the files are there; run.json says "running"
+///                                               // or resume(mark), of a run that goes on
 ///     recorder.record_step(record);             // every step: a line in each table
 ///     recorder.flush();                         // now and then: the lines go to the system
 ///     recorder.record_frame(std::move(frame));  // now and then: results.h5, fields, pictures
@@ -38,6 +39,10 @@ class Recorder {
 
   /// Collective, as are the frames; the other calls do nothing on other ranks than 0.
   void open();
+  /// Collective. Files that are there are cut back to the mark: of a run that goes on from a checkpoint.
+  void resume(const OutputMark& mark);
+  /// Where the files are, all of it on the disk; nothing on other ranks than 0.
+  OutputMark mark();
 
   void record_step(const StepRecord& record);
 
@@ -54,12 +59,14 @@ class Recorder {
   /// Says what came of the run, also where a call before failed.
   void end(const Summary& summary);
 
-  std::size_t frames() const { return frames_; }  ///< recorded
+  std::size_t frames() const {
+    return frame_times_.size();
+  }  ///< recorded, those before a resumption among them
 
  private:
   OutputContext context_;
   std::vector<std::unique_ptr<OutputSink>> sinks_;
-  std::size_t frames_ = 0;
+  std::vector<double> frame_times_;  ///< [s]
 };
 
 }  // namespace talus::io

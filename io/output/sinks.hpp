@@ -27,7 +27,7 @@ const SinkRegistry& sink_registry();
 std::set<std::string> default_sinks();
 
 /// True for the names, relative to the directory of a run, that Talus itself writes (docs/formats.md): those
-/// of sinks, and scene.resolved.toml, trace.h5 and dumps.
+/// of sinks, and scene.resolved.toml, trace.h5, run.log, status.json, checkpoints and dumps.
 bool is_output_name(const std::string& name);
 
 }  // namespace talus::io

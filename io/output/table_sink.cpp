@@ -23,6 +23,22 @@ class TableSink : public OutputSink {
     walls_.emplace(directory_ / names[1], walls_csv_header());
   }
 
+  void resume(const OutputMark& mark) override {
+    if (!writes_) return;
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      const auto known = mark.bytes.find(std::string(names[k]));
+      const std::filesystem::path path = directory_ / names[k];
+      if (known != mark.bytes.end())
+        tables()[k]->emplace(path, known->second);
+      else
+        std::filesystem::remove(path);
+    }
+  }
+  void mark(OutputMark& mark) override {
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if (*tables()[k]) mark.bytes[std::string(names[k])] = (*tables()[k])->sync();
+  }
+
   /// triaxial.csv and error_history.csv appear with their first line.
   void step(const StepRecord& record) override {
     append_steps_row(steps_->pending(), record.step);

@@ -49,6 +49,12 @@ class XyzSink : public OutputSink {
     if (file_) file_->flush();
   }
 
+  void resume(const OutputMark& mark) override {
+    const auto known = mark.bytes.find("frames.xyz");
+    if (known == mark.bytes.end()) return open();  // asked for with the resumption
+    if (ranks_.rank() == 0) file_.emplace(path_, known->second);
+  }
+  void mark(OutputMark& mark) override { mark.bytes["frames.xyz"] = file_->sync(); }
   void close() override { file_->close(); }
 
  private:

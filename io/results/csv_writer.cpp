@@ -155,6 +155,11 @@ CsvFile::CsvFile(const std::filesystem::path& path, std::string_view header)
   flush();
 }
 
+CsvFile::CsvFile(const std::filesystem::path& path, std::int64_t bytes)
+    : file_(path, O_WRONLY | O_APPEND), bytes_(bytes) {
+  file_.cut(bytes);
+}
+
 CsvFile::~CsvFile() {
   try {
     close();
@@ -168,6 +173,13 @@ void CsvFile::flush() {
   // Emptied first: lines that failed are not tried again, lest half of them appear twice.
   const std::string lines = std::exchange(pending_, {});
   file_.write(lines);
+  bytes_ += static_cast<std::int64_t>(lines.size());
+}
+
+std::int64_t CsvFile::sync() {
+  flush();
+  file_.sync();
+  return bytes_;
 }
 
 void CsvFile::close() {

@@ -3,6 +3,7 @@
 /// The tables of a run: steps.csv, walls.csv, triaxial.csv, error_history.csv (columns and units:
 /// docs/formats.md).
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -32,6 +33,9 @@ class CsvFile {
  public:
   /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.
   CsvFile(const std::filesystem::path& path, std::string_view header);
+  /// Goes on behind the first `bytes` of a file that is there; what it has more is cut off. Throws FileError,
+  /// also when it has less.
+  CsvFile(const std::filesystem::path& path, std::int64_t bytes);
   /// Writes what is left. A destructor cannot report a failure: call close() to be told of one.
   ~CsvFile();
 
@@ -39,12 +43,15 @@ class CsvFile {
   std::string& pending() { return pending_; }
   /// Hands the pending lines to the system. Throws FileError.
   void flush();
+  /// The same, and waits until the disk has them. Returns the bytes of the file. Throws FileError.
+  std::int64_t sync();
   /// Flushes and closes. Throws FileError.
   void close();
 
  private:
   detail::Descriptor file_;
   std::string pending_;
+  std::int64_t bytes_ = 0;  ///< handed to the system
 };
 
 }  // namespace talus::io

@@ -84,10 +84,11 @@ void Progress::finish() {
 void Progress::show() {
   if (terminal_) {
     // Back to the first column, write, clear what an older and longer line left.
-    fmt::print(stream_, "\r{}\x1b[K", cut(line_, columns_));
+    const std::string_view shown = cut(line_, columns_);
+    std::fprintf(stream_, "\r%.*s\x1b[K", static_cast<int>(shown.size()), shown.data());
     open_ = true;
   } else {
-    fmt::print(stream_, "{}\n", line_);
+    std::fprintf(stream_, "%s\n", line_.c_str());
   }
   std::fflush(stream_);
   shown_ = true;

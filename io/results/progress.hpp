@@ -17,7 +17,8 @@ std::string progress_line(const StepReport& report, const std::string& stage, do
                           std::optional<double> eta);
 
 /// Shows the progress on a stream: on a terminal one line that is rewritten at most 5 times a second;
-/// elsewhere plain lines at most every 10 s, the first and the last in any case. One thread at a time.
+/// elsewhere plain lines at most every 10 s, the first and the last in any case. One thread at a time. What
+/// the stream does not take is dropped.
 class Progress {
  public:
   using Clock = std::chrono::steady_clock;

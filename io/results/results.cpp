@@ -7,8 +7,10 @@
 #include <span>
 #include <stdexcept>
 
+#include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/hdf5_write.hpp"
 #include "io/files/error.hpp"
+#include "io/results/detail/directory_undo.hpp"
 #include "io/results/version.hpp"
 #include "runtime/graph/one_rank.hpp"
 
@@ -213,6 +215,34 @@ void validate(const Frame& frame) {
   demand_same_length(frame.contact_force.size(), contacts, "contact_force");
 }
 
+namespace {
+
+/// Removes the frames behind the first `kept`. Their room in the file is taken by those that follow, or
+/// given back, as far as they were its last.
+void cut_frames(const std::string& path, std::size_t kept) {
+  const detail::QuietHdf5 quiet;
+  detail::bring_back_directory(path);
+  detail::keep_directory(path);
+  const Hdf5Object access = file_access(path, false);
+  Hdf5Object file =
+      hold(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path, "opening the file");
+  {
+    const Place root{file.id(), path};
+    std::vector<std::string> names = detail::names_in(root, "frames");
+    if (names.size() < kept)
+      throw FileError(path, fmt::format("has {} frames, of {} that the checkpoint knows; begin anew in "
+                                        "another directory",
+                                        names.size(), kept));
+    for (; names.size() > kept; names.pop_back())
+      demand(H5Ldelete(file.id(), ("/frames/" + names.back()).c_str(), H5P_DEFAULT), path,
+             "removing frame " + names.back());
+  }
+  close_file(file, path);
+  detail::drop_directory(path);
+}
+
+}  // namespace
+
 SharedWriting shared_writing() {
 #ifdef H5_HAVE_PARALLEL
   return SharedWriting::parallel;
@@ -225,9 +255,12 @@ ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vecto
     : ResultsWriter(path, wall_names, graph::one_rank()) {}
 
 ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
-                             const graph::Communicator& ranks, SharedWriting way)
-    : path_(path.string()), wall_names_(wall_names), ranks_(ranks), way_(way) {
-  if (ranks.rank() == 0) {
+                             const graph::Communicator& ranks, SharedWriting way,
+                             std::optional<std::size_t> kept)
+    : path_(path.string()), wall_names_(wall_names), ranks_(ranks), way_(way), frames_(kept.value_or(0)) {
+  if (ranks.rank() == 0 && kept) {
+    cut_frames(path_, *kept);
+  } else if (ranks.rank() == 0) {
     const detail::QuietHdf5 quiet;
     const Hdf5Object access = file_access(path_, false);
     Hdf5Object file = hold(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose, path_,
@@ -263,8 +296,10 @@ void ResultsWriter::append(const Frame& part) {
   const std::int64_t own[row_counts] = {
       static_cast<std::int64_t>(part.id.size()), static_cast<std::int64_t>(part.contact_bodies.size()),
       !part.omega.empty(), !part.orientation.empty(), !part.material.empty()};
+  if (ranks_.rank() == 0) detail::keep_directory(path_);
   const std::vector<std::int64_t> rows = ranks_.gather_records(std::span<const std::int64_t>(own));
   append_here(part, rows);
+  if (ranks_.rank() == 0) detail::drop_directory(path_);
   ++frames_;
 }
 

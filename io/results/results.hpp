@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,15 +41,18 @@ SharedWriting shared_writing();
 
 /// Writes results.h5 frame by frame; one file, of the same content for any number of ranks.
 /// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame
-/// gets its name last, when all of it is there: after a kill the file holds the frames before, unless the
-/// kill hit the few milliseconds in which the file's directory is written.
+/// gets its name last, when all of it is there: after a kill the file holds the frames before. A kill in the
+/// few milliseconds in which the file's directory is written leaves results.h5.undo as well, which a run that
+/// goes on brings back.
 class ResultsWriter {
  public:
   /// Replaces a file of that name. Throws FileError. `ranks` must outlive the writer.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names);
   /// Collective, as are the frames.
+  /// With `kept` the file is there: its first frames stay, as many, the others are removed, and it goes on.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
-                const graph::Communicator& ranks, SharedWriting way = shared_writing());
+                const graph::Communicator& ranks, SharedWriting way = shared_writing(),
+                std::optional<std::size_t> kept = {});
 
   /// Appends a frame, of which each rank has its part; frame.walls are those of the constructor, in the same
   /// order. Throws FileError, with parallel writing on all ranks when one cannot write;

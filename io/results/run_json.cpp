@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "io/files/output_directory.hpp"
@@ -76,6 +77,13 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"seed", p.seed},
       {"scene_file", p.scene_file},
   };
+  for (const Resumption& resumed : p.resumed)
+    root["provenance"]["resumed"].push_back({{"date_utc", resumed.date_utc},
+                                             {"host", resumed.host},
+                                             {"ranks", resumed.ranks},
+                                             {"threads", resumed.threads},
+                                             {"step", resumed.step},
+                                             {"changes", resumed.changes}});
   nlohmann::ordered_json digest;  // null
   if (s.digest) digest = fmt::format("{:016x}", *s.digest);
   nlohmann::ordered_json sufficient;  // null
@@ -84,6 +92,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"status", s.status},
       {"message", s.message},
       {"exit_code", s.exit_code},
+      {"complete", s.complete},
       {"steps", s.steps},
       {"time", s.time},
       {"digest", digest},
@@ -104,6 +113,19 @@ std::string run_json(const Provenance& p, const Summary& s) {
   // Names of files and hosts may be anything: bytes that are not UTF-8 are replaced, not a reason to lose the
   // run.
   return root.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
+std::vector<Resumption> resumptions_in(const std::filesystem::path& path) {
+  std::vector<Resumption> all;
+  std::ifstream file(path);
+  const nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+  if (!root.is_object() || !root.contains("provenance")) return all;
+  const auto list = root["provenance"].value("resumed", nlohmann::json::array());
+  for (const nlohmann::json& entry : list)
+    all.push_back({entry.value("date_utc", ""), entry.value("host", ""), entry.value("ranks", 1),
+                   entry.value("threads", 1), entry.value("step", std::int64_t{0}),
+                   entry.value("changes", std::vector<std::string>())});
+  return all;
 }
 
 void write_run_json(const std::filesystem::path& path, const Provenance& provenance, const Summary& summary) {

@@ -10,6 +10,14 @@
 
 namespace talus::io {
 
+/// A run went on from a checkpoint.
+struct Resumption {
+  std::string date_utc, host;
+  int ranks = 1, threads = 1;
+  std::int64_t step = 0;             ///< behind which it went on
+  std::vector<std::string> changes;  ///< of the scene since the checkpoint, as sentences
+};
+
 /// Everything that is needed to repeat a run, or to understand why a repetition differs.
 struct Provenance {
   std::string version;     ///< release of Talus
@@ -29,6 +37,7 @@ struct Provenance {
   std::vector<std::string> command_line;
   std::uint64_t seed = 0;
   std::string scene_file;
+  std::vector<Resumption> resumed = {};  ///< in their order
 };
 
 /// What is known of the build and of the machine now. The fields from `threads` on that describe the run,
@@ -41,6 +50,7 @@ struct Summary {
   std::string status = "running";  ///< "running", "done", "failed" or "stopped"
   std::string message;             ///< why it failed or stopped, or what was left undone
   int exit_code = 0;
+  bool complete = false;  ///< the last stage has ended
   std::int64_t steps = 0;
   double time = 0;                      ///< [s] simulated
   std::optional<std::uint64_t> digest;  ///< talus::digest of the final state, as 16 hexadecimal digits
@@ -62,6 +72,9 @@ struct Summary {
 /// The text of run.json. Without a digest, as long as it runs and when it failed, that is null; so are
 /// numbers that are not finite.
 std::string run_json(const Provenance& provenance, const Summary& summary);
+
+/// Those that a run.json names; none where there is no such file.
+std::vector<Resumption> resumptions_in(const std::filesystem::path& path);
 
 /// Writes run.json whole (write_whole). Throws FileError.
 void write_run_json(const std::filesystem::path& path, const Provenance& provenance, const Summary& summary);

@@ -32,10 +32,10 @@ class SceneReader {
   }
 
   Scene read() && {
-    read_table(
-        root_, "", keys_.top,
-        {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition", "output"},
-        scene_);
+    read_table(root_, "", keys_.top,
+               {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition",
+                "output", "checkpoint"},
+               scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
     read_sample();
@@ -45,6 +45,7 @@ class SceneReader {
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
     read_decomposition();
     read_table(table_at(root_, "output"), "output", keys_.output, {}, scene_.output);
+    read_table(table_at(root_, "checkpoint"), "checkpoint", keys_.checkpoint, {}, scene_.checkpoint);
     if (scene_.output.directory.empty()) scene_.output.directory = "out/" + scene_.name;
     return std::move(scene_);
   }
@@ -89,12 +90,12 @@ class SceneReader {
     if (radii.min > radii.max)
       fail_at(*table.get("radius_min"), "sample.radius_min",
               fmt::format("must not exceed radius_max: {} > {}", radii.min, radii.max));
-    if (sample.kind != SampleSpec::Kind::bodies)
+    if (!sample.from_file())
       for (const double side : sample.base)
         if (on_base && side < 2 * radii.max)
           fail_at(*table.get("base"), "sample.base",
                   fmt::format("a side of {} m is less than the largest diameter, {} m", side, 2 * radii.max));
-    if (sample.kind == SampleSpec::Kind::bodies) {
+    if (sample.from_file()) {
       const std::filesystem::path file = (folder_ / sample.file).lexically_normal();
       if (!std::filesystem::is_regular_file(file))
         fail_at(*table.get("file"), "sample.file", fmt::format("no such file: {}", file.string()));

@@ -26,6 +26,7 @@ struct SampleSpec {
                  ///< sides of `base`
     lattice,     ///< simple cubic, not touching unless spacing is 1
     bodies,      ///< read from `file` (io/scene/bodies_file.hpp)
+    state,       ///< where an earlier run was: a checkpoint, or a frame of a results.h5, in `file`
   };
   Kind kind = Kind::deposition;
   std::int64_t count = 0;  ///< grains; 0 for a lattice given by `cells`
@@ -35,9 +36,11 @@ struct SampleSpec {
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
   BodyShape shape = BodyShape::sphere;  ///< of the grains; their radius is that of Clump
   SizeDistribution radii;
-  std::string file;      ///< absolute path
+  std::string file;                   ///< absolute path
+  std::optional<std::int64_t> frame;  ///< of a results.h5, from 0; none: the last
   std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names
 
+  bool from_file() const { return kind == Kind::bodies || kind == Kind::state; }
   /// Grains of a deposition or a lattice.
   std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
 };
@@ -52,6 +55,15 @@ struct OutputSpec {
   bool contacts = true;      ///< contacts with forces in the frames
   /// Names of the output sinks to write (io/output/sinks.hpp), besides those that always are.
   std::set<std::string> sinks = default_sinks();
+};
+
+/// When a run is written down, so that it can go on from there.
+struct CheckpointSpec {
+  double every_wall = 600;                    ///< elapsed [s]; 0: never for that
+  std::optional<double> every;                ///< simulated [s]
+  std::optional<std::int64_t> every_steps;    ///< steps
+  int keep = 2;                               ///< of the last ones
+  std::optional<std::int64_t> archive_every;  ///< each of so many is kept for good
 };
 
 /// A [[material]].
@@ -92,6 +104,7 @@ struct Scene {
                  ///< not used
   Setup setup;
   OutputSpec output;
+  CheckpointSpec checkpoint;
   std::string source_file;
 };
 
@@ -111,6 +124,13 @@ Scene parse_scene(const std::string& text, const std::string& file,
 /// - a pushed wall, also in the loads of the stages, without mass (0) gets a tenth of the mass of the grains.
 /// Throws SceneError when there are no grains, walls cross, or the centre of a grain lies behind a wall.
 void place_walls(Scene& scene, const Sample& grains);
+
+/// What place_walls gives to a pushed wall without mass [kg].
+double automatic_wall_mass(const Sample& grains);
+
+/// The same of a run that goes on, whose grains are not at hand: points of the walls [m], 3 numbers each, and
+/// the mass [kg], as they were placed at first. Throws SceneError when the walls are others.
+void place_walls_again(Scene& scene, const std::vector<double>& points, double mass);
 
 /// The scene as TOML with every default spelled out; parse_scene gives the same scene back.
 std::string resolved_scene(const Scene& scene);

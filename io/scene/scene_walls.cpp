@@ -54,7 +54,33 @@ void give_mass(WallLoad& load, double mass) {
   if (load.pushed() && load.mass == 0) load.mass = mass;
 }
 
+void give_masses(Setup& setup, double mass) {
+  for (Wall& wall : setup.walls) give_mass(wall.load, mass);
+  for (Stage& stage : setup.stages)
+    for (auto& [name, load] : stage.loads) give_mass(load, mass);
+}
+
 }  // namespace
+
+double automatic_wall_mass(const Sample& grains) {
+  double mass = 0;
+  for (std::size_t k = 0; k < grains.size(); ++k) mass += talus::mass(grains, k);
+  return 0.1 * mass;
+}
+
+void place_walls_again(Scene& scene, const std::vector<double>& points, double mass) {
+  std::vector<Wall>& walls = scene.setup.walls;
+  if (points.size() != 3 * walls.size())
+    throw SceneError(scene.source_file, 0, "wall", "the checkpoint is of other walls");
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    walls[w].point = {points[3 * w], points[3 * w + 1], points[3 * w + 2]};
+  give_masses(scene.setup, mass);
+  try {
+    validate(scene.setup);
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(scene.source_file, 0, "", error.what());
+  }
+}
 
 void place_walls(Scene& scene, const Sample& grains) {
   const auto refuse = [&](const std::string& message) {
@@ -66,11 +92,7 @@ void place_walls(Scene& scene, const Sample& grains) {
     if (const int axis = detail::axis_of(wall); axis >= 0 && std::isnan(wall.point[axis]))
       wall.point[axis] = automatic_position(wall, axis, scene.sample, grains);
 
-  double mass = 0;
-  for (std::size_t k = 0; k < grains.size(); ++k) mass += talus::mass(grains, k);
-  for (Wall& wall : walls) give_mass(wall.load, 0.1 * mass);
-  for (Stage& stage : scene.setup.stages)
-    for (auto& [name, load] : stage.loads) give_mass(load, 0.1 * mass);
+  give_masses(scene.setup, automatic_wall_mass(grains));
 
   for (std::size_t k = 0; k < walls.size(); ++k)
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);

@@ -44,6 +44,7 @@ std::string resolved_scene(const Scene& scene) {
   write_section(out, keys.solver, scene.setup.solver);
   write_section(out, keys.decomposition, scene.setup.decomposition);
   write_section(out, keys.output, scene.output);
+  write_section(out, keys.checkpoint, scene.checkpoint);
   const bool named = !scene.materials.empty();
   for (const Wall& wall : scene.setup.walls) {
     write_section(out, keys.wall, wall);

@@ -112,6 +112,9 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
 struct FoundCandidates {
   Candidates candidates;        ///< between places in the surroundings; without impulses
   std::span<const char> glued;  ///< per wall: it has a finite mass
+  /// Candidates between places in the surroundings whose impulses those found begin from, in the place of
+  /// those of the sample; null: the sample's.
+  const Candidates* begun_from = nullptr;
 };
 
 /// Collective. From the candidates found to the copies, candidates with the impulses of those in `sample`,

@@ -255,8 +255,9 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
                                        FoundCandidates among, const RankSample& sample) {
   const Partition& partition = decomposition.partition;
   Candidates& found = among.candidates;
-  match_impulses(collect_impulses(decomposition, ranks, around, sample.bodies, std::move(sample.candidates)),
-                 found);
+  const Candidates old =
+      collect_impulses(decomposition, ranks, around, sample.bodies, std::move(sample.candidates));
+  match_impulses(among.begun_from ? *among.begun_from : old, found);
   sample.candidates = {};
   release(sample.bodies.x);
 

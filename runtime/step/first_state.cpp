@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "kernels/shapes/clump_motion.hpp"
+#include "runtime/step/stage_loads.hpp"
 
 namespace talus {
 
@@ -49,6 +50,15 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
   state.clumps = setup.clumps;
   state.wall_states.resize(state.walls.size());
   state.free.u.resize(state.bodies.size());
+  return state;
+}
+
+StepState restored_state(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks) {
+  validate(setup);
+  StepState state = restore_state(setup, from, ranks);
+  demand_laws(setup, state.bodies);
+  for (std::size_t k = 0; k <= static_cast<std::size_t>(from.head.stage_index); ++k)
+    take_loads(setup.stages.at(k), state.walls);
   return state;
 }
 

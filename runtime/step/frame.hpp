@@ -42,6 +42,34 @@ struct StepReport {
                             ///< step: it is too long for them, and not converged
 };
 
+/// visit(name, number) for each number of a report; the pair that overlaps is left out.
+template <class Report, class Visit>
+void each_number(Report& report, const Visit& visit) {
+  visit("report_step", report.step);
+  visit("report_time", report.time);
+  visit("report_time_step", report.time_step);
+  visit("report_candidates", report.candidates);
+  visit("report_contacts", report.contacts);
+  visit("report_active", report.active);
+  visit("report_iterations", report.iterations);
+  visit("report_error_rms", report.error_rms);
+  visit("report_error_max", report.error_max);
+  visit("report_balance", report.balance);
+  visit("report_jump", report.jump);
+  visit("report_penetration_mean", report.penetration_mean);
+  visit("report_penetration_max", report.penetration_max);
+  visit("report_overlap", report.overlap);
+  visit("report_kinetic_translation", report.kinetic_translation);
+  visit("report_kinetic_rotation", report.kinetic_rotation);
+  visit("report_solid_fraction", report.solid_fraction);
+  visit("report_equilibrium", report.equilibrium);
+  visit("report_migrants", report.migrants);
+  visit("report_imbalance", report.imbalance);
+  visit("report_wall_s", report.wall_s);
+  visit("report_converged", report.converged);
+  visit("report_passed", report.passed);
+}
+
 /// One row of walls.csv.
 struct WallReport {
   std::string name;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "kernels/sweeps/momentum.hpp"
@@ -53,6 +54,11 @@ class PositionCorrection {
   const std::vector<WallCopy>& wall_copies() const { return moved_; }
   /// Something may have moved in this step.
   bool found() const { return found_; }
+
+  /// Per candidate, of the last step; empty where there was none since the candidates are new.
+  const std::vector<float>& pushes() const { return pushes_; }
+  /// Behind plan(): goes on from such pushes.
+  void go_on_from(std::vector<float> pushes) { pushes_ = std::move(pushes); }
 
  private:
   StepState& state_;

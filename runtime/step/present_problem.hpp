@@ -37,6 +37,14 @@ class PresentProblem final : public WholeProblem {
   double large_error(double enough) override { return admm_.large_error(enough); }
 
   bool grains_alike() const { return stiffness_.grains_alike(); }
+  const StiffnessMemory& stiffness() const { return stiffness_; }
+  /// As of the last plan() [m].
+  double farthest() const { return farthest_; }
+  /// What was learned of earlier problems; behind plan() where there is one.
+  void go_on_from(const StiffnessMemory& stiffness, double farthest) {
+    stiffness_ = stiffness;
+    farthest_ = farthest;
+  }
   double candidates() const { return candidates_; }  ///< of all ranks
   /// Of the lightest grain of all ranks [1/kg].
   double largest_inv_mass() const { return largest_inv_mass_; }

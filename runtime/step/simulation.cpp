@@ -11,6 +11,7 @@
 #include "runtime/step/first_state.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/stage_end.hpp"
+#include "runtime/step/stage_loads.hpp"
 #include "runtime/step/step_report.hpp"
 #include "runtime/step/time_step.hpp"
 
@@ -35,9 +36,7 @@ struct Simulation::Implementation {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
     state.decomposition.shapes = !setup.clumps.empty();
-    const double unit = smallest_radius();
-    parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
-    parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
+    choose_distances();
     begin_stage();
   }
 
@@ -57,6 +56,59 @@ struct Simulation::Implementation {
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
     lengths_at_start = from.lengths_of_box;
+  }
+
+  Implementation(Setup given, const Checkpoint& from, graph::Executor& executor,
+                 const graph::Communicator& ranks_)
+      : setup(std::move(given)),
+        ranks(ranks_),
+        state(restored_state(setup, from, ranks_)),
+        size(from.head.size),
+        report(from.head.report),
+        graph(state, parameters, setup, size.bodies, executor, ranks_) {
+    choose_distances();
+    const CheckpointHead& head = from.head;
+    stage_index = static_cast<std::size_t>(head.stage_index);
+    prescribe();
+    parameters.time_step = head.time_step;
+    clock = head.clock;
+    if (stage().chooses_time_step) clock.move_end(stage().end.time);
+    stage_steps = head.stage_steps;
+    held = head.held;
+    lengths_at_start = head.lengths_at_start;
+    for (std::size_t w = 0; w < state.walls.size(); ++w) {
+      const std::vector<double> load = numbers_of(state.walls[w].load);
+      if (std::equal(load.begin(), load.end(), head.wall_loads.begin() + static_cast<std::ptrdiff_t>(7 * w)))
+        continue;
+      put_load(state.walls[w], state.walls);
+      state.candidates_valid = false;  // a wall that is free now has chunks of another kind
+    }
+    graph.restore(from);
+  }
+
+  Checkpoint checkpoint() const {
+    Checkpoint to;
+    save_state(state, to);
+    graph.save(to);
+    CheckpointHead& head = to.head;
+    head.size = size;
+    head.stage_index = static_cast<std::int64_t>(stage_index);
+    head.stage_steps = stage_steps;
+    head.over = over;
+    head.held = held;
+    head.time_step = parameters.time_step;
+    head.impulse_time = parameters.impulse_time();
+    head.lengths_at_start = lengths_at_start;
+    head.clock = clock;
+    head.report = report;
+    return to;
+  }
+
+  /// Alert distance and skin.
+  void choose_distances() {
+    const double unit = smallest_radius();
+    parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
+    parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
   }
 
   const Stage& stage() const { return setup.stages[stage_index]; }
@@ -81,27 +133,18 @@ struct Simulation::Implementation {
 
   double smallest_radius() const { return size.bodies > 0 ? size.smallest : 1; }
 
-  void begin_stage() {
-    for (const auto& [name, load] : stage().loads)
-      for (Wall& wall : state.walls)
-        if (wall.name == name) wall.load = load;
-    for (Wall& wall : state.walls) {
-      if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
-      if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
-      if (wall.load.pushed()) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
-      if (wall.load.drive == WallDrive::pressure)
-        face_area(state.walls, static_cast<std::size_t>(&wall - state.walls.data()));
-    }
-    wind_clock();
-    parameters.gravity = stage().gravity;
-    parameters.laws = stage().laws;
-    const double last_reflection = parameters.reflection;
-    parameters.reflection = reflection_of(setup.solver.restitution_law, parameters.laws);
-    parameters.clumps = !setup.clumps.empty();
-    parameters.friction = parameters.clumps || stage().laws.largest(&PairLaw::friction) > 0;
-    parameters.rotates = parameters.friction && setup.rotation;
-    parameters.rolls = parameters.rotates && stage().laws.largest(&PairLaw::rolling_resistance) > 0;
+  /// What the stage prescribes, but for its loads and its time step.
+  void prescribe() {
+    parameters = parameters_of(setup, stage(), parameters);
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
+  }
+
+  void begin_stage() {
+    take_loads(stage(), state.walls);
+    for (Wall& wall : state.walls) put_load(wall, state.walls);
+    wind_clock();
+    const double last_reflection = parameters.reflection;
+    prescribe();
     if (state.candidates_valid && !state.decomposition.several()) {
       // Later stages: the sample has flowed, sort it again. Several subdomains are sorted when they are dealt
       // out.
@@ -187,8 +230,8 @@ struct Simulation::Implementation {
   StepState state;
   SampleSize size;
   StepParameters parameters;
-  StepGraph graph;
   StepReport report;
+  StepGraph graph;
   StageClock clock;  ///< of a stage that chooses its time steps
   double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
@@ -212,6 +255,12 @@ Simulation::Simulation(Setup setup, const SavedState& from, graph::Executor& exe
   impl_->pass_ended_stages();
 }
 
+Simulation::Simulation(Setup setup, const Checkpoint& from, graph::Executor& executor,
+                       const graph::Communicator& ranks)
+    : impl_(std::make_unique<Implementation>(std::move(setup), from, executor, ranks)) {
+  impl_->pass_ended_stages();
+}
+
 Simulation::~Simulation() = default;
 
 void Simulation::follow(trace::Order* order) {
@@ -224,6 +273,17 @@ SavedState Simulation::save() const {
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
           impl_->clock,        impl_->held};
+}
+
+void Simulation::begin_from(std::vector<GivenForce> forces) {
+  double any[1] = {forces.empty() ? 0.0 : 1.0};
+  impl_->ranks.max(any);
+  impl_->state.forces_given = any[0] > 0;
+  impl_->state.given_forces = std::move(forces);
+}
+
+Checkpoint Simulation::checkpoint() const {
+  return impl_->checkpoint();
 }
 
 const StepReport& Simulation::step() {
@@ -305,30 +365,9 @@ std::vector<WallReport> Simulation::walls() const {
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {
-  const double box = Domain{}.volume(impl_->state.walls);
-  if (!(box > 0)) return std::nullopt;
-  TriaxialReport out;
-  out.step = impl_->report.step;
-  out.time = impl_->report.time;
-  out.stage = stage().name;
-  out.solid_fraction = impl_->report.solid_fraction;
-  const Eigen::Matrix3d stress =
-      impl_->graph.sums().contacts.moment / (box * impl_->parameters.impulse_time());
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
-    out.strain[a] = impl_->strain(axis);
-    out.strain_volume += out.strain[a];
-    out.stress[a] = stress(axis, axis);
-    out.p += out.stress[a] / 3;
-  }
-  const auto axial = static_cast<std::size_t>(stage().end.strain_axis);
-  const std::size_t first = (axial + 1) % 3, second = (axial + 2) % 3;
-  out.strain_shear = out.strain[axial] - 0.5 * (out.strain[first] + out.strain[second]);
-  out.q = out.stress[axial] - 0.5 * (out.stress[first] + out.stress[second]);
-  out.q_over_p = out.p > 0 ? out.q / out.p : 0;
-  out.coordination = coordination(impl_->state, impl_->ranks, contacts_to_hold(impl_->parameters));
-  out.converged = impl_->report.converged;
-  return out;
+  Vec3 strain;
+  for (int axis = 0; axis < 3; ++axis) strain[axis] = impl_->strain(axis);
+  return triaxial_report(impl_->outcome(), impl_->report, stage(), strain, impl_->ranks);
 }
 
 std::uint64_t Simulation::digest() const {

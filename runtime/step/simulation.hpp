@@ -8,6 +8,7 @@
 
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/executor.hpp"
+#include "runtime/step/checkpoint.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/setup.hpp"
@@ -59,8 +60,16 @@ class Simulation {
   /// saved; solver, subdomains and threads need not be: so one step can be solved in many ways. The next step
   /// finds its candidates anew.
   Simulation(Setup setup, const SavedState& from, graph::Executor& executor);
+  /// Goes on from a checkpoint to the bits of the run that wrote it, on any ranks that the subdomains
+  /// suffice. `setup` is that of the run, with the walls placed as at first; loads and ends of stages may be
+  /// others. Throws std::invalid_argument when it does not fit. Collective.
+  Simulation(Setup setup, const Checkpoint& from, graph::Executor& executor,
+             const graph::Communicator& ranks);
   ~Simulation();
 
+  /// Before the first step: it begins from these forces, where contacts are those of the bodies named. Each
+  /// rank passes any part of all. Collective.
+  void begin_from(std::vector<GivenForce> forces);
   /// Steps go by a recorded order, see StepGraph::follow.
   void follow(trace::Order* order);
   /// Does one time step. Collective. Throws RunawayError, or graph::TaskError when a task failed. Not to be
@@ -73,6 +82,10 @@ class Simulation {
 
   /// The state after the last step and begin_next_stage(). Throws std::logic_error with several subdomains.
   SavedState save() const;
+
+  /// The whole run behind the last step and begin_next_stage(); at least one step is done. Each rank gets the
+  /// parts of its subdomains.
+  Checkpoint checkpoint() const;
 
   bool finished() const;
   /// Part of the current stage that is done, in [0, 1], by its nearest end condition.

@@ -84,6 +84,9 @@ class SolverLoop {
   const Gluing& gluing() const { return gluing_; }
   const SweepKernels& kernels() const { return kernels_; }
   const PositionCorrection& positions() const { return positions_; }
+  PositionCorrection& positions() { return positions_; }
+  const PresentProblem& problem() const { return problem_; }
+  PresentProblem& problem() { return problem_; }
   const IterationResult& result() const { return certificate_.result(); }
   /// The checks of the step.
   const std::vector<ErrorCheck>& history() const { return certificate_.history().all(); }

@@ -13,6 +13,7 @@
 #include "kernels/sweeps/single_precision.hpp"
 #include "kernels/sweeps/sweep.hpp"
 #include "runtime/step/decomposition.hpp"
+#include "runtime/step/given_forces.hpp"
 #include "runtime/step/overlap.hpp"
 #include "runtime/step/setup.hpp"
 
@@ -69,6 +70,9 @@ struct StepState {
   bool candidates_valid = false;  ///< false: the next step begins with a broad phase
   /// Overlaps that the sample began with (overlap.hpp), the same on all ranks; none before the first step.
   std::optional<std::vector<GivenOverlap>> given_overlaps;
+  /// What the first step begins from, until it has its candidates; any part of all on each rank.
+  std::vector<GivenForce> given_forces;
+  bool forces_given = false;  ///< on any rank, and not taken yet
 };
 
 /// The shapes of the bodies here.

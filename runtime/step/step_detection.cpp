@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/ball_pairs.hpp"
@@ -94,7 +95,7 @@ bool StepGraph::candidates_hold() const {
 void StepGraph::make_cells() {
   const double h = parameters_.time_step;
   for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
-  if (steps_ == partitioned_ + 1 || loop_.imbalance() < imbalance_then_) imbalance_then_ = loop_.imbalance();
+  if (steps_ == partitioned_ + 1 || imbalance_before_ < imbalance_then_) imbalance_then_ = imbalance_before_;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   Bodies& bodies = state_.bodies;
@@ -162,27 +163,26 @@ void StepGraph::make_chunks() {
   split_into_balls(clumps_of(state_, several ? around_.bodies : state_.bodies), fresh);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
+  const bool begins = std::exchange(state_.forces_given, false);
+  Candidates given;
+  if (begins) given = take_given_forces();
   std::vector<CandidateGroup> groups;
   const double began = graph::seconds_now();
   if (several) {
     const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
-    groups = distribute(state_.decomposition, decomposition_, ranks_, around_, {std::move(fresh), glued},
-                        {state_.bodies, state_.candidates});
+    groups =
+        distribute(state_.decomposition, decomposition_, ranks_, around_,
+                   {std::move(fresh), glued, begins ? &given : nullptr}, {state_.bodies, state_.candidates});
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
     sums_.times.dealing += graph::seconds_now() - began;
   } else {
-    match_impulses(state_.candidates, fresh);
+    match_impulses(begins ? given : state_.candidates, fresh);
     state_.candidates = std::move(fresh);
     const auto all = static_cast<std::int64_t>(state_.candidates.size());
     groups = groups_of_one_subdomain(state_.candidates, glued, chunk_target(all, all));
   }
-  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
-  note_kinds(clumps_of(state_), state_.chunks);
-  note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
-  allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
-  if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
-    state_.contacts.cohesion.resize(state_.candidates.size());
+  set_up_chunks(groups);
   const double planning = graph::seconds_now();
   loop_.plan();
   if (several) sums_.times.dealing += graph::seconds_now() - planning;
@@ -191,6 +191,32 @@ void StepGraph::make_chunks() {
   all_candidates_ = candidates[0];
   state_.candidates_valid = true;
   planned_ = false;
+}
+
+/// What the first step begins from, between slots, or with several subdomains between places in the
+/// surroundings. Collective.
+Candidates StepGraph::take_given_forces() {
+  const Bodies& bodies = state_.decomposition.several() ? around_.bodies : state_.bodies;
+  std::vector<std::pair<std::int64_t, Slot>> by_id;
+  for (std::size_t s = 0; s < bodies.size(); ++s)
+    by_id.emplace_back(static_cast<std::int64_t>(bodies.id[s]), static_cast<Slot>(s));
+  std::ranges::sort(by_id);
+  const std::vector<GivenForce> forces = std::exchange(state_.given_forces, {});
+  return given_candidates(forces, ranks_, parameters_.impulses(), parameters_.impulse_time(), bodies.size(),
+                          [&](std::int64_t id) -> Slot {
+                            const auto found = std::ranges::lower_bound(by_id, std::pair(id, Slot{0}));
+                            return found != by_id.end() && found->first == id ? found->second : -1;
+                          });
+}
+
+/// Chunks of the groups, and rooms for their contacts.
+void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
+  state_.chunks = cut_chunks(state_.candidates, groups, state_.bodies.size(), state_.decomposition.taken);
+  note_kinds(clumps_of(state_), state_.chunks);
+  note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
+  allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
+  if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
+    state_.contacts.cohesion.resize(state_.candidates.size());
 }
 
 /// What is kept per slot follows the copies to their new places.

@@ -17,6 +17,8 @@ class Order;
 
 namespace talus {
 
+struct Checkpoint;
+
 /// Elapsed time of the parts of a step [s].
 struct StepTimes {
   double detection = 0;  ///< predicted poses, broad and narrow phase, chunks, matching
@@ -60,6 +62,12 @@ class StepGraph {
   /// Throws std::invalid_argument when it is of other ranks x threads. It must outlive the steps.
   void follow(trace::Order* order);
 
+  /// What outlives a step besides the state, into the head and the parts of `to` (save_state).
+  void save(Checkpoint& to) const;
+  /// Goes on from there, behind restore_state: cuts the chunks of the state and fills its contacts.
+  /// Collective.
+  void restore(const Checkpoint& from);
+
   const StepSums& sums() const { return sums_; }
   const SolverLoop& loop() const { return loop_; }
   const graph::Graph& graph() const { return graph_; }
@@ -74,6 +82,8 @@ class StepGraph {
   void make_cells();
   void find_pairs_of_share(std::uint32_t share);
   void make_chunks();
+  Candidates take_given_forces();
+  void set_up_chunks(std::span<const CandidateGroup> groups);
   void renew_slots();
   void narrow_share(std::uint32_t share);
   void plan_iteration();
@@ -114,6 +124,8 @@ class StepGraph {
   std::int64_t all_candidates_ = 0;           ///< of all ranks
   std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
   double imbalance_then_ = 0;                 ///< the least since it was made
+  std::int64_t contacts_before_ = 0;          ///< of all ranks, in the last step
+  double imbalance_before_ = 0;               ///< SolverLoop::imbalance of the last step
   CellGrid cells_;
   std::vector<double> wall_margin_;        ///< at the last broad phase [m]
   std::vector<std::vector<Escape>> left_;  ///< per share: grains that have used up their margins

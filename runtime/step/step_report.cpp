@@ -156,4 +156,32 @@ double coordination(const StepState& state, const graph::Communicator& ranks, st
   }
 }
 
+std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const StepReport& report,
+                                              const Stage& stage, const Vec3& strain,
+                                              const graph::Communicator& ranks) {
+  const double box = Domain{}.volume(outcome.state.walls);
+  if (!(box > 0)) return std::nullopt;
+  TriaxialReport out;
+  out.step = report.step;
+  out.time = report.time;
+  out.stage = stage.name;
+  out.solid_fraction = report.solid_fraction;
+  const Eigen::Matrix3d stress = outcome.sums.contacts.moment / (box * outcome.parameters.impulse_time());
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    out.strain[a] = strain[axis];
+    out.strain_volume += out.strain[a];
+    out.stress[a] = stress(axis, axis);
+    out.p += out.stress[a] / 3;
+  }
+  const auto axial = static_cast<std::size_t>(stage.end.strain_axis);
+  const std::size_t first = (axial + 1) % 3, second = (axial + 2) % 3;
+  out.strain_shear = out.strain[axial] - 0.5 * (out.strain[first] + out.strain[second]);
+  out.q = out.stress[axial] - 0.5 * (out.stress[first] + out.stress[second]);
+  out.q_over_p = out.p > 0 ? out.q / out.p : 0;
+  out.coordination = coordination(outcome.state, ranks, contacts_to_hold(outcome.parameters));
+  out.converged = report.converged;
+  return out;
+}
+
 }  // namespace talus

@@ -3,6 +3,7 @@
 /// What is said of a step that has been done.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -36,6 +37,12 @@ struct StepOutcome {
 
 /// From the report of the step before to that of this one. `elapsed`: time that the step took [s].
 void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverlap& overlap, double elapsed);
+
+/// Stresses and strains of the box that the walls close, behind the step of `report`; nothing where they
+/// close none. `strain`: of its lengths, since the stage began [1]. Collective.
+std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const StepReport& report,
+                                              const Stage& stage, const Vec3& strain,
+                                              const graph::Communicator& ranks);
 
 /// Time in which the sample would fall by a mean diameter d, were its load all that moves it [s]:
 /// sqrt(2 d m / load). Load is the weight plus the sum of the forces on pushed walls; under gravity alone

@@ -34,9 +34,9 @@ bool StepGraph::partition_due() const {
 bool StepGraph::out_of_balance() const {
   constexpr std::int64_t few = 16;
   if (!state_.decomposition.several()) return false;
-  const std::int64_t contacts = loop_.result().contacts;
+  const std::int64_t contacts = contacts_before_;
   if (state_.decomposition.blind && contacts > 0) return true;
-  const double imbalance = loop_.imbalance();
+  const double imbalance = imbalance_before_;
   return contacts > few * state_.decomposition.partition.subdomains &&
          imbalance > decomposition_.max_imbalance && imbalance > 1.25 * imbalance_then_;
 }
@@ -237,6 +237,8 @@ void StepGraph::sum_up() {
   for (const SubdomainId e : by_subdomain.indices())
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
   sums_.candidates = all_candidates_;
+  contacts_before_ = loop_.result().contacts;
+  imbalance_before_ = loop_.imbalance();
   sums_.times.detection = iterating_ - started_;
   sums_.times.iteration = iterated_ - iterating_;
   sums_.times.rest = graph::seconds_now() - iterated_;

@@ -86,6 +86,12 @@ void StageClock::choose(double longest) {
   while (ticks_ % ticks_of(level_) != 0) ++level_;
 }
 
+void StageClock::move_end(std::optional<double> end) {
+  const double tick = std::ldexp(longest_, -levels_);
+  last_ =
+      end ? std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(*end / tick * (1 - 1e-12)))) : 0;
+}
+
 double StageClock::step() const {
   return std::ldexp(longest_, -std::max(0, level_));
 }

@@ -62,8 +62,31 @@ class StageClock {
   double time() const;  ///< of the run [s]
   /// Part of the time of the stage that is done; 0 where it has no end by time.
   double fraction() const { return last_ > 0 ? static_cast<double>(ticks_) / static_cast<double>(last_) : 0; }
+  /// The stage, which has begun, gets another end by time [s] or none: steps stay as they are, and the last
+  /// one may go beyond the end.
+  void move_end(std::optional<double> end);
+
+  /// visit(name, number) for each of its numbers.
+  template <class Visit>
+  void each_number(const Visit& visit) {
+    numbers_of(*this, visit);
+  }
+  template <class Visit>
+  void each_number(const Visit& visit) const {
+    numbers_of(*this, visit);
+  }
 
  private:
+  template <class Clock, class Visit>
+  static void numbers_of(Clock& clock, const Visit& visit) {
+    visit("clock_begin", clock.begin_);
+    visit("clock_longest", clock.longest_);
+    visit("clock_levels", clock.levels_);
+    visit("clock_level", clock.level_);
+    visit("clock_ticks", clock.ticks_);
+    visit("clock_last", clock.last_);
+  }
+
   std::int64_t ticks_of(int level) const { return std::int64_t{1} << (levels_ - level); }
 
   double begin_ = 0;        ///< time of the run when the stage began [s]

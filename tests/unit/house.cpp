@@ -45,6 +45,7 @@ const std::vector<Room>& rooms() {
       {"io/trace", {"io/files", "io/results"}},
       {"io/pictures", {"io/files", "io/results", "io/trace"}},
       {"io/output", {"io/files", "io/results", "io/pictures"}},
+      {"io/checkpoint", {"io/files"}},
       {"io/scene", {"io/files", "io/output"}},
       {"apps/shared", {}},
       {"apps/study_error", {"apps/shared"}},

@@ -116,11 +116,11 @@ TEST_F(Ending, BySignalLeavesWholeFiles) {
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     EXPECT_TRUE(asked) << messages;
     ASSERT_TRUE(WIFEXITED(status)) << messages;
-    EXPECT_EQ(WEXITSTATUS(status), 1) << messages;
+    EXPECT_EQ(WEXITSTATUS(status), 75) << messages;
 
     const auto end = summary(at("results"));
     EXPECT_EQ(end.at("status"), "stopped");
-    EXPECT_EQ(end.at("exit_code"), 1);
+    EXPECT_EQ(end.at("exit_code"), 75);
     const auto steps = end.at("steps").get<std::size_t>();
     EXPECT_GE(steps, 1U);
     EXPECT_NE(messages.find("after step " + std::to_string(steps)), std::string::npos) << messages;

@@ -16,7 +16,13 @@ void add_options(CLI::App& app, RunOptions& options) {
   app.add_option("--out", options.out, "directory of the results [the scene's output.directory]")
       ->type_name("DIR");
   app.add_flag("--force", options.force, "replace earlier results in the directory");
+  app.add_flag("--resume", options.resume,
+               "go on from the last checkpoint in the directory, or begin anew where there is none");
+  app.add_option("--max-walltime", options.max_walltime,
+                 "write a checkpoint and end before so much time has passed, 3:50:00")
+      ->type_name("H:MM:SS");
   app.add_option("--steps", options.steps, "stop after so many time steps")->type_name("N");
+  app.add_flag("--quiet", options.quiet, "say nothing on stderr but warnings and errors; run.log has it all");
   add_threads(app, options.threads);
   add_overrides(app, options.overrides);
   app.add_option("--error-history", options.error_history,

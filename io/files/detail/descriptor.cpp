@@ -35,6 +35,32 @@ void Descriptor::write(std::string_view bytes) {
   }
 }
 
+void Descriptor::write_at(std::int64_t place, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::pwrite(descriptor_, bytes.data(), bytes.size(), place);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      throw FileError(path_.string(), "cannot be written: " + last_error());
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+    place += written;
+  }
+}
+
+void Descriptor::cut(std::int64_t bytes) {
+  const off_t length = ::lseek(descriptor_, 0, SEEK_END);
+  if (length < bytes)
+    throw FileError(path_.string(), "is shorter than the checkpoint says; begin anew in another directory");
+  if (length > bytes && ::ftruncate(descriptor_, bytes) != 0)
+    throw FileError(path_.string(), "cannot be cut back: " + last_error());
+}
+
+void Descriptor::sync() {
+  // Pipes and the like cannot be synchronised, and say EINVAL.
+  if (::fsync(descriptor_) != 0 && errno != EINVAL)
+    throw FileError(path_.string(), "cannot be completed: " + last_error());
+}
+
 void Descriptor::close() {
   if (descriptor_ < 0) return;
   if (::close(std::exchange(descriptor_, -1)) != 0) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -21,6 +22,13 @@ class Descriptor {
 
   /// Writes everything, going on after short writes. Throws FileError.
   void write(std::string_view bytes);
+
+  /// The same at a place of the file [byte], of one that is not open for appending.
+  void write_at(std::int64_t place, std::string_view bytes);
+  /// Keeps the first `bytes` of the file. Throws FileError, also when it has less.
+  void cut(std::int64_t bytes);
+  /// Returns when the disk has all that was written. Throws FileError.
+  void sync();
 
   /// Closes and reports what the system kept for the end (quota, network file systems). Throws FileError.
   void close();

@@ -69,15 +69,11 @@ Section<Scene> top_keys() {
 Section<SampleSpec> sample_keys() {
   using Kind = SampleSpec::Kind;
   using Radii = SizeDistribution::Kind;
-  const auto made = [](const SampleSpec& s) { return s.kind != Kind::bodies; };
+  const auto made = [](const SampleSpec& s) { return !s.from_file(); };
   const auto lattice = [](const SampleSpec& s) { return s.kind == Kind::lattice; };
-  const auto one_size = [](const SampleSpec& s) {
-    return s.kind != Kind::bodies && s.radii.kind == Radii::constant;
-  };
-  const auto sizes = [](const SampleSpec& s) {
-    return s.kind != Kind::bodies && s.radii.kind != Radii::constant;
-  };
-  const std::string not_bodies = "kind is not bodies";
+  const auto one_size = [](const SampleSpec& s) { return !s.from_file() && s.radii.kind == Radii::constant; };
+  const auto sizes = [](const SampleSpec& s) { return !s.from_file() && s.radii.kind != Radii::constant; };
+  const std::string not_bodies = "kind is deposition or lattice";
   auto material = bound<std::string, SampleSpec>(
       "material", "", any, "Name of the grains' material.",
       [](SampleSpec& sample, const std::string& name) { sample.material = name; },
@@ -89,10 +85,11 @@ Section<SampleSpec> sample_keys() {
       "between the sides of `base` (Voivret et al. 2007); `lattice` is simple cubic; `bodies` reads a CSV "
       "file with the "
       "columns `id,x,y,z,radius`, then perhaps `vx,vy,vz`, then perhaps `wx,wy,wz` (m, m/s, rad/s), then "
-      "perhaps `material`.",
+      "perhaps `material`; `state` begins where a run was: spheres with their velocities, forces where "
+      "contacts are, and walls of the same names that have no place of their own.",
       {
-          choice<SampleSpec>("kind", {"deposition", "lattice", "bodies"}, "Way of making the sample.",
-                             &SampleSpec::kind)
+          choice<SampleSpec>("kind", {"deposition", "lattice", "bodies", "state"},
+                             "Way of making the sample.", &SampleSpec::kind)
               .need(),
           key<SampleSpec>("count", "", countable, "Number of grains. A lattice may give `cells` instead.",
                           &SampleSpec::count)
@@ -134,10 +131,15 @@ Section<SampleSpec> sample_keys() {
               "radius_max", "m", positive, "Largest radius.", [](auto& s) -> auto& { return s.radii.max; })
               .only("other distributions", sizes)
               .need(),
-          key<SampleSpec>("file", "", any, "CSV file; a relative path begins at the folder of the scene.",
+          key<SampleSpec>("file", "", any,
+                          "CSV file, or checkpoint or results.h5 of a run; a relative path begins at the "
+                          "folder of the scene.",
                           &SampleSpec::file)
-              .only("kind = bodies", [](const SampleSpec& s) { return s.kind == Kind::bodies; })
+              .only("kind = bodies or state", [](const SampleSpec& s) { return s.from_file(); })
               .need(),
+          key<SampleSpec>("frame", "", not_negative, "Frame of a results.h5, from 0.", &SampleSpec::frame)
+              .only("kind = state", [](const SampleSpec& s) { return s.kind == Kind::state; })
+              .or_else("the last"),
           std::move(material).or_else("the first, or those that a column of `file` names"),
       }};
 }
@@ -186,13 +188,28 @@ Section<OutputSpec> output_keys() {
           std::move(keys)};
 }
 
+Section<CheckpointSpec> checkpoint_keys() {
+  using C = CheckpointSpec;
+  return {
+      "[checkpoint]",
+      "When the run is written down, for `talus run --resume` ([checkpoints.md](checkpoints.md)): at the "
+      "first of `every_wall`, `every` and `every_steps`, and when it is stopped.",
+      {key<C>("every_wall", "s", not_negative, "Elapsed time between checkpoints; 0: never for that.",
+              &C::every_wall),
+       key<C>("every", "s", positive, "Simulated time between checkpoints.", &C::every),
+       key<C>("every_steps", "", at_least_one, "Steps between checkpoints.", &C::every_steps),
+       key<C>("keep", "", countable, "How many of the last checkpoints are kept.", &C::keep),
+       key<C>("archive_every", "", at_least_one,
+              "Each of so many checkpoints is kept for good, under a name of its own.", &C::archive_every)}};
+}
+
 }  // namespace
 
 const SceneKeys& scene_keys() {
   static const SceneKeys keys = {
       top_keys(),       material_keys(), named_material_keys(), pair_keys(),       sample_keys(),
       wall_keys(),      stage_keys(),    stage_end_keys(),      stage_load_keys(), stage_pair_keys(),
-      detection_keys(), solver_keys(),   decomposition_keys(),  output_keys()};
+      detection_keys(), solver_keys(),   decomposition_keys(),  output_keys(),     checkpoint_keys()};
   return keys;
 }
 

@@ -1,0 +1,149 @@
+#include "apps/commands/run_checkpoints.hpp"
+
+#include <fmt/format.h>
+
+#include <exception>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "io/checkpoint/checkpoint_folder.hpp"
+#include "io/checkpoint/number_text.hpp"
+#include "io/files/error.hpp"
+#include "io/scene/scene_change.hpp"
+#include "runtime/graph/clock.hpp"
+
+namespace talus {
+
+namespace {
+
+std::string content_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw io::FileError(path, "cannot be read");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// visit(name, number) for each number that outlives a stop. The step of the deepest overlap is told by its
+/// number, its depth and its pair.
+template <class Memory, class Visit>
+void each_number_of(Memory& memory, const Visit& visit) {
+  auto& tally = memory.tally;
+  visit("unconverged", tally.unconverged);
+  visit("passed", tally.passed);
+  visit("stagnated", tally.stagnated);
+  visit("floor", tally.floor);
+  visit("iterations", tally.iterations);
+  visit("worst_error", tally.worst_error);
+  visit("worst_balance", tally.worst_balance);
+  visit("worst_penetration", tally.worst_penetration);
+  visit("worst_overlap", tally.worst_overlap);
+  visit("last_overlap", tally.last_overlap);
+  visit("overlapped", tally.overlapped);
+  visit("deepest_step", tally.deepest.step);
+  visit("deepest_overlap", tally.deepest.overlap);
+  visit("sufficient_time_step", tally.sufficient_time_step);
+  visit("exposed", tally.exposed);
+  visit("iterating", tally.iterating);
+  visit("frames_passed", memory.frames_passed);
+  visit("saves_passed", memory.saves_passed);
+  visit("saved", memory.saved);
+  visit("wall_s", memory.wall_s);
+  visit("wall_points", memory.wall_points);
+  visit("wall_mass", memory.wall_mass);
+  visit("frame_times", memory.mark.frame_times);
+}
+
+}  // namespace
+
+std::string text_of(const RunMemory& memory) {
+  const io::NumberWriter write;
+  each_number_of(memory, write);
+  const OverlapPair deepest = memory.tally.deepest.overlapping.value_or(OverlapPair{});
+  write("deepest_pair", std::vector<std::int64_t>{deepest.body, deepest.with});
+  std::vector<std::string> files;
+  std::vector<std::int64_t> bytes;
+  for (const auto& [file, length] : memory.mark.bytes) {
+    files.push_back(file);
+    bytes.push_back(length);
+  }
+  write("files", files);
+  write("bytes", bytes);
+  return write.text();
+}
+
+RunMemory read_memory(const std::string& text, const std::string& file) {
+  const io::NumberReader read(text, file);
+  RunMemory memory;
+  each_number_of(memory, read);
+  std::vector<std::int64_t> deepest, bytes;
+  std::vector<std::string> files;
+  read("deepest_pair", deepest);
+  read("files", files);
+  read("bytes", bytes);
+  if (deepest.size() != 2 || files.size() != bytes.size()) throw io::FileError(file, "is damaged");
+  if (deepest[0] >= 0) memory.tally.deepest.overlapping = OverlapPair{deepest[0], deepest[1]};
+  for (std::size_t k = 0; k < files.size(); ++k) memory.mark.bytes[files[k]] = bytes[k];
+  return memory;
+}
+
+std::map<std::string, std::string> texts_of(const io::Scene& scene, const std::string& resolved,
+                                            const std::vector<std::string>& overrides) {
+  std::map<std::string, std::string> texts;
+  texts["scene.toml"] = content_of(scene.source_file);
+  texts[resolved_text] = resolved;
+  std::string& given = texts["overrides"];
+  for (const std::string& override : overrides) given += override + '\n';
+  for (const std::string& file : io::input_files(scene)) texts[input_prefix + file] = content_of(file);
+  return texts;
+}
+
+CheckpointKeeper::CheckpointKeeper(const io::CheckpointSpec& spec, std::filesystem::path directory,
+                                   std::map<std::string, std::string> texts, const graph::Communicator& ranks,
+                                   const Terminal& terminal)
+    : spec_(spec),
+      directory_(std::move(directory)),
+      texts_(std::move(texts)),
+      ranks_(ranks),
+      terminal_(terminal) {}
+
+void CheckpointKeeper::start(const RunMemory& memory) {
+  passed_ = memory.saves_passed;
+  saved_ = memory.saved;
+  last_save_ = graph::seconds_now();
+}
+
+bool CheckpointKeeper::due(const StepReport& report) {
+  bool now = spec_.every_steps && report.step % *spec_.every_steps == 0;
+  if (spec_.every) {
+    const auto passed = static_cast<std::int64_t>(report.time / *spec_.every * (1 + 1e-12));
+    now |= passed > passed_;
+    passed_ = passed;
+  }
+  return now;
+}
+
+bool CheckpointKeeper::save(const Simulation& simulation, RunMemory memory) {
+  const double began = graph::seconds_now();
+  const std::int64_t step = simulation.report().step;
+  memory.saves_passed = passed_;
+  memory.saved = saved_ + 1;
+  const bool archived = spec_.archive_every && memory.saved % *spec_.archive_every == 0;
+  bool written = true;
+  io::CheckpointFile file{simulation.checkpoint(), text_of(memory), std::move(texts_)};
+  try {
+    io::write_checkpoint(directory_ / io::checkpoint_name(step, archived), file, ranks_);
+  } catch (const std::exception& error) {
+    written = false;
+    if (ranks_.rank() == 0) terminal_.warn("warning: no checkpoint behind step {}: {}", step, error.what());
+  }
+  texts_ = std::move(file.texts);
+  last_save_ = graph::seconds_now();
+  seconds_ = last_save_ - began;
+  if (!written) return false;
+  saved_ = memory.saved;
+  last_step_ = step;
+  if (ranks_.rank() == 0) io::remove_old_checkpoints(directory_, spec_.keep);
+  return true;
+}
+
+}  // namespace talus

@@ -1,0 +1,115 @@
+#include "apps/commands/run_resume.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "io/checkpoint/checkpoint_folder.hpp"
+#include "runtime/step/decomposition.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Names of the files, the latest first, as rank 0 finds them: another rank may see a younger state of a
+/// shared folder.
+std::vector<std::filesystem::path> agreed_files(const std::filesystem::path& directory,
+                                                const graph::Communicator& ranks) {
+  std::string names;
+  if (ranks.rank() == 0)
+    for (const std::filesystem::path& path : io::checkpoints_in(directory))
+      names += path.filename().string() + '\n';
+  const std::vector<char> all = ranks.gather_records(std::span<const char>(names));
+  std::istringstream lines(std::string(all.begin(), all.end()));
+  std::vector<std::filesystem::path> paths;
+  for (std::string name; std::getline(lines, name);) paths.push_back(directory / name);
+  return paths;
+}
+
+std::optional<ResumePoint> read_point(const std::filesystem::path& path, const io::Scene& scene,
+                                      const graph::Communicator& ranks) {
+  ResumePoint point{path, io::read_checkpoint_head(path), {}, {}};
+  point.memory = read_memory(point.file.run, path.string());
+  const int subdomains = point.file.state.head.subdomains;
+  const Decomposition all = make_decomposition(with_subdomains(scene.setup.decomposition, subdomains), ranks);
+  for (const SubdomainId e : all.here) point.file.state.here.push_back(e.value());
+  point.file.state.parts = io::read_checkpoint_parts(path, point.file.state.here);
+  return point;
+}
+
+}  // namespace
+
+std::optional<ResumePoint> find_resume_point(const std::filesystem::path& directory, const io::Scene& scene,
+                                             const graph::Communicator& ranks, const Terminal& terminal) {
+  const std::vector<std::filesystem::path> files = agreed_files(directory, ranks);
+  std::string why;
+  for (const std::filesystem::path& path : files) {
+    std::optional<ResumePoint> point;
+    try {
+      point = read_point(path, scene, ranks);
+    } catch (const std::exception& error) {
+      why = error.what();
+    }
+    double failed[1] = {point ? 0.0 : 1.0};
+    ranks.max(failed);
+    if (failed[0] == 0) return point;
+    if (why.empty()) why = path.string() + ": another rank could not read its part";
+    if (ranks.rank() == 0) terminal.warn("warning: {}", why);
+  }
+  if (!files.empty())
+    throw std::invalid_argument(fmt::format(
+        "no checkpoint in {} can be gone on from; the last was refused with: {}", directory.string(), why));
+  return std::nullopt;
+}
+
+void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumePoint& point) {
+  const auto text = [&](const std::string& name) -> const std::string& {
+    const auto found = point.file.texts.find(name);
+    if (found == point.file.texts.end())
+      throw std::invalid_argument(fmt::format("{} holds no '{}'", point.path.string(), name));
+    return found->second;
+  };
+  point.changes = io::scene_changes(text(resolved_text), resolved);
+  std::vector<std::string> refused;
+  for (const io::SceneChange& change : point.changes)
+    if (!change.allowed) refused.push_back(io::describe(change));
+  for (const std::string& file : io::input_files(scene)) {
+    const auto known = point.file.texts.find(input_prefix + file);
+    if (known == point.file.texts.end()) continue;  // a change of a key
+    std::ifstream now(file, std::ios::binary);
+    if (std::string(std::istreambuf_iterator<char>(now), {}) != known->second)
+      refused.push_back(file + " has changed");
+  }
+  if (refused.empty()) return;
+  throw std::invalid_argument(fmt::format(
+      "the checkpoint {} is of another scene: {}. Ends and loads of stages, loads of walls, output and "
+      "checkpoints may change; for anything else begin a run in another directory, from this state if you "
+      "like ([sample] kind = \"state\")",
+      point.path.string(), fmt::join(refused, "; ")));
+}
+
+void take_over(const ResumePoint& point, io::Scene& scene) {
+  DecompositionSettings& decomposition = scene.setup.decomposition;
+  if (decomposition.subdomains == 0)
+    decomposition = with_subdomains(decomposition, point.file.state.head.subdomains);
+  io::place_walls_again(scene, point.memory.wall_points, point.memory.wall_mass);
+}
+
+EarlierRun earlier_run(const std::filesystem::path& directory) {
+  EarlierRun run;
+  std::ifstream file(directory / "run.json");
+  const nlohmann::json read = nlohmann::json::parse(file, nullptr, false);
+  if (!read.is_object() || !read.contains("summary")) return run;
+  const nlohmann::json& summary = read["summary"];
+  run.complete = summary.value("complete", false);
+  run.exit_code = summary.value("exit_code", 0);
+  return run;
+}
+
+}  // namespace talus

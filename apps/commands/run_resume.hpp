@@ -1,0 +1,47 @@
+#pragma once
+
+/// From where a run with --resume goes on.
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/commands/run_checkpoints.hpp"
+#include "apps/shared/terminal.hpp"
+#include "io/scene/scene.hpp"
+#include "io/scene/scene_change.hpp"
+#include "runtime/graph/communicator.hpp"
+
+namespace talus {
+
+/// A checkpoint that is whole, with the parts of this rank.
+struct ResumePoint {
+  std::filesystem::path path;
+  io::CheckpointFile file;
+  RunMemory memory;
+  std::vector<io::SceneChange> changes;  ///< of the scene since it was written
+};
+
+/// Collective. The last checkpoint in `directory` whose parts are whole on all ranks; none where there is no
+/// checkpoint. Those that are damaged are named by rank 0. Throws std::invalid_argument, on all ranks, when
+/// all that there are are damaged, or ranks are more than subdomains.
+std::optional<ResumePoint> find_resume_point(const std::filesystem::path& directory, const io::Scene& scene,
+                                             const graph::Communicator& ranks, const Terminal& terminal);
+
+/// Compares the scene, as load_scene gave it, with that of the checkpoint, and fills point.changes. Throws
+/// std::invalid_argument naming what differs and may not, an input file that has changed included.
+void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumePoint& point);
+
+/// Completes the scene with what the checkpoint knows: how many subdomains, and where the walls stood at
+/// first.
+void take_over(const ResumePoint& point, io::Scene& scene);
+
+/// What run.json in a directory says: whether the last stage of the scene has ended, and the exit code.
+struct EarlierRun {
+  bool complete = false;
+  int exit_code = 0;
+};
+EarlierRun earlier_run(const std::filesystem::path& directory);
+
+}  // namespace talus

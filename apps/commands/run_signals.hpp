@@ -1,0 +1,21 @@
+#pragma once
+
+/// What signals ask of a run. Handlers set flags, which the run looks at between two steps: the one place of
+/// the program with global variables, since a handler has no other.
+
+namespace talus {
+
+/// From now on SIGTERM, SIGINT, SIGHUP and SIGXCPU ask the run to end behind its step, and the second of them
+/// ends the process at once; SIGUSR1 asks for a checkpoint. SIGHUP that nohup has switched off stays so.
+/// Writing beyond a limit (SIGXFSZ) or to a closed terminal (SIGPIPE) fails where it happens, as an error.
+void catch_signals();
+
+/// The signal that has asked to end, or 0.
+int stop_signal();
+/// SIGUSR1 has come since the last call.
+bool save_was_asked();
+
+/// "SIGTERM"; "a signal" for those that are not caught.
+const char* signal_name(int signal);
+
+}  // namespace talus

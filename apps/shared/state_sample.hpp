@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "io/scene/scene.hpp"
+#include "kernels/samples/sample.hpp"
+#include "runtime/step/frame.hpp"
+#include "runtime/step/given_forces.hpp"
+
+namespace talus {
+
+/// Where an earlier run was ([sample] kind = "state"), and what the first step may begin from.
+struct StateSample {
+  Sample sample;
+  std::vector<WallReport> walls;   ///< of that run
+  std::vector<GivenForce> forces;  ///< walls by their numbers in the new scene; of others left out
+};
+
+/// Reads the checkpoint or the frame that the scene names. Throws io::SceneError for clumps, and where bodies
+/// are of materials that the scene has not; io::FileError for a file that cannot be read.
+StateSample read_state(const io::Scene& scene);
+
+/// Puts walls of the scene that nothing has placed yet where those of the same name were, with their
+/// velocities. Before io::place_walls.
+void place_walls_of(const std::vector<WallReport>& walls, io::Scene& scene);
+
+}  // namespace talus

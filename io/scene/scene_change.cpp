@@ -1,0 +1,103 @@
+#include "io/scene/scene_change.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <sstream>
+#include <string_view>
+
+#include "io/scene/detail/toml_document.hpp"
+
+namespace talus::io {
+
+namespace {
+
+using Leaves = std::map<std::string, std::string>;
+
+/// Elements of an array of tables go by their names, where they have one.
+std::string name_in(const toml::array& array, std::size_t k) {
+  if (const toml::table* table = array[k].as_table())
+    for (const char* key : {"name", "wall"})
+      if (const auto name = (*table)[key].value<std::string>()) return *name;
+  return std::to_string(k);
+}
+
+/// As scenes write it.
+std::string text_of(const toml::node& node) {
+  if (const auto* real = node.as_floating_point()) return fmt::format("{}", real->get());
+  std::ostringstream text;
+  if (const toml::array* list = node.as_array()) {
+    for (const toml::node& entry : *list) text << (text.tellp() > 0 ? ", " : "[") << text_of(entry);
+    text << ']';
+  } else {
+    node.visit([&](const auto& value) { text << value; });
+  }
+  return text.str();
+}
+
+void collect(const toml::node& node, const std::string& path, Leaves& leaves) {
+  const auto below = [&](const std::string& key) { return path.empty() ? key : path + "." + key; };
+  if (const toml::table* table = node.as_table()) {
+    for (const auto& [key, value] : *table) collect(value, below(std::string(key.str())), leaves);
+    return;
+  }
+  const toml::array* array = node.as_array();
+  if (array != nullptr && !array->empty() && array->front().is_table()) {
+    for (std::size_t k = 0; k < array->size(); ++k) collect((*array)[k], below(name_in(*array, k)), leaves);
+    return;
+  }
+  leaves[path] = text_of(node);
+}
+
+Leaves leaves_of(const std::string& scene) {
+  Leaves leaves;
+  collect(toml::parse(scene), "", leaves);
+  return leaves;
+}
+
+bool may_change(const std::string& key) {
+  for (const std::string_view front :
+       {"output.", "checkpoint.", "decomposition.mapping", "decomposition.overlap", "solver.simd",
+        "description", "name", "allow_unconverged"})
+    if (key.starts_with(front)) return true;
+  if (key.starts_with("stage."))
+    return key.find(".end.") != std::string::npos || key.find(".load.") != std::string::npos;
+  constexpr std::array<std::string_view, 5> loads{"drive", "pressure", "force", "velocity", "mass"};
+  const std::string_view last = std::string_view(key).substr(key.rfind('.') + 1);
+  return key.starts_with("wall.") && std::ranges::find(loads, last) != loads.end();
+}
+
+}  // namespace
+
+std::vector<SceneChange> scene_changes(const std::string& was, const std::string& is) {
+  const Leaves before = leaves_of(was), now = leaves_of(is);
+  std::map<std::string, SceneChange> changes;
+  const auto value_in = [](const Leaves& leaves, const std::string& key) {
+    const auto found = leaves.find(key);
+    return found == leaves.end() ? std::string() : found->second;
+  };
+  for (const Leaves* leaves : {&before, &now})
+    for (const auto& [key, value] : *leaves)
+      if (value_in(before, key) != value_in(now, key))
+        changes[key] = {key, value_in(before, key), value_in(now, key), may_change(key)};
+  std::vector<SceneChange> sorted;
+  for (auto& [key, change] : changes) sorted.push_back(std::move(change));
+  return sorted;
+}
+
+std::string describe(const SceneChange& change) {
+  const auto said = [](const std::string& value) { return value.empty() ? std::string("not given") : value; };
+  return fmt::format("{} was {} and is {}", change.key, said(change.was), said(change.is));
+}
+
+std::vector<std::string> input_files(const Scene& scene) {
+  std::vector<std::string> files;
+  if (scene.sample.kind == SampleSpec::Kind::bodies) files.push_back(scene.sample.file);
+  for (const Wall& wall : scene.setup.walls)
+    if (!wall.shape.values.file.empty()) files.push_back(wall.shape.values.file);
+  return files;
+}
+
+}  // namespace talus::io

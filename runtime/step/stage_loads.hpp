@@ -1,0 +1,24 @@
+#pragma once
+
+/// What a stage prescribes when it begins.
+
+#include <span>
+#include <vector>
+
+#include "kernels/shapes/walls.hpp"
+#include "runtime/step/setup.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// Walls that the stage names get its loads; others keep theirs.
+void take_loads(const Stage& stage, std::span<Wall> walls);
+
+/// The velocity that a wall has when its load comes into force. `wall` is one of `walls`. Throws
+/// std::invalid_argument when it is pushed with a pressure and has no face.
+void put_load(Wall& wall, const std::vector<Wall>& walls);
+
+/// `now` with gravity, laws and what follows from them; time step and distances stay.
+StepParameters parameters_of(const Setup& setup, const Stage& stage, StepParameters now);
+
+}  // namespace talus

@@ -1,0 +1,82 @@
+/// [sample] kind = "state": runs that begin where another one was.
+
+#include <algorithm>
+
+#include "io/results/results.hpp"
+#include "tests/mpi/launcher.hpp"
+
+namespace talus::state_sample_test {
+namespace {
+
+using namespace test;
+
+class BegunFromAState : public OnRanks {
+ protected:
+  void SetUp() override {
+    write(at("compact.toml"), six_subdomains);
+    std::string branch = six_subdomains;
+    const std::size_t begin = branch.find("kind = "), end = branch.find("[[wall]]");
+    branch.replace(begin, end - begin, "kind = \"state\"\nfile = \"compact/results.h5\"\n\n");
+    branch.replace(branch.find("[[stage]]"),
+                   branch.find("[[stage]]\nname = \"hold\"") - branch.find("[[stage]]"), "");
+    write(at("branch.toml"), branch);
+    ASSERT_EQ(
+        run(1,
+            "run compact.toml --out compact --resume --threads 1 --set solver.max_iterations=3000 --set "
+            "output.every_steps=1")
+            .code,
+        0);
+  }
+};
+
+TEST_F(BegunFromAState, IsWhereTheStateWas) {
+  ASSERT_EQ(run(1, "run branch.toml --out branch --threads 1 --set allow_unconverged=true").code, 0);
+  const fs::path from = at("compact/results.h5");
+  const Frame last = io::read_frame(from, io::frame_count(from) - 1);
+  const Frame first = io::read_frame(at("branch/results.h5"), 0);
+  EXPECT_EQ(first.id, last.id);
+  EXPECT_EQ(first.x, last.x);
+  EXPECT_EQ(first.u, last.u);
+  for (std::size_t w = 0; w < last.walls.size(); ++w)
+    EXPECT_EQ(first.walls[w].position, last.walls[w].position);
+  // An earlier frame is another state.
+  ASSERT_EQ(
+      run(1, "run branch.toml --out other --threads 1 --set sample.frame=2 --set allow_unconverged=true")
+          .code,
+      0);
+  EXPECT_EQ(io::read_frame(at("other/results.h5"), 0).x, io::read_frame(from, 2).x);
+  EXPECT_EQ(run(1, "run branch.toml --out none --set sample.frame=2000").code, 2);
+}
+
+// Forces come along: the first step has less to find, from a frame and from a checkpoint alike.
+TEST_F(BegunFromAState, BeginsFromItsForcesOnAnyRanks) {
+  const auto first_step = [&](const std::string& out) {
+    return read_table(at(out) / "steps.csv").number(0, "iterations");
+  };
+  const std::string line = "run branch.toml --force --threads 1 --set solver.max_iterations=3000 --out ";
+  ASSERT_EQ(run(1, line + "warm").code, 0);
+  ASSERT_EQ(run(1, line + "cold --set solver.warm_start=false").code, 0);
+  const std::string checkpoint = " --set sample.file=compact/checkpoint_000010.h5";
+  ASSERT_EQ(run(1, line + "point" + checkpoint).code, 0);
+  EXPECT_LT(first_step("warm"), 0.7 * first_step("cold"));
+  EXPECT_LT(first_step("point"), 0.7 * first_step("cold"));
+  for (const int ranks : {2, 3}) {
+    ASSERT_EQ(run(ranks, line + "ranks").code, 0);
+    EXPECT_EQ(digest_of("ranks"), digest_of("warm")) << ranks;
+    ASSERT_EQ(run(ranks, line + "ranks" + checkpoint).code, 0);
+    EXPECT_EQ(digest_of("ranks"), digest_of("point")) << ranks;
+  }
+  ASSERT_EQ(run(1, line + "alone --set decomposition.subdomains=1").code, 0);
+  EXPECT_LT(first_step("alone"), 0.7 * first_step("cold"));
+  // A run that began from a state is stopped and goes on as any other.
+  ASSERT_EQ(
+      run(1, "run branch.toml --threads 1 --set solver.max_iterations=3000 --out parts --resume --steps 2")
+          .code,
+      0);
+  ASSERT_EQ(run(2, "run branch.toml --threads 1 --set solver.max_iterations=3000 --out parts --resume").code,
+            0);
+  EXPECT_EQ(digest_of("parts"), digest_of("warm"));
+}
+
+}  // namespace
+}  // namespace talus::state_sample_test

@@ -1,0 +1,260 @@
+/// Stopping a run and going on with it, from outside: signals, limits, `talus status`, and what is refused.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "io/checkpoint/checkpoint_folder.hpp"
+#include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus::resume_command_test {
+namespace {
+
+using namespace test;
+
+class Resume : public testing::Test {
+ protected:
+  void SetUp() override {
+    write(at("scene.toml"), pressed_box);
+    std::string endless = pressed_box;
+    endless.replace(endless.rfind("steps = 6"), 9, "steps = 1000000000");
+    write(at("endless.toml"), endless);
+  }
+  Outcome run(const std::string& arguments, const std::string& before = "") {
+    return test::run(folder_.path(), arguments, before);
+  }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+  std::size_t checkpoints(const std::string& directory) const {
+    return io::checkpoints_in(at(directory)).size();
+  }
+
+  /// The endless scene until `act(process)`, asked again and again once steps are done, says that it has done
+  /// what it wanted. Exit status as waitpid gives it.
+  int run_until(const std::string& directory, const std::function<bool(pid_t)>& act) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const int null = ::open("/dev/null", O_WRONLY);
+      ::dup2(null, STDERR_FILENO);
+      if (::chdir(folder_.path().c_str()) == 0)
+        ::execl(TALUS_COMMAND, TALUS_COMMAND, "run", "endless.toml", "--resume", "--threads", "1", "--out",
+                directory.c_str(), nullptr);
+      ::_exit(127);
+    }
+    int status = 0;
+    for (bool done = false; ::waitpid(child, &status, WNOHANG) == 0;) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      const fs::path beat = at(directory) / "status.json";
+      if (!done && fs::exists(beat) && content(beat).find("stage_fraction") != std::string::npos)
+        done = act(child);
+    }
+    return status;
+  }
+
+  ScratchDirectory folder_;
+};
+
+TEST_F(Resume, AfterSignalsThatAskForAnEnd) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGXCPU}) {
+    const int status = run_until("stopped", [&](pid_t process) { return ::kill(process, signal) == 0; });
+    ASSERT_TRUE(WIFEXITED(status)) << signal;
+    EXPECT_EQ(WEXITSTATUS(status), 75) << signal;
+    EXPECT_EQ(summary(at("stopped")).at("status"), "stopped");
+    EXPECT_EQ(summary(at("stopped")).at("exit_code"), 75);
+    const std::int64_t steps = summary(at("stopped")).at("steps");
+    EXPECT_TRUE(fs::exists(at("stopped") / io::checkpoint_name(steps, false)))
+        << "each goes on from the last";
+    fs::remove(at("stopped/status.json"));
+  }
+  EXPECT_EQ(checkpoints("stopped"), 2U) << "as many as [checkpoint] keep says";
+}
+
+TEST_F(Resume, NeedsNoStopForACheckpointByASignal) {
+  const int status = run_until("saved", [&, asked = false](pid_t process) mutable {
+    if (!asked) asked = ::kill(process, SIGUSR1) == 0;
+    return checkpoints("saved") > 0 && ::kill(process, SIGTERM) == 0;
+  });
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 75);
+  EXPECT_EQ(checkpoints("saved"), 2U);
+}
+
+// The second signal may find the first one's work done: then the run has ended as it was asked to.
+TEST_F(Resume, IsNotWaitedForByASecondSignal) {
+  const int status = run_until("twice", [](pid_t process) {
+    ::kill(process, SIGSTOP);
+    ::kill(process, SIGTERM);
+    ::kill(process, SIGINT);
+    return ::kill(process, SIGCONT) == 0;
+  });
+  EXPECT_TRUE(WIFSIGNALED(status)) << status;
+  const Outcome told = run("status twice");
+  EXPECT_NE(told.output.find("dead"), std::string::npos) << told.output;
+}
+
+TEST_F(Resume, BeforeTheTimeIsUp) {
+  const auto began = std::chrono::steady_clock::now();
+  const Outcome limited = run("run endless.toml --out limited --max-walltime 0:03 --threads 1");
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+  EXPECT_EQ(limited.code, 75) << limited.messages;
+  EXPECT_LT(took.count(), 3);
+  EXPECT_NE(limited.messages.find("the time is up"), std::string::npos) << limited.messages;
+  EXPECT_EQ(checkpoints("limited"), 1U);
+  const Outcome granted =
+      run("run endless.toml --out limited --resume --threads 1", "SLURM_JOB_END_TIME=$(($(date +%s) + 3))");
+  EXPECT_EQ(granted.code, 75) << granted.messages;
+  EXPECT_GT(summary(at("limited")).at("steps").get<int>(), 6);
+  for (const std::string wrong : {"3600", "1:70:00", "soon", "0:00"})
+    EXPECT_EQ(run("run endless.toml --out none --max-walltime " + wrong).code, 2) << wrong;
+  EXPECT_FALSE(fs::exists(at("none")));
+}
+
+// A run of three days (docs/tutorial.md), in small: the same line again and again until it is done.
+TEST_F(Resume, IsTheSameLineUntilItIsDone) {
+  const std::string line =
+      "run scene.toml --out days --resume --set stage.shear.end.steps=400 --set allow_unconverged=true "
+      "--threads 1";
+  ASSERT_EQ(run("run scene.toml --out straight --set stage.shear.end.steps=400 --set allow_unconverged=true "
+                "--threads 1")
+                .code,
+            0);
+  int runs = 0;
+  for (int code = 75; code == 75; ++runs) {
+    ASSERT_LT(runs, 200);
+    const Outcome part = run(line + " --max-walltime 0:02");
+    code = part.code;
+    ASSERT_TRUE(code == 0 || code == 75) << part.messages;
+  }
+  for (const std::string name : {"walls.csv", "triaxial.csv", "triaxial.svg", "fields.pvd"})
+    EXPECT_EQ(content(at("days") / name), content(at("straight") / name)) << name;
+  EXPECT_EQ(summary(at("days")).at("digest"), summary(at("straight")).at("digest"));
+  // Once more: nothing is left to do, and nothing is touched.
+  const auto before = files_below(at("days"));
+  const Outcome again = run(line);
+  EXPECT_EQ(again.code, 0) << again.messages;
+  EXPECT_NE(again.messages.find("is done"), std::string::npos) << again.messages;
+  EXPECT_EQ(files_below(at("days")), before);
+  // Further than it was meant to go.
+  const Outcome further =
+      run("run scene.toml --out days --resume --set stage.shear.end.steps=410 --set allow_unconverged=true "
+          "--threads 1");
+  EXPECT_EQ(further.code, 0) << further.messages;
+  EXPECT_EQ(summary(at("days")).at("steps"), 416);
+  const auto json = nlohmann::json::parse(content(at("days/run.json")));
+  EXPECT_EQ(json.at("provenance").at("resumed").back().at("changes").front(),
+            "stage.shear.end.steps was 400 and is 410");
+}
+
+TEST_F(Resume, IsRefusedForAnotherScene) {
+  ASSERT_EQ(run("run scene.toml --out parts --resume --steps 3 --threads 1").code, 0);
+  const auto before = files_below(at("parts"));
+  const Outcome other =
+      run("run scene.toml --out parts --resume --set stage.shear.friction=0.5 --set solver.tolerance=0.5");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.messages.find("stage.shear.friction was 0.35 and is 0.5"), std::string::npos)
+      << other.messages;
+  EXPECT_NE(other.messages.find("solver.tolerance was 0.01 and is 0.5"), std::string::npos) << other.messages;
+  EXPECT_EQ(files_below(at("parts")), before) << "nothing was written";
+  const Outcome loads =
+      run("run scene.toml --out parts --resume --threads 1 --set wall.z+.pressure=2e4 "
+          "--set output.xyz=true --set stage.shear.end.steps=3");
+  EXPECT_EQ(loads.code, 0) << loads.messages;
+  EXPECT_EQ(run("run scene.toml --out parts --resume --force").code, 2);
+}
+
+TEST_F(Resume, GoesBackToTheCheckpointBeforeADamagedOne) {
+  ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
+  const std::string line = "run scene.toml --out parts --resume --threads 1 --set checkpoint.every_steps=2";
+  ASSERT_EQ(run(line + " --steps 8").code, 0);
+  ASSERT_EQ(checkpoints("parts"), 2U);
+  const fs::path last = io::checkpoints_in(at("parts")).front();
+  std::string bytes = content(last);
+  // In the middle of the columns, where HDF5 looks at nothing.
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 16);
+  write(last, bytes);
+  write(at("parts/checkpoint_000099.h5.part"), "half of one");
+  const Outcome gone_on = run(line);
+  EXPECT_EQ(gone_on.code, 0) << gone_on.messages;
+  EXPECT_NE(gone_on.messages.find("damaged"), std::string::npos) << gone_on.messages;
+  EXPECT_NE(gone_on.messages.find("behind step 6"), std::string::npos) << gone_on.messages;
+  EXPECT_EQ(summary(at("parts")).at("digest"), summary(at("straight")).at("digest"));
+  EXPECT_FALSE(fs::exists(at("parts/checkpoint_000099.h5.part")));
+}
+
+TEST_F(Resume, BeginsAnewWhereThereIsNoCheckpoint) {
+  ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
+  ASSERT_EQ(run("run scene.toml --out parts --threads 1 --steps 5").code, 0);
+  write(at("parts/notes.txt"), "mine");
+  const Outcome anew = run("run scene.toml --out parts --resume --threads 1");
+  EXPECT_EQ(anew.code, 0) << anew.messages;
+  EXPECT_EQ(content(at("parts/walls.csv")), content(at("straight/walls.csv")));
+  EXPECT_EQ(content(at("parts/notes.txt")), "mine");
+}
+
+TEST_F(Resume, DoesWithoutACheckpointThatTheDiskDoesNotTake) {
+  const Outcome full = run(
+      "run scene.toml --out full --threads 1 --set checkpoint.every_steps=3 --set output.stage_frames=false "
+      "--set output.fields=false --set output.pictures=false --set output.every_steps=100",
+      "ulimit -f 64;");
+  EXPECT_EQ(full.code, 0) << full.messages;
+  EXPECT_NE(full.messages.find("no checkpoint behind step 3"), std::string::npos) << full.messages;
+  EXPECT_EQ(checkpoints("full"), 0U);
+  EXPECT_EQ(summary(at("full")).at("steps"), 12);
+}
+
+TEST_F(Resume, KeepsArchivedCheckpoints) {
+  ASSERT_EQ(
+      run("run scene.toml --out kept --threads 1 --set checkpoint.every_steps=1 --set checkpoint.keep=3 "
+          "--set checkpoint.archive_every=5")
+          .code,
+      0);
+  for (const std::string name : {"archive_000005.h5", "archive_000010.h5", "checkpoint_000012.h5"})
+    EXPECT_TRUE(fs::exists(at("kept") / name)) << name;
+  EXPECT_EQ(checkpoints("kept"), 5U);
+}
+
+TEST_F(Resume, IsToldOfByStatusAndLog) {
+  std::string alive;
+  const int status = run_until("watched", [&](pid_t process) {
+    alive = run("status watched --json").output;
+    return ::kill(process, SIGKILL) == 0;
+  });
+  ASSERT_TRUE(WIFSIGNALED(status));
+  const auto json = nlohmann::json::parse(alive);
+  EXPECT_EQ(json.at("state"), "running");
+  EXPECT_GE(json.at("step").get<int>(), 1);
+  EXPECT_TRUE(json.contains("stage"));
+  EXPECT_EQ(nlohmann::json::parse(run("status watched --json").output).at("state"), "dead");
+  EXPECT_EQ(run("status nowhere").code, 2);
+
+  const Outcome quiet = run("run scene.toml --out quiet --quiet --threads 1 --resume");
+  EXPECT_EQ(quiet.code, 0);
+  EXPECT_EQ(quiet.messages, "");
+  const std::string log = content(at("quiet/run.log"));
+  for (const std::string words : {"400 grains", "stage 'press' ended", "results in quiet"})
+    EXPECT_NE(log.find(words), std::string::npos) << words << " in " << log;
+  const Outcome done = run("status quiet");
+  EXPECT_NE(done.output.find("done"), std::string::npos) << done.output;
+  EXPECT_NE(done.output.find("checkpoint_000012.h5"), std::string::npos) << done.output;
+}
+
+// A lost terminal, or a full log, is no reason to lose a simulation.
+TEST_F(Resume, IsNotNeededWhenTheTerminalIsLost) {
+  for (const std::string lost : {"2>/dev/full", "2>&-"}) {
+    const std::string line = "cd '" + folder_.path().string() +
+                             "' && '" TALUS_COMMAND "' run scene.toml --out lost --force --threads 1 " + lost;
+    const int status = std::system(line.c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 0) << lost;
+    EXPECT_EQ(summary(at("lost")).at("status"), "done");
+  }
+}
+
+}  // namespace
+}  // namespace talus::resume_command_test
