@@ -143,9 +143,11 @@ void add_boxes(std::vector<Scene>& table) {
   for (double pressure : {1e-3, 1.0, 1e3, 1e6, 1e9})
     table.push_back({fmt::format("pressure-{:.0e}", pressure),
                      "64 grains pressed from three sides, under gravity: all six wall forces",
-                     [pressure] { return pressed_cube(pressure, 1); }});
-  table.push_back(
-      {"pressure-1e+03-subdomains-8", "the same cut into 8 subdomains", [] { return pressed_cube(1e3, 8); }});
+                     [pressure] { return pressed_cube(pressure, 1); }, Verdicts{right, honest}});
+  // A cubic lattice with friction has answers without end, and its rows are about to buckle: some steps find
+  // none to the digits that the check of small clusters wants, and say so.
+  table.push_back({"pressure-1e+03-subdomains-8", "the same cut into 8 subdomains",
+                   [] { return pressed_cube(1e3, 8); }, Verdicts{right, honest}});
   for (double factor : {1e-2, 1.0, 1e2})
     table.push_back(
         {fmt::format("time-step-pile-{:.0e}", factor),

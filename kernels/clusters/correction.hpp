@@ -25,7 +25,7 @@ struct CorrectionThresholds {
   /// Impulses that leave less than this part of what need not be known, in (0, 1], are exact: what
   /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
   /// settle.
-  double exact = 1e-6, exact_with_friction = 0.1;
+  double exact = 1e-6, exact_with_friction = 0.02;
   /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
   int few_linear = 8;
   /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
