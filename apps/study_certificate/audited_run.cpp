@@ -27,7 +27,7 @@ constexpr double sharpness = 0.1;
 /// Forces are over-determined where the velocities, of the cluster that is furthest off, differ by less than
 /// this part of what the forces do: then gaps that no tolerance sees decide which of redundant contacts
 /// carry. (In a smooth wedge of half angle 1e-3 forces that are all wrong give a velocity error of 0.2.)
-constexpr double redundant = 1e-3;
+constexpr double redundant = 1e-4;
 
 /// What a step begins from.
 struct Start {

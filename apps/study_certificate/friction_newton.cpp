@@ -233,4 +233,16 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) con
   return result;
 }
 
+void FrictionNewton::go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, const Goal& goal) const {
+  const Vector centre = scaled(run);
+  Vector s = scaled(r);
+  double shift = first_shift;
+  for (int k = 0; k < goal.most && shift >= least_shift; ++k, shift /= 10) {
+    if (!solve_near(centre, shift, inner_part * goal.enough * goal.unit, s)) return;
+    if (law(s, s, 0).cwiseAbs().maxCoeff() > goal.enough * goal.unit) continue;
+    r = unscaled(s);
+    return;
+  }
+}
+
 }  // namespace talus::audit

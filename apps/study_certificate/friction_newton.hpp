@@ -41,6 +41,10 @@ class FrictionNewton {
     int most;
   };
   NewtonResult improve(std::vector<Vec3>& r, const Goal& goal) const;
+  /// Of the answers that redundant contacts leave, one next to the impulses `run`, met to `enough` over
+  /// `unit`: proximal steps about them with ever smaller shifts, the first from the answer r. Where none
+  /// comes out r stays.
+  void go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, const Goal& goal) const;
 
  private:
   using Matrix = Eigen::SparseMatrix<double>;

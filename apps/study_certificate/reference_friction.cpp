@@ -207,7 +207,10 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
     if (reference.found == Found::answer) break;
   }
   reference.motion = motion_under(problem, reference.r);
-  if (reference.found == Found::answer) return reference;
+  if (reference.found == Found::answer) {
+    newton.go_next_to(run, reference.r, {goal.unit, limits.residual, limits.proximal_steps});
+    return reference;
+  }
   if (const double approach = unavoidable_approach(problem, limits); approach > 0) {
     reference.found = Found::no_answer;
     reference.residual = approach;

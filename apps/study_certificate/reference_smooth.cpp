@@ -189,6 +189,21 @@ bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough,
   return true;
 }
 
+/// Of the answers that redundant contacts leave, one next to `start`, met to `enough`: steps from there with
+/// ever less weight on the distance. `answer` where none comes out.
+Vector next_to(const Dual& dual, const ReferenceLimits& limits, Real enough, const Vector& start,
+               const Vector& answer) {
+  std::vector<char> carry;
+  for (const Real value : answer) carry.push_back(value > 0);
+  Vector next;
+  for (Real shift = first_shift; shift >= least_shift; shift /= 10) {
+    if (!Pivots(dual.W, dual.q - shift * start, shift, limits.pivots).solve(carry, next)) return answer;
+    next = next.cwiseMax(Real{0}).eval();
+    if (met_by(dual, next).residual <= enough) return next;
+  }
+  return answer;
+}
+
 /// What impulses and speeds of approach are compared with.
 Real unit_of(const StepProblem& problem, const Dual& dual, const Vector& s, const ReferenceLimits& limits) {
   Real unit = std::max({s.maxCoeff(), (-dual.q).maxCoeff(), Real{1e-300L}});
@@ -219,17 +234,22 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
     s[c] = std::max(0.0, run[k].dot(problem.contacts[k].normal)) / dual.scale[c];
   }
   const Real unit = unit_of(problem, dual, s, limits);
+  const Vector start = s;
   const bool ended = find_impulses(dual, limits, sharpness * limits.residual * unit, s);
   const Met met = met_by(dual, s);
   reference.residual = static_cast<double>(met.residual / unit);
   reference.error = static_cast<double>(std::sqrt(met.gap));
   reference.exchanged = static_cast<double>(
       std::max(std::sqrt(std::max<Real>(0, s.dot(dual.W * s))), floor_of_exchange * s.maxCoeff()));
-  for (Eigen::Index c = 0; c < count; ++c) {
-    const auto k = static_cast<std::size_t>(c);
-    reference.r.push_back(static_cast<double>(s[c] * dual.scale[c]) * problem.contacts[k].normal);
-  }
-  reference.motion = motion_under(problem, reference.r);
+  const auto impulses = [&](const Vector& of) {
+    std::vector<Vec3> r;
+    for (Eigen::Index c = 0; c < count; ++c)
+      r.push_back(static_cast<double>(of[c] * dual.scale[c]) *
+                  problem.contacts[static_cast<std::size_t>(c)].normal);
+    return r;
+  };
+  reference.motion = motion_under(problem, impulses(s));
+  reference.r = impulses(next_to(dual, limits, limits.residual * unit, start, s));
   if (s.maxCoeff() > limits.pumped * unit) {
     reference.found = Found::no_answer;
     reference.why = "no velocities are admissible";

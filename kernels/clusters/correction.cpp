@@ -239,9 +239,11 @@ double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion)
   return sum;
 }
 
-Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds) {
+Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& given) {
   const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
                                     [](const ContactEquation& c) { return c.mu > 0; });
+  CorrectionThresholds thresholds = given;
+  if (!friction) thresholds.tolerance = given.smooth_tolerance;
   PartField motion(1, std::vector<Twist>(problem.bodies.size()));
   ActiveSet set = empty_set(problem);
   const double wrong = see_states(problem, motion[0], set);

@@ -19,13 +19,16 @@ struct CorrectionThresholds {
   /// What may be left: this part of what need not be known more exactly, or of this part of what was found,
   /// both in (0, 1).
   double tolerance = 0.1, sharpness = 1e-4;
+  /// The same part without friction, in (0, 1): there forces are found too, and redundant contacts whose gaps
+  /// hardly differ share them by what little is left.
+  double smooth_tolerance = 1e-3;
   /// Conjugate gradients of a linear system, at most, >= 1. They only mend what rounding leaves of the direct
   /// solve, and walls of finite mass on single grains.
   int most_linear = 16;
   /// Impulses that leave less than this part of what need not be known, in (0, 1], are exact: what
   /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
   /// settle.
-  double exact = 1e-6, exact_with_friction = 0.02;
+  double exact = 1e-6, exact_with_friction = 0.1;
   /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
   int few_linear = 8;
   /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
