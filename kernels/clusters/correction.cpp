@@ -247,6 +247,11 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   PartField motion(1, std::vector<Twist>(problem.bodies.size()));
   ActiveSet set = empty_set(problem);
   const double wrong = see_states(problem, motion[0], set);
+  if (wrong <= thresholds.certain * enough) return unchanged(problem, wrong);
+  if (const double error = thresholds.of_single_contact * wrong; problem.contacts.size() == 1 &&
+                                                                 problem.contacts.front().levers == nullptr &&
+                                                                 error <= thresholds.tolerance * enough)
+    return unchanged(problem, error);
   // Rounds that do not settle may carry the motion off: the best one counts.
   Correction best;
   double least = std::numeric_limits<double>::infinity();

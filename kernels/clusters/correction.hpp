@@ -29,6 +29,11 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
   /// settle.
   double exact = 1e-6, exact_with_friction = 0.1;
+  /// Where the law is met to this part of it, in (0, 1), no geometry can hide an error: no round is made.
+  double certain = 1e-9;
+  /// A single contact hides none: its error is at most so many times what the law finds wrong, >= 1. (The
+  /// eigenvalues of its W, of spheres and walls, are 1/W_nn and 3.5 times as much.)
+  double of_single_contact = 4;
   /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
   int few_linear = 8;
   /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
