@@ -219,6 +219,14 @@ double difference(const BodyProblem& problem, const std::vector<Twist>& a, const
   return momentum_of(problem, by);
 }
 
+/// All bodies together, over the least effective mass of a contact.
+double mass_ratio(const BodyProblem& problem) {
+  double all = 0, least = std::numeric_limits<double>::infinity();
+  for (const BodyUnknown& body : problem.bodies) all += body.mass;
+  for (const ContactEquation& c : problem.contacts) least = std::min(least, effective_mass(problem, c));
+  return all / least;
+}
+
 /// Of impulses that are an answer themselves.
 Correction unchanged(const BodyProblem& problem, double at_first) {
   Correction none;
@@ -247,10 +255,11 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
   PartField motion(1, std::vector<Twist>(problem.bodies.size()));
   ActiveSet set = empty_set(problem);
   const double wrong = see_states(problem, motion[0], set);
-  if (wrong <= thresholds.certain * enough) return unchanged(problem, wrong);
-  if (const double error = thresholds.of_single_contact * wrong; problem.contacts.size() == 1 &&
-                                                                 problem.contacts.front().levers == nullptr &&
-                                                                 error <= thresholds.tolerance * enough)
+  const double apart = mass_ratio(problem);
+  if (wrong * apart <= thresholds.certain * enough) return unchanged(problem, wrong * apart);
+  if (const double error = thresholds.of_single_contact * wrong;
+      problem.contacts.size() == 1 && problem.contacts.front().levers == nullptr && apart < 2 &&
+      error <= thresholds.tolerance * enough)
     return unchanged(problem, error);
   // Rounds that do not settle may carry the motion off: the best one counts.
   Correction best;
@@ -268,7 +277,8 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     now.open = see_states(problem, motion[0], set);
     now.moved = difference(problem, motion[0], before);
     if (rounds == 1) at_first = std::max(wrong, now.found + now.missed + now.left);
-    if (at_first <= thresholds.exact * enough) return unchanged(problem, at_first);
+    if (apart <= thresholds.most_apart && at_first <= thresholds.exact * enough)
+      return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);
     now.settled = now.open <= goal && (!friction || (rounds > 1 && now.moved <= goal));
     if (now.settled || now.error() < least) {
@@ -278,7 +288,8 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     }
     if (best.settled) break;
   }
-  if (friction && !best.settled && at_first <= thresholds.exact_with_friction * enough)
+  if (friction && !best.settled && apart <= thresholds.most_apart &&
+      at_first <= thresholds.exact_with_friction * enough)
     return unchanged(problem, at_first);
   best.rounds = rounds;
   best.at_first = at_first;

@@ -29,7 +29,11 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
   /// settle.
   double exact = 1e-6, exact_with_friction = 0.1;
-  /// Where the law is met to this part of it, in (0, 1), no geometry can hide an error: no round is made.
+  /// Not where all bodies of the cluster together are so many effective masses of a contact, >> 1: heavier
+  /// ones go on where the firm contacts of a round give way, and contacts feel next to nothing of it.
+  double most_apart = 1e7;
+  /// Where the law is met to this part of it, in (0, 1), over that ratio of masses, no geometry can hide an
+  /// error: no round is made.
   double certain = 1e-9;
   /// A single contact hides none: its error is at most so many times what the law finds wrong, >= 1. (The
   /// eigenvalues of its W, of spheres and walls, are 1/W_nn and 3.5 times as much.)
