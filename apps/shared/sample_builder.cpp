@@ -57,12 +57,11 @@ void check(const io::Scene& scene, const Sample& sample) {
       throw io::SceneError(file, 0, "",
                            fmt::format("body {}: {}", static_cast<std::int64_t>(sample.id_of(k)), what));
     };
-    const double m = mass(sample, k), mobility = 2.5 / m;
-    if (!(mobility > 0) || !std::isfinite(mobility))
+    if (const double m = mass(sample, k); !mass_is_sound(m))
       refuse(fmt::format(
-          "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg; mass and 1/mass must be "
-          "positive and finite",
-          sample.radius[k], sample.density_of(k), m));
+          "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg, which must lie in {} to {}; "
+          "give lengths in m and densities in kg/m^3",
+          sample.radius[k], sample.density_of(k), m, least_mass, most_mass));
     if (!sample.velocity.empty() &&
         !std::ranges::all_of(sample.velocity[k], [](double v) { return std::isfinite(v); }))
       refuse("radius times angular velocity is not finite");

@@ -43,7 +43,10 @@ TEST(SceneErrors, NumbersOutOfRangeAreNamedWithTheirLimit) {
   expect_refused(replaced(scene_with(), "radius = 0.01", "radius = -0.01"), "radius = -", "sample.radius",
                  "must be > 0");
   expect_refused(replaced(scene_with(), "density = 2600", "density = 0"), "density", "material.density",
-                 "must be > 0");
+                 "must be 1e-30 to 1e+30");
+  expect_refused(replaced(scene_with(), "density = 2600", "density = 1e-300"), "density", "material.density",
+                 "must be 1e-30 to 1e+30, got 1e-300");
+  expect_line_refused("#wall", "mass = 1e154", "wall[0].mass", "must be 1e-60 to 1e+60, got 1e+154");
   expect_refused(replaced(scene_with(), "steps = 5", "steps = 0"), "steps = 0", "stage[0].end.steps",
                  "must be >= 1");
   expect_refused(scene_with("#tail", "[solver]\ntolerance = -1"), "tolerance", "solver.tolerance",
