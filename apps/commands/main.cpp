@@ -109,6 +109,8 @@ int main(int argc, char** argv) {
   occupy_closed_streams();
   // Who reads stdout or stderr may go before a simulation ends: then writing fails, and nothing else.
   std::signal(SIGPIPE, SIG_IGN);
+  // The same for files beyond a limit: else the system ends a run that says "running" for ever.
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
   app.set_version_flag("--version", "talus " + io::version());
   app.require_subcommand(1);

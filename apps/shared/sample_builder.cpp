@@ -1,6 +1,7 @@
 #include "apps/shared/sample_builder.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -26,12 +27,27 @@ std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<
   return lattice(radii, sites);
 }
 
+/// Throws SceneError when this process cannot hold the grains that it is to make.
+void demand_memory(const io::Scene& scene, double grains) {
+  // What a grain takes while it is deposited, and all in all with its contacts (docs/performance.md).
+  constexpr double bytes_made = 100, bytes_run = 1160;
+  const double there =
+      static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  if (grains * bytes_made > there)
+    throw io::SceneError(
+        scene.source_file, 0, "sample",
+        fmt::format("{:.3g} grains take about {:.3g} GB to make and {:.3g} GB to run; this "
+                    "machine has {:.3g} GB. Ask for fewer",
+                    grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
+}
+
 Sample make_sample(const io::Scene& scene) {
   const io::SampleSpec& spec = scene.sample;
   if (spec.kind == io::SampleSpec::Kind::bodies)
     return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
   if (spec.kind == io::SampleSpec::Kind::state) return read_state(scene).sample;
 
+  demand_memory(scene, static_cast<double>(spec.grains()));
   Sample sample;
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;

@@ -41,7 +41,7 @@ struct Spread {
 };
 
 /// Of a thousand bodies at most. A few that fly far away must not push all others into one clamped cell, so
-/// that the farthest hundredth at either end does not count.
+/// that the farthest twentieth at either end does not count.
 Spread spread_of(std::span<const Vec3> x) {
   const std::size_t stride = (x.size() + 999) / 1000;
   std::vector<double> values;
@@ -54,7 +54,7 @@ Spread spread_of(std::span<const Vec3> x) {
       std::nth_element(values.begin(), at, values.end());
       return *at;
     };
-    const std::size_t ends = values.size() / 100;
+    const std::size_t ends = values.size() / 20;
     const double middle = smallest_but(values.size() / 2);
     result.middle[axis] = middle;
     const double low = smallest_but(ends), high = smallest_but(values.size() - 1 - ends);
@@ -66,7 +66,7 @@ Spread spread_of(std::span<const Vec3> x) {
 /// How much wider cells of `size` [m] have to be for the bodies to have places of their own: far cells are
 /// clamped into one, in which a line of grains would be compared pair by pair.
 double widening(const Spread& spread, double size) {
-  constexpr double margin = 1.25;  // a hundredth was left out at either end
+  constexpr double margin = 1.25;  // a twentieth was left out at either end
   constexpr double cells = cells_an_axis - 2 - middle_cell;
   const double factor = margin * spread.reach / (cells * size);
   return factor > 1 && std::isfinite(factor) ? factor : 1;

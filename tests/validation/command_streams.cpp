@@ -66,6 +66,15 @@ TEST_F(Streams, MessagesThatStderrDoesNotTakeEndNothing) {
   }
 }
 
+TEST_F(Streams, ScenesThatAreNoFilesOrTooLargeAreRefusedAtOnce) {
+  write(at("scene.toml"), column_scene);
+  EXPECT_EQ(shell("mkfifo pipe; timeout 5 \"" TALUS_COMMAND "\" run pipe 2>messages"), 2);
+  EXPECT_NE(content(at("messages")).find("is a pipe"), std::string::npos);
+  EXPECT_EQ(shell("talus run scene.toml --set sample.cells=[1000,1000,2000] 2>messages"), 2);
+  EXPECT_NE(content(at("messages")).find("GB to run"), std::string::npos) << content(at("messages"));
+  EXPECT_FALSE(fs::exists(at("out")));
+}
+
 // A file of results took the number of the stream, and messages went into it.
 TEST_F(Streams, FilesOfResultsAreNoStreams) {
   write(at("scene.toml"), column_scene);

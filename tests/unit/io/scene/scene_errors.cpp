@@ -53,6 +53,15 @@ TEST(SceneErrors, NumbersOutOfRangeAreNamedWithTheirLimit) {
                  "must be > 0");
 }
 
+// TOML's reader overflowed the stack.
+TEST(SceneErrors, KeysOfManyPartsAreRefused) {
+  std::string key = "a";
+  for (int part = 0; part < 200000; ++part) key += ".a";
+  for (const std::string& line : {key + " = 1", "[" + key + "]", "b = {" + key + " = 1}"})
+    expect_line_refused("#tail", line, "", "a key of more than 64 parts");
+  EXPECT_NE(std::string(error_of(scene_with(), {key + "=1"}).what()).find("parts"), std::string::npos);
+}
+
 TEST(SceneErrors, MissingKeysAreNamed) {
   expect_refused(replaced(scene_with(), "density = 2600\n", ""), "[material]", "material.density", "missing");
   expect_refused(replaced(scene_with(), "radius = 0.01\n", ""), "[sample]", "sample.radius",

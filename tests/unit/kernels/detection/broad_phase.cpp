@@ -135,8 +135,6 @@ TEST(BroadPhase, BodiesThatFlewABillionMetresAwayDisturbNobody) {
   EXPECT_GE(build_cells(bodies.x, reach).cells.size(), before.cells.size() / 2);
 }
 
-// Cells are counted up to 2^18 on each side; what is farther away stands in the outermost of them. A chain on
-// each axis goes from within to there, with smaller bodies beside it.
 // Cells that do not count so far are clamped into one, and detection was quadratic.
 TEST(BroadPhase, GrainsOnALongLineShareNoCellWithMany) {
   for (const Vec3& along : {Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(1, 1, 1)}) {
@@ -152,6 +150,8 @@ TEST(BroadPhase, GrainsOnALongLineShareNoCellWithMany) {
   }
 }
 
+// Cells are counted up to 2^18 on each side; what is farther away stands in the outermost of them. A chain on
+// each axis goes from within to there, with smaller bodies beside it.
 TEST(BroadPhase, FindsPairsAcrossTheOutermostCells) {
   std::vector<Vec3> x;
   std::vector<double> reach;
