@@ -1,15 +1,23 @@
 #include <hdf5.h>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 
 #include "apps/commands/commands.hpp"
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "io/results/version.hpp"
 #include "io/scene/detail/spelling.hpp"
 
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <exception>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -61,6 +69,34 @@ void add_commands(CLI::App& parent, const std::vector<Command>& table, std::vect
   }
 }
 
+/// Standard streams that the caller has closed get a place that holds nothing, lest a file of results take
+/// their number and messages go into it. Of stdout it is one that refuses what is written.
+void occupy_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
+      ::open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY);
+}
+
+/// The exit code of a command that ended with `code`: results that stdout did not take are an error.
+int with_results_written(int code) {
+  errno = 0;
+  const bool whole = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (whole) return code;
+  const std::string reason = errno == 0 ? "" : ": " + std::generic_category().message(errno);
+  print_error("talus: error: the results could not be written to stdout{}\n", reason);
+  return code == exit_done ? exit_failure : code;
+}
+
+/// What a command does not catch itself ends here: a task that has no memory left, above all.
+int run_guarded(const CommandRun& run, CommandLine line) {
+  try {
+    return run(line);
+  } catch (const std::exception& error) {
+    print_error("talus: error: {}\n", error.what());
+    return exit_failure;
+  }
+}
+
 }  // namespace
 
 }  // namespace talus
@@ -70,6 +106,11 @@ int main(int argc, char** argv) {
   // After a write that failed (a full disk) the library's clean-up at exit crashes, and would turn exit code
   // 1 into a signal; every file is closed where it is written.
   H5dont_atexit();
+  occupy_closed_streams();
+  // Who reads stdout or stderr may go before a simulation ends: then writing fails, and nothing else.
+  std::signal(SIGPIPE, SIG_IGN);
+  // The same for files beyond a limit: else the system ends a run that says "running" for ever.
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
   app.set_version_flag("--version", "talus " + io::version());
   app.require_subcommand(1);
@@ -85,9 +126,9 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? exit_done : exit_bad_input;
+    return with_results_written(app.exit(error) == 0 ? exit_done : exit_bad_input);
   }
   for (const AddedCommand& command : added)
-    if (*command.app) return command.run({argc, argv});
+    if (*command.app) return with_results_written(run_guarded(command.run, {argc, argv}));
   return exit_done;
 }

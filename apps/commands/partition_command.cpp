@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/pictures/picture.hpp"
@@ -123,18 +124,18 @@ Frame frame_of(const Bodies& bodies) {
 
 void print_table(const io::Scene& scene, std::size_t grains, const ContactPairs& contacts,
                  std::span<const Cut> cuts) {
-  fmt::print("{}: {} grains, {} contacts ({} at walls; gap below {:.4g} m), {} subdomains\n\n", scene.name,
-             grains, contacts.grains.size() + contacts.walls.size(), contacts.walls.size(), contacts.alert,
-             cuts.front().partition.subdomains);
+  print_out("{}: {} grains, {} contacts ({} at walls; gap below {:.4g} m), {} subdomains\n\n", scene.name,
+            grains, contacts.grains.size() + contacts.walls.size(), contacts.walls.size(), contacts.alert,
+            cuts.front().partition.subdomains);
   std::vector<std::string_view> names;
   std::vector<LoadTable> tables;
   for (const Cut& cut : cuts) {
     names.push_back(name_of(cut.kind));
     tables.push_back(cut.load);
   }
-  fmt::print("{}", load_text(names, tables));
+  print_out("{}", load_text(names, tables));
   for (const Cut& cut : cuts)
-    if (cut.kind == PartitionKind::automatic) fmt::print("\nauto is {}\n", name_of(cut.partition.kind));
+    if (cut.kind == PartitionKind::automatic) print_out("\nauto is {}\n", name_of(cut.partition.kind));
 }
 
 /// Whether `name` is one that write_files gives to a file.
@@ -177,7 +178,7 @@ int partition_command(const PartitionCommandOptions& options) {
     check_boxes(scene.setup.decomposition, options.subdomains, kinds);
     lock.emplace(io::prepare_output_directory(directory, options.force, is_partition_name));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   try {
@@ -185,7 +186,7 @@ int partition_command(const PartitionCommandOptions& options) {
     const ContactPairs contacts = find_contacts(scene, bodies, threads);
     const PartitionPoints points = candidate_points(bodies.x, contacts.grains, contacts.walls);
     if (points.x.empty())
-      fmt::print(stderr, "talus: warning: no grain touches another: there are no contacts to share out\n");
+      print_error("talus: warning: no grain touches another: there are no contacts to share out\n");
     std::vector<Cut> cuts;
     PartitionOptions cutting = partition_options(scene.setup.decomposition, options.subdomains);
     for (const PartitionKind kind : kinds) {
@@ -194,9 +195,9 @@ int partition_command(const PartitionCommandOptions& options) {
     }
     print_table(scene, bodies.size(), contacts, cuts);
     write_files(directory, scene, bodies, cuts);
-    fmt::print(stderr, "talus: .vtp and .svg files in {}\n", directory);
+    print_error("talus: .vtp and .svg files in {}\n", directory);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
   return exit_done;

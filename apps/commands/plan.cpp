@@ -7,6 +7,7 @@
 
 #include "apps/commands/plan_measure.hpp"
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "io/scene/scene.hpp"
 #include "runtime/step/simulation.hpp"
@@ -16,7 +17,7 @@ namespace talus {
 namespace {
 
 void line(const char* what, bool in, const std::string& why) {
-  fmt::print("  {:<24}{:<5}{}\n", what, in ? "in" : "out", why);
+  print_out("  {:<24}{:<5}{}\n", what, in ? "in" : "out", why);
 }
 
 /// What contacts do that most scenes do not ask for.
@@ -101,15 +102,14 @@ void print_costs(const Simulation& simulation) {
       (state.single.velocity.capacity() + state.single.last_v.capacity()) * sizeof(SingleVelocity) +
       state.x_then.capacity() * sizeof(Vec3) + state.reach_then.capacity() * 8);
   const double of_contacts = static_cast<double>(memory_used(state)) - of_bodies;
-  fmt::print("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(),
-             state.candidates.size(), simulation.report().contacts, state.chunks.size(),
-             state.chunks.colours);
-  fmt::print("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.3g} MB in all\n",
-             of_bodies / bodies, of_contacts / candidates, of_contacts / contacts,
-             static_cast<double>(memory_used(state)) / 1e6);
-  fmt::print("  {} tasks per sweep ({:.4f} per contact), {} tasks per step outside the sweeps\n",
-             state.chunks.size(), static_cast<double>(state.chunks.size()) / contacts,
-             simulation.step_graph().size() - 1);
+  print_out("\n  {} grains, {} candidates, {} contacts in {} chunks of {} colours\n", state.bodies.size(),
+            state.candidates.size(), simulation.report().contacts, state.chunks.size(), state.chunks.colours);
+  print_out("  {:.0f} bytes per grain, {:.0f} bytes per candidate ({:.0f} per contact), {:.3g} MB in all\n",
+            of_bodies / bodies, of_contacts / candidates, of_contacts / contacts,
+            static_cast<double>(memory_used(state)) / 1e6);
+  print_out("  {} tasks per sweep ({:.4f} per contact), {} tasks per step outside the sweeps\n",
+            state.chunks.size(), static_cast<double>(state.chunks.size()) / contacts,
+            simulation.step_graph().size() - 1);
 }
 
 }  // namespace
@@ -123,7 +123,7 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
     io::place_walls(scene, sample);
     append(sample, bodies);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   try {
@@ -139,8 +139,8 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
             if (wall.name == name) wall.load = load;
       setup.stages = {scene.setup.stages[k]};
       Simulation simulation(setup, bodies, executor);
-      fmt::print("{}stage '{}', {} thread{}\n", k == 0 ? "" : "\n", scene.setup.stages[k].name, threads,
-                 threads == 1 ? "" : "s");
+      print_out("{}stage '{}', {} thread{}\n", k == 0 ? "" : "\n", scene.setup.stages[k].name, threads,
+                threads == 1 ? "" : "s");
       if (!simulation.finished()) simulation.step();
       print_needs(simulation, scene, threads);
       print_costs(simulation);
@@ -148,7 +148,7 @@ int plan_command(const PlanOptions& options, const graph::Communicator& ranks) {
     constexpr int repeats = 3;
     if (options.measure) print_savings(measure_savings(scene, threads, repeats, ranks), threads, repeats);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
   return exit_done;

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "apps/shared/median.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/simulation.hpp"
@@ -202,20 +203,20 @@ std::vector<MeasuredSaving> measure_savings(const io::Scene& scene, int threads,
 }
 
 void print_savings(const std::vector<MeasuredSaving>& savings, int threads, int repeats) {
-  fmt::print(
+  print_out(
       "\nmeasured here: plain sweeps over the first step, {} thread{}, fastest stretch of {} x {} sweeps\n",
       threads, threads == 1 ? "" : "s", repeats, sweeps_measured);
-  fmt::print("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "", "in the", "ns a", "contact", "",
-             "bytes a", "contact", "");
-  fmt::print("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "part", "scene", "with", "without",
-             "saved", "with", "without", "saved");
+  print_out("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "", "in the", "ns a", "contact", "",
+            "bytes a", "contact", "");
+  print_out("  {:<26}{:<7}{:>10}{:>10}{:>9}   {:>9}{:>10}{:>9}\n", "part", "scene", "with", "without",
+            "saved", "with", "without", "saved");
   const auto saved = [](double with, double without) {
     return with > 0 ? fmt::format("{:.0f} %", 100 * (with - without) / with) : std::string("-");
   };
   for (const MeasuredSaving& s : savings)
-    fmt::print("  {:<26}{:<7}{:>10.1f}{:>10.1f}{:>9}   {:>9.0f}{:>10.0f}{:>9}\n", s.part,
-               s.in_scene ? "in" : "out", s.with_ns, s.without_ns, saved(s.with_ns, s.without_ns),
-               s.with_bytes, s.without_bytes, saved(s.with_bytes, s.without_bytes));
+    print_out("  {:<26}{:<7}{:>10.1f}{:>10.1f}{:>9}   {:>9.0f}{:>10.0f}{:>9}\n", s.part,
+              s.in_scene ? "in" : "out", s.with_ns, s.without_ns, saved(s.with_ns, s.without_ns),
+              s.with_bytes, s.without_bytes, saved(s.with_bytes, s.without_bytes));
 }
 
 }  // namespace talus

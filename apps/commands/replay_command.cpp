@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "io/files/detail/with_unit.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/trace/smpi_platform.hpp"
@@ -19,7 +20,7 @@ namespace talus {
 namespace {
 
 void print(const char* name, const std::string& value, const char* label = "") {
-  fmt::print("{:<28} {}{}{}\n", name, value, *label ? "   " : "", label);
+  print_out("{:<28} {}{}{}\n", name, value, *label ? "   " : "", label);
 }
 
 std::string seconds(double ns) {
@@ -42,8 +43,8 @@ void write_platform(const std::string& file, const std::string& platform, const 
     io::write_whole(file + ".hosts", io::smpi_hosts(machine));
     hosts = fmt::format("-hostfile {}.hosts ", file);
   }
-  fmt::print("\nthe machine for SMPI: smpirun -np {} {}-platform {} build/smpi/talus run SCENE ...\n",
-             machine.ranks, hosts, file);
+  print_out("\nthe machine for SMPI: smpirun -np {} {}-platform {} build/smpi/talus run SCENE ...\n",
+            machine.ranks, hosts, file);
 }
 
 /// Plays what was recorded on the machine `there`, prints, and returns what would have been.
@@ -64,9 +65,9 @@ trace::Trace report(const ReplayOptions& options, const trace::Timeline& timelin
   const trace::Summary summary = trace::analyse(played.trace);
   const double recorded_time = recorded_makespan(recorded);
 
-  fmt::print("{}: {} ranks x {} threads, {} steps, {} tasks\n", options.file, recorded.ranks,
-             recorded.threads, timeline.steps().size(), played.tasks);
-  fmt::print(
+  print_out("{}: {} ranks x {} threads, {} steps, {} tasks\n", options.file, recorded.ranks, recorded.threads,
+            timeline.steps().size(), played.tasks);
+  print_out(
       "machine: {} ranks x {} threads, map {}, schedule {}, latency {}, bandwidth {}, overhead {}, {} ranks "
       "a node\n",
       machine.ranks, machine.threads, name_of(machine.map), name_of(machine.schedule),
@@ -90,7 +91,7 @@ trace::Trace report(const ReplayOptions& options, const trace::Timeline& timelin
                     seconds(played.makespan * *options.steps / static_cast<double>(timeline.steps().size())),
                     *options.steps),
         "predicted");
-  fmt::print("\n{}", trace::describe(summary));
+  print_out("\n{}", trace::describe(summary));
   return std::move(played.trace);
 }
 
@@ -128,14 +129,14 @@ int replay_command(ReplayOptions options) {
     const trace::Timeline timeline(recorded);
     played = report(options, timeline, there, machine);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   try {
     if (!options.smpi_platform.empty()) write_platform(options.smpi_platform, platform, machine);
     if (!options.out.empty()) io::write_trace(options.out, played);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
   return exit_done;

@@ -20,6 +20,7 @@
 #include "apps/commands/run_steps.hpp"
 #include "apps/commands/step_list.hpp"
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/scene_warnings.hpp"
 #include "apps/shared/state_sample.hpp"
@@ -124,9 +125,9 @@ void make_sample(const RunOptions& options, const Terminal& terminal, Prepared& 
   run.warnings = scene_warnings(run.scene, run.sample);
   for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);
   if (!options.dry_run) return;
-  fmt::print("{}", io::resolved_scene(run.scene));
-  fmt::print(stderr, "talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n", options.scene,
-             contents(run.scene, run.sample.size()));
+  print_out("{}", io::resolved_scene(run.scene));
+  print_error("talus: {}: {}; the scene is sound, nothing was written (--dry-run)\n", options.scene,
+              contents(run.scene, run.sample.size()));
 }
 
 /// Collective: false when any rank refuses, which has been said.

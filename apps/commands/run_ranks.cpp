@@ -8,6 +8,8 @@
 #include <sstream>
 #include <vector>
 
+#include "apps/shared/print.hpp"
+
 namespace talus {
 
 void share_walls(Setup& setup, const graph::Communicator& ranks) {
@@ -35,7 +37,7 @@ bool any_refused(const std::string& why, const graph::Communicator& ranks) {
     const std::size_t space = refusal.find(' ');
     const std::string rank = refusal.substr(0, space), sentence = refusal.substr(space + 1);
     if (!said.insert(sentence).second) continue;
-    fmt::print(stderr, "talus: error: {}{}\n", rank == "0" ? "" : "rank " + rank + ": ", sentence);
+    print_error("talus: error: {}{}\n", rank == "0" ? "" : "rank " + rank + ": ", sentence);
     if (rank == "0") break;
   }
   return !all.empty();

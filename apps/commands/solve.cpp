@@ -13,6 +13,7 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/patience.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/solve_table.hpp"
 #include "io/fclib/fclib.hpp"
 #include "io/files/error.hpp"
@@ -113,7 +114,7 @@ void print_line(const SolveRow& row) {
       {"error", row.error},     {"scaled_error", row.scaled_error}, {"iterations", row.iterations},
       {"seconds", row.seconds}, {"converged", row.converged}};
   // A file name need not be UTF-8; replace what is not instead of losing the answer.
-  fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  print_out("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   std::fflush(stdout);
 }
 
@@ -127,7 +128,7 @@ int solve(const SolveOptions& options, const Plan& plan) {
     try {
       problem = io::read_fclib_problem(file.path);
     } catch (const io::FileError& error) {
-      fmt::print(stderr, "talus solve: {}\n", error.what());
+      print_error("talus solve: {}\n", error.what());
       if (!plan.table) return exit_bad_input;
       unreadable = true;
       continue;
@@ -145,13 +146,13 @@ int solve(const SolveOptions& options, const Plan& plan) {
       if (!options.out.empty())
         io::write_fclib_solution(file.path, options.out, io::fclib_solution(problem, solved.r));
       if (solved.failed_contacts > 0)
-        fmt::print(stderr,
-                   "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
-                   file.path.string(), solved.failed_contacts);
+        print_error(
+            "{}: the law of {} contacts has no solution (their block of W is not positive definite)\n",
+            file.path.string(), solved.failed_contacts);
       rows.push_back(std::move(solved.row));
     }
   }
-  if (plan.table) fmt::print("{}", solve_table(rows));
+  if (plan.table) print_out("{}", solve_table(rows));
   std::fflush(stdout);
   if (!options.csv.empty()) io::write_whole(options.csv.string(), solve_csv(rows));
   if (!options.profile.empty()) io::write_whole(options.profile.string(), performance_profile(rows));
@@ -166,15 +167,15 @@ int solve_command(const SolveOptions& options) {
   try {
     plan = plan_of(options);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus solve: {}\n", error.what());
+    print_error("talus solve: {}\n", error.what());
     return exit_bad_input;
   }
   try {
     return solve(options, plan);
   } catch (const io::FileError& error) {
-    fmt::print(stderr, "talus solve: {}\n", error.what());
+    print_error("talus solve: {}\n", error.what());
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus solve: {}: {}\n", options.path.string(), error.what());
+    print_error("talus solve: {}: {}\n", options.path.string(), error.what());
   }
   return exit_failure;
 }

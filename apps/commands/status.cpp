@@ -15,6 +15,7 @@
 #include <string>
 
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
@@ -104,7 +105,7 @@ void print(const ordered_json& status) {
   text += status.contains("checkpoint")
               ? fmt::format("last checkpoint: {}\n", status["checkpoint"].get<std::string>())
               : "no checkpoint\n";
-  fmt::print("{}", text);
+  print_out("{}", text);
 }
 
 }  // namespace
@@ -113,12 +114,12 @@ int status_command(const StatusOptions& options) {
   const std::filesystem::path directory = options.directory;
   if (!std::filesystem::exists(directory / "run.json") &&
       !std::filesystem::exists(directory / "status.json")) {
-    fmt::print(stderr, "talus: error: {}: no run was begun there\n", options.directory);
+    print_error("talus: error: {}: no run was begun there\n", options.directory);
     return exit_bad_input;
   }
   const ordered_json status = status_of(directory);
   if (options.json)
-    fmt::print("{}\n", status.dump(2, ' ', false, ordered_json::error_handler_t::replace));
+    print_out("{}\n", status.dump(2, ' ', false, ordered_json::error_handler_t::replace));
   else
     print(status);
   return exit_done;

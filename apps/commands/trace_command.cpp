@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/pictures/picture_gantt.hpp"
 #include "io/trace/trace_export.hpp"
@@ -20,9 +21,9 @@ namespace talus {
 int trace_show_command(const TraceShowOptions& options) {
   try {
     const trace::Trace trace = io::read_trace(options.file);
-    fmt::print("{}\n{}", options.file, trace::describe(trace::analyse(trace)));
+    print_out("{}\n{}", options.file, trace::describe(trace::analyse(trace)));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   return exit_done;
@@ -63,16 +64,16 @@ int trace_export_command(const TraceExportOptions& options) {
               : options.format == "paje"   ? io::to_paje(trace, window)
                                            : io::draw_gantt(timeline, window);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   try {
     io::write_whole(out, content);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
-  fmt::print(stderr, "talus: {} written\n", out);
+  print_error("talus: {} written\n", out);
   return exit_done;
 }
 

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <string>
 
 namespace talus {
 
@@ -25,7 +26,8 @@ class Patience {
     const Clock::time_point now = Clock::now();
     if (now < due_) return;
     due_ = now + between_;
-    fmt::print(stream_, "talus: {}\n", line());
+    const std::string text = fmt::format("talus: {}\n", line());
+    std::fwrite(text.data(), 1, text.size(), stream_);  // fmt::print would throw where a log is full
     std::fflush(stream_);
   }
 

@@ -1,6 +1,7 @@
 #include "apps/shared/sample_builder.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -26,12 +27,27 @@ std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<
   return lattice(radii, sites);
 }
 
+/// Throws SceneError when this process cannot hold the grains that it is to make.
+void demand_memory(const io::Scene& scene, double grains) {
+  // What a grain takes while it is deposited, and all in all with its contacts (docs/performance.md).
+  constexpr double bytes_made = 100, bytes_run = 1160;
+  const double there =
+      static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  if (grains * bytes_made > there)
+    throw io::SceneError(
+        scene.source_file, 0, "sample",
+        fmt::format("{:.3g} grains take about {:.3g} GB to make and {:.3g} GB to run; this "
+                    "machine has {:.3g} GB. Ask for fewer",
+                    grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
+}
+
 Sample make_sample(const io::Scene& scene) {
   const io::SampleSpec& spec = scene.sample;
   if (spec.kind == io::SampleSpec::Kind::bodies)
     return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
   if (spec.kind == io::SampleSpec::Kind::state) return read_state(scene).sample;
 
+  demand_memory(scene, static_cast<double>(spec.grains()));
   Sample sample;
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;
@@ -57,12 +73,11 @@ void check(const io::Scene& scene, const Sample& sample) {
       throw io::SceneError(file, 0, "",
                            fmt::format("body {}: {}", static_cast<std::int64_t>(sample.id_of(k)), what));
     };
-    const double m = mass(sample, k), mobility = 2.5 / m;
-    if (!(mobility > 0) || !std::isfinite(mobility))
+    if (const double m = mass(sample, k); !mass_is_sound(m))
       refuse(fmt::format(
-          "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg; mass and 1/mass must be "
-          "positive and finite",
-          sample.radius[k], sample.density_of(k), m));
+          "a radius of {} m with a density of {} kg/m^3 makes a mass of {} kg, which must lie in {} to {}; "
+          "give lengths in m and densities in kg/m^3",
+          sample.radius[k], sample.density_of(k), m, least_mass, most_mass));
     if (!sample.velocity.empty() &&
         !std::ranges::all_of(sample.velocity[k], [](double v) { return std::isfinite(v); }))
       refuse("radius times angular velocity is not finite");

@@ -1,15 +1,14 @@
 #pragma once
 
-#include <fmt/format.h>
-
-#include <cstdio>
 #include <string>
+
+#include "apps/shared/print.hpp"
 
 namespace talus {
 
 /// Progress of a study: a line on stderr.
 inline void say(const std::string& line) {
-  fmt::print(stderr, "talus: {}\n", line);
+  print_error("talus: {}\n", line);
 }
 
 }  // namespace talus

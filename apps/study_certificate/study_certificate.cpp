@@ -12,6 +12,7 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
 #include "apps/shared/say.hpp"
 #include "apps/study_certificate/calibration.hpp"
@@ -159,12 +160,12 @@ std::string summary_of(const Progress& progress, std::size_t scenes) {
 int conclude(const Progress& progress, std::size_t scenes, const std::string& directory, bool by_family) {
   const std::vector<CalibrationRow> rows = calibrate(progress.steps);
   const std::string summary = summary_of(progress, scenes);
-  fmt::print("{}\n{}\n", calibration_table(rows, by_family), summary);
+  print_out("{}\n{}\n", calibration_table(rows, by_family), summary);
   write_certificate_report(directory, progress.steps, rows, summary);
   say(fmt::format("calibration.csv, steps.csv, pictures and report.html in {}", directory));
   const std::vector<std::string> broken = broken_bounds(rows, {});
-  for (const std::string& sentence : broken) fmt::print(stderr, "talus: error: {}\n", sentence);
-  for (const std::string& sentence : progress.ended) fmt::print(stderr, "talus: error: {}\n", sentence);
+  for (const std::string& sentence : broken) print_error("talus: error: {}\n", sentence);
+  for (const std::string& sentence : progress.ended) print_error("talus: error: {}\n", sentence);
   return broken.empty() && progress.ended.empty() ? exit_done : exit_failure;
 }
 
@@ -217,7 +218,7 @@ int study_certificate_command(const StudyCertificateOptions& options) {
     if (!options.scenes_from.empty()) given = given_scenes(options);
     lock.emplace(io::prepare_output_directory(directory, options.force, is_certificate_name));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   try {
@@ -232,7 +233,7 @@ int study_certificate_command(const StudyCertificateOptions& options) {
       audit_made(options, directory, progress);
     return conclude(progress, scenes, directory, files);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
 }

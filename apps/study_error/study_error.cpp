@@ -13,6 +13,7 @@
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/report_page.hpp"
 #include "apps/shared/say.hpp"
 #include "apps/study_error/study_problem.hpp"
@@ -96,7 +97,7 @@ int study_scene(const StudyErrorOptions& options) {
     if (directory.empty()) directory = "out/error-" + scene.name;
     lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   const io::Scene& scene = samples.front().scene;
@@ -125,8 +126,8 @@ int study_scene(const StudyErrorOptions& options) {
   say(fmt::format("tables, pictures and report.html in {}", directory));
   const bool no_step = options.only != "run" && problem.truth.empty();
   if (no_step || (options.only != "step" && runs.rows.empty())) {
-    fmt::print(stderr, "talus: error: {} of {} could not be solved in any of these ways\n",
-               no_step ? "the step" : "whole runs", scene.name);
+    print_error("talus: error: {} of {} could not be solved in any of these ways\n",
+                no_step ? "the step" : "whole runs", scene.name);
     return exit_failure;
   }
   const bool sound =
@@ -146,7 +147,7 @@ int study_folder(const StudyErrorOptions& options) {
     check_profile(folder, methods);
     lock.emplace(io::prepare_output_directory(directory, options.force, is_study_error_name));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   const std::string introduction =
@@ -247,7 +248,7 @@ int study_error_command(const StudyErrorOptions& options) {
   try {
     return fs::is_directory(options.subject) ? study_folder(options) : study_scene(options);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
 }

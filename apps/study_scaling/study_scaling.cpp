@@ -17,6 +17,7 @@
 #include "apps/shared/child_process.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/options.hpp"
+#include "apps/shared/print.hpp"
 #include "apps/shared/say.hpp"
 #include "apps/study_scaling/scaling_plan.hpp"
 #include "apps/study_scaling/scaling_report.hpp"
@@ -150,7 +151,7 @@ int run_study(const StudyScalingOptions& options) {
   try {
     prepare(options, prepared);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   const ScalingPlan& plan = prepared.plan;
@@ -170,8 +171,8 @@ int run_study(const StudyScalingOptions& options) {
   say_subject(options, prepared);
   report.commands = scaling_commands(study.launcher(), plan.strong, plan.repeat);
   write_scaling_report(directory, report);  // what a cluster needs is there at once
-  fmt::print("{}", report.commands.lines);
-  fmt::print("\n{}", report.commands.slurm);
+  print_out("{}", report.commands.lines);
+  print_out("\n{}", report.commands.slurm);
   prepared.sample = {};
   study.strong(subject);
   if (prepared.no_weak.empty())
@@ -262,7 +263,7 @@ int study_scaling_command(const StudyScalingOptions& options) {
   try {
     return run_study(options);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
 }

@@ -11,6 +11,7 @@
 
 #include "apps/shared/exit_codes.hpp"
 
+#include "apps/shared/print.hpp"
 #include "io/files/csv_table.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/pictures/detail/svg.hpp"
@@ -170,40 +171,40 @@ int stability_command(const StabilityOptions& options) {
   try {
     scenes = chosen(options.only);
     if (options.list) {
-      for (const Scene& scene : scenes) fmt::print("{:<33} {}\n", scene.name, scene.asks);
+      for (const Scene& scene : scenes) print_out("{:<33} {}\n", scene.name, scene.asks);
       return exit_done;
     }
     lock.emplace(io::prepare_output_directory(directory, options.force, is_stability_name));
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_bad_input;
   }
   try {
     const auto start = std::chrono::steady_clock::now();
     std::vector<Row> rows;
-    fmt::print("{}", table_head());
+    print_out("{}", table_head());
     for (const Scene& scene : scenes) {
       std::fflush(nullptr);  // the process of the scene must not print again what waits here
       const Outcome outcome = run_scene_apart(scene, options.settings);
       rows.push_back({scene, outcome, as_expected(scene, outcome, options.settings)});
-      fmt::print("{}", table_line(rows.back()));
+      print_out("{}", table_line(rows.back()));
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const std::string summary = summary_of(rows, seconds);
-    fmt::print("\n{}\n", summary);
+    print_out("\n{}\n", summary);
     io::write_whole(directory + "/stability.csv", csv(rows));
     io::write_whole(directory + "/stability.html", html(rows, summary));
-    fmt::print(stderr, "talus: stability.csv and stability.html in {}\n", directory);
+    print_error("talus: stability.csv and stability.html in {}\n", directory);
     int code = exit_done;
     for (const Row& row : rows)
       if (!row.as_expected) {
-        fmt::print(stderr, "talus: error: scene '{}' is {}: {}\n", row.scene.name,
-                   name_of(row.outcome.verdict), note(row));
+        print_error("talus: error: scene '{}' is {}: {}\n", row.scene.name, name_of(row.outcome.verdict),
+                    note(row));
         code = exit_failure;
       }
     return code;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "talus: error: {}\n", error.what());
+    print_error("talus: error: {}\n", error.what());
     return exit_failure;
   }
 }

@@ -139,18 +139,7 @@ void write_bytes(Place place, const std::string& name, const std::string& text) 
                           std::bit_cast<std::int64_t>(checksum(bytes_of(text))));
 }
 
-/// Throws FileError when a dataset claims more than the file holds: its length is one of the bits that may
-/// have flipped.
-void demand_room(Place place, const std::string& name, std::size_t columns, std::size_t row_bytes) {
-  const Hdf5Object dataset =
-      hold(H5Dopen2(place.group, name.c_str(), H5P_DEFAULT), H5Dclose, place.file, "opening " + name);
-  const std::size_t rows = detail::row_count(dataset.id(), columns, place.file, name);
-  if (rows > std::filesystem::file_size(place.file) / row_bytes)
-    throw FileError(place.file, name + " is longer than the file: it is damaged");
-}
-
 std::string read_bytes(Place place, const std::string& name) {
-  demand_room(place, name, 1, 1);
   const std::vector<std::uint8_t> bytes = detail::read_array<std::uint8_t>(place, name);
   std::string text(bytes.begin(), bytes.end());
   const Hdf5Object dataset =
@@ -304,7 +293,6 @@ Hdf5Object open_checkpoint(const std::string& path) {
 }
 
 std::vector<std::array<std::int64_t, 4>> read_rows(Place place) {
-  demand_room(place, "rows", 4, sizeof(std::array<std::int64_t, 4>));
   const auto rows = detail::read_array<std::array<std::int64_t, 4>>(place, "rows", H5T_NATIVE_INT64, 4);
   if (fmt::format("{}", checksum(std::as_bytes(std::span(rows)))) != read_bytes(place, "rows_sum"))
     throw FileError(place.file, "rows has another checksum: the file is damaged");
@@ -314,14 +302,15 @@ std::vector<std::array<std::int64_t, 4>> read_rows(Place place) {
 /// Rows [begin, begin + count) of a dataset.
 template <class Row>
 std::vector<Row> read_rows_of(Place place, const std::string& name, std::size_t begin, std::size_t count) {
-  std::vector<Row> rows(count);
-  if (count == 0) return rows;
+  if (count == 0) return {};
   using Number = typename Element<Row>::Number;
   constexpr std::size_t columns = Element<Row>::columns;
   const Hdf5Object dataset =
       hold(H5Dopen2(place.group, name.c_str(), H5P_DEFAULT), H5Dclose, place.file, "opening " + name);
-  if (detail::row_count(dataset.id(), columns, place.file, name) < begin + count)
+  const std::size_t stored = detail::row_count(dataset.id(), columns, place.file, name);
+  if (begin > stored || count > stored - begin)
     throw FileError(place.file, name + " is shorter than it says: the file is damaged");
+  std::vector<Row> rows(count);
   const hsize_t start[2] = {begin, 0}, extent[2] = {count, columns};
   const int dimensions = columns == 1 ? 1 : 2;
   const std::string action = "reading " + name;

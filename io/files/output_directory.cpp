@@ -46,6 +46,21 @@ std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_
   return found;
 }
 
+/// A symbolic link in the place of a file or folder that a run may write, relative; empty: there is none.
+/// Files are opened by name, so that results would go where it leads.
+fs::path link_in_the_way(const fs::path& directory, IsOutputName is_ours) {
+  for (const char* folder : {"fields", "traces"})
+    if (fs::is_symlink(directory / folder)) return folder;
+  for (const fs::path& folder : {directory, directory / "fields", directory / "traces"}) {
+    if (!fs::is_directory(folder)) continue;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      const fs::path relative = entry.path().lexically_relative(directory);
+      if (entry.is_symlink() && is_ours(whole_name(relative.generic_string()))) return relative;
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 bool is_numbered_name(std::string_view name, std::string_view prefix, std::string_view suffix) {
@@ -84,6 +99,10 @@ DirectoryLock prepare_output_directory(const fs::path& directory, bool force, Is
             "exists and is not empty; choose another directory with --out, or replace the results in "
             "it with --force");
       }
+      if (const fs::path link = link_in_the_way(directory, is_ours); !link.empty())
+        throw FileError((directory / link).string(),
+                        "is a symbolic link, and results would be written where it leads; remove it, or "
+                        "choose another directory with --out");
       for (const fs::path& relative : former_outputs(directory, is_ours)) fs::remove(directory / relative);
     }
     // Asked before the run starts, not an hour later when the first file is written.

@@ -36,9 +36,9 @@ class DirectoryLock {
 /// Makes `directory` (and its parents) ready for a run, which holds the lock until it has written all.
 /// An existing directory with anything in it is refused without `force`, and nothing is touched. With `force`
 /// only files that `is_ours` knows are removed, and their unfinished forms, which end in ".part"; whatever
-/// else the user keeps there stays, and so do symbolic links and what is behind them. Throws FileError naming
-/// the directory when it is refused, when another run is writing there, or when it is not a directory, or
-/// cannot be created or written to.
+/// else the user keeps there stays. Throws FileError naming the link when a symbolic link stands in the place
+/// of results, which would be written where it leads; naming the directory when it is refused, when another
+/// run is writing there, or when it is not a directory, or cannot be created or written to.
 [[nodiscard]] DirectoryLock prepare_output_directory(const std::filesystem::path& directory, bool force,
                                                      IsOutputName is_ours);
 

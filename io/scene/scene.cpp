@@ -314,6 +314,16 @@ Scene parse_scene(const std::string& text, const std::string& file,
 }
 
 Scene load_scene(const std::string& path, const std::vector<std::string>& overrides) {
+  // Reading from a pipe would wait for whoever writes into it, on every rank.
+  std::error_code missing;
+  const bool there = std::filesystem::exists(path, missing);
+  if (there && !std::filesystem::is_directory(path) && !std::filesystem::is_regular_file(path))
+    throw SceneError(path, 0, "", "is a pipe or a device, not a file; write the scene to a file");
+  constexpr std::uintmax_t most_bytes = 1 << 24;
+  if (std::filesystem::is_regular_file(path, missing) && std::filesystem::file_size(path) > most_bytes)
+    throw SceneError(path, 0, "",
+                     fmt::format("has {} bytes, more than the {} of any scene; grains go to a CSV file",
+                                 std::filesystem::file_size(path), most_bytes));
   std::ifstream in(path);
   if (!in) throw SceneError(path, 0, "", "cannot open the scene: " + std::generic_category().message(errno));
   if (std::filesystem::is_directory(path)) throw SceneError(path, 0, "", "is a directory, not a scene file");

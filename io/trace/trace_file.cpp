@@ -38,8 +38,7 @@ using detail::write_machine;
 using detail::write_plan;
 using detail::write_tasks;
 
-constexpr std::int64_t format_version = 4;         // 3: ranks of another tree, walls told with publish
-constexpr std::size_t largest_machine = 1U << 24;  ///< tracks; more is a damaged number
+constexpr std::int64_t format_version = 5;  // 4: texts of variable length
 
 /// A trace file, opened and known to be one.
 Hdf5Object open_trace(const std::string& path) {
@@ -70,7 +69,8 @@ void turn_clock(const RankClock& clock, trace::Track& track) {
 trace::Trace read_head(Place root) {
   trace::Trace trace;
   const std::int64_t ranks = read_integer(root, "ranks"), threads = read_integer(root, "threads");
-  const auto most = static_cast<std::int64_t>(largest_machine);
+  // Each track has some bytes in the file: more tracks than bytes is a damaged number.
+  const auto most = static_cast<std::int64_t>(std::min<std::uintmax_t>(fs::file_size(root.file), 1U << 24));
   if (ranks < 1 || threads < 1 || ranks > most || threads > most || ranks * threads > most)
     damaged_trace(root.file, fmt::format("{} ranks with {} threads", ranks, threads));
   trace.ranks = static_cast<int>(ranks);

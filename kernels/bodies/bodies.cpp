@@ -110,7 +110,7 @@ void validate(const Bodies& bodies) {
     if (!bodies.x[k].allFinite()) refuse("its centre is not finite");
     if (!(bodies.radius[k] > 0) || !std::isfinite(bodies.radius[k]))
       refuse("its radius must be positive and finite, not " + std::to_string(bodies.radius[k]) + " m");
-    if (!(v.inv_mass > 0) || !std::isfinite(v.inv_mass)) refuse("its mass must be positive and finite");
+    if (!mass_is_sound(1 / v.inv_mass)) refuse("its mass must lie in 1e-60 to 1e60 kg");
     if (!(v.spin_mobility >= 0) || !std::isfinite(v.spin_mobility))
       refuse("its R^2/I must be finite and not negative");
     for (int c = 0; c < 3; ++c)

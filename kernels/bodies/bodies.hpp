@@ -46,6 +46,13 @@ struct Bodies {
   }
 };
 
+/// Range of masses [kg] that bodies and walls of finite mass may have. Solvers multiply masses with ratios of
+/// masses, and square what they get: within these limits no such number overflows or vanishes.
+inline constexpr double least_mass = 1e-60, most_mass = 1e60;
+inline bool mass_is_sound(double mass) {
+  return mass >= least_mass && mass <= most_mass;
+}
+
 /// Mass of a solid sphere [kg].
 double sphere_mass(double radius, double density);
 

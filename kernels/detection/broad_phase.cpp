@@ -34,20 +34,42 @@ std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, dou
   return key;
 }
 
-/// Medians of the coordinates, of a thousand bodies at most: a few that fly far away must not push all others
-/// into one clamped cell.
-Vec3 middle_of(std::span<const Vec3> x) {
+/// Where bodies are.
+struct Spread {
+  Vec3 middle;       ///< medians of the coordinates [m]
+  double reach = 0;  ///< within so much of it along every axis are nearly all [m]
+};
+
+/// Of a thousand bodies at most. A few that fly far away must not push all others into one clamped cell, so
+/// that the farthest twentieth at either end does not count.
+Spread spread_of(std::span<const Vec3> x) {
   const std::size_t stride = (x.size() + 999) / 1000;
   std::vector<double> values;
-  Vec3 result;
+  Spread result;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     values.clear();
     for (std::size_t k = 0; k < x.size(); k += stride) values.push_back(x[k][axis]);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    result[axis] = *middle;
+    const auto smallest_but = [&](std::size_t place) {
+      const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
+      std::nth_element(values.begin(), at, values.end());
+      return *at;
+    };
+    const std::size_t ends = values.size() / 20;
+    const double middle = smallest_but(values.size() / 2);
+    result.middle[axis] = middle;
+    const double low = smallest_but(ends), high = smallest_but(values.size() - 1 - ends);
+    result.reach = std::max({result.reach, middle - low, high - middle});
   }
   return result;
+}
+
+/// How much wider cells of `size` [m] have to be for the bodies to have places of their own: far cells are
+/// clamped into one, in which a line of grains would be compared pair by pair.
+double widening(const Spread& spread, double size) {
+  constexpr double margin = 1.25;  // a twentieth was left out at either end
+  constexpr double cells = cells_an_axis - 2 - middle_cell;
+  const double factor = margin * spread.reach / (cells * size);
+  return factor > 1 && std::isfinite(factor) ? factor : 1;
 }
 
 struct Entry {
@@ -143,7 +165,8 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   const std::size_t n = x.size();
   if (n == 0) return grid;
   double smallest = reach[0], largest = reach[0];
-  grid.origin = middle_of(x);
+  const Spread spread = spread_of(x);
+  grid.origin = spread.middle;
   for (double r : reach) {
     smallest = std::min(smallest, r);
     largest = std::max(largest, r);
@@ -156,6 +179,8 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   for (int level = 0; level < levels; ++level)
     grid.cell_size[static_cast<std::size_t>(level)] =
         2 * largest * std::exp2(level - levels + 1) * rounding_margin;
+  if (const double factor = widening(spread, grid.cell_size[0]); factor > 1)
+    for (double& size : grid.cell_size) size *= factor;
 
   std::vector<Entry> entries(n);
   for (std::size_t k = 0; k < n; ++k) {

@@ -30,7 +30,8 @@ struct CellGrid {
     double reach;  ///< [m]
   };
   Vec3 origin = Vec3::Zero();     ///< amid the centres [m]
-  std::vector<double> cell_size;  ///< per level [m], doubling
+  std::vector<double> cell_size;  ///< per level [m], doubling; wider where bodies lie so far apart that
+                                  ///< cells could not be counted
   std::vector<Slot> slots;        ///< all bodies, sorted by (level, cell, slot)
   std::vector<Member> members;    ///< likewise
   std::vector<Cell> cells;        ///< non-empty cells in order of key; sorted like `slots`

@@ -107,6 +107,15 @@ void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
     result.balance_defect = Vec3(sum[sample], sum[sample + 1], sum[sample + 2]).norm() / sum[scale];
 }
 
+/// Whether all weights are numbers that sums and products of a few of them stay numbers of. Collective.
+bool weights_are_sound(const BodyParts& parts, std::span<const std::vector<double>> rho) {
+  constexpr double least = 1e-250, most = 1e250;
+  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+    row[0] = static_cast<double>(
+        std::ranges::count_if(rho[p], [](double weight) { return !(weight >= least && weight <= most); }));
+  })[0] == 0;
+}
+
 bool any_contact(const BodyParts& parts) {
   return parts.total(1, [&](std::size_t p, std::span<double> row) {
     row[0] = static_cast<double>(parts[p].contacts.size());
@@ -128,6 +137,7 @@ BodyAdmmResult solve_admm(std::span<BodyProblem> problems, const PartLink& link,
   std::vector<std::vector<double>> rho(parts.size());
   for (std::size_t p = 0; p < parts.size(); ++p)
     for (const ContactEquation& c : parts[p].contacts) rho[p].push_back(kappa * effective_mass(parts[p], c));
+  if (!weights_are_sound(parts, rho)) return result;
   std::vector<PartState> states(rho.begin(), rho.end());
   BodySolver linear(parts, rho);
 

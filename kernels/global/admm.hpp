@@ -41,7 +41,9 @@ struct BodyAdmmResult {
 ///   r' <- P_Kmu(r - rho x),   y <- x + (r' - r)/rho
 ///
 /// with the De Saxce shift of the last y (Boyd et al. 2011; Acary et al. 2018 for the shift). rho = kappa /
-/// W_nn: see `estimate_stiffness`. The same bits and the same result wherever the parts lie.
+/// W_nn: see `estimate_stiffness`. Masses so large, so small or so far apart that some rho has no place in a
+/// double leave the impulses as they are, not converged. The same bits and the same result wherever the parts
+/// lie.
 BodyAdmmResult solve_admm(std::span<BodyProblem> parts, const PartLink& link,
                           const BodyAdmmSettings& settings);
 /// The whole problem in one part.

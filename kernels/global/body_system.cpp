@@ -71,6 +71,7 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     : problem_(problem),
       begin_(problem.bodies.size() + 1, 0),
       middle_(problem.bodies.size(), 0),
+      touched_(problem.bodies.size(), 0),
       diagonal_(problem.bodies.size(), Matrix6::Zero()),
       inverse_(problem.bodies.size(), Matrix6::Zero()) {
   inertia_.reserve(problem.bodies.size());
@@ -86,6 +87,8 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
     const std::int32_t kind = c.levers != nullptr ? static_cast<std::int32_t>(2 * k)
                               : c.mu == 0         ? slick
                                                   : rough;
+    touched_[at(c.first)] = 1;
+    if (c.second >= 0) touched_[at(c.second)] = 1;
     links_.push_back({c.normal, rho[k], c.first, c.second, kind});
     if (c.levers != nullptr)
       add_block_of_blocks(c, rho[k]);
@@ -118,7 +121,8 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
 
 void BodySystem::close() {
   for (std::size_t b = 0; b < size(); ++b) {
-    touched_.push_back(diagonal_[b].trace() > 0 ? 1 : 0);
+    // The trace tells of contacts in other parts. It is 0 or NaN where weights are too small or no numbers.
+    if (diagonal_[b].trace() != 0) touched_[b] = 1;
     if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];
     Matrix6 inverse = Matrix6::Zero();

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "kernels/bodies/bodies.hpp"
+
 namespace talus {
 
 namespace {
@@ -22,8 +24,8 @@ void validate_load(const std::string& where, const Wall& wall, const WallLoad& l
           fmt::format("{}: pressure must be finite [Pa], got {}", where, load.pressure));
   require(std::isfinite(load.force), fmt::format("{}: force must be finite [N], got {}", where, load.force));
   if (!load.pushed()) return;
-  require(load.mass > 0 && std::isfinite(load.mass),
-          fmt::format("{}: a pushed wall needs a finite mass > 0 [kg], got {}", where, load.mass));
+  require(mass_is_sound(load.mass), fmt::format("{}: a pushed wall needs a mass of {} to {} kg, got {}",
+                                                where, least_mass, most_mass, load.mass));
 }
 }  // namespace
 

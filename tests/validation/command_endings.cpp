@@ -139,7 +139,7 @@ TEST_F(Ending, OnAFullDiskIsInRunJson) {
       test::run(folder_.path(),
                 "run scene.toml --out results --threads 1 --set 'stage.press.end={steps=300}' --set "
                 "output.stage_frames=false --set output.fields=false --set output.pictures=false",
-                "trap '' XFSZ; ulimit -f 32;");
+                "ulimit -f 32;");
   EXPECT_EQ(outcome.code, 1) << outcome.messages;
   EXPECT_NE(outcome.messages.find("too large"), std::string::npos) << outcome.messages;
   EXPECT_EQ(summary(at("results")).at("status"), "failed") << outcome.messages;

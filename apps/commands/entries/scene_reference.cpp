@@ -1,8 +1,7 @@
 #include "apps/commands/commands.hpp"
 
-#include <cstdio>
-
 #include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
 #include "io/scene/scene.hpp"
 
 namespace talus {
@@ -12,7 +11,7 @@ namespace {
 struct NoOptions {};
 
 int print_reference(NoOptions&, CommandLine) {
-  std::fputs(io::scene_reference().c_str(), stdout);
+  print_out("{}", io::scene_reference());
   return exit_done;
 }
 

@@ -1,5 +1,7 @@
 #include "io/files/detail/hdf5.hpp"
 
+#include <algorithm>
+
 #include "io/files/error.hpp"
 
 namespace talus::io::detail {
@@ -41,9 +43,10 @@ void demand(long long status, const std::string& file, const std::string& action
   if (status < 0) fail(file, action);
 }
 
-Hdf5Object text_type(const std::string& file) {
+Hdf5Object text_type(const std::string& file, std::size_t bytes) {
   Hdf5Object type = hold(H5Tcopy(H5T_C_S1), H5Tclose, file, "preparing a text");
-  demand(H5Tset_size(type.id(), H5T_VARIABLE), file, "preparing a text");
+  demand(H5Tset_size(type.id(), std::max<std::size_t>(bytes, 1)), file, "preparing a text");
+  demand(H5Tset_strpad(type.id(), H5T_STR_NULLPAD), file, "preparing a text");
   demand(H5Tset_cset(type.id(), H5T_CSET_UTF8), file, "preparing a text");
   return type;
 }

@@ -5,6 +5,7 @@
 
 #include <hdf5.h>
 
+#include <cstddef>
 #include <string>
 #include <utility>
 
@@ -53,7 +54,8 @@ Hdf5Object hold(hid_t id, Hdf5Object::Close close, const std::string& file, cons
 /// Throws the same error when `status` is negative.
 void demand(long long status, const std::string& file, const std::string& action);
 
-/// The type of texts of any length in UTF-8.
-Hdf5Object text_type(const std::string& file);
+/// The type of texts in UTF-8 of up to `bytes`, the rest zeros. Never of variable length: those stand in
+/// heaps of the file, in which a flipped bit can make HDF5 go in circles.
+Hdf5Object text_type(const std::string& file, std::size_t bytes);
 
 }  // namespace talus::io::detail

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
+
 #include "io/files/error.hpp"
 
 namespace talus::io::detail {
@@ -11,6 +14,25 @@ Hdf5Object open_file(const std::string& path) {
   demand(H5Pset_file_locking(access.id(), false, true), path, "preparing HDF5");
   return hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening as HDF5");
 }
+
+namespace {
+
+/// Throws FileError when a dataset says that it has more elements than are stored in the file. One that is
+/// compressed is packed by deflate, at most 1032 to 1.
+void demand_stored(hid_t dataset, hsize_t elements, const std::string& path, const std::string& name) {
+  const std::string action = "reading the shape of " + name;
+  const Hdf5Object type = hold(H5Dget_type(dataset), H5Tclose, path, action);
+  const Hdf5Object creation = hold(H5Dget_create_plist(dataset), H5Pclose, path, action);
+  const double packed = H5Pget_nfilters(creation.id()) > 0 ? 1032 : 1;
+  const auto stored = static_cast<double>(H5Dget_storage_size(dataset));
+  const double claimed = static_cast<double>(elements) * static_cast<double>(H5Tget_size(type.id()));
+  if (stored > static_cast<double>(std::filesystem::file_size(path)) || claimed > packed * stored)
+    throw FileError(
+        path, fmt::format("{} says that it has {} entries, more than the file holds: it is damaged", name,
+                          elements));
+}
+
+}  // namespace
 
 std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& path, const std::string& name) {
   const Hdf5Object space = hold(H5Dget_space(dataset), H5Sclose, path, "reading the shape of " + name);
@@ -24,41 +46,75 @@ std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& pat
   if (extent[1] != columns) {
     throw FileError(path, fmt::format("{} has {} numbers a row, expected {}", name, extent[1], columns));
   }
+  demand_stored(dataset, extent[0] * columns, path, name);
   return extent[0];
 }
 
-std::vector<std::string> take_texts(std::vector<char*>& texts) {
-  std::vector<std::string> values;
-  for (char* text : texts) {
-    values.emplace_back(text == nullptr ? "" : text);
-    H5free_memory(text);
-  }
-  return values;
+namespace {
+
+/// The type that texts of the file's type `stored` are read as. Throws FileError for those of variable
+/// length.
+Hdf5Object readable_text_type(hid_t stored, const std::string& path, const std::string& name) {
+  const bool fixed = H5Tget_class(stored) == H5T_STRING && H5Tis_variable_str(stored) == 0;
+  if (!fixed)
+    throw FileError(path, name + " holds no texts of fixed length: the file is damaged or older than Talus " +
+                              "writes; make it again");
+  return text_type(path, H5Tget_size(stored));
 }
+
+/// Of a text that zeros fill up.
+std::string trimmed(const char* text, std::size_t bytes) {
+  return {text, std::find(text, text + bytes, '\0')};
+}
+
+}  // namespace
 
 std::vector<std::string> read_names(Place place, const std::string& name) {
   const Hdf5Object dataset =
       hold(H5Dopen2(place.group, name.c_str(), H5P_DEFAULT), H5Dclose, place.file, "opening " + name);
-  const Hdf5Object type = text_type(place.file);
-  std::vector<char*> texts(row_count(dataset.id(), 1, place.file, name));
-  if (!texts.empty()) {
+  const Hdf5Object stored = hold(H5Dget_type(dataset.id()), H5Tclose, place.file, "reading " + name);
+  const Hdf5Object type = readable_text_type(stored.id(), place.file, name);
+  const std::size_t bytes = H5Tget_size(type.id());
+  std::vector<std::string> names(row_count(dataset.id(), 1, place.file, name));
+  std::string texts(names.size() * bytes, '\0');
+  if (!names.empty())
     demand(H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), place.file,
            "reading " + name);
-  }
-  return take_texts(texts);
+  for (std::size_t k = 0; k < names.size(); ++k) names[k] = trimmed(texts.data() + k * bytes, bytes);
+  return names;
 }
 
-void read_attribute(Place place, const char* name, hid_t type, void* value) {
+namespace {
+
+Hdf5Object open_attribute(Place place, const char* name) {
   const std::string action = fmt::format("reading attribute '{}'", name);
-  const Hdf5Object attribute = hold(H5Aopen(place.group, name, H5P_DEFAULT), H5Aclose, place.file, action);
-  demand(H5Aread(attribute.id(), type, value), place.file, action);
+  Hdf5Object attribute = hold(H5Aopen(place.group, name, H5P_DEFAULT), H5Aclose, place.file, action);
+  const Hdf5Object space = hold(H5Aget_space(attribute.id()), H5Sclose, place.file, action);
+  if (H5Sget_simple_extent_npoints(space.id()) != 1)
+    throw FileError(place.file, fmt::format("attribute '{}' is not one value", name));
+  return attribute;
+}
+
+}  // namespace
+
+void read_attribute(Place place, const char* name, hid_t type, void* value) {
+  const Hdf5Object attribute = open_attribute(place, name);
+  demand(H5Aread(attribute.id(), type, value), place.file, fmt::format("reading attribute '{}'", name));
 }
 
 std::string read_text(Place place, const char* name) {
   if (H5Aexists(place.group, name) <= 0) return "";
-  std::vector<char*> text(1);
-  read_attribute(place, name, text_type(place.file).id(), text.data());
-  return take_texts(text).front();
+  const Hdf5Object attribute = open_attribute(place, name);
+  const std::string action = fmt::format("reading attribute '{}'", name);
+  const Hdf5Object stored = hold(H5Aget_type(attribute.id()), H5Tclose, place.file, action);
+  const Hdf5Object type = readable_text_type(stored.id(), place.file, fmt::format("attribute '{}'", name));
+  // Attributes stand in the header of their object, whose blocks are no longer than this.
+  constexpr std::size_t longest = 1 << 16;
+  const std::size_t bytes = H5Tget_size(type.id());
+  if (bytes > longest) throw FileError(place.file, fmt::format("attribute '{}' has {} bytes", name, bytes));
+  std::string text(bytes, '\0');
+  demand(H5Aread(attribute.id(), type.id(), text.data()), place.file, action);
+  return trimmed(text.data(), bytes);
 }
 
 std::int64_t read_integer(Place place, const char* name) {

@@ -14,10 +14,8 @@ namespace talus::io::detail {
 /// Opens a file for reading, without locking it.
 Hdf5Object open_file(const std::string& path);
 
-/// Texts copied out of HDF5's memory.
-std::vector<std::string> take_texts(std::vector<char*>& texts);
-
-/// Length of the first dimension, after a check of the others: `columns` numbers a row.
+/// Length of the first dimension, after a check of the others: `columns` numbers a row. Throws FileError also
+/// where the rows are more than the file can hold, so that a damaged length does not become memory.
 std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& path, const std::string& name);
 
 /// Entries of the dataset `name`, `columns` elements of `memory_type` each, as many as T holds.
@@ -36,7 +34,9 @@ std::vector<T> read_array(Place place, const std::string& name) {
   return read_array<T>(place, name, element_types(static_cast<const T*>(nullptr)).memory, 1);
 }
 
+/// Texts of fixed length, as write_names writes them; others are refused.
 std::vector<std::string> read_names(Place place, const std::string& name);
+/// Of one value.
 void read_attribute(Place place, const char* name, hid_t type, void* value);
 /// The text of an attribute; "" when there is none of that name.
 std::string read_text(Place place, const char* name);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "io/files/error.hpp"
 
 namespace talus::io::detail {
@@ -51,9 +53,8 @@ void write_attribute(Place place, const char* name, double value) {
 }
 
 void write_attribute(Place place, const char* name, const std::string& value) {
-  const Hdf5Object type = text_type(place.file);
-  const char* text = value.c_str();
-  write_attribute(place, name, type.id(), type.id(), &text);
+  const Hdf5Object type = text_type(place.file, value.size());
+  write_attribute(place, name, type.id(), type.id(), value.c_str());
 }
 
 void write_array(Place place, const char* name, const char* units, const NumberTable& table) {
@@ -77,14 +78,16 @@ Hdf5Object create_group(Place place, const std::string& name) {
 
 void write_names(Place place, const char* name, const std::vector<std::string>& values) {
   const std::string action = fmt::format("writing '{}'", name);
-  const Hdf5Object type = text_type(place.file);
+  std::size_t longest = 1;
+  for (const std::string& value : values) longest = std::max(longest, value.size());
+  const Hdf5Object type = text_type(place.file, longest);
   const hsize_t extent = values.size();
   const Hdf5Object space = hold(H5Screate_simple(1, &extent, nullptr), H5Sclose, place.file, action);
   const Hdf5Object dataset =
       hold(H5Dcreate2(place.group, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
            H5Dclose, place.file, action);
-  std::vector<const char*> texts;
-  for (const std::string& value : values) texts.push_back(value.c_str());
+  std::string texts;
+  for (const std::string& value : values) texts.append(value).append(longest - value.size(), '\0');
   if (!texts.empty()) {
     demand(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), place.file,
            action);

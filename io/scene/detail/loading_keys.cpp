@@ -39,7 +39,7 @@ std::vector<Key<WallLoad>> load_keys() {
       key<WallLoad>("force", "N", not_negative, "Pushes into the grains.", &WallLoad::force)
           .only("drive = force", driven_by(WallDrive::force))
           .need(),
-      key<WallLoad>("mass", "kg", positive, "Inertia of the wall.", &WallLoad::mass)
+      key<WallLoad>("mass", "kg", sound_mass, "Inertia of the wall.", &WallLoad::mass)
           .or_auto(0, "a tenth of the mass of the grains")
           .only("drive = pressure or force", [](const WallLoad& load) { return load.pushed(); }),
   };

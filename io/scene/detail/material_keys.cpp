@@ -72,7 +72,7 @@ Section<PairSpec> pair_section(const char* header, const char* meaning, const st
 
 Section<Scene> material_keys() {
   std::vector<Key<Scene>> keys = {
-      key<Scene>("density", "kg/m³", positive, "Mass per volume of a grain.", &Scene::density).need()};
+      key<Scene>("density", "kg/m³", sound_density, "Mass per volume of a grain.", &Scene::density).need()};
   for (Key<Scene>& law_key : law_keys<Scene>()) keys.push_back(std::move(law_key));
   return {"[material]",
           "What the grains are made of, where all are of one material. What is said of contacts holds in the "
@@ -86,7 +86,8 @@ Section<MaterialSpec> named_material_keys() {
       "Several materials, instead of `[material]`: samples and walls name theirs, and a `[[pair]]` says "
       "what holds between two.",
       {key<MaterialSpec>("name", "", any, "Name, unique among the materials.", &MaterialSpec::name).need(),
-       key<MaterialSpec>("density", "kg/m³", positive, "Mass per volume of a grain.", &MaterialSpec::density)
+       key<MaterialSpec>("density", "kg/m³", sound_density, "Mass per volume of a grain.",
+                         &MaterialSpec::density)
            .need()}};
 }
 

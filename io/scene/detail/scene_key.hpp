@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "kernels/bodies/types.hpp"
+#include "kernels/bodies/bodies.hpp"
 #include "kernels/registry.hpp"
 
 namespace talus::io::detail {
@@ -32,6 +32,9 @@ struct Range {
 };
 inline constexpr Range any{};
 inline constexpr Range positive{.low = 0, .without_low = true};
+inline constexpr Range sound_mass{.low = least_mass, .high = most_mass};
+inline constexpr Range sound_density{.low = 1e-30,
+                                     .high = 1e30};  ///< a grain of any radius has a mass of its own limits
 inline constexpr Range not_negative{.low = 0};
 inline constexpr Range at_least_one{.low = 1};
 inline constexpr Range countable{.low = 1, .high = 2147483647};  ///< what fits a Slot or an int

@@ -146,10 +146,35 @@ void apply(toml::table& root, const Override& override) {
   }
 }
 
+/// Throws SceneError for a key of many parts: TOML's reader goes down one call a part, and the stack ends.
+void demand_short_keys(const std::string& text, const std::string& file) {
+  constexpr int most_parts = 64;
+  int line = 1, dots = 0;
+  char quote = 0;
+  for (const char c : text) {
+    if (c == '\n') {
+      ++line;
+      quote = 0;
+    } else if (quote != 0) {
+      if (c == quote && quote != '#') quote = 0;
+      continue;
+    } else if (c == '"' || c == '\'' || c == '#') {
+      quote = c;
+    }
+    if (c == '.' && ++dots >= most_parts)
+      throw SceneError(file, line, "",
+                       fmt::format("a key of more than {} parts; scenes have none", most_parts));
+    if (c == '\n' || c == '=' || c == ',' || c == '{' || c == '}') dots = 0;
+  }
+}
+
 }  // namespace
 
 toml::table parse_document(const std::string& text, const std::string& file,
                            const std::vector<std::string>& overrides) {
+  demand_short_keys(text, file);
+  for (const std::string& override : overrides)
+    demand_short_keys(override, "--set " + override.substr(0, 40));
   try {
     toml::table root = toml::parse(text, file);
     name_stages(root);

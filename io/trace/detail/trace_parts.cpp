@@ -138,6 +138,7 @@ std::vector<trace::Task> read_tasks(Place place) {
   const auto group = read_array<std::int32_t>(place, "group");
   const auto offset = read_array<std::uint32_t>(place, "offset"),
              before = read_array<std::uint32_t>(place, "predecessor");
+  if (offset.empty()) damaged_trace(place.file, "/tasks/offset");
   for (std::size_t length : {kind.size(), team.size(), group.size(), offset.size() - 1})
     demand_length(place.file, "/tasks", length, names.size());
   if (!std::is_sorted(offset.begin(), offset.end()) || offset.back() != before.size())

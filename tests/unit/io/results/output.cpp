@@ -66,12 +66,25 @@ TEST(OutputDirectory, ForceRemovesOurFilesAndNeverTheUsers) {
   for (const auto& name : users) touch(scratch / name);
   fs::create_directories(scratch / "walls.csv");  // a directory of that name is not ours
   touch(scratch / "elsewhere");
-  fs::create_symlink(scratch / "elsewhere", scratch / "triaxial.csv");
+  fs::create_symlink(scratch / "elsewhere", scratch / "notes-of-others.txt");
   prepare(scratch.path(), true);
   for (const auto& name : ours) EXPECT_FALSE(fs::exists(scratch / name)) << name;
   for (const auto& name : users) EXPECT_TRUE(fs::exists(scratch / name)) << name;
   EXPECT_TRUE(fs::is_directory(scratch / "walls.csv"));
-  EXPECT_TRUE(fs::is_symlink(scratch / "triaxial.csv"));
+  EXPECT_TRUE(fs::is_symlink(scratch / "notes-of-others.txt"));
+}
+
+TEST(OutputDirectory, ForceWritesThroughNoLink) {
+  for (const std::string name : {"triaxial.csv", "results.h5", "run.log", "status.json", "steps.csv.part"}) {
+    const ScratchDirectory scratch, elsewhere;
+    touch(elsewhere / "file");
+    touch(scratch / "steps.csv");
+    fs::create_symlink(elsewhere / "file", scratch / name);
+    const std::string message = message_of<FileError>([&] { prepare(scratch.path(), true); });
+    EXPECT_NE(message.find(name + ": is a symbolic link"), std::string::npos) << message;
+    EXPECT_TRUE(fs::exists(scratch / "steps.csv")) << "nothing was touched";
+    EXPECT_EQ(content_of(elsewhere / "file"), "mine");
+  }
 }
 
 TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
@@ -79,8 +92,9 @@ TEST(OutputDirectory, ForceSparesWhatIsBehindALinkedFolder) {
   touch(elsewhere / "grains_000000.vtp");
   touch(scratch / "steps.csv");
   fs::create_directory_symlink(elsewhere.path(), scratch / "fields");
-  prepare(scratch.path(), true);
-  EXPECT_FALSE(fs::exists(scratch / "steps.csv"));
+  const std::string message = message_of<FileError>([&] { prepare(scratch.path(), true); });
+  EXPECT_NE(message.find("fields: is a symbolic link"), std::string::npos) << message;
+  EXPECT_TRUE(fs::exists(scratch / "steps.csv"));
   EXPECT_TRUE(fs::is_symlink(scratch / "fields"));
   EXPECT_EQ(content_of(elsewhere / "grains_000000.vtp"), "mine");
 }
@@ -178,7 +192,8 @@ TEST(Csv, StepsRowHoldsEveryValueInItsColumn) {
                12.5, 0.75, {},   13.5, 14.5, 15.5, 19.5, 16,  17.5, 18.5, true};
   std::string row;
   append_steps_row(row, r);
-  EXPECT_EQ(row, "1,2.5,0.25,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,16,17.5,18.5,1\n");
+  EXPECT_EQ(row,
+            "1,2.5,0.25,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,16,17.5,18.5,1\n");
   r.overlapping = {7, -2};
   row.clear();
   append_steps_row(row, r);

@@ -43,11 +43,23 @@ TEST(SceneErrors, NumbersOutOfRangeAreNamedWithTheirLimit) {
   expect_refused(replaced(scene_with(), "radius = 0.01", "radius = -0.01"), "radius = -", "sample.radius",
                  "must be > 0");
   expect_refused(replaced(scene_with(), "density = 2600", "density = 0"), "density", "material.density",
-                 "must be > 0");
+                 "must be 1e-30 to 1e+30");
+  expect_refused(replaced(scene_with(), "density = 2600", "density = 1e-300"), "density", "material.density",
+                 "must be 1e-30 to 1e+30, got 1e-300");
+  expect_line_refused("#wall", "mass = 1e154", "wall[0].mass", "must be 1e-60 to 1e+60, got 1e+154");
   expect_refused(replaced(scene_with(), "steps = 5", "steps = 0"), "steps = 0", "stage[0].end.steps",
                  "must be >= 1");
   expect_refused(scene_with("#tail", "[solver]\ntolerance = -1"), "tolerance", "solver.tolerance",
                  "must be > 0");
+}
+
+// TOML's reader overflowed the stack.
+TEST(SceneErrors, KeysOfManyPartsAreRefused) {
+  std::string key = "a";
+  for (int part = 0; part < 200000; ++part) key += ".a";
+  for (const std::string& line : {key + " = 1", "[" + key + "]", "b = {" + key + " = 1}"})
+    expect_line_refused("#tail", line, "", "a key of more than 64 parts");
+  EXPECT_NE(std::string(error_of(scene_with(), {key + "=1"}).what()).find("parts"), std::string::npos);
 }
 
 TEST(SceneErrors, MissingKeysAreNamed) {

@@ -135,6 +135,21 @@ TEST(BroadPhase, BodiesThatFlewABillionMetresAwayDisturbNobody) {
   EXPECT_GE(build_cells(bodies.x, reach).cells.size(), before.cells.size() / 2);
 }
 
+// Cells that do not count so far are clamped into one, and detection was quadratic.
+TEST(BroadPhase, GrainsOnALongLineShareNoCellWithMany) {
+  for (const Vec3& along : {Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(1, 1, 1)}) {
+    std::vector<Vec3> x;
+    for (int k = 0; k < 20000; ++k) x.emplace_back(200.0 * k * along);
+    for (int k = 0; k < 20; ++k) x.emplace_back(1e12 * along + Vec3(1.5 * k, 0, 0));  // and a few far away
+    const std::vector<double> reach(x.size(), 1);
+    const CellGrid grid = build_cells(x, reach);
+    for (const CellGrid::Cell& cell : grid.cells) ASSERT_LE(cell.end - cell.begin, 300);
+    std::vector<std::vector<GrainPair>> pairs(1);
+    find_pairs(grid, 0, grid.cells.size(), pairs[0]);
+    EXPECT_EQ(sort_pairs(pairs, x.size()).size(), 19U);
+  }
+}
+
 // Cells are counted up to 2^18 on each side; what is farther away stands in the outermost of them. A chain on
 // each axis goes from within to there, with smaller bodies beside it.
 TEST(BroadPhase, FindsPairsAcrossTheOutermostCells) {
