@@ -8,6 +8,7 @@
 
 #include "io/fclib/fclib.hpp"
 #include "io/results/version.hpp"
+#include "runtime/step/global_solver.hpp"
 
 namespace talus {
 
@@ -28,23 +29,14 @@ void check_dump(const Setup& setup, int ranks) {
                     setup.decomposition.subdomains));
 }
 
-StepProblem contact_problem(const Simulation& simulation) {
-  const StepState& state = simulation.state();
-  std::vector<Vec3> wall_free;
-  for (const WallState& wall : state.wall_states) wall_free.push_back(wall.free_velocity);
-  return assemble_step({.bodies = state.bodies.velocity,
-                        .free = state.free,
-                        .contacts = state.contacts,
-                        .chunks = state.chunks,
-                        .walls = state.walls,
-                        .wall_free = wall_free,
-                        .laws = simulation.parameters().laws});
+ContactMatrix matrix_of_step(const Simulation& simulation) {
+  return matrix_of(contact_problem(simulation.state(), simulation.parameters()));
 }
 
 std::function<void()> fclib_dump(const Simulation& simulation, const std::filesystem::path& directory) {
   const StepParameters& parameters = simulation.parameters();
   const StepReport& report = simulation.report();
-  StepProblem step = contact_problem(simulation);
+  ContactMatrix step = matrix_of_step(simulation);
   io::FclibInfo info{
       .title =
           fmt::format("Talus {}, stage {}, step {}", io::version(), simulation.stage().name, report.step),

@@ -104,28 +104,19 @@ CheckpointKeeper::CheckpointKeeper(const io::CheckpointSpec& spec, std::filesyst
       directory_(std::move(directory)),
       texts_(std::move(texts)),
       ranks_(ranks),
-      terminal_(terminal) {}
+      terminal_(terminal),
+      due_(spec.every_steps, spec.every) {}
 
 void CheckpointKeeper::start(const RunMemory& memory) {
-  passed_ = memory.saves_passed;
+  due_ = DueClock(spec_.every_steps, spec_.every, memory.saves_passed);
   saved_ = memory.saved;
   last_save_ = graph::seconds_now();
-}
-
-bool CheckpointKeeper::due(const StepReport& report) {
-  bool now = spec_.every_steps && report.step % *spec_.every_steps == 0;
-  if (spec_.every) {
-    const auto passed = static_cast<std::int64_t>(report.time / *spec_.every * (1 + 1e-12));
-    now |= passed > passed_;
-    passed_ = passed;
-  }
-  return now;
 }
 
 bool CheckpointKeeper::save(const Simulation& simulation, RunMemory memory) {
   const double began = graph::seconds_now();
   const std::int64_t step = simulation.report().step;
-  memory.saves_passed = passed_;
+  memory.saves_passed = due_.passed();
   memory.saved = saved_ + 1;
   const bool archived = spec_.archive_every && memory.saved % *spec_.archive_every == 0;
   bool written = true;

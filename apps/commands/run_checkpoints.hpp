@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/commands/due_clock.hpp"
 #include "apps/commands/run_messages.hpp"
 #include "apps/shared/terminal.hpp"
 #include "io/checkpoint/checkpoint_file.hpp"
@@ -21,7 +22,7 @@ namespace talus {
 /// What outlives a stop besides the simulation. Rank 0's counts.
 struct RunMemory {
   Tally tally;
-  std::int64_t frames_passed = 0;   ///< FrameClock
+  std::int64_t frames_passed = 0;   ///< DueClock of frames
   std::int64_t saves_passed = 0;    ///< the same of checkpoints
   std::int64_t saved = 0;           ///< checkpoints so far, which archive_every counts
   double wall_s = 0;                ///< elapsed [s]
@@ -51,7 +52,7 @@ class CheckpointKeeper {
   /// As of what a checkpoint remembers, or as of a new run; the clock of every_wall begins.
   void start(const RunMemory& memory);
   /// One is due by steps or simulated time: the same on all ranks, to be asked behind every step.
-  bool due(const StepReport& report);
+  bool due(const StepReport& report) { return due_.due(report); }
   /// By this rank's clock.
   bool wall_due(double now) const { return spec_.every_wall > 0 && now - last_save_ >= spec_.every_wall; }
 
@@ -69,7 +70,8 @@ class CheckpointKeeper {
   std::map<std::string, std::string> texts_;
   const graph::Communicator& ranks_;
   const Terminal& terminal_;
-  std::int64_t passed_ = 0, saved_ = 0;
+  DueClock due_;
+  std::int64_t saved_ = 0;
   std::optional<std::int64_t> last_step_;
   double last_save_ = 0, seconds_ = 0;
 };

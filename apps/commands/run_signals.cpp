@@ -37,8 +37,6 @@ void catch_signals() {
   sigaction(SIGHUP, nullptr, &before);
   if (before.sa_handler != SIG_IGN) handle(SIGHUP, ask_to_stop);
   handle(SIGUSR1, ask_to_save);
-  handle(SIGXFSZ, SIG_IGN);
-  handle(SIGPIPE, SIG_IGN);
 }
 
 int stop_signal() {

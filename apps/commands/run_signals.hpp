@@ -7,7 +7,6 @@ namespace talus {
 
 /// From now on SIGTERM, SIGINT, SIGHUP and SIGXCPU ask the run to end behind its step, and the second of them
 /// ends the process at once; SIGUSR1 asks for a checkpoint. SIGHUP that nohup has switched off stays so.
-/// Writing beyond a limit (SIGXFSZ) or to a closed terminal (SIGPIPE) fails where it happens, as an error.
 void catch_signals();
 
 /// The signal that has asked to end, or 0.

@@ -2,12 +2,12 @@
 
 #include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "io/files/output_directory.hpp"
+#include "io/results/run_json.hpp"
 #include "runtime/graph/clock.hpp"
 
 namespace talus {
@@ -16,18 +16,13 @@ namespace {
 
 constexpr double interval = 1;  // [s]
 
-std::string host() {
-  std::array<char, 256> name{};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
-}
-
 double since_1970() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 void write(const std::filesystem::path& path, nlohmann::ordered_json status) {
   status["pid"] = ::getpid();
-  status["host"] = host();
+  status["host"] = io::host_name();
   status["heartbeat"] = since_1970();
   try {
     io::write_whole(path,

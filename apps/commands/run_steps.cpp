@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/commands/due_clock.hpp"
 #include "apps/commands/dump_fclib.hpp"
 #include "apps/commands/recorder_feed.hpp"
 #include "apps/commands/run_checkpoints.hpp"
@@ -31,28 +32,6 @@
 namespace talus {
 
 namespace {
-
-/// When the next frame is due.
-class FrameClock {
- public:
-  FrameClock(const io::OutputSpec& output, std::int64_t passed) : output_(output), passed_(passed) {}
-  std::int64_t passed() const { return passed_; }
-
-  bool due(const StepReport& report) {
-    bool now = false;
-    if (output_.every_steps) now |= report.step % *output_.every_steps == 0;
-    if (output_.every) {
-      const auto passed = static_cast<std::int64_t>(report.time / *output_.every * (1 + 1e-12));
-      now |= passed > passed_;
-      passed_ = passed;
-    }
-    return now;
-  }
-
- private:
-  const io::OutputSpec& output_;
-  std::int64_t passed_;
-};
 
 /// What is asked of a run between two steps, the same on all ranks.
 struct Asked {
@@ -98,7 +77,7 @@ struct Advance {
   io::Recorder& recorder;
   CheckpointKeeper& keeper;
   RunMemory memory;
-  FrameClock frames;
+  DueClock frames;
   WallLimit limit;
   std::optional<StatusFile> status;  ///< rank 0's
 
@@ -272,7 +251,7 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
               recorder,
               keeper,
               memory,
-              FrameClock(scene.output, memory.frames_passed),
+              DueClock(scene.output.every_steps, scene.output.every, memory.frames_passed),
               WallLimit(run.granted ? std::optional(run.began + *run.granted) : std::nullopt),
               {}};
   if (ranks.rank() == 0) all.status.emplace(run.directory);

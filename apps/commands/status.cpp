@@ -1,13 +1,8 @@
 #include "apps/commands/status.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
-#include <unistd.h>
 
-#include <array>
-#include <cerrno>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -19,6 +14,7 @@
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
+#include "io/results/run_json.hpp"
 
 namespace talus {
 
@@ -42,9 +38,7 @@ std::string life_of(const std::filesystem::path& directory, const json& beat) {
   } catch (const io::FileError&) {
     return "alive";
   }
-  std::array<char, 256> host{};
-  ::gethostname(host.data(), host.size() - 1);
-  if (beat.value("host", "") == host.data()) return "dead";
+  if (beat.value("host", "") == io::host_name()) return "dead";
   const double now =
       std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
   return now - beat.value("heartbeat", 0.0) < silence ? "alive" : "silent";
@@ -56,7 +50,10 @@ ordered_json status_of(const std::filesystem::path& directory) {
   ordered_json status;
   std::string state = summary.value("status", "running");
   const bool ended = state != "running";
-  if (!ended && life_of(directory, beat) != "alive") state = life_of(directory, beat);
+  if (!ended) {
+    const std::string life = life_of(directory, beat);
+    if (life != "alive") state = life;
+  }
   status["state"] = state;
   status["step"] = ended ? summary.value("steps", std::int64_t{0}) : beat.value("step", std::int64_t{0});
   status["time"] = ended ? summary.value("time", 0.0) : beat.value("time", 0.0);

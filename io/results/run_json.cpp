@@ -23,11 +23,6 @@ std::string environment(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-std::string host_name() {
-  std::array<char, 256> name{};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
-}
-
 int allowed_cores() {
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -35,6 +30,11 @@ int allowed_cores() {
 }
 
 }  // namespace
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
+}
 
 Provenance collect_provenance() {
   const BuildInfo build = build_info();

@@ -40,6 +40,9 @@ struct Provenance {
   std::vector<Resumption> resumed = {};  ///< in their order
 };
 
+/// Of this machine; "unknown" where the system does not say.
+std::string host_name();
+
 /// What is known of the build and of the machine now. The fields from `threads` on that describe the run,
 /// apart from the environment and the date, are for the caller to fill. Call it before threads are pinned:
 /// they narrow the affinity mask.

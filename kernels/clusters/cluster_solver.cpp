@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "kernels/clusters/cluster_matrix.hpp"
+#include "kernels/clusters/contact_matrix.hpp"
 #include "kernels/delassus/delassus_auto.hpp"
 #include "kernels/global/stiffness.hpp"
 #include "kernels/law/friction_cone.hpp"
@@ -100,7 +100,7 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, double enough, const Clu
     admit(problem, friction, answer);
     return answer;
   }
-  ClusterMatrix matrix = matrix_of(problem);
+  ContactMatrix matrix = matrix_of(problem);
   for (const ClusterThresholds::Turn& turn : thresholds.turns) {
     const DelassusGoal goal{
         .tolerance = turn.residual, .measure = ErrorMeasure::scaled, .max_iterations = turn.most_iterations};

@@ -1,16 +1,13 @@
 #include "kernels/clusters/correction.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
 
-#include "kernels/bodies/index.hpp"
-#include "kernels/global/balance.hpp"
-#include "kernels/global/body_parts.hpp"
-#include "kernels/global/body_solver.hpp"
+#include "kernels/bodies/larger.hpp"
+#include "kernels/clusters/firm_contacts.hpp"
 #include "kernels/global/stiffness.hpp"
 #include "kernels/law/friction_cone.hpp"
 
@@ -120,20 +117,22 @@ double goal_of(double found, double enough, const CorrectionThresholds& threshol
 class Round {
  public:
   Round(const BodyProblem& all, ActiveSet& set, double enough, const CorrectionThresholds& thresholds)
-      : all_(all), set_(set), enough_(enough), thresholds_(thresholds), active_(active_part(all, set)) {
-    for (const ContactEquation& c : active_.problem.contacts)
-      rho_[0].push_back(thresholds.firmness * effective_mass(active_.problem, c));
-  }
+      : all_(all),
+        set_(set),
+        enough_(enough),
+        thresholds_(thresholds),
+        active_(active_part(all, set)),
+        firm_(active_.problem, thresholds.firmness) {}
 
-  /// Improves `motion`; the multipliers go to the set's `change`, what is missed and left to `result`.
-  void solve(PartField& motion, Correction& result) {
-    const PartLink alone;
-    const BodyParts parts({&active_.problem, 1}, alone);
-    BodySolver solver(parts, rho_, 1);
+  /// The motion; the multipliers go to the set's `change`, what is missed and left to `result`.
+  std::vector<Twist> solve(Correction& result) {
+    FirmContacts::Solution solution;
     for (int update = 0; update < thresholds_.most_updates; ++update) {
-      gradients(solver, {force()}, motion, result);
-      if (take_multipliers(motion[0], result)) break;
+      solution = firm_.solve(force());
+      result.left = momentum_of(all_, solution.last);
+      if (take_multipliers(solution.motion, result)) break;
     }
+    return solution.motion;
   }
 
  private:
@@ -145,49 +144,12 @@ class Round {
         add_force(all_.contacts[k], known, force);
     for (std::size_t a = 0; a < active_.origin.size(); ++a) {
       const ContactEquation& c = active_.problem.contacts[a];
-      add_force(c, multiplier(a) + rho_[0][a] * constrained(c, set_.wish(all_, active_.origin[a])), force);
+      add_force(c, multiplier(a) + firm_.rho(a) * constrained(c, set_.wish(all_, active_.origin[a])), force);
     }
-    for (std::size_t b = 0; b < force.size(); ++b) restrict_to_freedoms(all_.bodies[b], force[b]);
     return force;
   }
   Vec3 multiplier(std::size_t a) const {
     return constrained(active_.problem.contacts[a], set_.change[active_.origin[a]]);
-  }
-  bool small(double part, double found) const { return part <= goal_of(found, enough_, thresholds_); }
-
-  /// Until what they leave is small beside what they have found.
-  void gradients(BodySolver& solver, const PartField& force, PartField& motion, Correction& result) {
-    solver.begin(force, motion);
-    std::vector<Twist> then = motion[0];
-    double before = std::numeric_limits<double>::infinity();
-    // One at least: multipliers are rho times what the wishes have not got, and rho is large.
-    int k = 0;
-    for (bool goes = true;;) {
-      const bool looks =
-          !goes || std::has_single_bit(static_cast<unsigned>(k)) || k >= thresholds_.most_linear;
-      if (looks && settled(solver, motion[0], then, before, k, result)) return;
-      if (!goes || k >= thresholds_.most_linear) return;
-      ++k;
-      goes = solver.iterate(motion) > 0;
-    }
-  }
-  bool settled(const BodySolver& solver, const std::vector<Twist>& motion, std::vector<Twist>& then,
-               double& before, int k, Correction& result) const {
-    double found = 0, change = 0, mass = 0, energy = 0;
-    for (std::size_t b = 0; b < motion.size(); ++b) {
-      const BodyUnknown& body = all_.bodies[b];
-      found += body.mass * motion[b].u.norm() + body.spin_mass * motion[b].w.norm();
-      change +=
-          body.mass * (motion[b].u - then[b].u).norm() + body.spin_mass * (motion[b].w - then[b].w).norm();
-      mass += body.mass;
-      energy += dot(solver.residual()[0][b], solver.preconditioned()[0][b]);
-    }
-    result.left = thresholds_.caution * std::sqrt(mass * std::max(0.0, energy));
-    if (k >= thresholds_.few_linear)
-      result.left = std::min(result.left, left_over(change, before, thresholds_.unsettled));
-    if (k > 0) before = change;
-    then = motion;
-    return small(result.left, found);
   }
 
   /// s += rho (w - H^T d). True when the wishes are granted but for what is small.
@@ -199,10 +161,10 @@ class Round {
       const std::size_t k = active_.origin[a];
       const ContactEquation& c = active_.problem.contacts[a];
       const Vec3 rest = constrained(c, set_.wish(all_, k)) - constrained(c, relative_velocity(c, motion));
-      set_.change[k] = multiplier(a) + rho_[0][a] * rest + set_.known(all_, k);
+      set_.change[k] = multiplier(a) + firm_.rho(a) * rest + set_.known(all_, k);
       result.missed += effective_mass(active_.problem, c) * rest.norm();
     }
-    return small(result.missed, momentum_of(all_, motion));
+    return result.missed <= goal_of(momentum_of(all_, motion), enough_, thresholds_);
   }
 
   const BodyProblem& all_;
@@ -210,7 +172,7 @@ class Round {
   double enough_;
   const CorrectionThresholds& thresholds_;
   ActiveProblem active_;
-  std::vector<std::vector<double>> rho_{1};
+  FirmContacts firm_;
 };
 
 double difference(const BodyProblem& problem, const std::vector<Twist>& a, const std::vector<Twist>& b) {
@@ -252,9 +214,9 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
                                     [](const ContactEquation& c) { return c.mu > 0; });
   CorrectionThresholds thresholds = given;
   if (!friction) thresholds.tolerance = given.smooth_tolerance;
-  PartField motion(1, std::vector<Twist>(problem.bodies.size()));
+  std::vector<Twist> motion(problem.bodies.size());
   ActiveSet set = empty_set(problem);
-  const double wrong = see_states(problem, motion[0], set);
+  const double wrong = see_states(problem, motion, set);
   const double apart = mass_ratio(problem);
   if (wrong * apart <= thresholds.certain * enough) return unchanged(problem, wrong * apart);
   if (const double error = thresholds.of_single_contact * wrong;
@@ -262,21 +224,22 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
       error <= thresholds.tolerance * enough)
     return unchanged(problem, error);
   // Rounds that do not settle may carry the motion off: the best one counts.
-  Correction best;
+  Correction best = unchanged(problem, std::numeric_limits<double>::infinity());
+  best.settled = false;
   double least = std::numeric_limits<double>::infinity();
   int rounds = 0;
   double at_first = 0;
   for (int since = 0; rounds < thresholds.most_rounds && since < thresholds.patience; ++since) {
     ++rounds;
     Correction now;
-    const std::vector<Twist> before = motion[0];
-    Round(problem, set, enough, thresholds).solve(motion, now);
+    const std::vector<Twist> before =
+        std::exchange(motion, Round(problem, set, enough, thresholds).solve(now));
     now.impulse = set.change;
-    now.motion = motion[0];
-    now.found = momentum_of(problem, motion[0]);
-    now.open = see_states(problem, motion[0], set);
-    now.moved = difference(problem, motion[0], before);
-    if (rounds == 1) at_first = std::max(wrong, now.found + now.missed + now.left);
+    now.motion = motion;
+    now.found = momentum_of(problem, motion);
+    now.open = see_states(problem, motion, set);
+    now.moved = difference(problem, motion, before);
+    if (rounds == 1) at_first = larger(wrong, now.found + now.missed + now.left);
     if (apart <= thresholds.most_apart && at_first <= thresholds.exact * enough)
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);

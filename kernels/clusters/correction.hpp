@@ -22,9 +22,6 @@ struct CorrectionThresholds {
   /// The same part without friction, in (0, 1): there forces are found too, and redundant contacts whose gaps
   /// hardly differ share them by what little is left.
   double smooth_tolerance = 1e-3;
-  /// Conjugate gradients of a linear system, at most, >= 1. They only mend what rounding leaves of the direct
-  /// solve, and walls of finite mass on single grains.
-  int most_linear = 16;
   /// Impulses that leave less than this part of what need not be known, in (0, 1], are exact: what
   /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
   /// settle.
@@ -38,17 +35,10 @@ struct CorrectionThresholds {
   /// A single contact hides none: its error is at most so many times what the law finds wrong, >= 1. (The
   /// eigenvalues of its W, of spheres and walls, are 1/W_nn and 3.5 times as much.)
   double of_single_contact = 4;
-  /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
-  int few_linear = 8;
-  /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
-  double unsettled = 20;
   /// Rounds, at most, >= 1: before each further one contacts open, close, stick or slide.
   int most_rounds = 12;
   /// Rounds that have not made the error smaller, after which no more follow, >= 1.
   int patience = 3;
-  /// Factor on the gradients' bound, >= 1: they see a preconditioned residual, which is smaller than the
-  /// error.
-  double caution = 3;
 };
 
 /// What would set all contacts right, and how well that is known. Momenta are sum m |u| + (I/R^2) |w|.
@@ -58,7 +48,7 @@ struct Correction {
   double found = 0;           ///< momentum of the motion [N s]
   double missed = 0;          ///< wishes of contacts that the motion does not grant [N s]
   double open = 0;            ///< what the natural map still finds wrong behind the last round [N s]
-  double left = 0;            ///< what the linear solver has left [N s]
+  double left = 0;            ///< what rounding may leave of the linear system [N s]
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
   int rounds = 0;

@@ -31,7 +31,7 @@ void PresentProblem::plan(const graph::Communicator& ranks) {
 
 void PresentProblem::find_clusters() {
   const int most = certificate_.most_direct();
-  if (!std::exchange(clusters_known_, true)) admm_.find_clusters(most);
+  if (!std::exchange(clusters_known_, true)) global_.find_clusters(most);
 }
 
 double PresentProblem::plain_sweeps_needed() {
@@ -41,7 +41,7 @@ double PresentProblem::plain_sweeps_needed() {
     problem.carrying.push_back(certificate_.wall_impulses()[w] != Vec3::Zero() ? state_.walls[w].inv_mass()
                                                                                : -1);
   return stiffness_.sweeps_needed(problem, certificate_.stiff_for(contacts),
-                                  [&] { return admm_.sweeps_needed(); });
+                                  [&] { return global_.sweeps_needed(); });
 }
 
 }  // namespace talus

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "runtime/step/admm.hpp"
 #include "runtime/step/certificate.hpp"
 #include "runtime/step/courses.hpp"
+#include "runtime/step/global_solver.hpp"
 #include "runtime/step/stiffness_memory.hpp"
 
 namespace talus {
@@ -11,14 +11,14 @@ namespace talus {
 class PresentProblem final : public WholeProblem {
  public:
   /// Keeps references.
-  PresentProblem(const StepState& state, Admm& admm, const Courses& courses, const Certificate& certificate)
-      : state_(state), admm_(admm), courses_(courses), certificate_(certificate) {}
+  PresentProblem(const StepState& state, GlobalSolver& global, const Courses& courses,
+                 const Certificate& certificate)
+      : state_(state), global_(global), courses_(courses), certificate_(certificate) {}
 
   /// Collective, where candidates were found anew.
   void plan(const graph::Communicator& ranks);
   /// Of each step.
-  void begin(bool friction) {
-    friction_ = friction;
+  void begin() {
     stiffness_.begin_step();
     clusters_known_ = false;
   }
@@ -27,14 +27,14 @@ class PresentProblem final : public WholeProblem {
   double speed() const override { return speed_of(courses_.now().plan); }
   bool small_clusters() override {
     find_clusters();
-    return admm_.small_clusters();
+    return global_.small_clusters();
   }
   bool large_clusters() override {
     find_clusters();
-    return admm_.large_clusters();
+    return global_.large_clusters();
   }
-  SmallError small_error(double enough) override { return admm_.small_error(enough, farthest_); }
-  double large_error(double enough) override { return admm_.large_error(enough); }
+  SmallError small_error(double enough) override { return global_.small_error(enough, farthest_); }
+  double large_error(double enough) override { return global_.large_error(enough); }
 
   bool grains_alike() const { return stiffness_.grains_alike(); }
   const StiffnessMemory& stiffness() const { return stiffness_; }
@@ -53,11 +53,10 @@ class PresentProblem final : public WholeProblem {
   void find_clusters();
 
   const StepState& state_;
-  Admm& admm_;
+  GlobalSolver& global_;
   const Courses& courses_;
   const Certificate& certificate_;
   StiffnessMemory stiffness_;
-  bool friction_ = false;
   bool clusters_known_ = false;  ///< of this step
   double candidates_ = 0;
   double farthest_ = 0;  ///< largest coordinate of a body [m]

@@ -98,11 +98,11 @@ SolverLoop::SolverLoop(StepState& state, const StepParameters& parameters, const
       ranks_(ranks),
       kernels_(settled(settings.simd, ranks)),
       gluing_(state, decomposition, ranks),
-      admm_(state, parameters, decomposition, gluing_, ranks),
+      global_(state, parameters, decomposition, gluing_, ranks),
       work_(state, parameters, kernels_, schedule_, courses_),
       positions_(state, settings, kernels_, work_),
       certificate_(settings),
-      problem_(state, admm_, courses_, certificate_) {}
+      problem_(state, global_, courses_, certificate_) {}
 
 void SolverLoop::plan() {
   gluing_.plan(parameters_.rotates);
@@ -160,7 +160,7 @@ void SolverLoop::begin() {
   for (const WallState& wall : state_.wall_states)
     scales.wall_pushes.push_back(parameters_.impulse_time() * wall.applied);
   certificate_.begin(std::move(scales));
-  problem_.begin(parameters_.friction);
+  problem_.begin();
   pending_.reset();
   schedule_ = {};
   method_ =
@@ -345,7 +345,7 @@ bool SolverLoop::judge() {
 }
 
 bool SolverLoop::ask_remedy() {
-  corrects_ = method_->corrects() && certificate_.correctable() && admm_.correction_helps();
+  corrects_ = method_->corrects() && certificate_.correctable() && global_.correction_helps();
   if (corrects_) return true;
   StepView view(certificate_, problem_);
   return method_->calls_admm(view);
@@ -356,11 +356,11 @@ void SolverLoop::call_remedy(int epoch) {
   if (ranks_.ranks() > 1) work_.restore();
   gluing_.forget_jumps();
   if (corrects_) {
-    admm_.correct();
+    global_.correct();
     certificate_.corrected();
   } else {
     certificate_.solved_by_admm(
-        admm_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
+        global_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
   }
   // What the last sweeps changed says nothing of where the impulses have gone.
   begin_course(method_->after_admm(courses_.now().plan), schedule_.checked());

@@ -7,12 +7,12 @@
 
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "runtime/graph/loop_plan.hpp"
-#include "runtime/step/admm.hpp"
 #include "runtime/step/certificate.hpp"
 #include "runtime/step/chunk_work.hpp"
 #include "runtime/step/courses.hpp"
 #include "runtime/step/epoch_schedule.hpp"
 #include "runtime/step/fetch_subdomain.hpp"
+#include "runtime/step/global_solver.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/methods/method.hpp"
 #include "runtime/step/position_correction.hpp"
@@ -59,7 +59,7 @@ class SolverLoop {
     return schedule_.measures_at(epoch) && schedule_.planned() >= settings_.max_iterations;
   }
   /// Of threads that wait for decide(): ADMM's subdomains are shared out.
-  void assist() { admm_.assist(); }
+  void assist() { global_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
@@ -129,7 +129,7 @@ class SolverLoop {
   const graph::Communicator& ranks_;
   SweepKernels kernels_;
   Gluing gluing_;
-  Admm admm_;
+  GlobalSolver global_;
   EpochSchedule schedule_;  ///< written at gates only, when every thread waits; so are courses_
   Courses courses_;
   ChunkWork work_;

@@ -238,7 +238,7 @@ inline NamedProblem step_of_scene(std::uint64_t seed, std::size_t index) {
   graph::Executor executor({.threads = 1});
   Simulation simulation(scene.setup, scene.bodies, executor);
   for (std::size_t step = 0, last = draw.below(4); step <= last; ++step) simulation.step();
-  return {fmt::format("{}-{}", family.name, index), contact_problem(simulation).problem};
+  return {fmt::format("{}-{}", family.name, index), matrix_of_step(simulation).problem};
 }
 
 // --- Disturbances ----------------------------------------------------------------------------------------

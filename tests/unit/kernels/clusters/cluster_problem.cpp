@@ -9,7 +9,7 @@
 #include <random>
 
 #include "kernels/bodies/index.hpp"
-#include "kernels/clusters/cluster_matrix.hpp"
+#include "kernels/clusters/contact_matrix.hpp"
 #include "kernels/clusters/step_error.hpp"
 #include "tests/unit/kernels/global/cut_problem.hpp"
 
@@ -88,6 +88,43 @@ std::vector<std::int32_t> dealt(const BodyProblem& problem, int count, std::uint
   return part;
 }
 
+/// By how much a contact breaks Signorini's and Coulomb's laws, as they stand in any text on mechanics, with
+/// no projection and no De Saxce: impulses over `unit` [N s], velocities as the impulse that they are worth
+/// to a mass of 1 kg.
+double violation(const BodyProblem& problem, const std::vector<Vec3>& r, double unit) {
+  const std::vector<Twist> V = velocities_of(problem, r);
+  double worst = 0;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    const Vec3 v = relative_velocity(c, V) + c.offset;
+    const double rn = c.normal.dot(r[k]), vn = c.normal.dot(v);
+    const Vec3 rt = r[k] - rn * c.normal, vt = v - vn * c.normal;
+    const double slip = vt.norm();
+    worst = std::max({worst, -rn, -vn, std::min(rn, vn), rt.norm() - c.mu * rn});
+    // A contact that slides is at the limit, against the slip.
+    if (slip > 1e-7 && c.mu > 0) worst = std::max(worst, (rt + c.mu * rn * vt / slip).norm());
+  }
+  return worst / unit;
+}
+
+TEST(ClusterProblem, IsMendedToWhatSignoriniAndCoulombAskFor) {
+  for (const double mu : {0.0, 0.1, 0.4, 1.0})
+    for (const std::uint32_t seed : {1u, 2u, 3u, 4u, 5u}) {
+      BodyProblem problem = heaps(4, mu, 30, seed);
+      const double unit = 12 * std::abs(fall);  // of a heap
+      ASSERT_GT(violation(problem, problem.impulse, unit), 1e-2);
+      const StepError error = step_error(problem, {.enough = 1e-6});
+      for (std::size_t k = 0; k < problem.impulse.size(); ++k) problem.impulse[k] += error.change[0][k];
+      EXPECT_LT(violation(problem, problem.impulse, unit), 1e-5) << "mu " << mu << ", seed " << seed;
+    }
+}
+
+TEST(ClusterProblem, WhoseLinearSystemOverflowsHasNoErrorThatPasses) {
+  BodyProblem problem = heaps(1, 0, 0, 3);
+  for (BodyUnknown& body : problem.bodies) body.mass *= 1e302;  // firm contacts are beyond all numbers
+  EXPECT_FALSE(step_error(problem, {.enough = 1e-3}).relative() <= 0.05);
+}
+
 TEST(ClusterProblem, IsTheSameWhereverItsContactsLie) {
   for (const double mu : {0.0, 0.4})
     for (const double plate : {0.0, 30.0})
@@ -137,9 +174,9 @@ TEST(ClusterProblem, HasEachBodyAndContactOnce) {
   EXPECT_NEAR(mass, all, 1e-12 * all);
 }
 
-TEST(ClusterMatrix, GivesTheVelocitiesOfTheBodies) {
+TEST(ContactMatrix, GivesTheVelocitiesOfTheBodies) {
   BodyProblem problem = heaps(3, 0.4, 30, 11);
-  const ClusterMatrix matrix = matrix_of(problem);
+  const ContactMatrix matrix = matrix_of(problem);
   std::vector<double> u(matrix.r.size());
   relative_velocity(matrix.problem, matrix.r, u);
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);

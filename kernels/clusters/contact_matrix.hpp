@@ -11,7 +11,7 @@
 namespace talus {
 
 /// The problem and its impulses, in frames (normal, tangent 1, tangent 2) of the contacts.
-struct ClusterMatrix {
+struct ContactMatrix {
   DelassusProblem problem;
   std::vector<double> r;     ///< 3 per contact [N s]
   std::vector<Mat3> frames;  ///< per contact: columns n, t, s
@@ -21,6 +21,6 @@ struct ClusterMatrix {
 };
 
 /// Of a whole problem, in one part. Bodies that do not turn have no spin mass.
-ClusterMatrix matrix_of(const BodyProblem& problem);
+ContactMatrix matrix_of(const BodyProblem& problem);
 
 }  // namespace talus

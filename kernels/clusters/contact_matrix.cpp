@@ -1,4 +1,4 @@
-#include "kernels/clusters/cluster_matrix.hpp"
+#include "kernels/clusters/contact_matrix.hpp"
 
 #include <array>
 #include <cmath>
@@ -37,16 +37,16 @@ Arm arm_of(const BodyProblem& problem, std::size_t k, std::int32_t body, const M
 
 }  // namespace
 
-std::vector<Vec3> ClusterMatrix::impulses() const {
+std::vector<Vec3> ContactMatrix::impulses() const {
   std::vector<Vec3> in_space;
   for (std::size_t k = 0; k < frames.size(); ++k)
     in_space.emplace_back(frames[k] * Eigen::Map<const Vec3>(&r[3 * k]));
   return in_space;
 }
 
-ClusterMatrix matrix_of(const BodyProblem& problem) {
+ContactMatrix matrix_of(const BodyProblem& problem) {
   const std::size_t n = problem.contacts.size();
-  ClusterMatrix matrix;
+  ContactMatrix matrix;
   std::vector<double> q, mu;
   std::vector<std::vector<Arm>> arms(problem.bodies.size());
   const std::vector<Twist> free = velocities_of(problem, std::vector<Vec3>(n, Vec3::Zero()));

@@ -1,4 +1,4 @@
-#include "runtime/step/admm.hpp"
+#include "runtime/step/global_solver.hpp"
 
 #include <algorithm>
 #include <array>
@@ -102,41 +102,62 @@ double energy_without(const BodyParts& parts) {
   return all[energy] + all[mass] * all[fastest] * all[fastest];
 }
 
+std::vector<WallMotion> motions_of(const StepState& state) {
+  std::vector<WallMotion> walls;
+  for (std::size_t w = 0; w < state.walls.size(); ++w)
+    walls.push_back({state.walls[w].normal, state.wall_states[w].free_velocity, state.walls[w].inv_mass()});
+  return walls;
+}
+
+BodyProblemSource source_of(const StepState& state, const StepParameters& parameters,
+                            const std::vector<WallMotion>& walls) {
+  return {state.bodies.x, state.bodies.radius, state.bodies.velocity,    state.free, walls, state.chunks,
+          state.contacts, parameters.laws,     state.decomposition.parts};
+}
+
+/// Contacts do something besides r: BodyProblem::known.
+bool knows_more(const StepParameters& parameters) {
+  return parameters.rolls || parameters.laws.largest(&PairLaw::cohesion) > 0;
+}
+
 }  // namespace
 
-Admm::Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
-           Gluing& gluing, const graph::Communicator& ranks)
+BodyProblem contact_problem(const StepState& state, const StepParameters& parameters) {
+  const std::vector<WallMotion> walls = motions_of(state);
+  BodyProblem problem = gather_problem(source_of(state, parameters, walls));
+  if (knows_more(parameters)) set_free({&problem, 1}, PartLink{});
+  return problem;
+}
+
+GlobalSolver::GlobalSolver(StepState& state, const StepParameters& parameters,
+                           const DecompositionSettings& decomposition, Gluing& gluing,
+                           const graph::Communicator& ranks)
     : state_(state),
       parameters_(parameters),
       decomposition_(decomposition),
       ranks_(ranks),
       link_(std::make_unique<StepLink>(state, gluing, ranks, crew_, rounds_)) {}
 
-class Admm::Whole {
+class GlobalSolver::Whole {
  public:
-  explicit Whole(const Admm& admm)
-      : admm_(admm), span_(admm.ranks_.trace(), kind_of(TaskKind::whole), 0, trace::Span::in_check) {
-    admm.rounds_ = {};
+  explicit Whole(const GlobalSolver& solver)
+      : solver_(solver), span_(solver.ranks_.trace(), kind_of(TaskKind::whole), 0, trace::Span::in_check) {
+    solver.rounds_ = {};
   }
-  ~Whole() { span_.set_node(admm_.rounds_.packed()); }
+  ~Whole() { span_.set_node(solver_.rounds_.packed()); }
   Whole(const Whole&) = delete;
   Whole& operator=(const Whole&) = delete;
 
  private:
-  const Admm& admm_;
+  const GlobalSolver& solver_;
   trace::Span span_;
 };
 
 template <class Gathered, class Gather>
-std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
-  std::vector<WallMotion> walls;
-  for (std::size_t w = 0; w < state_.walls.size(); ++w)
-    walls.push_back(
-        {state_.walls[w].normal, state_.wall_states[w].free_velocity, state_.walls[w].inv_mass()});
+std::vector<Gathered> GlobalSolver::gather_parts(const Gather& gather) const {
   const Decomposition& all = state_.decomposition;
-  const BodyProblemSource source{
-      state_.bodies.x, state_.bodies.radius, state_.bodies.velocity, state_.free, walls,
-      state_.chunks,   state_.contacts,      parameters_.laws,       all.parts};
+  const std::vector<WallMotion> walls = motions_of(state_);
+  const BodyProblemSource source = source_of(state_, parameters_, walls);
   std::vector<Gathered> parts;
   if (!all.several()) {
     parts.push_back(gather(source));
@@ -150,19 +171,19 @@ std::vector<Gathered> Admm::gather_parts(const Gather& gather) const {
   return parts;
 }
 
-std::vector<BodyProblem> Admm::gather() const {
+std::vector<BodyProblem> GlobalSolver::gather() const {
   auto parts = gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
-  if (parameters_.rolls || parameters_.laws.largest(&PairLaw::cohesion) > 0) set_free(parts, *link_);
+  if (knows_more(parameters_)) set_free(parts, *link_);
   return parts;
 }
 
-double Admm::sweeps_needed() const {
+double GlobalSolver::sweeps_needed() const {
   const Whole span(*this);
   const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
   return estimate_stiffness(graphs, *link_);
 }
 
-void Admm::find_clusters(int most_direct) {
+void GlobalSolver::find_clusters(int most_direct) {
   small_ = false;
   large_ = true;
   if (most_direct == 0) return;
@@ -179,7 +200,7 @@ void Admm::find_clusters(int most_direct) {
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
 
-std::vector<BodyProblem> Admm::checked(bool small) const {
+std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
   std::vector<BodyProblem> problems = gather();
   if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
     for (BodyProblem& problem : problems)
@@ -198,7 +219,7 @@ std::vector<BodyProblem> Admm::checked(bool small) const {
   return problems;
 }
 
-SmallError Admm::small_error(double enough, double farthest) {
+SmallError GlobalSolver::small_error(double enough, double farthest) {
   const Whole span(*this);
   problems_ = checked(true);
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
@@ -208,20 +229,20 @@ SmallError Admm::small_error(double enough, double farthest) {
   return {error.relative(), error.solved};
 }
 
-double Admm::large_error(double enough) const {
+double GlobalSolver::large_error(double enough) const {
   const Whole span(*this);
   std::vector<BodyProblem> problems = checked(false);
   return velocity_error(problems, *link_, enough).relative;
 }
 
-void Admm::correct() {
+void GlobalSolver::correct() {
   for (std::size_t p = 0; p < problems_.size(); ++p) {
     for (std::size_t k = 0; k < change_[p].size(); ++k) problems_[p].impulse[k] += change_[p][k];
     scatter_impulses(problems_[p], state_.contacts);
   }
 }
 
-BodyAdmmResult Admm::improve(double tolerance, int calls) {
+BodyAdmmResult GlobalSolver::improve(double tolerance, int calls) {
   const Whole span(*this);
   std::vector<BodyProblem> problems = gather();
   const BodyParts parts(problems, *link_);

@@ -13,18 +13,19 @@
 
 namespace talus {
 
-/// ADMM (kernels/global/admm.hpp) on the contacts of a step. Each subdomain is a part of the problem: it
-/// holds its own contacts and bodies, masses whole; what copies have to agree on goes the way of the gluing,
-/// and sums are gathered as rows by subdomain. So the bits depend on the partition alone, and a rank holds no
-/// more than its own subdomains and the coarse level.
+/// What looks at all contacts of a step at once: how stiff they are, how far their impulses are from an
+/// answer, ADMM (kernels/global), and the answers of small clusters (kernels/clusters). Each subdomain is a
+/// part of the problem: it holds its own contacts and bodies, masses whole; what copies have to agree on goes
+/// the way of the gluing, and sums are gathered as rows by subdomain. So the bits depend on the partition
+/// alone, and a rank holds no more than its own subdomains, the coarse level, and clusters that lie in them.
 ///
-///   between two epochs, at a gate of all ranks:  admm.improve();  next epoch: V afresh from r, then sweeps
-///   threads that wait at the gate:               admm.assist()
-class Admm {
+///   between two epochs, at a gate of all ranks:  improve() or correct();  next epoch: V afresh from r
+///   threads that wait at the gate:               assist()
+class GlobalSolver {
  public:
   /// Keeps references.
-  Admm(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
-       Gluing& gluing, const graph::Communicator& ranks);
+  GlobalSolver(StepState& state, const StepParameters& parameters, const DecompositionSettings& decomposition,
+               Gluing& gluing, const graph::Communicator& ranks);
 
   /// Of a thread that waits for the one that calls: takes its share of the subdomains.
   void assist() { crew_.help(); }
@@ -78,5 +79,9 @@ class Admm {
   PartImpulses change_;                ///< found there [N s]
   bool mends_ = false;
 };
+
+/// The contact problem of the step that the state stands in or behind, with the impulses that it has found.
+/// One subdomain.
+BodyProblem contact_problem(const StepState& state, const StepParameters& parameters);
 
 }  // namespace talus

@@ -1,0 +1,114 @@
+#include "kernels/clusters/firm_contacts.hpp"
+
+#include <array>
+#include <limits>
+
+#include "kernels/bodies/index.hpp"
+#include "kernels/global/stiffness.hpp"
+
+namespace talus {
+
+namespace {
+
+/// Each takes off what rounding has left, a millionth part of the step or less.
+constexpr int refinements = 2;
+
+Eigen::Index freedoms_of_body(const BodyUnknown& body) {
+  return body.wall ? 1 : body.spin_mass > 0 ? 6 : 3;
+}
+
+/// One number per freedom of a body.
+struct Freedoms {
+  Eigen::Index begin = 0, count = 0;
+  std::array<double, 6> value{};
+};
+
+Freedoms freedoms(const BodyUnknown& body, Eigen::Index begin, const Twist& of) {
+  Freedoms own{begin, freedoms_of_body(body), {}};
+  if (body.wall) {
+    own.value[0] = body.axis.dot(of.u);
+    return own;
+  }
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    own.value[at(k)] = of.u[k];
+    own.value[at(k + 3)] = of.w[k];
+  }
+  return own;
+}
+
+}  // namespace
+
+FirmContacts::FirmContacts(const BodyProblem& problem, double firmness) : problem_(problem) {
+  begin_.push_back(0);
+  for (const BodyUnknown& body : problem.bodies) begin_.push_back(begin_.back() + freedoms_of_body(body));
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+    for (Eigen::Index k = begin_[b]; k < begin_[b + 1]; ++k) {
+      const BodyUnknown& body = problem.bodies[b];
+      entries.emplace_back(k, k, k - begin_[b] < 3 ? body.mass : body.spin_mass);
+    }
+  for (const ContactEquation& c : problem.contacts) {
+    rho_.push_back(firmness * effective_mass(problem, c));
+    for (int axis = 0; axis < (c.mu > 0 ? 3 : 1); ++axis) {
+      const Vec3 direction = c.mu > 0 ? Vec3(Vec3::Unit(axis)) : c.normal;
+      // The contact as if its bodies were 0 and 1.
+      ContactEquation alone = c;
+      alone.first = 0;
+      alone.second = c.second < 0 ? -1 : 1;
+      std::array<Twist, 2> force{};
+      add_force(alone, direction, force);
+      std::array<Freedoms, 2> column{};
+      std::size_t bodies = 0;
+      for (const std::int32_t b : {c.first, c.second})
+        if (b >= 0) column[bodies] = freedoms(problem.bodies[at(b)], begin_[at(b)], force[bodies]), ++bodies;
+      for (std::size_t i = 0; i < bodies; ++i)
+        for (std::size_t j = 0; j < bodies; ++j)
+          for (Eigen::Index k = 0; k < column[i].count; ++k)
+            for (Eigen::Index l = 0; l < column[j].count; ++l)
+              entries.emplace_back(column[i].begin + k, column[j].begin + l,
+                                   rho_.back() * column[i].value[at(k)] * column[j].value[at(l)]);
+    }
+  }
+  matrix_.resize(begin_.back(), begin_.back());
+  matrix_.setFromTriplets(entries.begin(), entries.end());
+  factor_.compute(matrix_);
+}
+
+Eigen::VectorXd FirmContacts::freedoms_of(std::span<const Twist> of) const {
+  Eigen::VectorXd x(begin_.back());
+  for (std::size_t b = 0; b < of.size(); ++b) {
+    const Freedoms own = freedoms(problem_.bodies[b], begin_[b], of[b]);
+    for (Eigen::Index k = 0; k < own.count; ++k) x[own.begin + k] = own.value[at(k)];
+  }
+  return x;
+}
+
+std::vector<Twist> FirmContacts::twists_of(const Eigen::VectorXd& x) const {
+  std::vector<Twist> twists(problem_.bodies.size());
+  for (std::size_t b = 0; b < twists.size(); ++b) {
+    const BodyUnknown& body = problem_.bodies[b];
+    if (body.wall) {
+      twists[b].u = x[begin_[b]] * body.axis;
+      continue;
+    }
+    twists[b].u = x.segment<3>(begin_[b]);
+    if (body.spin_mass > 0) twists[b].w = x.segment<3>(begin_[b] + 3);
+  }
+  return twists;
+}
+
+FirmContacts::Solution FirmContacts::solve(std::span<const Twist> force) const {
+  const Eigen::VectorXd f = freedoms_of(force);
+  Eigen::VectorXd x = Eigen::VectorXd::Constant(f.size(), std::numeric_limits<double>::quiet_NaN());
+  Eigen::VectorXd last = x;
+  if (factor_.info() == Eigen::Success) {
+    x = factor_.solve(f);
+    for (int k = 0; k < refinements; ++k) {
+      last = factor_.solve(f - matrix_ * x);
+      x += last;
+    }
+  }
+  return {twists_of(x), twists_of(last)};
+}
+
+}  // namespace talus
