@@ -75,4 +75,11 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
                     step.text(), energy, supplied, describe(state.bodies, motion.fastest)));
 }
 
+double free_energy_of(std::span<const Wall> walls) {
+  double energy = 0;
+  for (const Wall& wall : walls)
+    if (wall.load.pushed()) energy += 0.5 * wall.load.mass * (wall.velocity + wall.gain).squaredNorm();
+  return energy;
+}
+
 }  // namespace talus

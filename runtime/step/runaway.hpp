@@ -2,6 +2,7 @@
 
 /// Steps after which there is no sense in going on.
 
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -24,5 +25,8 @@ double pressed_area(const std::vector<Wall>& walls, std::size_t w, const StepNam
 /// or the kinetic energy is far above what was supplied. `wall_energy_free`: of the walls with their free
 /// velocities [J].
 void check_for_runaway(const StepOutcome& outcome, double wall_energy_free);
+
+/// Kinetic energy of the pushed walls with their free velocities, before a step [J].
+double free_energy_of(std::span<const Wall> walls);
 
 }  // namespace talus

@@ -17,15 +17,6 @@
 
 namespace talus {
 
-namespace {
-
-/// Kinetic energy of the walls [J] with the given velocities.
-double energy_of(const Wall& wall, const Vec3& velocity) {
-  return wall.load.pushed() ? 0.5 * wall.load.mass * velocity.squaredNorm() : 0;
-}
-
-}  // namespace
-
 struct Simulation::Implementation {
   Implementation(Setup given, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks_)
       : setup(std::move(given)),
@@ -290,10 +281,7 @@ const StepReport& Simulation::step() {
   const double start = graph::seconds_now();
   impl_->choose_time_step();
   impl_->load_walls();
-  double wall_energy_free = 0;
-  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w)
-    wall_energy_free +=
-        energy_of(impl_->state.walls[w], impl_->state.walls[w].velocity + impl_->state.walls[w].gain);
+  const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
   check_for_runaway(outcome, wall_energy_free);
