@@ -209,19 +209,17 @@ double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion)
   return sum;
 }
 
-Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& given) {
+Correction correction_of(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds) {
   const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
                                     [](const ContactEquation& c) { return c.mu > 0; });
-  CorrectionThresholds thresholds = given;
-  if (!friction) thresholds.tolerance = given.smooth_tolerance;
   std::vector<Twist> motion(problem.bodies.size());
   ActiveSet set = empty_set(problem);
   const double wrong = see_states(problem, motion, set);
   const double apart = mass_ratio(problem);
   if (wrong * apart <= thresholds.certain * enough) return unchanged(problem, wrong * apart);
-  if (const double error = thresholds.of_single_contact * wrong;
-      problem.contacts.size() == 1 && problem.contacts.front().levers == nullptr && apart < 2 &&
-      error <= thresholds.tolerance * enough)
+  if (const double error = thresholds.of_single_contact * wrong; problem.contacts.size() == 1 &&
+                                                                 problem.contacts.front().levers == nullptr &&
+                                                                 apart < 2 && error <= enough)
     return unchanged(problem, error);
   // Rounds that do not settle may carry the motion off: the best one counts.
   Correction best = unchanged(problem, std::numeric_limits<double>::infinity());
@@ -251,9 +249,9 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     }
     if (best.settled) break;
   }
-  if (friction && !best.settled && apart <= thresholds.most_apart &&
-      at_first <= thresholds.exact_with_friction * enough)
-    return unchanged(problem, at_first);
+  if (const double error = thresholds.of_first_round * at_first;
+      friction && !best.settled && apart <= thresholds.most_apart && error <= enough)
+    return unchanged(problem, error);
   best.rounds = rounds;
   best.at_first = at_first;
   return best;

@@ -17,15 +17,15 @@ struct CorrectionThresholds {
   /// Updates of the multipliers in a round, at most, >= 1.
   int most_updates = 8;
   /// What may be left: this part of what need not be known more exactly, or of this part of what was found,
-  /// both in (0, 1).
-  double tolerance = 0.1, sharpness = 1e-4;
-  /// The same part without friction, in (0, 1): there forces are found too, and redundant contacts whose gaps
-  /// hardly differ share them by what little is left.
-  double smooth_tolerance = 1e-3;
+  /// both in (0, 1). Small, as redundant contacts whose gaps hardly differ share forces by what little is
+  /// left, and with friction rounds may come nearer by a few per cent each.
+  double tolerance = 1e-3, sharpness = 1e-4;
   /// Impulses that leave less than this part of what need not be known, in (0, 1], are exact: what
-  /// multipliers still say of them is rounding, firmness times as large. With friction, where rounds do not
-  /// settle.
-  double exact = 1e-6, exact_with_friction = 0.1;
+  /// multipliers still say of them is rounding, firmness times as large.
+  double exact = 1e-6;
+  /// With friction, where rounds do not settle, impulses stay whose first round finds next to nothing: so
+  /// many times that counts as their error, >= 1, and must be no more than what need not be known.
+  double of_first_round = 10;
   /// Not where all bodies of the cluster together are so many effective masses of a contact, >> 1: heavier
   /// ones go on where the firm contacts of a round give way, and contacts feel next to nothing of it.
   double most_apart = 1e7;
