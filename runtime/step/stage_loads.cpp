@@ -13,7 +13,10 @@ void take_loads(const Stage& stage, std::span<Wall> walls) {
 void put_load(Wall& wall, const std::vector<Wall>& walls) {
   if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
   if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
-  if (wall.load.pushed()) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+  if (wall.load.pushed()) {
+    wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+    if (wall.load.velocity != Vec3::Zero()) wall.velocity += wall.load.velocity;
+  }
   if (wall.load.drive == WallDrive::pressure)
     face_area(walls, static_cast<std::size_t>(&wall - walls.data()));
 }
