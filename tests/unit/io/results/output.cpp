@@ -180,7 +180,9 @@ TEST(Csv, HeadersAreThosePromised) {
             "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,"
             "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
             "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged\n");
-  EXPECT_EQ(walls_csv_header(), "step,time,wall,position,velocity,force_x,force_y,force_z\n");
+  EXPECT_EQ(walls_csv_header(),
+            "step,time,wall,position,velocity,force_x,force_y,force_z,torque_x,torque_y,"
+            "torque_z,work\n");
   EXPECT_EQ(triaxial_csv_header(),
             "step,time,stage,strain_x,strain_y,strain_z,strain_volume,strain_shear,solid_fraction,stress_x,"
             "stress_y,"
