@@ -1,6 +1,5 @@
 #include "runtime/step/simulation.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -16,6 +15,7 @@
 #include "runtime/step/step_report.hpp"
 #include "runtime/step/time_step.hpp"
 #include "runtime/step/wall_motions.hpp"
+#include "runtime/step/wall_reports.hpp"
 
 namespace talus {
 
@@ -198,20 +198,7 @@ struct Simulation::Implementation {
     state.time = report.time;
     demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
     prepare_walls(report.time, parameters.time_step, state, ranks);
-    for (std::size_t w = 0; w < state.walls.size(); ++w) {
-      Wall& wall = state.walls[w];
-      WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.absent ? 0
-                           : wall.load.drive == WallDrive::pressure
-                               ? wall.load.pressure * pressed_area(state.walls, w, next_step())
-                           : wall.load.drive == WallDrive::force ? wall.load.force
-                                                                 : 0;
-      if (wall.load.pushed() && wall.load.weight && !wall.absent)
-        wall_state.applied += wall.load.mass * parameters.gravity.dot(wall.normal);
-      if (wall.absent && wall.load.pushed()) wall.velocity.setZero();
-      wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
-      wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);
-    }
+    apply_loads(parameters, next_step(), state);
   }
 
   double strain(int axis) const {
@@ -363,35 +350,11 @@ const graph::Graph& Simulation::step_graph() const {
 }
 
 std::vector<WallReport> Simulation::walls() const {
-  std::vector<WallReport> reports;
-  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w) {
-    const Wall& wall = impl_->state.walls[w];
-    const WallState& of = impl_->state.wall_states[w];
-    const double acts = impl_->parameters.impulse_time();
-    reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
-                       of.impulse / acts, of.torque / acts, of.work});
-  }
-  return reports;
+  return wall_reports(impl_->state, impl_->parameters.impulse_time());
 }
 
 std::vector<WallReport> Simulation::groups() const {
-  std::vector<WallReport> reports;
-  const std::vector<WallReport> walls = this->walls();
-  for (const WallGroup& group : impl_->setup.groups) {
-    WallReport& sum = reports.emplace_back();
-    sum.name = group.name;
-    std::optional<Vec3> about;
-    for (std::size_t w = 0; w < walls.size(); ++w) {
-      const Wall& wall = impl_->state.walls[w];
-      const WallState& of = impl_->state.wall_states[w];
-      if (wall.group != group.name) continue;
-      if (!about) about = point_of_group(group, of);
-      sum.force += walls[w].force;
-      sum.torque += walls[w].torque + (of.own_point - *about).cross(walls[w].force);
-      sum.work += walls[w].work;
-    }
-  }
-  return reports;
+  return group_reports(impl_->setup, impl_->state, walls());
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {

@@ -280,6 +280,19 @@ TEST(Tumbler, OfRectanglesAndOfTrianglesMoveGrainsAlike) {
   EXPECT_GT(plates.kinetic_energy(), 0.2) << "has been moved";
 }
 
+TEST(Tumbler, MeetsTheSameWallsWhateverTheSkinIs) {
+  const auto moved = [](double skin) {
+    Scene scene = tumbler(true, 0.6, 0.3);
+    scene.setup.detection.skin = skin;
+    Experiment run(std::move(scene));
+    run.steps(1500);
+    return std::pair{run.x(0), run.x(1)};
+  };
+  const auto often = moved(0), seldom = moved(0.5);
+  EXPECT_NEAR((often.first - seldom.first).norm(), 0, 1e-8);
+  EXPECT_NEAR((often.second - seldom.second).norm(), 0, 1e-8);
+}
+
 double work_of(const Experiment& run) {
   double work = 0;
   for (const WallReport& wall : run.simulation().walls()) work += wall.work;
