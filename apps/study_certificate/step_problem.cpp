@@ -47,6 +47,10 @@ void refuse_what_is_unknown(const StepInput& input) {
   for (const Wall& wall : input.walls)
     if (wall.surface() != nullptr)
       throw std::invalid_argument("the audit knows plane walls only; '" + wall.name + "' is none");
+  for (const Wall& wall : input.walls)
+    if (!wall.motion.empty() || wall.absent)
+      throw std::invalid_argument("the audit knows no walls that move by themselves or are absent: '" +
+                                  wall.name + "'");
   for (auto number : {&PairLaw::cohesion, &PairLaw::rolling_resistance})
     if (input.stage.laws.largest(number) > 0)
       throw std::invalid_argument("the audit knows neither cohesion nor rolling resistance");

@@ -77,9 +77,11 @@ void each_number(Report& report, const Visit& visit) {
 /// One row of walls.csv.
 struct WallReport {
   std::string name;
-  double position = 0;        ///< normal . point [m]
-  double velocity = 0;        ///< along the normal [m/s]
-  Vec3 force = Vec3::Zero();  ///< of the wall on the grains, mean over the step [N]
+  double position = 0;         ///< normal . point [m]
+  double velocity = 0;         ///< along the normal [m/s]
+  Vec3 force = Vec3::Zero();   ///< of the wall on the grains, mean over the step [N]
+  Vec3 torque = Vec3::Zero();  ///< likewise, about the wall's own point [N m] (Wall::torque_point)
+  double work = 0;             ///< done on the grains since the run began [J]
 };
 
 /// One row of triaxial.csv; compression is positive for stresses, strains (28)-(30) are negative in

@@ -14,6 +14,8 @@
 #include "runtime/step/stage_loads.hpp"
 #include "runtime/step/step_report.hpp"
 #include "runtime/step/time_step.hpp"
+#include "runtime/step/wall_motions.hpp"
+#include "runtime/step/wall_reports.hpp"
 
 namespace talus {
 
@@ -36,6 +38,7 @@ struct Simulation::Implementation {
     state.bodies = from.bodies;
     state.walls = from.walls;
     stage_index = from.stage_index;
+    stage_begins = from.stage_begins;
     begin_stage();
     state.walls = from.walls;
     state.candidates = from.candidates;
@@ -60,6 +63,7 @@ struct Simulation::Implementation {
     choose_distances();
     const CheckpointHead& head = from.head;
     stage_index = static_cast<std::size_t>(head.stage_index);
+    stage_begins = head.stage_begins;
     prescribe();
     parameters.time_step = head.time_step;
     clock = head.clock;
@@ -69,11 +73,14 @@ struct Simulation::Implementation {
     lengths_at_start = head.lengths_at_start;
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const std::vector<double> load = numbers_of(state.walls[w].load);
-      if (std::equal(load.begin(), load.end(), head.wall_loads.begin() + static_cast<std::ptrdiff_t>(7 * w)))
+      if (std::equal(load.begin(), load.end(),
+                     head.wall_loads.begin() + static_cast<std::ptrdiff_t>(load.size() * w)))
         continue;
       put_load(state.walls[w], state.walls);
       state.candidates_valid = false;  // a wall that is free now has chunks of another kind
     }
+    resolve_stages(setup, stage_index, stage_begins, state.walls);
+    set_walls(setup, report.time, parameters.time_step, state);
     graph.restore(from);
   }
 
@@ -85,6 +92,7 @@ struct Simulation::Implementation {
     head.size = size;
     head.stage_index = static_cast<std::int64_t>(stage_index);
     head.stage_steps = stage_steps;
+    head.stage_begins = stage_begins;
     head.over = over;
     head.held = held;
     head.time_step = parameters.time_step;
@@ -134,6 +142,8 @@ struct Simulation::Implementation {
   }
 
   void begin_stage() {
+    if (stage_begins.size() == stage_index) stage_begins.push_back(report.time);
+    resolve_stages(setup, stage_index, stage_begins, state.walls);
     take_loads(stage(), state.walls);
     for (Wall& wall : state.walls) put_load(wall, state.walls);
     wind_clock();
@@ -168,7 +178,9 @@ struct Simulation::Implementation {
   }
 
   void choose_time_step() {
+    set_walls(setup, report.time, parameters.time_step, state);
     if (!stage().chooses_time_step) return;
+    prepare_walls(report.time, parameters.time_step, state, ranks);
     clock.choose(longest_time_step(state, setup, parameters, smallest_radius(), ranks));
     take_time_step(clock.step());
   }
@@ -184,18 +196,12 @@ struct Simulation::Implementation {
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
   }
 
-  /// Loads of the walls for the step: applied forces and free velocities.
+  /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
-    for (std::size_t w = 0; w < state.walls.size(); ++w) {
-      Wall& wall = state.walls[w];
-      WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.load.drive == WallDrive::pressure
-                               ? wall.load.pressure * pressed_area(state.walls, w, next_step())
-                           : wall.load.drive == WallDrive::force ? wall.load.force
-                                                                 : 0;
-      wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
-      wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);
-    }
+    state.time = report.time;
+    demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
+    prepare_walls(report.time, parameters.time_step, state, ranks);
+    apply_loads(parameters, next_step(), state);
   }
 
   double strain(int axis) const {
@@ -229,6 +235,7 @@ struct Simulation::Implementation {
   StageClock clock;  ///< of a stage that chooses its time steps
   double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
+  std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   std::int64_t stage_steps = 0;
   bool over = false;
   Vec3 lengths_at_start = Vec3::Zero();
@@ -266,7 +273,7 @@ SavedState Simulation::save() const {
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
-          impl_->clock,        impl_->held};
+          impl_->clock,        impl_->held,        impl_->stage_begins};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {
@@ -346,13 +353,11 @@ const graph::Graph& Simulation::step_graph() const {
 }
 
 std::vector<WallReport> Simulation::walls() const {
-  std::vector<WallReport> reports;
-  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w) {
-    const Wall& wall = impl_->state.walls[w];
-    reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
-                       impl_->state.wall_states[w].impulse / impl_->parameters.impulse_time()});
-  }
-  return reports;
+  return wall_reports(impl_->state, impl_->parameters.impulse_time());
+}
+
+std::vector<WallReport> Simulation::groups() const {
+  return group_reports(impl_->setup, impl_->state, walls());
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {

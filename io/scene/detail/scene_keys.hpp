@@ -1,6 +1,7 @@
 #pragma once
 
 #include "io/scene/detail/loading_keys.hpp"
+#include "io/scene/detail/motion_keys.hpp"
 #include "io/scene/detail/scene_key.hpp"
 #include "io/scene/scene.hpp"
 
@@ -13,6 +14,9 @@ struct SceneKeys {
   Section<PairSpec> pair;
   Section<SampleSpec> sample;
   Section<Wall> wall;
+  Section<MotionPart> wall_motion;
+  Section<WallGroup> group;
+  Section<MotionPart> group_motion;
   Section<Stage> stage;
   Section<StageEnd> stage_end;
   Section<NamedLoad> stage_load;
@@ -28,6 +32,7 @@ struct SceneKeys {
 template <class Keys, class F>
 void for_each_section(Keys&& keys, F&& f) {
   f(keys.top), f(keys.material), f(keys.named_material), f(keys.pair), f(keys.sample), f(keys.wall);
+  f(keys.wall_motion), f(keys.group), f(keys.group_motion);
   f(keys.stage), f(keys.stage_end), f(keys.stage_load), f(keys.stage_pair);
   f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output), f(keys.checkpoint);
 }
