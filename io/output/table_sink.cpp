@@ -15,7 +15,7 @@ constexpr std::array<std::string_view, 4> names{"steps.csv", "walls.csv", "triax
 class TableSink : public OutputSink {
  public:
   explicit TableSink(const OutputContext& context)
-      : directory_(context.directory), writes_(context.ranks.rank() == 0) {}
+      : context_(context), directory_(context.directory), writes_(context.ranks.rank() == 0) {}
 
   void open() override {
     if (!writes_) return;
@@ -42,8 +42,10 @@ class TableSink : public OutputSink {
   /// triaxial.csv and error_history.csv appear with their first line.
   void step(const StepRecord& record) override {
     append_steps_row(steps_->pending(), record.step);
-    for (const WallReport& wall : record.walls) append_walls_row(walls_->pending(), record.step, wall);
-    if (record.triaxial) {
+    const bool line = context_.has_table_line(record.step.step);
+    for (const WallReport& wall : record.walls)
+      if (line) append_walls_row(walls_->pending(), record.step, wall);
+    if (record.triaxial && line) {
       if (!triaxial_) triaxial_.emplace(directory_ / names[2], triaxial_csv_header());
       append_triaxial_row(triaxial_->pending(), *record.triaxial);
     }
@@ -65,6 +67,7 @@ class TableSink : public OutputSink {
  private:
   std::array<std::optional<CsvFile>*, 4> tables() { return {&steps_, &walls_, &triaxial_, &errors_}; }
 
+  OutputContext context_;
   std::filesystem::path directory_;
   bool writes_;
   std::optional<CsvFile> steps_, walls_, triaxial_, errors_;

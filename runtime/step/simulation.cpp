@@ -391,6 +391,7 @@ Frame Simulation::frame(bool contacts) const {
   fill_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
              impl_->parameters.impulse_time(), frame);
   frame.walls = walls();
+  frame.with_contacts = contacts;
   return frame;
 }
 
