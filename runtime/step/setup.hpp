@@ -157,8 +157,15 @@ struct DecompositionSettings {
   bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
 };
 
+/// A body whose path is told step by step.
+struct NamedBody {
+  std::string name;
+  BodyId id{-1};
+};
+
 /// A simulation, apart from its grains.
 struct Setup {
+  std::vector<NamedBody> named;
   std::vector<Wall> walls;
   std::vector<Clump> clumps;  ///< shapes of bodies that are no spheres (Bodies::shape)
   std::vector<Stage> stages;

@@ -9,6 +9,7 @@
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
+#include "runtime/step/named_bodies.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/stage_end.hpp"
 #include "runtime/step/stage_loads.hpp"
@@ -229,6 +230,8 @@ struct Simulation::Implementation {
   std::int64_t stage_steps = 0;
   bool over = false;
   Vec3 lengths_at_start = Vec3::Zero();
+  NamedBodies named;
+  std::vector<BodyReport> named_reports;  ///< of the last step
 };
 
 Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
@@ -281,6 +284,7 @@ const StepReport& Simulation::step() {
   const double start = graph::seconds_now();
   impl_->choose_time_step();
   impl_->load_walls();
+  impl_->named.begin_step(impl_->setup.named, impl_->state, impl_->ranks);
   const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
@@ -288,6 +292,8 @@ const StepReport& Simulation::step() {
   const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
+  impl_->named_reports =
+      impl_->named.end_step(impl_->setup.named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
   return impl_->report;
 }
@@ -350,6 +356,10 @@ std::vector<WallReport> Simulation::walls() const {
                        impl_->state.wall_states[w].impulse / impl_->parameters.impulse_time()});
   }
   return reports;
+}
+
+const std::vector<BodyReport>& Simulation::named_bodies() const {
+  return impl_->named_reports;
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {

@@ -109,6 +109,8 @@ class Simulation {
 
   /// Walls after the last step: positions, velocities, forces.
   std::vector<WallReport> walls() const;
+  /// Bodies that the setup names, after the last step: those that are still there.
+  const std::vector<BodyReport>& named_bodies() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them
