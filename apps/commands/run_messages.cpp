@@ -25,6 +25,7 @@ void Tally::add(const Simulation& simulation) {
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
   worst_penetration = larger(worst_penetration, report.penetration_max);
+  if (report.worst.contact_error > furthest.worst.contact_error) furthest = report;
   add_overlap(simulation);
 }
 
@@ -96,10 +97,13 @@ void print_stage_end(const Terminal& terminal, const Simulation& simulation) {
                                : "");
 }
 
-std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls) {
-  if (pair.with < 0)
-    return fmt::format("body {} and wall '{}'", pair.body,
-                       walls[static_cast<std::size_t>(-1 - pair.with)].name);
+std::string name_of(std::int64_t body, const std::vector<Wall>& walls) {
+  if (body >= 0) return fmt::format("body {}", body);
+  return fmt::format("wall '{}'", walls[static_cast<std::size_t>(-1 - body)].name);
+}
+
+std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls) {
+  if (pair.with < 0) return fmt::format("body {} and {}", pair.body, name_of(pair.with, walls));
   return fmt::format("bodies {} and {}", pair.body, pair.with);
 }
 
@@ -127,6 +131,12 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         tally.sufficient_time_step > 0
             ? fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step)
             : "");
+  if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > 0)
+    terminal.warn(
+        "warning: of the steps that missed, step {} is the furthest off: at the contact of {} by {:.2g} of "
+        "its velocities, and {} by {:.2g}; worst_* in steps.csv name those of each",
+        tally.furthest.step, name_of(worst.contact, simulation.setup().walls), worst.contact_error,
+        name_of(worst.body, simulation.setup().walls), worst.body_error);
   if (tally.stagnated > 0)
     terminal.warn(
         "warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "

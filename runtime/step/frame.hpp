@@ -11,6 +11,7 @@
 #include "kernels/bodies/types.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/overlap.hpp"
+#include "runtime/step/worst_errors.hpp"
 
 namespace talus {
 
@@ -24,11 +25,13 @@ struct StepReport {
   std::int64_t active = 0;              ///< normal impulse > 0
   int iterations = 0;                   ///< sweeps
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale
+  double error_quantile = 0;            ///< SolverSettings::quantile of them, where that has a tolerance
+  WorstErrors worst = {};               ///< of a step whose iterations did not converge
   double balance = 0;  ///< estimated error of the forces, or momentum defect of the sample, the larger
   double jump = 0;     ///< interface jump (several subdomains)
   double penetration_mean = 0, penetration_max = 0;  ///< over smallest radius, at the end of the step
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
-  std::optional<OverlapPair> overlapping = {};           ///< that pair, where it is beyond the tolerance
+  std::optional<BodyPair> overlapping = {};              ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
   double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   double equilibrium =
@@ -42,7 +45,7 @@ struct StepReport {
                             ///< step: it is too long for them, and not converged
 };
 
-/// visit(name, number) for each number of a report; the pair that overlaps is left out.
+/// visit(name, number) for each number of a report; names of bodies are left out.
 template <class Report, class Visit>
 void each_number(Report& report, const Visit& visit) {
   visit("report_step", report.step);
@@ -54,6 +57,7 @@ void each_number(Report& report, const Visit& visit) {
   visit("report_iterations", report.iterations);
   visit("report_error_rms", report.error_rms);
   visit("report_error_max", report.error_max);
+  visit("report_error_quantile", report.error_quantile);
   visit("report_balance", report.balance);
   visit("report_jump", report.jump);
   visit("report_penetration_mean", report.penetration_mean);

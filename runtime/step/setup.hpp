@@ -91,6 +91,13 @@ enum class Precision {
 struct SolverSettings {
   SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
+  /// On error_max, of the worst contact; 0: most_over_rms times `tolerance`.
+  double max_tolerance = 0;
+  static constexpr double most_over_rms = 100;
+  double worst_allowed() const { return max_tolerance > 0 ? max_tolerance : most_over_rms * tolerance; }
+  /// On error_quantile, that a share `quantile` of the contacts does not exceed; 0: not asked.
+  double quantile_tolerance = 0;
+  double quantile = 0.99;  ///< in (0, 1]
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
   /// On overlap: what two bodies end a step in by, beyond what they were given, over the smaller radius.

@@ -63,7 +63,7 @@ TEST(Overlap, OfAStepThatIsTooLongIsMissedAndNamed) {
     EXPECT_EQ(reports[k].converged, overlap <= 0.05);
     ASSERT_EQ(reports[k].overlapping.has_value(), overlap > 0.05);
     if (overlap > 0.05) {
-      EXPECT_EQ(*reports[k].overlapping, (OverlapPair{7, -1}));
+      EXPECT_EQ(*reports[k].overlapping, (BodyPair{7, -1}));
     }
   }
   EXPECT_TRUE(reports.back().converged);
