@@ -13,7 +13,9 @@ void RecorderFeed::row(const Simulation& simulation, const std::optional<Triaxia
   rows_.push_back({.step = simulation.report(),
                    .walls = simulation.walls(),
                    .triaxial = triaxial,
-                   .bodies = simulation.named_bodies()});
+                   .bodies = simulation.named_bodies(),
+                   .inserted = simulation.inserted(),
+                   .removed = simulation.removed()});
   if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
   if (rows_.size() >= 64 || graph::seconds_now() - flushed_ > 0.5) flush();
 }

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "io/scene/detail/grain_read.hpp"
 #include "io/scene/detail/material_read.hpp"
 #include "io/scene/detail/sample_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
@@ -34,14 +35,15 @@ class SceneReader {
 
   Scene read() && {
     read_table(root_, "", keys_.top,
-               {"material", "pair", "sample", "wall", "stage", "detection", "solver", "decomposition",
-                "output", "checkpoint"},
+               {"material", "pair", "sample", "insert", "remove", "wall", "stage", "detection", "solver",
+                "decomposition", "output", "checkpoint"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
     read_samples(root_, folder_, scene_);
     read_walls();
     read_stages();
+    read_grain_rules(root_, scene_);
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
     read_decomposition();

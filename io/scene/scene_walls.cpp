@@ -97,12 +97,16 @@ void place_walls(Scene& scene, const Sample& grains) {
   const auto refuse = [&](const std::string& message) {
     throw SceneError(scene.source_file, 0, "wall", message);
   };
-  if (grains.size() == 0) throw SceneError(scene.source_file, 0, "sample", "there are no grains");
+  if (grains.size() == 0 && scene.setup.inserts.empty())
+    throw SceneError(scene.source_file, 0, "sample", "there are no grains");
   for (std::size_t k = 0; k < grains.named.size(); ++k) scene.setup.named.at(k).id = grains.named[k];
   std::vector<Wall>& walls = scene.setup.walls;
   for (Wall& wall : walls)
     if (const int axis = detail::axis_of(wall); axis >= 0 && std::isnan(wall.point[axis]))
       wall.point[axis] = automatic_position(wall, axis, scene.samples, grains);
+  for (const Wall& wall : walls)
+    if (wall.surface() == nullptr && !wall.point.allFinite())
+      refuse(fmt::format("wall '{}' needs a position: no grains are there yet to place it by", wall.name));
 
   give_masses(scene.setup, automatic_wall_mass(grains));
 

@@ -40,6 +40,23 @@ void write_samples(std::string& out, const Scene& scene) {
   }
 }
 
+void write_grain_rules(std::string& out, const Scene& scene) {
+  const SceneKeys& keys = scene_keys();
+  const auto write_material = [&](std::size_t number) {
+    out += fmt::format("material = \"{}\"\n", scene.materials[number].name);
+  };
+  for (const InsertRule& rule : scene.setup.inserts) {
+    write_section(out, keys.insert, rule);
+    if (!scene.materials.empty()) write_material(rule.material);
+    write_section(out, keys.region, rule.region, {}, "[insert.region]");
+  }
+  for (const RemoveRule& rule : scene.setup.removes) {
+    write_section(out, keys.remove, rule);
+    if (rule.material) write_material(*rule.material);
+    write_section(out, keys.region, rule.region, {}, "[remove.region]");
+  }
+}
+
 }  // namespace
 
 std::string resolved_scene(const Scene& scene) {
@@ -48,6 +65,7 @@ std::string resolved_scene(const Scene& scene) {
   write_section(out, keys.top, scene);
   write_materials(out, scene);
   write_samples(out, scene);
+  write_grain_rules(out, scene);
   write_section(out, keys.detection, scene.setup.detection);
   write_section(out, keys.solver, scene.setup.solver);
   write_section(out, keys.decomposition, scene.setup.decomposition);

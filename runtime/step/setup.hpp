@@ -18,6 +18,7 @@
 #include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
+#include "runtime/step/grain_rules.hpp"
 
 namespace talus {
 
@@ -173,6 +174,9 @@ struct NamedBody {
 /// A simulation, apart from its grains.
 struct Setup {
   std::vector<NamedBody> named;
+  std::vector<InsertRule> inserts;
+  std::vector<RemoveRule> removes;
+  std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   std::vector<Wall> walls;
   std::vector<Clump> clumps;  ///< shapes of bodies that are no spheres (Bodies::shape)
   std::vector<Stage> stages;

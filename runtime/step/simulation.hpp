@@ -10,6 +10,7 @@
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/checkpoint.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/population.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/solver_loop.hpp"
@@ -32,6 +33,7 @@ struct SavedState {
   std::optional<std::vector<GivenOverlap>> given_overlaps = {};  ///< of StepState
   StageClock clock = {};                                         ///< of a stage that chooses its time steps
   double held = 0;  ///< time for which the stage's bound on equilibrium has held [s]
+  PopulationState population = {};
 };
 
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
@@ -111,6 +113,9 @@ class Simulation {
   std::vector<WallReport> walls() const;
   /// Bodies that the setup names, after the last step: those that are still there.
   const std::vector<BodyReport>& named_bodies() const;
+  /// What insertions and removals have done so far; empty without any.
+  std::vector<InsertReport> inserted() const;
+  std::vector<RemoveReport> removed() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them

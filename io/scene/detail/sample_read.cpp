@@ -133,7 +133,8 @@ std::optional<Region> read_region(const toml::table& table, const std::string& p
 
 void read_samples(const toml::table& root, const std::filesystem::path& folder, Scene& scene) {
   const toml::node* node = root.get("sample");
-  if (!node) fail_at(root, "sample", "missing table [sample]");
+  if (!node && root.get("insert")) return;
+  if (!node) fail_at(root, "sample", "missing table [sample]; only a scene with an [[insert]] needs none");
   if (const toml::table* one = node->as_table()) return read_sample(*one, "sample", folder, scene);
   if (!node->is_array()) fail_at(*node, "sample", "must be a table: write [sample]");
   for (const toml::table* table : tables_at(root, "sample", "sample"))
