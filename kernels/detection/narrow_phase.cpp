@@ -179,7 +179,7 @@ void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chu
   const double restitution = law == mixed_laws ? 0 : in.laws.laws()[at(law)].restitution;
   const ChunkPhase phase{
       in,
-      {in.time_step, in.alert, restitution, 2 * in.time_step * in.gravity.norm(), in.reflection},
+      {in.time_step, in.alert, restitution, 2 * in.time_step * in.gravity.norm(), in.turning, in.reflection},
       candidates,
       chunks,
       chunk};

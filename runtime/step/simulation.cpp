@@ -124,10 +124,13 @@ struct Simulation::Implementation {
     return to;
   }
 
-  /// Alert distance and skin.
+  /// Alert distance, skin, and how far from one another two may turn, in smallest radii: no body is in
+  /// between.
   void choose_distances() {
+    constexpr double farthest_turning = 0.5;
     const double unit = smallest_radius();
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
+    parameters.turning = farthest_turning * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
   }
 

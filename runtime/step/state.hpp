@@ -34,6 +34,7 @@ struct StepParameters {
   }
   double alert = 0;       ///< [m]
   double skin = 0;        ///< [m]
+  double turning = 0;     ///< [m] GapRule::turning
   double reflection = 0;  ///< E of Moreau's restitution, 0 without (kernels/law/restitution_law.hpp)
   /// How long loads act on the velocities that the iterations find [s]: force = impulse / impulse_time().
   double impulse_time() const { return time_step / (1 + reflection); }

@@ -242,10 +242,10 @@ void StepGraph::narrow_share(std::uint32_t share) {
                end = static_cast<std::size_t>(state_.chunks.begin[own.end]);
     std::ranges::fill(state_.candidates.impulse.values(begin, end), 0.0);
   }
-  const NarrowPhase in{bodies.x,         bodies.radius,         bodies.velocity,
-                       state_.walls,     parameters_.time_step, parameters_.alert,
-                       parameters_.laws, parameters_.gravity,   parameters_.reflection,
-                       bodies.material,  clumps_of(state_)};
+  const NarrowPhase in{
+      bodies.x,          bodies.radius,    bodies.velocity,     state_.walls,        parameters_.time_step,
+      parameters_.alert, parameters_.laws, parameters_.gravity, parameters_.turning, parameters_.reflection,
+      bodies.material,   clumps_of(state_)};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);

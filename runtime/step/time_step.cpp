@@ -45,11 +45,10 @@ TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver
 double longest_time_step(const StepState& state, const Setup& setup, const StepParameters& parameters,
                          double smallest, const graph::Communicator& ranks, const TimeStepRule& rule) {
   const double unseen = unseen_overlap(setup.solver, smallest, rule);
-  // Without restitution a pair within the alert distance is a contact, and does not overlap: bodies that are
-  // struck have that gap to use up, too, and half of it where both were. With it an impact waits for the
-  // overlap.
-  const bool bounces = parameters.laws.largest(&PairLaw::restitution) > 0;
-  const double near = unseen + (bounces ? 0 : 0.5 * parameters.alert);
+  // A pair within the alert distance is a contact, and does not overlap: bodies that are struck have that gap
+  // to use up, too, and half of it where both were. But for elastic pairs (gap_law.hpp).
+  const bool elastic = parameters.laws.largest(&PairLaw::restitution) >= 1;
+  const double near = unseen + (elastic ? 0 : 0.5 * parameters.alert);
   const bool blind = !state.given_overlaps;  // before the first step any two may approach
   double rates[2] = {
       blind ? 0
