@@ -41,6 +41,10 @@ void each_number_of(Memory& memory, const Visit& visit) {
   visit("overlapped", tally.overlapped);
   visit("deepest_step", tally.deepest.step);
   visit("deepest_overlap", tally.deepest.overlap);
+  visit("furthest_step", tally.furthest.step);
+  visit("furthest_contact_error", tally.furthest.worst.contact_error);
+  visit("furthest_body_error", tally.furthest.worst.body_error);
+  visit("furthest_body", tally.furthest.worst.body);
   visit("sufficient_time_step", tally.sufficient_time_step);
   visit("exposed", tally.exposed);
   visit("iterating", tally.iterating);
@@ -50,6 +54,7 @@ void each_number_of(Memory& memory, const Visit& visit) {
   visit("wall_s", memory.wall_s);
   visit("wall_points", memory.wall_points);
   visit("wall_mass", memory.wall_mass);
+  visit("named", memory.named);
   visit("frame_times", memory.mark.frame_times);
 }
 
@@ -58,8 +63,10 @@ void each_number_of(Memory& memory, const Visit& visit) {
 std::string text_of(const RunMemory& memory) {
   const io::NumberWriter write;
   each_number_of(memory, write);
-  const OverlapPair deepest = memory.tally.deepest.overlapping.value_or(OverlapPair{});
+  const BodyPair deepest = memory.tally.deepest.overlapping.value_or(BodyPair{});
   write("deepest_pair", std::vector<std::int64_t>{deepest.body, deepest.with});
+  const BodyPair& furthest = memory.tally.furthest.worst.contact;
+  write("furthest_pair", std::vector<std::int64_t>{furthest.body, furthest.with});
   std::vector<std::string> files;
   std::vector<std::int64_t> bytes;
   for (const auto& [file, length] : memory.mark.bytes) {
@@ -75,13 +82,16 @@ RunMemory read_memory(const std::string& text, const std::string& file) {
   const io::NumberReader read(text, file);
   RunMemory memory;
   each_number_of(memory, read);
-  std::vector<std::int64_t> deepest, bytes;
+  std::vector<std::int64_t> deepest, furthest, bytes;
   std::vector<std::string> files;
   read("deepest_pair", deepest);
+  read("furthest_pair", furthest);
   read("files", files);
   read("bytes", bytes);
-  if (deepest.size() != 2 || files.size() != bytes.size()) throw io::FileError(file, "is damaged");
-  if (deepest[0] >= 0) memory.tally.deepest.overlapping = OverlapPair{deepest[0], deepest[1]};
+  if (deepest.size() != 2 || furthest.size() != 2 || files.size() != bytes.size())
+    throw io::FileError(file, "is damaged");
+  if (deepest[0] >= 0) memory.tally.deepest.overlapping = BodyPair{deepest[0], deepest[1]};
+  memory.tally.furthest.worst.contact = {furthest[0], furthest[1]};
   for (std::size_t k = 0; k < files.size(); ++k) memory.mark.bytes[files[k]] = bytes[k];
   return memory;
 }

@@ -25,6 +25,7 @@ void Tally::add(const Simulation& simulation) {
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
   worst_penetration = larger(worst_penetration, report.penetration_max);
+  if (report.worst.contact_error > furthest.worst.contact_error) furthest = report;
   add_overlap(simulation);
 }
 
@@ -96,14 +97,41 @@ void print_stage_end(const Terminal& terminal, const Simulation& simulation) {
                                : "");
 }
 
-std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls) {
-  if (pair.with < 0)
-    return fmt::format("body {} and wall '{}'", pair.body,
-                       walls[static_cast<std::size_t>(-1 - pair.with)].name);
+std::string name_of(std::int64_t body, const std::vector<Wall>& walls) {
+  if (body >= 0) return fmt::format("body {}", body);
+  return fmt::format("wall '{}'", walls[static_cast<std::size_t>(-1 - body)].name);
+}
+
+std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls) {
+  if (pair.with < 0) return fmt::format("body {} and {}", pair.body, name_of(pair.with, walls));
   return fmt::format("bodies {} and {}", pair.body, pair.with);
 }
 
+namespace {
+
+/// What came and went, and what found no room.
+void print_grains(const Terminal& terminal, const Simulation& simulation) {
+  for (const InsertReport& insert : simulation.inserted()) {
+    terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
+                 counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
+    if (insert.no_room > 0)
+      terminal.warn(
+          "warning: insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "
+          "inserted.csv "
+          "says when. Enlarge its region, raise its velocity or attempts, or ask for fewer",
+          insert.name, counted(static_cast<std::size_t>(insert.no_room), "step"),
+          counted(static_cast<std::size_t>(insert.waiting), "grain"));
+  }
+  for (const RemoveReport& remove : simulation.removed())
+    terminal.say("remove '{}': {}{}, {:.6g} kg", remove.name,
+                 counted(static_cast<std::size_t>(remove.count), "grain"),
+                 remove.material.empty() ? "" : fmt::format(" of '{}'", remove.material), remove.mass);
+}
+
+}  // namespace
+
 void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally) {
+  print_grains(terminal, simulation);
   const MessageCount& messages = simulation.messages();
   if (messages.messages > 0)
     terminal.say(
@@ -127,6 +155,12 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         tally.sufficient_time_step > 0
             ? fmt::format(". A time_step of {:.2g} s would do", tally.sufficient_time_step)
             : "");
+  if (const WorstErrors& worst = tally.furthest.worst; worst.contact_error > 0)
+    terminal.warn(
+        "warning: of the steps that missed, step {} is the furthest off: at the contact of {} by {:.2g} of "
+        "its velocities, and {} by {:.2g}; worst_* in steps.csv name those of each",
+        tally.furthest.step, name_of(worst.contact, simulation.setup().walls), worst.contact_error,
+        name_of(worst.body, simulation.setup().walls), worst.body_error);
   if (tally.stagnated > 0)
     terminal.warn(
         "warning: in {} steps the error stood still above the tolerance, at {:.2g} at worst; "

@@ -28,6 +28,7 @@ struct Tally {
   double worst_overlap = 0, last_overlap = 0;  ///< [smaller radius of a pair]: of all steps, of the last
   std::int64_t overlapped = 0;                 ///< steps that ended with an overlap beyond its tolerance
   StepReport deepest;                          ///< of these steps the one with the deepest
+  StepReport furthest;  ///< of the steps whose iterations did not converge the one with the worst contact
   double sufficient_time_step = 0;    ///< [s] at which they would have stayed within it; 0: not known
   double exposed = 0, iterating = 0;  ///< [s] waited for messages; in the iterations
 
@@ -53,8 +54,10 @@ void print_start(const Terminal& terminal, const io::Scene& scene, std::size_t g
 /// Which of its conditions a stage has come to, and how far it was from rest where that was one.
 void print_stage_end(const Terminal& terminal, const Simulation& simulation);
 
+/// "body 3", or of a number below 0 "wall 'floor'".
+std::string name_of(std::int64_t body, const std::vector<Wall>& walls);
 /// "bodies 3 and 17", "body 3 and wall 'floor'".
-std::string name_of(const OverlapPair& pair, const std::vector<Wall>& walls);
+std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls);
 
 /// Messages of an exchange, and warnings of steps that grains passed through one another in, that ended with
 /// overlaps, or whose error stood still.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 
 #include "kernels/detection/contacts.hpp"
@@ -20,7 +21,8 @@ struct NarrowPhase {
   double time_step;                    ///< h [s]
   double alert;                        ///< [m]
   PairTable laws;
-  Vec3 gravity;                             ///< [m/s^2]
+  Vec3 gravity;                                              ///< [m/s^2]
+  double turning = std::numeric_limits<double>::infinity();  ///< [m] GapRule::turning
   double reflection = 0;                    ///< E of the step (kernels/law/restitution_law.hpp)
   std::span<const Material> material = {};  ///< of the bodies; empty: material_of_grains
   ClumpView clumps = {};
@@ -29,8 +31,7 @@ struct NarrowPhase {
 
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.
 /// A candidate is a contact when gap < alert, or when it would close within a step at its speed. Bias
-/// (docs/theory.md, "Gap term and restitution"): inelastic quasi-Signorini b = max(g, 0)/h; with e > 0 and an
-/// approach faster than 2 h |gravity|, Moreau's impact law: b = e v_n- once g <= 0, and no constraint before.
+/// and impacts follow from kernels/law/gap_law.hpp; an approach is fast above 2 h |gravity|.
 /// Coincident centres get the normal +z.
 ///
 /// A chunk whose contacts are the candidates that they were keeps their places and groups; where a few came

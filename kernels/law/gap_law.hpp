@@ -3,16 +3,19 @@
 /// When a pair is a contact of a step, and with which bias, on one pair or on several at once: V is a double
 /// or a vector of doubles (kernels/simd/lanes.hpp). Everything here has internal linkage, as there.
 
+#include <limits>
+
 #include "kernels/simd/lanes.hpp"
 
 namespace talus {
 
 /// Numbers of the rule, the same for all pairs of a step.
 struct GapRule {
-  double time_step;       ///< h [s]
-  double alert;           ///< [m]
-  double restitution;     ///< e in [0, 1], where pairs have none of their own
-  double slow;            ///< [m/s] no restitution up to here
+  double time_step;    ///< h [s]
+  double alert;        ///< [m]
+  double restitution;  ///< e in [0, 1], where pairs have none of their own
+  double slow;         ///< [m/s] no restitution up to here
+  double turning = std::numeric_limits<double>::infinity();  ///< [m] an impact turns no earlier than this
   double reflection = 0;  ///< E of Moreau's law (restitution_law.hpp); 0: the bias is that of v_n
 };
 
@@ -35,10 +38,13 @@ struct GapResult {
   BitsOf<V> absent;  ///< where the pair constrains nothing in this step
 };
 
-/// Inelastic quasi-Signorini, b = max(g, 0)/h. With
-/// restitution, a pair faster than `slow` follows Moreau's impact law instead: b = e v_n once g <= 0, and no
-/// constraint before. `v_n` [m/s] is the normal velocity at the beginning of the step, `v_n_free` the one at
-/// its end without contacts. `restitution` is a number, or one per lane.
+/// Inelastic quasi-Signorini, b = max(g, 0)/h: no more than the gap is used up. With restitution, a pair
+/// faster than `slow` that touches, or would meet within the step, follows the impact law instead, b = e v_n:
+/// once braked to g/h, it would have lost the speed that is to rebound. Where it is as far as `turning`
+/// others may stand between, and it flies on until it overlaps. Pairs that others push together within the
+/// step are braked; that costs energy, so with e = 1 they fly on, too. `v_n` [m/s] is the normal velocity at
+/// the beginning of the step, `v_n_free` the one at its end without contacts. `restitution` is a number, or
+/// one per lane.
 template <class V, class E>
 [[gnu::always_inline]] inline GapResult<V> solve_gap(const GapRule& rule, V gap, V v_n, V v_n_free,
                                                      E restitution) {
@@ -47,8 +53,10 @@ template <class V, class E>
   // Separating contacts too follow the impact law, as in Moreau's: with e here and 0 there, a grain caught
   // between both would gain energy.
   const auto impact = [&](BitsOf<V> quick) {
-    absent |= quick & (gap > 0);
-    bias = quick ? restitution * v_n : bias;
+    const BitsOf<V> closes = (v_n < 0) & (gap < -rule.time_step * v_n_free);
+    const BitsOf<V> meets = (gap <= 0) | (closes & (gap < rule.turning));
+    bias = (quick & meets) ? restitution * v_n : bias;
+    absent |= quick & (meets == BitsOf<V>{}) & (closes | (V{} + restitution >= 1));
   };
   if constexpr (std::same_as<E, double>) {
     if (restitution > 0) impact(absolute(v_n) > rule.slow);

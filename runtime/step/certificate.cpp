@@ -15,7 +15,7 @@ void Certificate::begin(Scales scales) {
   result_ = {};
   history_.clear();
   wall_impulses_.clear();
-  small_check_ = large_check_ = {};
+  small_check_ = large_check_ = quantile_check_ = {};
   corrected_from_ = std::numeric_limits<double>::infinity();
   corrected_at_ = -1;
   doubts_ = 0;
@@ -37,6 +37,13 @@ void Certificate::measure(const CheckSums& sums) {
 }
 
 Verdict Certificate::judge(const CheckSums& sums, const Check& check, WholeProblem& whole) {
+  const Verdict verdict = verdict_on(sums, check, whole);
+  if (verdict == Verdict::exhausted || verdict == Verdict::stagnated || verdict == Verdict::diverged)
+    result_.worst = whole.worst_errors();
+  return verdict;
+}
+
+Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, WholeProblem& whole) {
   result_.iterations = check.iterations;
   measure(sums);
   history_.add({check.iterations, result_.error_rms, check.seconds});
@@ -45,12 +52,13 @@ Verdict Certificate::judge(const CheckSums& sums, const Check& check, WholeProbl
 
   // Before the first sweep the drift of the walls is not known yet; only an exact solution is taken as it is.
   const bool judged = check.iterations > 0 || residual2_ == 0;
-  const bool small = judged && result_.error_rms <= settings_.tolerance;
+  const bool small =
+      judged && result_.error_rms <= settings_.tolerance && result_.error_max <= settings_.worst_allowed();
   const bool last = check.iterations >= settings_.max_iterations;
   result_.unbalance = result_.drift;
   // Only a step that may end pays for an answer about the whole problem.
   const bool balance = (small || last) && balanced(whole);
-  result_.converged = small && balance;
+  result_.converged = ((small && balance) || last) && even(whole) && small && balance;
 
   if (history_.first_since_start()) first_residual2_ = std::max(residual2_, scale2_);
   const double most = thresholds_.divergence * thresholds_.divergence * first_residual2_;
@@ -107,8 +115,7 @@ bool Certificate::checks_velocities(WholeProblem& whole) const {
 
 /// The last answer where nothing can have changed it, a guess from the residual where that is too large, else
 /// a new one.
-double Certificate::repeated(WholeCheck& then, const std::function<double(double)>& ask) {
-  const double tolerance = settings_.balance_tolerance;
+double Certificate::repeated(WholeCheck& then, double tolerance, const std::function<double(double)>& ask) {
   const int done = result_.iterations;
   // From a residual of 0 nothing is inferred.
   const double guess = then.error_rms > 0 ? then.error * result_.error_rms / then.error_rms : then.error;
@@ -117,6 +124,15 @@ double Certificate::repeated(WholeCheck& then, const std::function<double(double
   if (then.at < 0 || (then.at != done && due))
     then = {done, result_.error_rms, ask(thresholds_.velocity_resolution * tolerance)};
   return then.at == done ? then.error : guess;
+}
+
+/// Not too many contacts are far from their law, where the user has said how many that is.
+bool Certificate::even(WholeProblem& whole) {
+  const double tolerance = settings_.quantile_tolerance;
+  if (tolerance == 0) return true;
+  result_.error_quantile =
+      repeated(quantile_check_, tolerance, [&](double) { return whole.quantile_error(settings_.quantile); });
+  return result_.error_quantile <= tolerance;
 }
 
 bool Certificate::balanced(WholeProblem& whole) {
@@ -138,7 +154,7 @@ bool Certificate::balanced(WholeProblem& whole) {
 double Certificate::small_unbalance(WholeProblem& whole) {
   const bool last = result_.iterations >= settings_.max_iterations;
   if (doubts_ >= thresholds_.most_doubts && !last) return std::numeric_limits<double>::infinity();
-  return repeated(small_check_, [&](double enough) {
+  return repeated(small_check_, settings_.balance_tolerance, [&](double enough) {
     const SmallError error = whole.small_error(enough);
     if (!error.solved) ++doubts_;
     return error.relative;
@@ -147,7 +163,8 @@ double Certificate::small_unbalance(WholeProblem& whole) {
 
 double Certificate::large_unbalance(WholeProblem& whole) {
   if (checks_velocities(whole))
-    return repeated(large_check_, [&](double enough) { return whole.large_error(enough); });
+    return repeated(large_check_, settings_.balance_tolerance,
+                    [&](double enough) { return whole.large_error(enough); });
   if (result_.drift > 0 && result_.drift <= settings_.balance_tolerance)
     return unbalance(result_.drift, result_.iterations, whole.sweeps_needed());
   return result_.drift;
@@ -165,14 +182,14 @@ void Certificate::corrected() {
   corrected_at_ = result_.iterations;
   ++result_.corrections;
   history_.start_anew();
-  small_check_ = large_check_ = {};
+  small_check_ = large_check_ = quantile_check_ = {};
 }
 
 void Certificate::solved_by_admm(const BodyAdmmResult& result) {
   result_.stiff = result;
   ++result_.stiff_calls;
   history_.start_anew();
-  small_check_ = large_check_ = {};
+  small_check_ = large_check_ = quantile_check_ = {};
   doubts_ = 0;
 }
 

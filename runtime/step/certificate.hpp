@@ -12,6 +12,7 @@
 #include "runtime/step/check_sums.hpp"
 #include "runtime/step/error_history.hpp"
 #include "runtime/step/setup.hpp"
+#include "runtime/step/worst_errors.hpp"
 
 namespace talus {
 
@@ -19,6 +20,7 @@ namespace talus {
 struct IterationResult {
   int iterations = 0;  ///< sweeps
   double error_rms = 0, error_max = 0;
+  double error_quantile = 0;  ///< where it has a tolerance: Residuals, SolverSettings::quantile of them
   double jump = 0;  ///< of the copies at the end of the last sweep, over their velocities, kinetic norms
   double drift =
       0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
@@ -30,6 +32,7 @@ struct IterationResult {
   bool converged = false;
   bool diverged = false;   ///< the error grows without bound
   bool stagnated = false;  ///< more sweeps would not have made the error smaller
+  WorstErrors worst;       ///< where it did not converge
 };
 
 /// Every number that a verdict depends on, besides the tolerances that the user sets (SolverSettings).
@@ -98,6 +101,9 @@ class WholeProblem {
   /// in velocities (balance.hpp).
   virtual SmallError small_error(double enough) = 0;
   virtual double large_error(double enough) = 0;
+  /// The residual that a share `part` of all contacts does not exceed (kernels/global/residuals.hpp).
+  virtual double quantile_error(double part) = 0;
+  virtual WorstErrors worst_errors() = 0;
 
   double sweeps_needed() { return plain_sweeps_needed() / speed(); }
 };
@@ -174,6 +180,7 @@ class Certificate {
   }
 
  private:
+  Verdict verdict_on(const CheckSums& sums, const Check& check, WholeProblem& whole);
   void measure(const CheckSums& sums);
   double drift() const;
   double wall_scale() const;
@@ -194,11 +201,12 @@ class Certificate {
     int at = -1;  ///< sweeps then; -1: none in this step, or since a new start
     double error_rms = 0, error = 0;
   };
-  double repeated(WholeCheck& then, const std::function<double(double)>& ask);
+  double repeated(WholeCheck& then, double tolerance, const std::function<double(double)>& ask);
+  bool even(WholeProblem& whole);
   double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
 
-  WholeCheck small_check_, large_check_;
+  WholeCheck small_check_, large_check_, quantile_check_;
   double corrected_from_ = 0;  ///< error before small clusters were last put right in this step
   int corrected_at_ = -1;      ///< sweeps done then
   int doubts_ = 0;             ///< times in this step that no answer was found

@@ -11,6 +11,7 @@
 #include "kernels/bodies/types.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/overlap.hpp"
+#include "runtime/step/worst_errors.hpp"
 
 namespace talus {
 
@@ -24,11 +25,13 @@ struct StepReport {
   std::int64_t active = 0;              ///< normal impulse > 0
   int iterations = 0;                   ///< sweeps
   double error_rms = 0, error_max = 0;  ///< natural map over velocity scale
+  double error_quantile = 0;            ///< SolverSettings::quantile of them, where that has a tolerance
+  WorstErrors worst = {};               ///< of a step whose iterations did not converge
   double balance = 0;  ///< estimated error of the forces, or momentum defect of the sample, the larger
   double jump = 0;     ///< interface jump (several subdomains)
   double penetration_mean = 0, penetration_max = 0;  ///< over smallest radius, at the end of the step
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
-  std::optional<OverlapPair> overlapping = {};           ///< that pair, where it is beyond the tolerance
+  std::optional<BodyPair> overlapping = {};              ///< that pair, where it is beyond the tolerance
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
   double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   double equilibrium =
@@ -42,7 +45,7 @@ struct StepReport {
                             ///< step: it is too long for them, and not converged
 };
 
-/// visit(name, number) for each number of a report; the pair that overlaps is left out.
+/// visit(name, number) for each number of a report; names of bodies are left out.
 template <class Report, class Visit>
 void each_number(Report& report, const Visit& visit) {
   visit("report_step", report.step);
@@ -54,6 +57,7 @@ void each_number(Report& report, const Visit& visit) {
   visit("report_iterations", report.iterations);
   visit("report_error_rms", report.error_rms);
   visit("report_error_max", report.error_max);
+  visit("report_error_quantile", report.error_quantile);
   visit("report_balance", report.balance);
   visit("report_jump", report.jump);
   visit("report_penetration_mean", report.penetration_mean);
@@ -73,9 +77,38 @@ void each_number(Report& report, const Visit& visit) {
 /// One row of walls.csv.
 struct WallReport {
   std::string name;
-  double position = 0;        ///< normal . point [m]
-  double velocity = 0;        ///< along the normal [m/s]
-  Vec3 force = Vec3::Zero();  ///< of the wall on the grains, mean over the step [N]
+  double position = 0;         ///< normal . point [m]
+  double velocity = 0;         ///< along the normal [m/s]
+  Vec3 force = Vec3::Zero();   ///< of the wall on the grains, mean over the step [N]
+  Vec3 torque = Vec3::Zero();  ///< likewise, about the wall's own point [N m] (Wall::torque_point)
+  double work = 0;             ///< done on the grains since the run began [J]
+};
+
+/// One row of bodies.csv: a body that the scene names, at the end of a step.
+struct BodyReport {
+  std::string name;
+  Vec3 x = Vec3::Zero();      ///< [m]
+  Vec3 u = Vec3::Zero();      ///< [m/s]
+  Vec3 omega = Vec3::Zero();  ///< [rad/s]
+  Vec3 force = Vec3::Zero();  ///< of its contacts on it, mean over the step [N]: what its momentum gained,
+                              ///< less gravity
+};
+
+/// One row of inserted.csv: what an insertion has done since the beginning.
+struct InsertReport {
+  std::string name;
+  std::int64_t placed = 0;   ///< grains
+  double mass = 0;           ///< [kg] of these
+  std::int64_t waiting = 0;  ///< grains that are due, and for which no room was found yet
+  std::int64_t no_room = 0;  ///< steps in which room was missing for one grain or more
+};
+
+/// One row of removed.csv: what a removal has taken away since the beginning.
+struct RemoveReport {
+  std::string name;
+  std::string material;  ///< "" where materials have no names
+  std::int64_t count = 0;
+  double mass = 0;  ///< [kg]
 };
 
 /// One row of triaxial.csv; compression is positive for stresses, strains (28)-(30) are negative in

@@ -9,6 +9,7 @@
 #include "kernels/clusters/clusters.hpp"
 #include "kernels/clusters/step_error.hpp"
 #include "kernels/global/balance.hpp"
+#include "kernels/global/residuals.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -200,7 +201,7 @@ void GlobalSolver::find_clusters(int most_direct) {
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
 
-std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
+std::vector<BodyProblem> GlobalSolver::checked() const {
   std::vector<BodyProblem> problems = gather();
   if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
     for (BodyProblem& problem : problems)
@@ -209,6 +210,11 @@ std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
         const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
         problem.impulse[k] = state_.candidates.impulse.force(from, problem.contacts[k].normal);
       }
+  return problems;
+}
+
+std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
+  std::vector<BodyProblem> problems = checked();
   if (!(small_ && large_)) return problems;
   for (std::size_t p = 0; p < problems.size(); ++p) {
     std::vector<char> taken = in_small_[p];
@@ -233,6 +239,34 @@ double GlobalSolver::large_error(double enough) const {
   const Whole span(*this);
   std::vector<BodyProblem> problems = checked(false);
   return velocity_error(problems, *link_, enough).relative;
+}
+
+double GlobalSolver::quantile_error(double part) const {
+  const Whole span(*this);
+  const std::vector<BodyProblem> problems = checked();
+  return quantile_of(residuals_of({problems, *link_}), *link_, part);
+}
+
+WorstErrors GlobalSolver::worst_errors() const {
+  const Whole span(*this);
+  const std::vector<BodyProblem> problems = checked();
+  const BodyParts parts(problems, *link_);
+  const Decomposition& all = state_.decomposition;
+  UnknownNames names;
+  const std::span<const BodyId> ids = state_.bodies.id;
+  if (!all.several()) names.bodies.push_back(ids);
+  if (all.several())
+    for (const SubdomainPlace e : all.here.indices()) {
+      const auto [begin, end] = all.slots_of(e);
+      names.bodies.push_back(ids.subspan(begin, end - begin));
+    }
+  for (std::size_t w = 0; w < state_.walls.size(); ++w)
+    if (state_.walls[w].inv_mass() > 0) names.walls.push_back(static_cast<std::int32_t>(w));
+  const WorstErrors here = worst_errors_of(parts, residuals_of(parts), names);
+  WorstErrors worst;
+  for (const WorstErrors& of_rank : ranks_.gather_records(std::span<const WorstErrors>(&here, 1)))
+    worst.take(of_rank);
+  return worst;
 }
 
 void GlobalSolver::correct() {

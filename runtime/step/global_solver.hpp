@@ -9,6 +9,7 @@
 #include "runtime/step/certificate.hpp"
 #include "runtime/step/gluing.hpp"
 #include "runtime/step/state.hpp"
+#include "runtime/step/worst_errors.hpp"
 #include "runtime/trace/trace.hpp"
 
 namespace talus {
@@ -46,6 +47,10 @@ class GlobalSolver {
   /// is kept for `correct`. In large ones of velocities (balance.hpp).
   SmallError small_error(double enough, double farthest);
   double large_error(double enough) const;
+  /// Of the same impulses: the residual that a share `part` of all contacts does not exceed, and what is
+  /// furthest from its law (kernels/global/residuals.hpp).
+  double quantile_error(double part) const;
+  WorstErrors worst_errors() const;
 
   /// Whether the last small_error has found what mends clusters that are wrong. `correct` puts it into
   /// `state.contacts`; velocities are left to be made afresh.
@@ -63,7 +68,8 @@ class GlobalSolver {
   template <class Gathered, class Gather>
   std::vector<Gathered> gather_parts(const Gather& gather) const;
   std::vector<BodyProblem> gather() const;
-  /// The contacts of small, or of large clusters, with the impulses of the last check.
+  /// All contacts with the impulses of the last check, or those of small or of large clusters.
+  std::vector<BodyProblem> checked() const;
   std::vector<BodyProblem> checked(bool small) const;
 
   StepState& state_;

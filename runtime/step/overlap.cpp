@@ -15,14 +15,13 @@ namespace {
 /// Part of the tolerance below which an overlap that a sample begins with is as good as none.
 constexpr double negligible = 0.1;
 
-OverlapPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
+BodyPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
   const auto id = [&](Slot slot) {
     return static_cast<std::int64_t>(state.bodies.id[static_cast<std::size_t>(slot)]);
   };
   const std::int64_t first = id(state.contacts.first[k]);
-  if (wall >= 0) return {first, -1 - wall};
-  const std::int64_t second = id(state.contacts.second[k]);
-  return {std::min(first, second), std::max(first, second)};
+  return wall >= 0 ? BodyPair::at_wall(first, wall)
+                   : BodyPair::of_bodies(first, id(state.contacts.second[k]));
 }
 
 /// Calls visit(k, wall index or -1, touch) for each contact of this rank, with the present poses.
@@ -52,7 +51,7 @@ std::vector<GivenOverlap> gathered(std::span<const GivenOverlap> part, const gra
   return deepest_of_pairs(ranks.gather_records(part));
 }
 
-double given_to(const std::vector<GivenOverlap>& given, const OverlapPair& pair) {
+double given_to(const std::vector<GivenOverlap>& given, const BodyPair& pair) {
   const auto found = std::ranges::lower_bound(given, pair, {}, &GivenOverlap::pair);
   return found != given.end() && found->pair == pair ? found->depth : 0;
 }
@@ -66,8 +65,8 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
   };
   std::vector<GivenOverlap> given;
   for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
-    const Vec3 other =
-        wall < 0 ? velocity(state.contacts.second[k]) : state.walls[static_cast<std::size_t>(wall)].velocity;
+    const Vec3 other = wall < 0 ? velocity(state.contacts.second[k])
+                                : state.walls[static_cast<std::size_t>(wall)].velocity_at(touch.point);
     const Vec3 way = 0.5 * parameters.time_step * (velocity(state.contacts.first[k]) - other);
     // Where separation and normal are parallel, as in overlaps less deep than a centre.
     const double then =
@@ -85,7 +84,7 @@ DeepestOverlap find_deepest_overlap(StepState& state, double deepest, double tol
   const std::vector<GivenOverlap>& given = *state.given_overlaps;
   struct Candidate {
     double depth;
-    OverlapPair pair;
+    BodyPair pair;
   };
   Candidate worst{0, {}};
   std::vector<GivenOverlap> left;
@@ -94,7 +93,7 @@ DeepestOverlap find_deepest_overlap(StepState& state, double deepest, double tol
   };
   for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
     if (!(touch.gap < 0)) return;
-    const OverlapPair pair = pair_of(state, k, wall);
+    const BodyPair pair = pair_of(state, k, wall);
     const double before = given_to(given, pair);
     if (before > 0) left.push_back({pair, std::min(before, -touch.gap)});
     const Candidate here{(-touch.gap - before) / touch.smaller_radius, pair};

@@ -17,15 +17,19 @@ struct StepParameters;
 struct StepState;
 
 /// Two bodies by their ids, the smaller first; or a body and wall w, as -1 - w.
-struct OverlapPair {
+struct BodyPair {
   std::int64_t body = -1;
   std::int64_t with = -1;
-  auto operator<=>(const OverlapPair&) const = default;
+  auto operator<=>(const BodyPair&) const = default;
+  static BodyPair of_bodies(std::int64_t a, std::int64_t b) {
+    return a < b ? BodyPair{a, b} : BodyPair{b, a};
+  }
+  static BodyPair at_wall(std::int64_t body, std::int32_t wall) { return {body, -1 - wall}; }
 };
 
 /// Depth by which a pair overlapped before the first step [m], as far as it has not opened since.
 struct GivenOverlap {
-  OverlapPair pair;
+  BodyPair pair;
   double depth = 0;
 };
 
@@ -33,7 +37,7 @@ struct GivenOverlap {
 struct DeepestOverlap {
   double depth = 0;    ///< over the smaller radius, beyond what the pair was given
   bool named = false;  ///< `pair` is known: `depth` is beyond the tolerance
-  OverlapPair pair;
+  BodyPair pair;
 };
 
 /// Overlaps of more than a tenth of `tolerance` x smaller radius before the first step, in order of their

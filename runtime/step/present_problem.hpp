@@ -35,6 +35,8 @@ class PresentProblem final : public WholeProblem {
   }
   SmallError small_error(double enough) override { return global_.small_error(enough, farthest_); }
   double large_error(double enough) override { return global_.large_error(enough); }
+  double quantile_error(double part) override { return global_.quantile_error(part); }
+  WorstErrors worst_errors() override { return global_.worst_errors(); }
 
   bool grains_alike() const { return stiffness_.grains_alike(); }
   const StiffnessMemory& stiffness() const { return stiffness_; }

@@ -18,6 +18,7 @@
 #include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
+#include "runtime/step/grain_rules.hpp"
 
 namespace talus {
 
@@ -91,6 +92,13 @@ enum class Precision {
 struct SolverSettings {
   SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
+  /// On error_max, of the worst contact; 0: most_over_rms times `tolerance`.
+  double max_tolerance = 0;
+  static constexpr double most_over_rms = 100;
+  double worst_allowed() const { return max_tolerance > 0 ? max_tolerance : most_over_rms * tolerance; }
+  /// On error_quantile, that a share `quantile` of the contacts does not exceed; 0: not asked.
+  double quantile_tolerance = 0;
+  double quantile = 0.99;  ///< in (0, 1]
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
   /// On overlap: what two bodies end a step in by, beyond what they were given, over the smaller radius.
@@ -157,10 +165,21 @@ struct DecompositionSettings {
   bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
 };
 
+/// A body whose path is told step by step.
+struct NamedBody {
+  std::string name;
+  BodyId id{-1};
+};
+
 /// A simulation, apart from its grains.
 struct Setup {
+  std::vector<NamedBody> named;
+  std::vector<InsertRule> inserts;
+  std::vector<RemoveRule> removes;
+  std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   std::vector<Wall> walls;
-  std::vector<Clump> clumps;  ///< shapes of bodies that are no spheres (Bodies::shape)
+  std::vector<WallGroup> groups = {};  ///< that walls name
+  std::vector<Clump> clumps;           ///< shapes of bodies that are no spheres (Bodies::shape)
   std::vector<Stage> stages;
   DetectionSettings detection;
   SolverSettings solver;
@@ -170,6 +189,11 @@ struct Setup {
   bool allow_unconverged = false;  ///< true: steps over tolerance do not change the exit code
   std::uint64_t seed = 1;
 };
+
+/// Whether a wall is there in the first stage.
+inline bool stands_at_first(const Setup& setup, const Wall& wall) {
+  return wall.from_stage.empty() || setup.stages.empty() || wall.from_stage == setup.stages.front().name;
+}
 
 /// Throws std::invalid_argument with the name of the wall or stage, the value and its limit when the setup
 /// makes no sense.

@@ -9,21 +9,48 @@
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
+#include "runtime/step/named_bodies.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/stage_end.hpp"
 #include "runtime/step/stage_loads.hpp"
 #include "runtime/step/step_report.hpp"
 #include "runtime/step/time_step.hpp"
+#include "runtime/step/wall_motions.hpp"
+#include "runtime/step/wall_reports.hpp"
 
 namespace talus {
+
+namespace {
+
+/// Of a run that begins: no grain that will come is smaller than it says, and there are materials where some
+/// may come with one.
+SampleSize first_size(const Setup& setup, SampleSize size) {
+  size.smallest = smallest_ever(setup, size.bodies > 0 ? size.smallest : 0);
+  size.materials = size.materials || (!setup.inserts.empty() && !setup.material_names.empty());
+  return size;
+}
+
+/// Grains that may come, roughly: enough to share the work of a step among threads.
+std::int64_t expected_grains(const Setup& setup) {
+  constexpr std::int64_t unknown = 16384;
+  std::int64_t grains = 0;
+  for (const InsertRule& rule : setup.inserts) grains += rule.count.value_or(unknown);
+  return grains;
+}
+
+}  // namespace
 
 struct Simulation::Implementation {
   Implementation(Setup given, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks_)
       : setup(std::move(given)),
         ranks(ranks_),
         state(first_state(setup, std::move(bodies), ranks_)),
-        size(measure_sample(state.bodies, ranks_, setup.clumps)),
-        graph(state, parameters, setup, size.bodies, executor, ranks_) {
+        size(first_size(setup, measure_sample(state.bodies, ranks_, setup.clumps))),
+        population(setup, state.bodies, ranks_),
+        graph(state, parameters, setup,
+              StepGraph::shares_for(size.bodies + expected_grains(setup),
+                                    state.decomposition.partition.subdomains),
+              executor, ranks_) {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
     state.decomposition.shapes = !setup.clumps.empty();
@@ -36,6 +63,7 @@ struct Simulation::Implementation {
     state.bodies = from.bodies;
     state.walls = from.walls;
     stage_index = from.stage_index;
+    stage_begins = from.stage_begins;
     begin_stage();
     state.walls = from.walls;
     state.candidates = from.candidates;
@@ -44,6 +72,7 @@ struct Simulation::Implementation {
     stage_steps = from.steps_of_stage;
     clock = from.clock;
     held = from.held;
+    population.go_on_from(from.population);
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
     lengths_at_start = from.lengths_of_box;
@@ -55,11 +84,13 @@ struct Simulation::Implementation {
         ranks(ranks_),
         state(restored_state(setup, from, ranks_)),
         size(from.head.size),
+        population(setup, from.head.population),
         report(from.head.report),
-        graph(state, parameters, setup, size.bodies, executor, ranks_) {
+        graph(state, parameters, setup, static_cast<std::uint32_t>(from.head.shares), executor, ranks_) {
     choose_distances();
     const CheckpointHead& head = from.head;
     stage_index = static_cast<std::size_t>(head.stage_index);
+    stage_begins = head.stage_begins;
     prescribe();
     parameters.time_step = head.time_step;
     clock = head.clock;
@@ -69,11 +100,14 @@ struct Simulation::Implementation {
     lengths_at_start = head.lengths_at_start;
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const std::vector<double> load = numbers_of(state.walls[w].load);
-      if (std::equal(load.begin(), load.end(), head.wall_loads.begin() + static_cast<std::ptrdiff_t>(7 * w)))
+      if (std::equal(load.begin(), load.end(),
+                     head.wall_loads.begin() + static_cast<std::ptrdiff_t>(load.size() * w)))
         continue;
       put_load(state.walls[w], state.walls);
       state.candidates_valid = false;  // a wall that is free now has chunks of another kind
     }
+    resolve_stages(setup, stage_index, stage_begins, state.walls);
+    set_walls(setup, report.time, parameters.time_step, state);
     graph.restore(from);
   }
 
@@ -83,8 +117,11 @@ struct Simulation::Implementation {
     graph.save(to);
     CheckpointHead& head = to.head;
     head.size = size;
+    head.shares = graph.shares_of_subdomain();
+    head.population = population.state();
     head.stage_index = static_cast<std::int64_t>(stage_index);
     head.stage_steps = stage_steps;
+    head.stage_begins = stage_begins;
     head.over = over;
     head.held = held;
     head.time_step = parameters.time_step;
@@ -95,10 +132,13 @@ struct Simulation::Implementation {
     return to;
   }
 
-  /// Alert distance and skin.
+  /// Alert distance, skin, and how far from one another two may turn, in smallest radii: no body is in
+  /// between.
   void choose_distances() {
+    constexpr double farthest_turning = 0.5;
     const double unit = smallest_radius();
     parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
+    parameters.turning = farthest_turning * unit;
     parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
   }
 
@@ -122,7 +162,7 @@ struct Simulation::Implementation {
     if (parameters.time_step == 0) parameters.time_step = clock.step();
   }
 
-  double smallest_radius() const { return size.bodies > 0 ? size.smallest : 1; }
+  double smallest_radius() const { return std::isfinite(size.smallest) ? size.smallest : 1; }
 
   /// What the stage prescribes, but for its loads and its time step.
   void prescribe() {
@@ -131,6 +171,8 @@ struct Simulation::Implementation {
   }
 
   void begin_stage() {
+    if (stage_begins.size() == stage_index) stage_begins.push_back(report.time);
+    resolve_stages(setup, stage_index, stage_begins, state.walls);
     take_loads(stage(), state.walls);
     for (Wall& wall : state.walls) put_load(wall, state.walls);
     wind_clock();
@@ -155,6 +197,7 @@ struct Simulation::Implementation {
     }
     stage_steps = 0;
     held = 0;
+    population.begin_stage(report.time);
     lengths_at_start = Domain{}.lengths(state.walls);
   }
 
@@ -165,9 +208,30 @@ struct Simulation::Implementation {
   }
 
   void choose_time_step() {
+    set_walls(setup, report.time, parameters.time_step, state);
     if (!stage().chooses_time_step) return;
-    clock.choose(longest_time_step(state, setup, parameters, smallest_radius(), ranks));
+    prepare_walls(report.time, parameters.time_step, state, ranks);
+    double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
+    // Grains that come are not there yet.
+    if (const double speed = population.fastest(span()); speed > 0)
+      longest = std::min(longest, TimeStepRule{}.longest_way * smallest_radius() / speed);
+    clock.choose(longest);
     take_time_step(clock.step());
+  }
+
+  /// The step that is about to be made.
+  StepSpan span() const { return {report.time, report.time + parameters.time_step, &stage()}; }
+
+  /// Grains that come and go with the step.
+  void change_grains() {
+    if (!population.has_rules() || !population.change(span(), state, ranks)) return;
+    state.free.u.resize(state.bodies.size());
+    state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
+    const SampleSize now = measure_sample(state.bodies, ranks, setup.clumps, &state.decomposition);
+    size.bodies = now.bodies;
+    size.mean_diameter = now.mean_diameter;
+    size.total_mass = now.total_mass;
+    size.volume = now.volume;
   }
 
   /// Behind a step: time and steps of the stage.
@@ -179,20 +243,16 @@ struct Simulation::Implementation {
     }
     const StageEnd& end = stage().end;
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
+    const StepSpan last{report.time - report.time_step, report.time, &stage()};
+    if (held > 0 && population.expects_grains(last)) held = 0;
   }
 
-  /// Loads of the walls for the step: applied forces and free velocities.
+  /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
-    for (std::size_t w = 0; w < state.walls.size(); ++w) {
-      Wall& wall = state.walls[w];
-      WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.load.drive == WallDrive::pressure
-                               ? wall.load.pressure * pressed_area(state.walls, w, next_step())
-                           : wall.load.drive == WallDrive::force ? wall.load.force
-                                                                 : 0;
-      wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
-      wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);
-    }
+    state.time = report.time;
+    demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
+    prepare_walls(report.time, parameters.time_step, state, ranks);
+    apply_loads(parameters, next_step(), state);
   }
 
   double strain(int axis) const {
@@ -220,15 +280,19 @@ struct Simulation::Implementation {
   const graph::Communicator& ranks;
   StepState state;
   SampleSize size;
+  Population population;
   StepParameters parameters;
   StepReport report;
   StepGraph graph;
   StageClock clock;  ///< of a stage that chooses its time steps
   double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
+  std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   std::int64_t stage_steps = 0;
   bool over = false;
   Vec3 lengths_at_start = Vec3::Zero();
+  NamedBodies named;
+  std::vector<BodyReport> named_reports;  ///< of the last step
 };
 
 Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
@@ -263,7 +327,7 @@ SavedState Simulation::save() const {
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
-          impl_->clock,        impl_->held};
+          impl_->clock,        impl_->held,        impl_->stage_begins,     impl_->population.state()};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {
@@ -280,7 +344,9 @@ Checkpoint Simulation::checkpoint() const {
 const StepReport& Simulation::step() {
   const double start = graph::seconds_now();
   impl_->choose_time_step();
+  impl_->change_grains();
   impl_->load_walls();
+  impl_->named.begin_step(impl_->setup.named, impl_->state, impl_->ranks);
   const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
@@ -288,6 +354,8 @@ const StepReport& Simulation::step() {
   const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
+  impl_->named_reports =
+      impl_->named.end_step(impl_->setup.named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
   return impl_->report;
 }
@@ -343,13 +411,22 @@ const graph::Graph& Simulation::step_graph() const {
 }
 
 std::vector<WallReport> Simulation::walls() const {
-  std::vector<WallReport> reports;
-  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w) {
-    const Wall& wall = impl_->state.walls[w];
-    reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
-                       impl_->state.wall_states[w].impulse / impl_->parameters.impulse_time()});
-  }
-  return reports;
+  return wall_reports(impl_->state, impl_->parameters.impulse_time());
+}
+
+std::vector<WallReport> Simulation::groups() const {
+  return group_reports(impl_->setup, impl_->state, walls());
+}
+
+const std::vector<BodyReport>& Simulation::named_bodies() const {
+  return impl_->named_reports;
+}
+
+std::vector<InsertReport> Simulation::inserted() const {
+  return impl_->population.inserted();
+}
+std::vector<RemoveReport> Simulation::removed() const {
+  return impl_->population.removed();
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {

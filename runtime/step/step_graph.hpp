@@ -50,9 +50,11 @@ struct StepSums {
 /// Each task declares what it reads and writes; the order above follows from that.
 class StepGraph {
  public:
-  /// Keeps references. `bodies`: of all ranks.
-  StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup, std::int64_t bodies,
+  /// Keeps references. `shares`: of each subdomain.
+  StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup, std::uint32_t shares,
             graph::Executor& executor, const graph::Communicator& ranks);
+  /// Shares of a subdomain, from the bodies of all ranks that there are or may come.
+  static std::uint32_t shares_for(std::int64_t bodies, std::int32_t subdomains);
 
   /// One step: poses, velocities, walls, impulses of `state` go from the beginning to the end of the step.
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
@@ -72,6 +74,7 @@ class StepGraph {
   const SolverLoop& loop() const { return loop_; }
   const graph::Graph& graph() const { return graph_; }
   std::uint32_t shares() const { return shares_; }
+  std::uint32_t shares_of_subdomain() const { return shares_per_subdomain_; }
 
  private:
   void build();
@@ -96,10 +99,11 @@ class StepGraph {
   template <class Otherwise>
   std::vector<double> copies_of_walls(const std::vector<WallCopy>& copies, const Otherwise& otherwise) const;
   void measure_share(std::uint32_t share);
+  void take_wall_sums(std::span<const double> sums);
   void sum_up();
   SlotRange range_of_share(std::size_t count, std::uint32_t share) const;
   SlotRange slots(std::uint32_t share) const;
-  double margin_of(const Wall& wall) const;
+  double margin_of(std::size_t w) const;
   bool walls_left_margin() const;
   bool out_of_balance() const;
   std::vector<double> work() const;
@@ -107,6 +111,7 @@ class StepGraph {
 
   StepState& state_;
   const StepParameters& parameters_;
+  const Setup& setup_;
   const SolverSettings& settings_;
   const DecompositionSettings& decomposition_;
   graph::Executor& executor_;
@@ -132,6 +137,7 @@ class StepGraph {
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
   std::vector<ContactSums> contact_sums_;  ///< per chunk
+  std::vector<WallSums> wall_sums_;        ///< per chunk
   StepSums sums_;
 };
 

@@ -72,6 +72,8 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   report.iterations = result.iterations;
   report.error_rms = result.error_rms;
   report.error_max = result.error_max;
+  report.error_quantile = result.error_quantile;
+  report.worst = result.worst;
   report.balance = larger(result.unbalance, defect);
   report.jump = result.jump;
   report.migrants = sums.migrants;

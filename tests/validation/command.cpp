@@ -215,7 +215,8 @@ TEST_F(Command, WritesEveryFileOfItsPageAndTheyRead) {
 
   const Table steps = read_table(at("results/steps.csv"));
   EXPECT_EQ(steps.header,
-            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,"
+            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,error_quantile,"
+            "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,jump,"
             "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
             "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged");
   ASSERT_EQ(steps.rows.size(), 12U);
@@ -228,7 +229,8 @@ TEST_F(Command, WritesEveryFileOfItsPageAndTheyRead) {
     EXPECT_EQ(steps.rows[k].at("converged"), "1");
   }
   const Table walls = read_table(at("results/walls.csv"));
-  EXPECT_EQ(walls.header, "step,time,wall,position,velocity,force_x,force_y,force_z");
+  EXPECT_EQ(walls.header,
+            "step,time,wall,position,velocity,force_x,force_y,force_z,torque_x,torque_y,torque_z,work");
   EXPECT_EQ(walls.rows.size(), 12U * 6U);
   const Table triaxial = read_table(at("results/triaxial.csv"));
   ASSERT_EQ(triaxial.rows.size(), 12U);

@@ -68,7 +68,7 @@ TEST_F(Warnings, AreInTheSummaryOfTheRun) {
   EXPECT_NE(warnings[0].get<std::string>().find("2.6 kg/m^3"), std::string::npos);
 }
 
-/// A grain that bounces off the floor at 2 m/s, a fifth of its radius in a step.
+/// A grain that begins on the floor at 3 m/s, 0.3 radii in a step, half of which it is in before it rebounds.
 std::string bouncing() {
   std::string scene = with_bodies(column_scene);
   scene.replace(scene.find("[0, 0, -9.81]"), 13, "[0, 0, 0]");
@@ -80,12 +80,13 @@ std::string bouncing() {
 // The step is exact and the position is not. Its time step follows from how far it was missed, and does.
 TEST_F(Warnings, NameTheOverlapOfAStepThatIsTooLongAndTheStepThatWouldDo) {
   write(at("scene.toml"), bouncing());
-  write(at("grains.csv"), "id,x,y,z,radius,vx,vy,vz\n42,0,0,0.0115,0.01,0,0,-2\n");
+  write(at("grains.csv"), "id,x,y,z,radius,vx,vy,vz\n42,0,0,0.01,0.01,0,0,-3\n");
   const Outcome outcome = run("run scene.toml --out results");
   EXPECT_EQ(outcome.code, 3) << outcome.messages;
-  EXPECT_NE(outcome.messages.find("overlaps beyond solver.overlap_tolerance = 0.05: the deepest, 0.1 of the "
-                                  "smaller radius, of body 42 and wall 'floor' in step 2"),
-            std::string::npos)
+  EXPECT_NE(
+      outcome.messages.find("overlaps beyond solver.overlap_tolerance = 0.05: the deepest, 0.075 of the "
+                            "smaller radius, of body 42 and wall 'floor' in step 1"),
+      std::string::npos)
       << outcome.messages;
   const Table steps = read_table(at("results/steps.csv"));
   double worst = 0;

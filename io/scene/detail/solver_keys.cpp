@@ -33,6 +33,20 @@ Section<SolverSettings> solver_keys() {
           key<SolverSettings>("tolerance", "", positive,
                               "Bound on the relative error of the contact law (error_rms).",
                               &SolverSettings::tolerance),
+          key<SolverSettings>("max_tolerance", "", positive,
+                              "Bound on the error of the worst contact (error_max).",
+                              &SolverSettings::max_tolerance)
+              .or_auto(0, "a hundred times `tolerance`"),
+          key<SolverSettings>("quantile_tolerance", "", positive,
+                              "Bound on the error that a share `quantile` of the contacts does not exceed "
+                              "(error_quantile).",
+                              &SolverSettings::quantile_tolerance)
+              .blank_when_zero()
+              .or_else("not asked for"),
+          key<SolverSettings>("quantile", "", {.low = 0.001, .high = 1}, "That share.",
+                              &SolverSettings::quantile)
+              .only("quantile_tolerance is given",
+                    [](const SolverSettings& s) { return s.quantile_tolerance > 0; }),
           key<SolverSettings>(
               "balance_tolerance", "", positive,
               "Bound on the estimated error of the forces and on the momentum defect (balance).",

@@ -177,10 +177,13 @@ TEST(WholeFile, KeepsTheOldContentWhenTheNewDoesNotFit) {
 
 TEST(Csv, HeadersAreThosePromised) {
   EXPECT_EQ(steps_csv_header(),
-            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,balance,jump,"
+            "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,error_quantile,"
+            "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,jump,"
             "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
             "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged\n");
-  EXPECT_EQ(walls_csv_header(), "step,time,wall,position,velocity,force_x,force_y,force_z\n");
+  EXPECT_EQ(walls_csv_header(),
+            "step,time,wall,position,velocity,force_x,force_y,force_z,torque_x,torque_y,"
+            "torque_z,work\n");
   EXPECT_EQ(triaxial_csv_header(),
             "step,time,stage,strain_x,strain_y,strain_z,strain_volume,strain_shear,solid_fraction,stress_x,"
             "stress_y,"
@@ -188,12 +191,14 @@ TEST(Csv, HeadersAreThosePromised) {
 }
 
 TEST(Csv, StepsRowHoldsEveryValueInItsColumn) {
-  StepReport r{1,    2.5,  0.25, 3,    4,    5,    6,    7.5, 8.5,  9.5,  10.5, 11.5,
-               12.5, 0.75, {},   13.5, 14.5, 15.5, 19.5, 16,  17.5, 18.5, true};
+  StepReport r{1,    2.5,  0.25, 3,    4,    5,  6,    7.5,  8.5,  8.75, {0.5, {2, 9}, 0.625, 3},
+               9.5,  10.5, 11.5, 12.5, 0.75, {}, 13.5, 14.5, 15.5, 19.5, 16,
+               17.5, 18.5, true};
   std::string row;
   append_steps_row(row, r);
   EXPECT_EQ(row,
-            "1,2.5,0.25,3,4,5,6,7.5,8.5,9.5,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,16,17.5,18.5,1\n");
+            "1,2.5,0.25,3,4,5,6,7.5,8.5,8.75,2,9,3,0.625,9.5,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,"
+            "16,17.5,18.5,1\n");
   r.overlapping = {7, -2};
   row.clear();
   append_steps_row(row, r);

@@ -216,13 +216,16 @@ TEST(GapTerm, AtAWallCountsWhatGravityAddsToTheApproach) {
   EXPECT_NEAR(bias_of({0.06, -5.92, 0, 9}, true), 0.06 / h, 1e-12);
 }
 
-TEST(Restitution, ActsOnFastPairsOnceTheGapIsClosed) {
+TEST(Restitution, ActsOnFastPairsThatMeetWithinTheStep) {
   for (bool wall : {false, true}) {
-    EXPECT_TRUE(std::isnan(bias_of({0.02, -3, 0.5}, wall))) << "a fast pair flies on until it touches";
+    EXPECT_DOUBLE_EQ(bias_of({0.02, -3, 0.5}, wall), -1.5);
+    EXPECT_NEAR(bias_of({0.02, -1.5, 0.5}, wall), 0.02 / h, 1e-12) << "others may push it together";
+    EXPECT_TRUE(std::isnan(bias_of({0.02, -1.5, 1}, wall))) << "which would cost an elastic pair energy";
     EXPECT_DOUBLE_EQ(bias_of({-0.02, -3, 0.5}, wall), -1.5);
     EXPECT_DOUBLE_EQ(bias_of({-0.02, -3, 1}, wall), -3);
     EXPECT_DOUBLE_EQ(bias_of({-0.02, 3, 0.5}, wall), 1.5) << "separating pairs follow the same law";
-    EXPECT_TRUE(std::isnan(bias_of({0.02, 3, 0.5}, wall)));
+    EXPECT_NEAR(bias_of({0.02, 3, 0.5}, wall), 0.02 / h, 1e-12);
+    EXPECT_TRUE(std::isnan(bias_of({0.02, 3, 1}, wall)));
   }
 }
 

@@ -126,7 +126,12 @@ TEST(GapLaw, LeavesOutPairsThatStayApartAndFollowsTheImpactLawOfFastOnes) {
   EXPECT_EQ(solve(0.05, -0.5).bias, 5) << "g/h";
   EXPECT_EQ(solve(-0.05, -0.5).bias, 0) << "an overlap stays";
   EXPECT_EQ(solve(-0.05, -2).bias, -1) << "e v_n";
-  EXPECT_TRUE(solve(0.05, -2).absent) << "fast, and not there yet";
+  EXPECT_EQ(solve(0.05, -2).bias, 5) << "fast, and not there within the step";
+  EXPECT_EQ(solve(0.05, -6).bias, -3) << "but this one is";
+  EXPECT_EQ(solve(0.05, 6).bias, 5) << "nor one that separates";
+  EXPECT_FALSE(solve(0.05, -2).absent);
+  EXPECT_TRUE(solve_gap(rule, 0.05, -2.0, -2.0, 1.0).absent) << "with e = 1 it is not to lose energy";
+  EXPECT_FALSE(solve_gap(rule, 0.05, -6.0, -6.0, 1.0).absent);
   EXPECT_TRUE(stays_apart(0.2, -10.0, 0.01, 0.1));
   EXPECT_FALSE(stays_apart(0.2, -30.0, 0.01, 0.1)) << "closes within the step";
 }

@@ -1,0 +1,31 @@
+#pragma once
+
+/// How far each contact of a step is from its law: what a mean over the sample hides.
+
+#include <vector>
+
+#include "kernels/global/body_parts.hpp"
+
+namespace talus {
+
+/// Residuals of all contacts, relative to the step's velocities.
+struct Residuals {
+  /// Per part and contact: |r' - r| W_nn over `scale` [1], with r' one projection away from r (natural map,
+  /// rho = 1/W_nn).
+  std::vector<std::vector<double>> contact;
+  /// Per part and unknown: the velocity u that all its contacts together would give it by r' - r, over
+  /// `scale` [1].
+  std::vector<std::vector<double>> body;
+  /// Of error_rms: root mean square over the contacts of W_nn |r|, or of |v + b n| where they carry or close,
+  /// the larger [m/s].
+  double scale = 0;
+};
+
+/// Of the impulses of the problem and the velocities that they give. Collective.
+Residuals residuals_of(const BodyParts& parts);
+
+/// The residual that a share `part` in (0, 1] of all contacts does not exceed [1], rounded up by at most 10
+/// %. 0 without contacts. Collective.
+double quantile_of(const Residuals& residuals, const PartLink& link, double part);
+
+}  // namespace talus

@@ -1,0 +1,35 @@
+#pragma once
+
+/// Which contact and which body a step that was missed is furthest off at, by their names.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "kernels/bodies/types.hpp"
+#include "kernels/global/residuals.hpp"
+#include "runtime/step/overlap.hpp"
+
+namespace talus {
+
+/// Residuals over the step's velocities, as error_max (kernels/global/residuals.hpp).
+struct WorstErrors {
+  double contact_error = 0;  ///< of the contact that is furthest from its law
+  BodyPair contact;          ///< its bodies; none where every contact satisfies its law
+  double body_error = 0;  ///< of the body that its contacts would change the velocity of most, by that change
+  std::int64_t body = 0;  ///< its id; wall w as -1 - w. Means nothing where body_error is 0
+
+  /// Keeps the worse of both, and of equal ones that of smaller names.
+  void take(const WorstErrors& other);
+};
+
+/// How unknowns are called.
+struct UnknownNames {
+  std::vector<std::span<const BodyId>> bodies;  ///< per part: ids of the unknowns before the first wall
+  std::vector<std::int32_t> walls;              ///< numbers of the others, the same in every part
+};
+
+/// Of the parts here.
+WorstErrors worst_errors_of(const BodyParts& parts, const Residuals& residuals, const UnknownNames& names);
+
+}  // namespace talus

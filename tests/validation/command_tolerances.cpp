@@ -1,0 +1,96 @@
+/// What `talus run` asks of single contacts, and whom it names where they are missed.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus {
+namespace {
+
+using namespace test;
+
+class Tolerances : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+  double largest(const std::string& results, const std::string& column) const {
+    const Table steps = read_table(at(results) / "steps.csv");
+    double most = 0;
+    for (std::size_t k = 0; k < steps.rows.size(); ++k) most = std::max(most, steps.number(k, column));
+    return most;
+  }
+
+  ScratchDirectory folder_;
+};
+
+// 400 grains at rest on the floor, and far from them a column of 210, ids 1000 to 1209, that stands on grain
+// 1000: too large for a direct check, too long for five sweeps.
+TEST_F(Tolerances, NameTheContactAndTheBodyThatAStepMissed) {
+  std::string grains = "id,x,y,z,radius\n";
+  for (int k = 0; k < 400; ++k)
+    grains += std::to_string(k) + "," + std::to_string(0.05 * (k % 20)) + "," +
+              std::to_string(0.05 * (k / 20)) + ",0.01,0.01\n";
+  for (int k = 0; k < 210; ++k)
+    grains += std::to_string(1000 + k) + ",2,2," + std::to_string(0.01 + 0.02 * k) + ",0.01\n";
+  write(at("grains.csv"), grains);
+  write(at("scene.toml"), with_bodies(column_scene));
+  const std::string few = "run scene.toml --set solver.method=nlgs --set solver.max_iterations=5 ";
+  const Outcome outcome = run(few + "--out results");
+  EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  const Table steps = read_table(at("results/steps.csv"));
+  ASSERT_EQ(steps.rows.size(), 4U);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(steps.rows[k].at("converged"), "0");
+    const double body = steps.number(k, "worst_contact_body"), with = steps.number(k, "worst_contact_with");
+    EXPECT_GE(body, 1000);
+    EXPECT_TRUE(with == body + 1 || (body == 1000 && with == -1)) << body << " and " << with;
+    EXPECT_GE(steps.number(k, "worst_body"), 1000);
+    EXPECT_GT(steps.number(k, "worst_body_error"), 0);
+  }
+  EXPECT_NE(outcome.messages.find("is the furthest off: at the contact of bod"), std::string::npos)
+      << outcome.messages;
+
+  EXPECT_EQ(run(few + "--set decomposition.subdomains=3 --set decomposition.partitioner=rcb --out cut").code,
+            3);
+  const Table cut = read_table(at("cut/steps.csv"));
+  EXPECT_GE(cut.number(0, "worst_contact_body"), 1000);
+
+  EXPECT_EQ(run("run scene.toml --out done").code, 0);
+  const Table done = read_table(at("done/steps.csv"));
+  EXPECT_EQ(done.rows[3].at("converged"), "1");
+  EXPECT_EQ(done.rows[3].at("worst_contact_body"), "-1");
+  EXPECT_EQ(done.number(3, "worst_body_error"), 0);
+}
+
+// Each bound is missed where nothing asks for it, and kept where it is asked.
+TEST_F(Tolerances, OfTheWorstContactAndOfMostOfThemAreKept) {
+  write(at("scene.toml"), pressed_box);
+  const std::string plain = "run scene.toml --set solver.tolerance=1e-2 --set solver.balance_tolerance=1 ";
+  ASSERT_EQ(run(plain + "--out loose --set solver.quantile_tolerance=1e3").code, 0);
+  const double worst = largest("loose", "error_max"), most = largest("loose", "error_quantile");
+  EXPECT_GT(worst, most);
+  EXPECT_GT(most, 0);
+  ASSERT_EQ(run(plain + "--out worst --set solver.max_tolerance=" + std::to_string(0.3 * worst)).code, 0);
+  EXPECT_LE(largest("worst", "error_max"), 0.3 * worst);
+  ASSERT_EQ(run(plain + "--out most --set solver.quantile_tolerance=" + std::to_string(0.3 * most)).code, 0);
+  EXPECT_LE(largest("most", "error_quantile"), 0.3 * most);
+  EXPECT_EQ(largest("worst", "error_quantile"), 0) << "nobody asked for it";
+}
+
+TEST_F(Tolerances, ThatMakeNoSenseAreRefused) {
+  write(at("scene.toml"), pressed_box);
+  for (const char* wrong :
+       {"solver.max_tolerance=-1", "solver.quantile_tolerance=nan", "solver.quantile=2"}) {
+    const Outcome outcome = run(std::string("run scene.toml --dry-run --set ") + wrong);
+    EXPECT_EQ(outcome.code, 2) << wrong;
+    EXPECT_NE(outcome.messages.find("solver."), std::string::npos) << outcome.messages;
+  }
+}
+
+}  // namespace
+}  // namespace talus
