@@ -1,5 +1,6 @@
 #include "tests/fuzz/targets.hpp"
 
+#include <hdf5.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -20,6 +21,14 @@ namespace talus::fuzz {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// As the command does (apps/commands/main.cpp).
+const herr_t no_cleaning_at_exit = H5dont_atexit();
+
+/// What HDF5 could not close of a damaged file would be found again under the next file's name.
+void forget_open_files() {
+  if (no_cleaning_at_exit >= 0 && H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL) > 0) H5close();
+}
 
 /// The bytes as a file, in memory where the system has such files; the same name for all of a process.
 class GivenFile {
@@ -75,6 +84,7 @@ void read_mesh(Bytes bytes) {
 void read_fclib(Bytes bytes) {
   const GivenFile file(bytes);
   expect_only<io::FileError>([&] { io::read_fclib_problem(file.path()); });
+  forget_open_files();
 }
 
 void read_results(Bytes bytes) {
@@ -83,6 +93,7 @@ void read_results(Bytes bytes) {
     const std::size_t frames = io::frame_count(file.path());
     for (std::size_t k = 0; k < frames && k < 4; ++k) io::read_frame(file.path(), k);
   });
+  forget_open_files();
 }
 
 void read_checkpoint(Bytes bytes) {
@@ -91,11 +102,13 @@ void read_checkpoint(Bytes bytes) {
     io::read_checkpoint_head(file.path());
     io::read_checkpoint_parts(file.path(), {0});
   });
+  forget_open_files();
 }
 
 void read_trace(Bytes bytes) {
   const GivenFile file(bytes);
   expect_only<io::FileError>([&] { io::read_trace(file.path()); });
+  forget_open_files();
 }
 
 }  // namespace talus::fuzz
