@@ -1,4 +1,3 @@
-#include <hdf5.h>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -103,9 +102,6 @@ int run_guarded(const CommandRun& run, CommandLine line) {
 
 int main(int argc, char** argv) {
   using namespace talus;
-  // After a write that failed (a full disk) the library's clean-up at exit crashes, and would turn exit code
-  // 1 into a signal; every file is closed where it is written.
-  H5dont_atexit();
   occupy_closed_streams();
   // Who reads stdout or stderr may go before a simulation ends: then writing fails, and nothing else.
   std::signal(SIGPIPE, SIG_IGN);

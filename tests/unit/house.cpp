@@ -46,7 +46,7 @@ const std::vector<Room>& rooms() {
       {"io/pictures", {"io/files", "io/results", "io/trace"}},
       {"io/output", {"io/files", "io/results", "io/pictures"}},
       {"io/checkpoint", {"io/files"}},
-      {"io/scene", {"io/files", "io/output"}},
+      {"io/scene", {"io/files", "io/results", "io/output"}},
       {"apps/shared", {}},
       {"apps/study_error", {"apps/shared"}},
       {"apps/study_scaling", {"apps/shared"}},

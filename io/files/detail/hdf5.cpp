@@ -7,6 +7,10 @@
 namespace talus::io::detail {
 namespace {
 
+/// After a write that failed (a full disk) the library's clean-up at exit crashes, and would turn exit code 1
+/// into a signal; every file is closed where it is written. To be said before anything else is asked of it.
+[[maybe_unused]] const bool without_exit_handler = H5dont_atexit() >= 0;
+
 /// H5E_WALK_UPWARD begins (n = 0) at the function that met the trouble first.
 herr_t keep_first(unsigned n, const H5E_error2_t* error, void* text) {
   if (n == 0 && error->desc != nullptr) *static_cast<std::string*>(text) = error->desc;

@@ -214,8 +214,8 @@ TEST(Csv, TriaxialAndWallRowsHoldEveryValueInItsColumn) {
   EXPECT_EQ(row, "1,2.5,s,3.5,4.5,5.5,6.5,7.5,8.5,9.5,10.5,11.5,12.5,13.5,14.5,15.5,0\n");
   row.clear();
   append_walls_row(row, StepReport{.step = 3, .time = 0.5},
-                   WallReport{"top", 1.5, -2.5, Vec3(3.5, 4.5, 5.5)});
-  EXPECT_EQ(row, "3,0.5,top,1.5,-2.5,3.5,4.5,5.5\n");
+                   WallReport{"top", 1.5, -2.5, Vec3(3.5, 4.5, 5.5), Vec3(6.5, 7.5, 8.5), 9.5});
+  EXPECT_EQ(row, "3,0.5,top,1.5,-2.5,3.5,4.5,5.5,6.5,7.5,8.5,9.5\n");
 }
 
 TEST(Csv, NumbersReadBackBitForBit) {
@@ -231,7 +231,7 @@ TEST(Csv, NumbersReadBackBitForBit) {
 TEST(Csv, NamesWithCommasAndQuotesAreQuoted) {
   std::string row;
   append_walls_row(row, StepReport{}, WallReport{"top, \"left\""});
-  EXPECT_EQ(row, "0,0,\"top, \"\"left\"\"\",0,0,0,0,0\n");
+  EXPECT_EQ(row, "0,0,\"top, \"\"left\"\"\",0,0,0,0,0,0,0,0,0\n");
 }
 
 TEST(Csv, AFullDiskIsAnErrorThatNamesTheFile) {
