@@ -12,7 +12,12 @@ void RecorderFeed::row(const Simulation& simulation, const std::optional<Triaxia
   if (ranks_.rank() != 0) return;
   std::vector<WallReport> walls = simulation.walls();
   for (WallReport& group : simulation.groups()) walls.push_back(std::move(group));
-  rows_.push_back({simulation.report(), std::move(walls), triaxial, {}});
+  rows_.push_back({.step = simulation.report(),
+                   .walls = std::move(walls),
+                   .triaxial = triaxial,
+                   .bodies = simulation.named_bodies(),
+                   .inserted = simulation.inserted(),
+                   .removed = simulation.removed()});
   if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
   if (rows_.size() >= 64 || graph::seconds_now() - flushed_ > 0.5) flush();
 }

@@ -112,9 +112,9 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
 
 /// The sample, on rank 0, and what is to be said of it.
 void make_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
-  if (run.scene.sample.kind == io::SampleSpec::Kind::state) {
+  if (run.scene.from_state()) {
     StateSample state = read_state(run.scene);
-    run.sample = completed(run.scene, std::move(state.sample));
+    run.sample = build_sample(run.scene, std::move(state.sample));
     run.forces = std::move(state.forces);
     place_walls_of(state.walls, run.scene);
   } else {

@@ -54,6 +54,7 @@ void each_number_of(Memory& memory, const Visit& visit) {
   visit("wall_s", memory.wall_s);
   visit("wall_points", memory.wall_points);
   visit("wall_mass", memory.wall_mass);
+  visit("named", memory.named);
   visit("frame_times", memory.mark.frame_times);
 }
 

@@ -28,6 +28,7 @@ struct RunMemory {
   double wall_s = 0;                ///< elapsed [s]
   std::vector<double> wall_points;  ///< where the walls stood at first [m]
   double wall_mass = 0;             ///< of pushed walls to which the scene gives none [kg]
+  std::vector<std::int64_t> named;  ///< ids of the bodies with names
   io::OutputMark mark;
 };
 std::string text_of(const RunMemory& memory);

@@ -107,7 +107,31 @@ std::string name_of(const BodyPair& pair, const std::vector<Wall>& walls) {
   return fmt::format("bodies {} and {}", pair.body, pair.with);
 }
 
+namespace {
+
+/// What came and went, and what found no room.
+void print_grains(const Terminal& terminal, const Simulation& simulation) {
+  for (const InsertReport& insert : simulation.inserted()) {
+    terminal.say("insert '{}': {} placed, {:.6g} kg", insert.name,
+                 counted(static_cast<std::size_t>(insert.placed), "grain"), insert.mass);
+    if (insert.no_room > 0)
+      terminal.warn(
+          "warning: insert '{}' had no room for a grain in {}, and {} wait still; \"waiting\" in "
+          "inserted.csv "
+          "says when. Enlarge its region, raise its velocity or attempts, or ask for fewer",
+          insert.name, counted(static_cast<std::size_t>(insert.no_room), "step"),
+          counted(static_cast<std::size_t>(insert.waiting), "grain"));
+  }
+  for (const RemoveReport& remove : simulation.removed())
+    terminal.say("remove '{}': {}{}, {:.6g} kg", remove.name,
+                 counted(static_cast<std::size_t>(remove.count), "grain"),
+                 remove.material.empty() ? "" : fmt::format(" of '{}'", remove.material), remove.mass);
+}
+
+}  // namespace
+
 void print_notes(const Terminal& terminal, const Simulation& simulation, const Tally& tally) {
+  print_grains(terminal, simulation);
   const MessageCount& messages = simulation.messages();
   if (messages.messages > 0)
     terminal.say(

@@ -27,6 +27,11 @@ void share_walls(Setup& setup, const graph::Communicator& ranks) {
     for (const double* value : values) own.push_back(*value);
   const std::vector<double> shared = ranks.gather_records(std::span<const double>(own));
   for (std::size_t k = 0; k < values.size(); ++k) *values[k] = shared[k];
+  std::vector<BodyId> ids;
+  if (ranks.rank() == 0)
+    for (const NamedBody& body : setup.named) ids.push_back(body.id);
+  ids = ranks.gather_records(std::span<const BodyId>(ids));
+  for (std::size_t k = 0; k < ids.size(); ++k) setup.named[k].id = ids[k];
 }
 
 bool any_refused(const std::string& why, const graph::Communicator& ranks) {

@@ -11,7 +11,7 @@
 namespace talus {
 
 /// Collective. Shares what rank 0 alone knows when it has made the sample: where the walls stand, how
-/// they move, and what they weigh.
+/// they move, what they weigh, and the ids of bodies with names.
 void share_walls(Setup& setup, const graph::Communicator& ranks);
 
 /// Collective. True when any rank refuses to run: `why` says it for this one, "" when it does not. Rank 0

@@ -98,7 +98,7 @@ void take_over(const ResumePoint& point, io::Scene& scene) {
   DecompositionSettings& decomposition = scene.setup.decomposition;
   if (decomposition.subdomains == 0)
     decomposition = with_subdomains(decomposition, point.file.state.head.subdomains);
-  io::place_walls_again(scene, point.memory.wall_points, point.memory.wall_mass);
+  io::place_walls_again(scene, {point.memory.wall_points, point.memory.wall_mass, point.memory.named});
 }
 
 EarlierRun earlier_run(const std::filesystem::path& directory) {

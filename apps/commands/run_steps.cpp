@@ -207,7 +207,7 @@ std::unique_ptr<Simulation> make_simulation(const PreparedRun& run, Sample sampl
   if (run.resume) return std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
   auto simulation = std::make_unique<Simulation>(
       setup, deal_out(std::move(sample), setup.decomposition, run.ranks), executor, run.ranks);
-  if (run.scene.sample.kind == io::SampleSpec::Kind::state) simulation->begin_from(std::move(forces));
+  if (run.scene.from_state()) simulation->begin_from(std::move(forces));
   return simulation;
 }
 
@@ -218,6 +218,8 @@ RunMemory first_memory(const PreparedRun& run) {
   for (const Wall& wall : run.scene.setup.walls)
     memory.wall_points.insert(memory.wall_points.end(), wall.point.begin(), wall.point.end());
   memory.wall_mass = run.wall_mass;
+  for (const NamedBody& body : run.scene.setup.named)
+    memory.named.push_back(static_cast<std::int64_t>(body.id));
   return memory;
 }
 

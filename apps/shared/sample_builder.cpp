@@ -8,6 +8,7 @@
 #include <string>
 
 #include "apps/shared/patience.hpp"
+#include "apps/shared/sample_join.hpp"
 #include "apps/shared/state_sample.hpp"
 #include "io/scene/bodies_file.hpp"
 #include "kernels/detection/broad_phase.hpp"
@@ -17,6 +18,9 @@
 namespace talus {
 
 namespace {
+
+/// What fits a Slot.
+constexpr std::int64_t most_grains = 2147483647;
 
 std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<double>& radii) {
   const double spacing = sample.spacing * 2 * *std::max_element(radii.begin(), radii.end());
@@ -41,33 +45,81 @@ void demand_memory(const io::Scene& scene, double grains) {
                     grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
 }
 
-Sample make_sample(const io::Scene& scene) {
-  const io::SampleSpec& spec = scene.sample;
-  if (spec.kind == io::SampleSpec::Kind::bodies)
-    return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
-  if (spec.kind == io::SampleSpec::Kind::state) return read_state(scene).sample;
+std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double>& radii) {
+  std::vector<Vec3> places;
+  if (spec.kind == io::SampleSpec::Kind::lattice) {
+    places = lattice_sites(spec, radii);
+  } else {
+    Patience patience;
+    places = deposit(radii, spec.base[0], spec.base[1], [&](std::size_t placed) {
+      patience.tell([&] { return fmt::format("{} of {} grains deposited", placed, radii.size()); });
+    });
+  }
+  if (!spec.origin.isZero(0))
+    for (Vec3& x : places) x += spec.origin;
+  return places;
+}
 
-  demand_memory(scene, static_cast<double>(spec.grains()));
+/// The sites of a lattice in its region: `count` of them, or all.
+std::vector<Vec3> sites_in_region(const io::Scene& scene, const io::SampleSpec& spec,
+                                  const std::string& path) {
+  const double largest = largest_radius(spec.radii), spacing = spec.spacing * 2 * largest;
+  const Bounds bounds = bounds_of(*spec.region);
+  const Vec3 cells = ((bounds.high - bounds.low) / spacing).array().max(1);
+  demand_memory(scene, spec.count > 0 ? static_cast<double>(spec.count) : cells.prod());
+  const auto most =
+      spec.count > 0 ? static_cast<std::size_t>(spec.count) : static_cast<std::size_t>(most_grains);
+  std::vector<Vec3> sites = lattice_in(*spec.region, largest, spacing, most);
+  if (spec.count > 0 && sites.size() < most)
+    throw io::SceneError(scene.source_file, 0, path,
+                         fmt::format("the region has {} sites for {} grains; make it larger, or leave count "
+                                     "out",
+                                     sites.size(), spec.count));
+  return sites;
+}
+
+void set_velocity(const io::SampleSpec& spec, Sample& sample) {
+  if (spec.velocity.isZero(0) && spec.angular_velocity.isZero(0)) return;
+  const Vec3& u = spec.velocity;
+  for (const double radius : sample.radius) {
+    const Vec3 w = radius * spec.angular_velocity;
+    sample.velocity.push_back({u[0], u[1], u[2], w[0], w[1], w[2]});
+  }
+}
+
+/// Sample `k` of the scene.
+Sample make_part(const io::Scene& scene, std::size_t k) {
+  using Kind = io::SampleSpec::Kind;
+  const io::SampleSpec& spec = scene.samples[k];
+  if (spec.kind == Kind::bodies)
+    return io::read_bodies(spec.file, scene.density, scene.setup.rotation, scene.materials);
   Sample sample;
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;
   if (!scene.setup.clumps.empty()) sample.shape = mass_of(1, scene.setup.clumps.front());
   sample.seed = scene.setup.seed;
-  sample.radius = draw_radii(spec.radii, static_cast<std::size_t>(spec.grains()), scene.setup.seed);
-  if (spec.kind == io::SampleSpec::Kind::lattice) {
-    sample.x = lattice_sites(spec, sample.radius);
-    return sample;
+  const auto stream = static_cast<std::uint32_t>(k);
+  const auto draw = [&](std::size_t n) { return draw_radii(spec.radii, n, scene.setup.seed, stream); };
+  if (spec.kind == Kind::body) {
+    sample.x = {spec.position};
+    sample.radius = draw(1);
+    sample.named = {BodyId{0}};
+  } else if (spec.region) {
+    sample.x = sites_in_region(scene, spec, fmt::format("sample[{}].region", k));
+    sample.radius = draw(sample.x.size());
+  } else {
+    demand_memory(scene, static_cast<double>(spec.grains()));
+    sample.radius = draw(static_cast<std::size_t>(spec.grains()));
+    sample.x = places_of(spec, sample.radius);
   }
-  Patience patience;
-  sample.x = deposit(sample.radius, spec.base[0], spec.base[1], [&](std::size_t placed) {
-    patience.tell([&] { return fmt::format("{} of {} grains deposited", placed, sample.radius.size()); });
-  });
+  set_velocity(spec, sample);
   return sample;
 }
 
 /// What Simulation would refuse (validate of Bodies), while the file that says it is at hand.
 void check(const io::Scene& scene, const Sample& sample) {
-  const std::string& file = scene.sample.from_file() ? scene.sample.file : scene.source_file;
+  const bool one_file = scene.samples.size() == 1 && scene.samples.front().from_file();
+  const std::string& file = one_file ? scene.samples.front().file : scene.source_file;
   for (std::size_t k = 0; k < sample.size(); ++k) {
     const auto refuse = [&](const std::string& what) {
       throw io::SceneError(file, 0, "",
@@ -110,22 +162,26 @@ struct Overlaps {
 
 }  // namespace
 
-void put_materials(const io::Scene& scene, Sample& sample) {
+void put_materials(const io::Scene& scene, Sample& sample, std::size_t of_sample) {
   if (scene.materials.empty()) return;
+  sample.material_density.clear();
   for (const io::MaterialSpec& material : scene.materials)
     sample.material_density.push_back(material.density);
   if (!sample.material.empty()) return;
-  const auto named = std::ranges::find(scene.materials, scene.sample.material, &io::MaterialSpec::name);
+  const std::string name = of_sample < scene.samples.size() ? scene.samples[of_sample].material : "";
+  const auto named = std::ranges::find(scene.materials, name, &io::MaterialSpec::name);
   const auto of_all = named == scene.materials.end() ? 0 : named - scene.materials.begin();
   sample.material.assign(sample.size(), static_cast<Material>(of_all));
 }
 
-Sample build_sample(const io::Scene& scene) {
-  return completed(scene, make_sample(scene));
-}
-
-Sample completed(const io::Scene& scene, Sample sample) {
-  put_materials(scene, sample);
+Sample build_sample(const io::Scene& scene, std::optional<Sample> state) {
+  std::vector<Sample> parts;
+  for (std::size_t k = 0; k < scene.samples.size(); ++k) {
+    const bool is_state = scene.samples[k].kind == io::SampleSpec::Kind::state;
+    parts.push_back(!is_state ? make_part(scene, k) : state ? std::move(*state) : read_state(scene).sample);
+    put_materials(scene, parts.back(), k);
+  }
+  Sample sample = parts.size() == 1 ? std::move(parts.front()) : join_samples(scene, std::move(parts));
   check(scene, sample);
   return sample;
 }
@@ -134,7 +190,7 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   Overlaps overlaps;
   const auto id = [&](std::size_t k) { return static_cast<std::int64_t>(sample.id_of(k)); };
   // Samples that are made have none between grains.
-  if (scene.sample.from_file()) {
+  if (std::ranges::any_of(scene.samples, &io::SampleSpec::from_file)) {
     const CellGrid grid = build_cells(sample.x, sample.radius);
     std::vector<GrainPair> pairs;
     find_pairs(grid, 0, grid.cells.size(), pairs);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "io/scene/scene.hpp"
@@ -7,17 +8,16 @@
 
 namespace talus {
 
-/// The grains that a scene asks for, at rest unless its file gives velocities; ids 0..n-1, or those of the
-/// file. Throws io::SceneError when the file is missing or damaged, or when a grain has no mass or speed that
-/// is finite, std::invalid_argument when grains do not fit their base.
-Sample build_sample(const io::Scene& scene);
+/// The grains of all samples of a scene, one sample behind the other, at rest unless it says otherwise; ids
+/// 0, 1, ..., but those of a file or a state, behind which the others go on. `state`: what read_state gave,
+/// where it is at hand. Throws io::SceneError when a file is missing or damaged, when a grain has no mass or
+/// speed that is finite, or samples overlap one another, std::invalid_argument when grains do not fit their
+/// base.
+Sample build_sample(const io::Scene& scene, std::optional<Sample> state = std::nullopt);
 
-/// A sample that was made otherwise, with the materials of the scene, and checked likewise.
-Sample completed(const io::Scene& scene, Sample sample);
-
-/// Where materials have names: gives the grains that have none that of the scene's sample, and all their
+/// Where materials have names: gives the grains that have none that of a sample of the scene, and all their
 /// densities.
-void put_materials(const io::Scene& scene, Sample& sample);
+void put_materials(const io::Scene& scene, Sample& sample, std::size_t of_sample = 0);
 
 /// How many grains overlap others or walls (placed, io::place_walls) by more than a tenth of the smaller
 /// radius, the worst of them, and what to do; "" when none does.

@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "apps/shared/sample_builder.hpp"
+#include "kernels/detection/wall_pairs.hpp"
+#include "kernels/samples/detail/random_numbers.hpp"
+#include "kernels/shapes/region.hpp"
 
 namespace talus {
 
@@ -41,12 +45,54 @@ void add_gravity(const io::Scene& scene, std::vector<std::string>& warnings) {
   }
 }
 
+/// Nothing can come where walls are.
+void add_regions(const io::Scene& scene, std::vector<std::string>& warnings) {
+  constexpr std::uint64_t probes = 256;
+  for (const InsertRule& rule : scene.setup.inserts) {
+    const double radius = smallest_radius(rule.radii);
+    bool free = false;
+    for (std::uint64_t k = 0; k < probes && !free; ++k) {
+      const auto [a, b] = detail::uniform_pair(1, k, 0);
+      const Place place = place_in(rule.region, radius, {a, b, detail::uniform_pair(1, k, 1)[0]});
+      free = place.found && std::ranges::none_of(scene.setup.walls, [&](const Wall& wall) {
+               return meets_wall(wall, place.x, radius);
+             });
+    }
+    if (!free)
+      warnings.push_back(fmt::format(
+          "the region of insert '{}' lies in or behind walls: no grain will find room there", rule.name));
+  }
+}
+
+/// A deposition fills pores with small grains, far below the place where they would have come to rest.
+void add_segregation(const io::Scene& scene, const Sample& sample, std::vector<std::string>& warnings) {
+  constexpr double sorted = 1.5;  // mean radii, highest over lowest fifth; radii of 1 : 5 give 2.0
+  if (scene.samples.size() != 1 || scene.samples.front().kind != io::SampleSpec::Kind::deposition) return;
+  const std::size_t fifth = sample.size() / 5;
+  if (fifth < 20) return;
+  std::vector<std::size_t> by_height(sample.size());
+  std::iota(by_height.begin(), by_height.end(), std::size_t{0});
+  std::ranges::sort(by_height, {}, [&](std::size_t k) { return sample.x[k][2]; });
+  double low = 0, high = 0;
+  for (std::size_t k = 0; k < fifth; ++k) {
+    low += sample.radius[by_height[k]] / static_cast<double>(fifth);
+    high += sample.radius[by_height[sample.size() - 1 - k]] / static_cast<double>(fifth);
+  }
+  if (high > sorted * low)
+    warnings.push_back(
+        fmt::format("the deposition is sorted by size: the mean radius of the lowest fifth of the grains is "
+                    "{:.3g} m, of the highest {:.3g} m. Let such sizes rain instead, with an [[insert]]",
+                    low, high));
+}
+
 }  // namespace
 
 std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sample) {
   std::vector<std::string> warnings;
   if (scene.setup.walls.empty()) warnings.push_back("the scene has no walls: nothing holds the grains");
   add_gravity(scene, warnings);
+  add_regions(scene, warnings);
+  add_segregation(scene, sample, warnings);
   if (scene.materials.empty()) add_density("the material", scene.density, warnings);
   for (const io::MaterialSpec& material : scene.materials)
     add_density(fmt::format("material '{}'", material.name), material.density, warnings);

@@ -31,10 +31,11 @@ std::int64_t wall_in(const io::Scene& scene, std::int64_t second, const std::vec
 }
 
 StateSample state_of_frame(const io::Scene& scene) {
-  const std::string& file = scene.sample.file;
+  const io::SampleSpec& spec = scene.samples.front();
+  const std::string& file = spec.file;
   const std::size_t frames = io::frame_count(file);
-  const Frame frame = io::read_frame(file, scene.sample.frame ? static_cast<std::size_t>(*scene.sample.frame)
-                                                              : std::max<std::size_t>(frames, 1) - 1);
+  const Frame frame = io::read_frame(
+      file, spec.frame ? static_cast<std::size_t>(*spec.frame) : std::max<std::size_t>(frames, 1) - 1);
   StateSample state;
   state.walls = frame.walls;
   for (std::size_t k = 0; k < frame.id.size(); ++k)
@@ -93,7 +94,7 @@ void add_forces(const io::Scene& scene, const io::CheckpointFile& file, const Ch
 }
 
 StateSample state_of_checkpoint(const io::Scene& scene) {
-  const std::string& path = scene.sample.file;
+  const std::string& path = scene.samples.front().file;
   const io::CheckpointFile file = io::read_checkpoint_head(path);
   const CheckpointHead& head = file.state.head;
   StateSample state;
@@ -127,9 +128,9 @@ StateSample read_state(const io::Scene& scene) {
   const auto refuse = [&](const std::string& what) {
     throw io::SceneError(scene.source_file, 0, "sample.file", what);
   };
-  const std::string name = std::filesystem::path(scene.sample.file).filename().string();
+  const std::string name = std::filesystem::path(scene.samples.front().file).filename().string();
   const bool checkpoint = io::is_checkpoint_name(name);
-  if (checkpoint && scene.sample.frame) refuse("a checkpoint has no frames: leave `frame` out");
+  if (checkpoint && scene.samples.front().frame) refuse("a checkpoint has no frames: leave `frame` out");
   StateSample state = checkpoint ? state_of_checkpoint(scene) : state_of_frame(scene);
   if (!scene.setup.clumps.empty()) refuse("states of clumps cannot be begun from");
   Sample& sample = state.sample;

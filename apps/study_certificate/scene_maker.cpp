@@ -90,7 +90,8 @@ void finish_scene(SceneBench& bench, const MakerSettings& settings) {
   scene.setup.decomposition.subdomains = settings.subdomains;
   scene.setup.decomposition.coupling = settings.coupling;
   scene.setup.seed = bench.made.seed;
-  scene.sample.kind = io::SampleSpec::Kind::bodies;
+  scene.samples.resize(1);
+  scene.samples.front().kind = io::SampleSpec::Kind::bodies;
   scene.output.every_steps = 1;
   scene.output.sinks = {};
 }
@@ -110,12 +111,12 @@ MadeScene make_scene(std::string_view family, std::uint64_t seed, const MakerSet
   io::Scene& scene = bench.made.scene;
   scene.name = bench.made.name();
   scene.description = fmt::format("{} (talus study certificate, seed {})", found->sentence, seed);
-  scene.sample.file = scene.name + ".csv";
+  scene.samples.front().file = scene.name + ".csv";
   return std::move(bench.made);
 }
 
 void keep_scene(const MadeScene& made, const std::filesystem::path& directory) {
-  io::write_bodies(directory / made.scene.sample.file, made.grains);
+  io::write_bodies(directory / made.scene.samples.front().file, made.grains);
   io::write_whole(directory / (made.scene.name + ".toml"), io::resolved_scene(made.scene));
 }
 

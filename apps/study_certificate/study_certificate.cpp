@@ -101,7 +101,7 @@ void audit_made(const StudyCertificateOptions& options, const fs::path& director
       const std::string& family = families[static_cast<std::size_t>(k) % families.size()];
       MadeScene made = make_scene(family, options.seed + static_cast<std::uint64_t>(k), settings);
       made.scene.name = fmt::format("{}-{:.0e}", made.name(), tolerance);
-      made.scene.sample.file = made.scene.name + ".csv";
+      made.scene.samples.front().file = made.scene.name + ".csv";
       const std::size_t first = progress.steps.size();
       progress.audit(made.scene, family, made.grains, {settings.steps, {}});
       double ratio = 0;

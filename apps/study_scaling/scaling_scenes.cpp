@@ -107,23 +107,25 @@ std::string range_of_radii(const Sample& grains) {
 }
 
 std::string other_sample(const io::Scene& scene, const Sample& grains) {
-  const io::SampleSpec& spec = scene.sample;
-  if (spec.from_file()) return "";
+  if (scene.samples.size() != 1) return "";
+  const io::SampleSpec& spec = scene.samples.front();
+  if (spec.from_file() || spec.grains() == 0) return "";
   if (const auto there = static_cast<std::int64_t>(grains.size()); there != spec.grains())
     return fmt::format("{} grains where the scene's sample has {}", there, spec.grains());
   const SizeDistribution& radii = spec.radii;
-  const double least = radii.kind == SizeDistribution::Kind::constant ? radii.max : radii.min;
+  const double least = smallest_radius(radii), most = largest_radius(radii);
   const auto [smallest, largest] = std::ranges::minmax(grains.radius);
   constexpr double rounding = 1e-9;
-  if (smallest < least * (1 - rounding) || largest > radii.max * (1 + rounding))
+  if (smallest < least * (1 - rounding) || largest > most * (1 + rounding))
     return fmt::format("radii of {} where the scene's sample has {:.4g} to {:.4g} m", range_of_radii(grains),
-                       least, radii.max);
+                       least, most);
   return "";
 }
 
 std::string why_not_weak(const io::Scene& scene) {
-  if (scene.sample.from_file()) return "its grains are read from a file";
-  if (scene.sample.count == 0) return "its lattice is given by cells";
+  if (scene.samples.size() != 1) return "it has several samples";
+  if (scene.samples.front().from_file()) return "its grains are read from a file";
+  if (scene.samples.front().base[0] == 0) return "its grains stand on no base";
   for (const Wall& wall : scene.setup.walls)
     if (wall.point.allFinite())  // others wait for the grains
       return fmt::format("wall '{}' has a place of its own", wall.name);
@@ -135,9 +137,9 @@ ScalingSample scaled_sample(const std::string& path, const std::vector<std::stri
   io::Scene scene = io::load_scene(path, overrides);
   if (const std::string why = why_not_weak(scene); !why.empty())
     throw std::invalid_argument(fmt::format("{}: the sample cannot grow, since {}", path, why));
-  scene.sample.count =
-      std::max<std::int64_t>(1, std::llround(static_cast<double>(scene.sample.count) * part));
-  for (double& edge : scene.sample.base) edge *= std::cbrt(part);
+  io::SampleSpec& spec = scene.samples.front();
+  spec.count = std::max<std::int64_t>(1, std::llround(static_cast<double>(spec.count) * part));
+  for (double& edge : spec.base) edge *= std::cbrt(part);
   Sample grains = build_sample(scene);
   return finished(std::move(scene), std::move(grains), stage);
 }
@@ -145,10 +147,12 @@ ScalingSample scaled_sample(const std::string& path, const std::vector<std::stri
 void write_scaling_sample(const ScalingSample& sample, const std::filesystem::path& directory,
                           const std::string& stem) {
   io::Scene scene = sample.scene;
-  scene.sample = io::SampleSpec{};
-  scene.sample.kind = io::SampleSpec::Kind::bodies;
-  scene.sample.file = stem + ".csv";  // beside the scene
-  io::write_bodies(directory / scene.sample.file, sample.grains);
+  io::SampleSpec spec;
+  spec.kind = io::SampleSpec::Kind::bodies;
+  spec.file = stem + ".csv";  // beside the scene
+  io::write_bodies(directory / spec.file, sample.grains);
+  scene.samples = {std::move(spec)};
+  scene.setup.named.clear();
   io::write_whole(directory / (stem + ".toml"), io::resolved_scene(scene));
 }
 

@@ -55,6 +55,9 @@ struct StepRecord {
   std::vector<WallReport> walls = {};           ///< in the order of the setup
   std::optional<TriaxialReport> triaxial = {};  ///< of a stage that has one
   std::vector<ErrorCheck> errors = {};          ///< checks of the error, where asked for
+  std::vector<BodyReport> bodies = {};          ///< that the scene names
+  std::vector<InsertReport> inserted = {};      ///< of each insertion
+  std::vector<RemoveReport> removed = {};       ///< of each removal and material
 };
 
 /// How far the files of a run are: a checkpoint keeps it.

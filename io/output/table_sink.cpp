@@ -1,4 +1,5 @@
-/// The tables of a run as CSV: a line for each step, wall, triaxial report and check of the error.
+/// The tables of a run as CSV: a line for each step, wall, named body, insertion, removal, triaxial report
+/// and check of the error.
 
 #include <algorithm>
 #include <array>
@@ -9,8 +10,13 @@
 namespace talus::io {
 namespace {
 
-constexpr std::array<std::string_view, 4> names{"steps.csv", "walls.csv", "triaxial.csv",
-                                                "error_history.csv"};
+enum Table : std::size_t { steps, walls, triaxial, errors, bodies, inserted, removed, tables };
+constexpr std::array<std::string_view, tables> names{"steps.csv",         "walls.csv",  "triaxial.csv",
+                                                     "error_history.csv", "bodies.csv", "inserted.csv",
+                                                     "removed.csv"};
+constexpr std::array<std::string (*)(), tables> headers{
+    steps_csv_header,  walls_csv_header,    triaxial_csv_header, error_history_csv_header,
+    bodies_csv_header, inserted_csv_header, removed_csv_header};
 
 class TableSink : public OutputSink {
  public:
@@ -19,8 +25,8 @@ class TableSink : public OutputSink {
 
   void open() override {
     if (!writes_) return;
-    steps_.emplace(directory_ / names[0], steps_csv_header());
-    walls_.emplace(directory_ / names[1], walls_csv_header());
+    lines_of(steps);
+    lines_of(walls);
   }
 
   void resume(const OutputMark& mark) override {
@@ -29,48 +35,51 @@ class TableSink : public OutputSink {
       const auto known = mark.bytes.find(std::string(names[k]));
       const std::filesystem::path path = directory_ / names[k];
       if (known != mark.bytes.end())
-        tables()[k]->emplace(path, known->second);
+        table_[k].emplace(path, known->second);
       else
         std::filesystem::remove(path);
     }
   }
   void mark(OutputMark& mark) override {
     for (std::size_t k = 0; k < names.size(); ++k)
-      if (*tables()[k]) mark.bytes[std::string(names[k])] = (*tables()[k])->sync();
+      if (table_[k]) mark.bytes[std::string(names[k])] = table_[k]->sync();
   }
 
-  /// triaxial.csv and error_history.csv appear with their first line.
+  /// All but steps.csv and walls.csv appear with their first line.
   void step(const StepRecord& record) override {
-    append_steps_row(steps_->pending(), record.step);
+    append_steps_row(lines_of(steps), record.step);
     const bool line = context_.has_table_line(record.step.step);
     for (const WallReport& wall : record.walls)
-      if (line) append_walls_row(walls_->pending(), record.step, wall);
-    if (record.triaxial && line) {
-      if (!triaxial_) triaxial_.emplace(directory_ / names[2], triaxial_csv_header());
-      append_triaxial_row(triaxial_->pending(), *record.triaxial);
-    }
-    if (record.errors.empty()) return;
-    if (!errors_) errors_.emplace(directory_ / names[3], error_history_csv_header());
+      if (line) append_walls_row(lines_of(walls), record.step, wall);
+    for (const BodyReport& body : record.bodies) append_bodies_row(lines_of(bodies), record.step, body);
+    for (const InsertReport& insert : record.inserted)
+      append_inserted_row(lines_of(inserted), record.step, insert);
+    for (const RemoveReport& remove : record.removed)
+      append_removed_row(lines_of(removed), record.step, remove);
+    if (record.triaxial && line) append_triaxial_row(lines_of(triaxial), *record.triaxial);
     for (const ErrorCheck& check : record.errors)
-      append_error_history_row(errors_->pending(), record.step.step, check);
+      append_error_history_row(lines_of(errors), record.step.step, check);
   }
 
   void flush() override {
-    for (std::optional<CsvFile>* table : tables())
-      if (*table) (*table)->flush();
+    for (std::optional<CsvFile>& table : table_)
+      if (table) table->flush();
   }
   void close() override {
-    for (std::optional<CsvFile>* table : tables())
-      if (*table) (*table)->close();
+    for (std::optional<CsvFile>& table : table_)
+      if (table) table->close();
   }
 
  private:
-  std::array<std::optional<CsvFile>*, 4> tables() { return {&steps_, &walls_, &triaxial_, &errors_}; }
+  std::string& lines_of(Table table) {
+    if (!table_[table]) table_[table].emplace(directory_ / names[table], headers[table]());
+    return table_[table]->pending();
+  }
 
   OutputContext context_;
   std::filesystem::path directory_;
   bool writes_;
-  std::optional<CsvFile> steps_, walls_, triaxial_, errors_;
+  std::array<std::optional<CsvFile>, tables> table_;
 };
 
 }  // namespace

@@ -28,6 +28,21 @@ struct WallRow {
   const WallReport& wall;
 };
 
+struct BodyRow {
+  const StepReport& step;
+  const BodyReport& body;
+};
+
+struct InsertRow {
+  const StepReport& step;
+  const InsertReport& insert;
+};
+
+struct RemoveRow {
+  const StepReport& step;
+  const RemoveReport& remove;
+};
+
 struct ErrorRow {
   std::int64_t step;
   const ErrorCheck& check;
@@ -80,6 +95,43 @@ constexpr Column<WallRow> walls_columns[] = {
     {"torque_y", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.y()); }},
     {"torque_z", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.z()); }},
     {"work", [](std::string& t, const WallRow& r) { put(t, r.wall.work); }},
+};
+
+constexpr Column<BodyRow> bodies_columns[] = {
+    {"step", [](std::string& t, const BodyRow& r) { put(t, r.step.step); }},
+    {"time", [](std::string& t, const BodyRow& r) { put(t, r.step.time); }},
+    {"body", [](std::string& t, const BodyRow& r) { put(t, r.body.name); }},
+    {"x", [](std::string& t, const BodyRow& r) { put(t, r.body.x.x()); }},
+    {"y", [](std::string& t, const BodyRow& r) { put(t, r.body.x.y()); }},
+    {"z", [](std::string& t, const BodyRow& r) { put(t, r.body.x.z()); }},
+    {"vx", [](std::string& t, const BodyRow& r) { put(t, r.body.u.x()); }},
+    {"vy", [](std::string& t, const BodyRow& r) { put(t, r.body.u.y()); }},
+    {"vz", [](std::string& t, const BodyRow& r) { put(t, r.body.u.z()); }},
+    {"wx", [](std::string& t, const BodyRow& r) { put(t, r.body.omega.x()); }},
+    {"wy", [](std::string& t, const BodyRow& r) { put(t, r.body.omega.y()); }},
+    {"wz", [](std::string& t, const BodyRow& r) { put(t, r.body.omega.z()); }},
+    {"force_x", [](std::string& t, const BodyRow& r) { put(t, r.body.force.x()); }},
+    {"force_y", [](std::string& t, const BodyRow& r) { put(t, r.body.force.y()); }},
+    {"force_z", [](std::string& t, const BodyRow& r) { put(t, r.body.force.z()); }},
+};
+
+constexpr Column<InsertRow> inserted_columns[] = {
+    {"step", [](std::string& t, const InsertRow& r) { put(t, r.step.step); }},
+    {"time", [](std::string& t, const InsertRow& r) { put(t, r.step.time); }},
+    {"insert", [](std::string& t, const InsertRow& r) { put(t, r.insert.name); }},
+    {"placed", [](std::string& t, const InsertRow& r) { put(t, r.insert.placed); }},
+    {"mass", [](std::string& t, const InsertRow& r) { put(t, r.insert.mass); }},
+    {"waiting", [](std::string& t, const InsertRow& r) { put(t, r.insert.waiting); }},
+    {"no_room", [](std::string& t, const InsertRow& r) { put(t, r.insert.no_room); }},
+};
+
+constexpr Column<RemoveRow> removed_columns[] = {
+    {"step", [](std::string& t, const RemoveRow& r) { put(t, r.step.step); }},
+    {"time", [](std::string& t, const RemoveRow& r) { put(t, r.step.time); }},
+    {"remove", [](std::string& t, const RemoveRow& r) { put(t, r.remove.name); }},
+    {"material", [](std::string& t, const RemoveRow& r) { put(t, r.remove.material); }},
+    {"count", [](std::string& t, const RemoveRow& r) { put(t, r.remove.count); }},
+    {"mass", [](std::string& t, const RemoveRow& r) { put(t, r.remove.mass); }},
 };
 
 constexpr Column<TriaxialReport> triaxial_columns[] = {
@@ -136,6 +188,15 @@ std::string steps_csv_header() {
 std::string walls_csv_header() {
   return header_line<WallRow>(walls_columns);
 }
+std::string bodies_csv_header() {
+  return header_line<BodyRow>(bodies_columns);
+}
+std::string inserted_csv_header() {
+  return header_line<InsertRow>(inserted_columns);
+}
+std::string removed_csv_header() {
+  return header_line<RemoveRow>(removed_columns);
+}
 std::string triaxial_csv_header() {
   return header_line<TriaxialReport>(triaxial_columns);
 }
@@ -149,6 +210,18 @@ void append_steps_row(std::string& text, const StepReport& report) {
 
 void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall) {
   append_line<WallRow>(text, walls_columns, WallRow{report, wall});
+}
+
+void append_bodies_row(std::string& text, const StepReport& report, const BodyReport& body) {
+  append_line<BodyRow>(text, bodies_columns, BodyRow{report, body});
+}
+
+void append_inserted_row(std::string& text, const StepReport& report, const InsertReport& insert) {
+  append_line<InsertRow>(text, inserted_columns, InsertRow{report, insert});
+}
+
+void append_removed_row(std::string& text, const StepReport& report, const RemoveReport& remove) {
+  append_line<RemoveRow>(text, removed_columns, RemoveRow{report, remove});
 }
 
 void append_triaxial_row(std::string& text, const TriaxialReport& report) {

@@ -1,7 +1,7 @@
 #pragma once
 
-/// The tables of a run: steps.csv, walls.csv, triaxial.csv, error_history.csv (columns and units:
-/// docs/formats.md).
+/// The tables of a run: steps.csv, walls.csv, bodies.csv, inserted.csv, removed.csv, triaxial.csv,
+/// error_history.csv (columns and units: docs/formats.md).
 
 #include <cstdint>
 #include <filesystem>
@@ -17,6 +17,9 @@ namespace talus::io {
 /// Header lines, with line end.
 std::string steps_csv_header();
 std::string walls_csv_header();
+std::string bodies_csv_header();
+std::string inserted_csv_header();
+std::string removed_csv_header();
 std::string triaxial_csv_header();
 std::string error_history_csv_header();
 
@@ -24,6 +27,9 @@ std::string error_history_csv_header();
 /// and false are 1 and 0; names are quoted only where they must be (RFC 4180).
 void append_steps_row(std::string& text, const StepReport& report);
 void append_walls_row(std::string& text, const StepReport& report, const WallReport& wall);
+void append_bodies_row(std::string& text, const StepReport& report, const BodyReport& body);
+void append_inserted_row(std::string& text, const StepReport& report, const InsertReport& insert);
+void append_removed_row(std::string& text, const StepReport& report, const RemoveReport& remove);
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
 void append_error_history_row(std::string& text, std::int64_t step, const ErrorCheck& check);
 

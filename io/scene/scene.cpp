@@ -9,8 +9,10 @@
 #include <sstream>
 #include <system_error>
 
+#include "io/scene/detail/grain_read.hpp"
 #include "io/scene/detail/material_read.hpp"
 #include "io/scene/detail/motion_read.hpp"
+#include "io/scene/detail/sample_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
 #include "io/scene/detail/shape_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
@@ -34,16 +36,17 @@ class SceneReader {
 
   Scene read() && {
     read_table(root_, "", keys_.top,
-               {"material", "pair", "sample", "wall", "group", "stage", "detection", "solver",
-                "decomposition", "output", "checkpoint"},
+               {"material", "pair", "sample", "insert", "remove", "wall", "group", "stage", "detection",
+                "solver", "decomposition", "output", "checkpoint"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
-    read_sample();
+    read_samples(root_, folder_, scene_);
     read_groups(root_, folder_, scene_);
     read_walls();
     read_stages();
     check_motions(root_, scene_);
+    read_grain_rules(root_, scene_);
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
     read_decomposition();
@@ -61,51 +64,10 @@ class SceneReader {
   /// A table that may be left out: then an empty one, so that missing keys are found all the same.
   const toml::table& table_at(const toml::table& parent, const std::string& name) {
     const toml::node* node = parent.get(name);
-    if (!node) {
-      if (required_keys(name)) fail_at(parent, name, fmt::format("missing table [{}]", name));
-      return nothing_;
-    }
+    if (!node) return nothing_;
     if (!node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
     return *node->as_table();
   }
-  static bool required_keys(const std::string& name) { return name == "sample"; }
-
-  void read_sample() {
-    SampleSpec& sample = scene_.sample;
-    const toml::table& table = table_at(root_, "sample");
-    read_table(table, "sample", keys_.sample, {}, sample);
-    read_material(table, "sample", scene_, material_of_grains);
-    if (const ClumpMaker clump = body_shapes().of(sample.shape).make) scene_.setup.clumps.push_back(clump());
-    const bool on_base = sample.count > 0 && sample.base[0] > 0;
-    const bool by_cells = sample.cells[0] > 0;
-    if (sample.kind == SampleSpec::Kind::deposition && !on_base)
-      fail_at(table, "sample", "a deposition needs count and base");
-    if (sample.kind == SampleSpec::Kind::lattice &&
-        (by_cells ? sample.count > 0 || sample.base[0] > 0 : !on_base))
-      fail_at(table, "sample", "a lattice needs either cells, or count and base");
-    if (const double grains = static_cast<double>(sample.cells[0]) * static_cast<double>(sample.cells[1]) *
-                              static_cast<double>(sample.cells[2]);
-        grains > countable.high)
-      fail_at(*table.get("cells"), "sample.cells",
-              fmt::format("makes {:.3g} grains, more than {:.0f}", grains, countable.high));
-    SizeDistribution& radii = sample.radii;
-    if (radii.kind == SizeDistribution::Kind::constant) radii.min = radii.max;
-    if (radii.min > radii.max)
-      fail_at(*table.get("radius_min"), "sample.radius_min",
-              fmt::format("must not exceed radius_max: {} > {}", radii.min, radii.max));
-    if (!sample.from_file())
-      for (const double side : sample.base)
-        if (on_base && side < 2 * radii.max)
-          fail_at(*table.get("base"), "sample.base",
-                  fmt::format("a side of {} m is less than the largest diameter, {} m", side, 2 * radii.max));
-    if (sample.from_file()) {
-      const std::filesystem::path file = (folder_ / sample.file).lexically_normal();
-      if (!std::filesystem::is_regular_file(file))
-        fail_at(*table.get("file"), "sample.file", fmt::format("no such file: {}", file.string()));
-      sample.file = file.string();
-    }
-  }
-
   void read_walls() {
     std::vector<Wall>& walls = scene_.setup.walls;
     if (!scene_.materials.empty())

@@ -16,33 +16,41 @@
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/size_distribution.hpp"
 #include "kernels/shapes/body_shapes.hpp"
+#include "kernels/shapes/region.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus::io {
 
-/// Where the grains come from. Fields that the kind does not use keep their defaults.
+/// Where grains come from. Fields that the kind does not use keep their defaults.
 struct SampleSpec {
   enum class Kind {
-    deposition,  ///< layer by layer, each grain in the lowest place with three supports, on z = 0 between the
-                 ///< sides of `base`
-    lattice,     ///< simple cubic, not touching unless spacing is 1
+    deposition,  ///< layer by layer, each grain in the lowest place with three supports, on the floor of
+                 ///< `base`
+    lattice,     ///< simple cubic, not touching unless spacing is 1; on `base`, of `cells`, or in `region`
     bodies,      ///< read from `file` (io/scene/bodies_file.hpp)
     state,       ///< where an earlier run was: a checkpoint, or a frame of a results.h5, in `file`
+    body,        ///< one sphere
   };
   Kind kind = Kind::deposition;
-  std::int64_t count = 0;  ///< grains; 0 for a lattice given by `cells`
+  std::string name;        ///< of a body, whose path is written; for the rest what overrides may call it
+  std::int64_t count = 0;  ///< grains; 0 for a lattice given by `cells`, or that fills its region
   std::array<double, 2>
-      base{};  ///< [m] the sample stands on [0, base[0]] x [0, base[1]]; 0 for a lattice given by `cells`
-  std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given by `count` and `base`
+      base{};  ///< [m] the sample stands on [0, base[0]] x [0, base[1]] from `origin`; 0 for other lattices
+  Vec3 origin = Vec3::Zero();           ///< [m] lower corner of deposition and lattice
+  std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given otherwise
+  std::optional<Region> region;         ///< that a lattice fills
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
   BodyShape shape = BodyShape::sphere;  ///< of the grains; their radius is that of Clump
   SizeDistribution radii;
-  std::string file;                   ///< absolute path
-  std::optional<std::int64_t> frame;  ///< of a results.h5, from 0; none: the last
+  Vec3 position = Vec3::Zero();          ///< [m] of a body
+  Vec3 velocity = Vec3::Zero();          ///< [m/s] of all grains, unless they come from a file
+  Vec3 angular_velocity = Vec3::Zero();  ///< [rad/s] likewise
+  std::string file;                      ///< absolute path
+  std::optional<std::int64_t> frame;     ///< of a results.h5, from 0; none: the last
   std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names
 
   bool from_file() const { return kind == Kind::bodies || kind == Kind::state; }
-  /// Grains of a deposition or a lattice.
+  /// Grains of a deposition or a lattice; 0 for a lattice that fills its region.
   std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
 };
 
@@ -103,13 +111,16 @@ struct Scene {
   std::string description;
   double density = 0;                   ///< [kg/m^3] of the only material; 0 where materials have names
   std::vector<MaterialSpec> materials;  ///< by name; empty with [material]
-  SampleSpec sample;
+  std::vector<SampleSpec> samples;      ///< none where all grains are inserted
   Stage common;  ///< time_step, gravity and law of the stages that give none themselves; its other fields are
                  ///< not used
   Setup setup;
   OutputSpec output;
   CheckpointSpec checkpoint;
   std::string source_file;
+
+  /// Begins where an earlier run was: the first sample says so, if any.
+  bool from_state() const { return !samples.empty() && samples.front().kind == SampleSpec::Kind::state; }
 };
 
 /// Reads a scene. `overrides` are texts "a.b=c" applied in order: the value is read as TOML, or taken as a
@@ -126,15 +137,23 @@ Scene parse_scene(const std::string& text, const std::string& file,
 /// - a wall without position (NaN in `point`) is placed at its side of `sample.base`, else where it touches
 /// the outermost grain;
 /// - a pushed wall, also in the loads of the stages, without mass (0) gets a tenth of the mass of the grains.
-/// Throws SceneError when there are no grains, walls cross, or the centre of a grain lies behind a wall.
+/// - named bodies get their ids.
+/// Throws SceneError when there are no grains and none are inserted, walls cross, or the centre of a grain
+/// lies behind a wall.
 void place_walls(Scene& scene, const Sample& grains);
 
 /// What place_walls gives to a pushed wall without mass [kg].
 double automatic_wall_mass(const Sample& grains);
 
 /// The same of a run that goes on, whose grains are not at hand: points of the walls [m], 3 numbers each, and
-/// the mass [kg], as they were placed at first. Throws SceneError when the walls are others.
-void place_walls_again(Scene& scene, const std::vector<double>& points, double mass);
+/// the mass [kg], as they were placed at first, and the ids of the bodies with names. Throws SceneError when
+/// the walls or bodies are others.
+struct PlacedThen {
+  std::vector<double> points;
+  double mass = 0;
+  std::vector<std::int64_t> named;
+};
+void place_walls_again(Scene& scene, const PlacedThen& then);
 
 /// The scene as TOML with every default spelled out; parse_scene gives the same scene back.
 std::string resolved_scene(const Scene& scene);

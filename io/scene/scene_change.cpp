@@ -96,7 +96,8 @@ std::string describe(const SceneChange& change) {
 
 std::vector<std::string> input_files(const Scene& scene) {
   std::vector<std::string> files;
-  if (scene.sample.kind == SampleSpec::Kind::bodies) files.push_back(scene.sample.file);
+  for (const SampleSpec& sample : scene.samples)
+    if (sample.kind == SampleSpec::Kind::bodies) files.push_back(sample.file);
   for (const Wall& wall : scene.setup.walls)
     if (!wall.shape.values.file.empty()) files.push_back(wall.shape.values.file);
   for (const Wall& wall : scene.setup.walls)

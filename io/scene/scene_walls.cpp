@@ -31,14 +31,21 @@ std::string wall_conflict(const std::vector<Wall>& walls, std::size_t k) {
 
 namespace {
 
-/// Coordinate of the face of an axis-aligned wall that nothing has placed yet.
-double automatic_position(const Wall& wall, int axis, const SampleSpec& sample, const Sample& grains) {
+/// Coordinate of the face of an axis-aligned wall that nothing has placed yet: at the side of the bases of
+/// the samples that have one, but never within a grain of several samples.
+double automatic_position(const Wall& wall, int axis, const std::vector<SampleSpec>& samples,
+                          const Sample& grains) {
   const bool low = wall.normal[axis] > 0;
-  if (axis < 2 && sample.base[0] > 0) return low ? 0 : sample.base[static_cast<std::size_t>(axis)];
   double face = low ? std::numeric_limits<double>::infinity() : -std::numeric_limits<double>::infinity();
+  const auto reach = [&](double coordinate) {
+    face = low ? std::min(face, coordinate) : std::max(face, coordinate);
+  };
+  for (const SampleSpec& sample : samples)
+    if (axis < 2 && sample.base[0] > 0)
+      reach(sample.origin[axis] + (low ? 0 : sample.base[static_cast<std::size_t>(axis)]));
+  if (samples.size() == 1 && std::isfinite(face)) return face;
   for (std::size_t k = 0; k < grains.size(); ++k)
-    face = low ? std::min(face, grains.x[k][axis] - grains.radius[k])
-               : std::max(face, grains.x[k][axis] + grains.radius[k]);
+    reach(low ? grains.x[k][axis] - grains.radius[k] : grains.x[k][axis] + grains.radius[k]);
   return face;
 }
 
@@ -70,10 +77,14 @@ double automatic_wall_mass(const Sample& grains) {
   return 0.1 * mass;
 }
 
-void place_walls_again(Scene& scene, const std::vector<double>& points, double mass) {
+void place_walls_again(Scene& scene, const PlacedThen& then) {
+  const auto& [points, mass, named] = then;
   std::vector<Wall>& walls = scene.setup.walls;
   if (points.size() != 3 * walls.size())
     throw SceneError(scene.source_file, 0, "wall", "the checkpoint is of other walls");
+  if (named.size() != scene.setup.named.size())
+    throw SceneError(scene.source_file, 0, "sample", "the checkpoint is of other bodies");
+  for (std::size_t k = 0; k < named.size(); ++k) scene.setup.named[k].id = BodyId{named[k]};
   for (std::size_t w = 0; w < walls.size(); ++w)
     walls[w].point = {points[3 * w], points[3 * w + 1], points[3 * w + 2]};
   give_masses(scene.setup, mass);
@@ -88,11 +99,16 @@ void place_walls(Scene& scene, const Sample& grains) {
   const auto refuse = [&](const std::string& message) {
     throw SceneError(scene.source_file, 0, "wall", message);
   };
-  if (grains.size() == 0) throw SceneError(scene.source_file, 0, "sample", "there are no grains");
+  if (grains.size() == 0 && scene.setup.inserts.empty())
+    throw SceneError(scene.source_file, 0, "sample", "there are no grains");
+  for (std::size_t k = 0; k < grains.named.size(); ++k) scene.setup.named.at(k).id = grains.named[k];
   std::vector<Wall>& walls = scene.setup.walls;
   for (Wall& wall : walls)
     if (const int axis = detail::axis_of(wall); axis >= 0 && std::isnan(wall.point[axis]))
-      wall.point[axis] = automatic_position(wall, axis, scene.sample, grains);
+      wall.point[axis] = automatic_position(wall, axis, scene.samples, grains);
+  for (const Wall& wall : walls)
+    if (wall.surface() == nullptr && !wall.point.allFinite())
+      refuse(fmt::format("wall '{}' needs a position: no grains are there yet to place it by", wall.name));
 
   give_masses(scene.setup, automatic_wall_mass(grains));
 

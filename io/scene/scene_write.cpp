@@ -15,8 +15,8 @@ using namespace detail;
 /// The section of one part, every key that applies and holds something on a line of its own, with its unit.
 template <class Part>
 void write_section(std::string& out, const Section<Part>& section, const Part& part,
-                   const std::set<std::string>& left_out = {}) {
-  if (!section.header.empty()) out += "\n" + section.header + "\n";
+                   const std::set<std::string>& left_out = {}, const std::string& header = "") {
+  if (!section.header.empty()) out += "\n" + (header.empty() ? section.header : header) + "\n";
   for (const Key<Part>& key : section.keys) {
     if ((key.applies && !key.applies(part)) || left_out.contains(key.name)) continue;
     const std::string text = text_of(key, part);
@@ -33,6 +33,31 @@ void write_materials(std::string& out, const Scene& scene) {
     write_section(out, keys.pair, pair);
 }
 
+void write_samples(std::string& out, const Scene& scene) {
+  const SceneKeys& keys = scene_keys();
+  for (const SampleSpec& sample : scene.samples) {
+    write_section(out, keys.sample, sample, {}, scene.samples.size() > 1 ? "[[sample]]" : "");
+    if (sample.region) write_section(out, keys.region, *sample.region);
+  }
+}
+
+void write_grain_rules(std::string& out, const Scene& scene) {
+  const SceneKeys& keys = scene_keys();
+  const auto write_material = [&](std::size_t number) {
+    out += fmt::format("material = \"{}\"\n", scene.materials[number].name);
+  };
+  for (const InsertRule& rule : scene.setup.inserts) {
+    write_section(out, keys.insert, rule);
+    if (!scene.materials.empty()) write_material(rule.material);
+    write_section(out, keys.region, rule.region, {}, "[insert.region]");
+  }
+  for (const RemoveRule& rule : scene.setup.removes) {
+    write_section(out, keys.remove, rule);
+    if (rule.material) write_material(*rule.material);
+    write_section(out, keys.region, rule.region, {}, "[remove.region]");
+  }
+}
+
 }  // namespace
 
 std::string resolved_scene(const Scene& scene) {
@@ -40,7 +65,8 @@ std::string resolved_scene(const Scene& scene) {
   std::string out;
   write_section(out, keys.top, scene);
   write_materials(out, scene);
-  write_section(out, keys.sample, scene.sample);
+  write_samples(out, scene);
+  write_grain_rules(out, scene);
   write_section(out, keys.detection, scene.setup.detection);
   write_section(out, keys.solver, scene.setup.solver);
   write_section(out, keys.decomposition, scene.setup.decomposition);

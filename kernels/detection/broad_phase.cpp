@@ -239,6 +239,39 @@ void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::v
   }
 }
 
+bool meets_any(const CellGrid& grid, const Vec3& x, double reach) {
+  for (std::size_t level = 0; level < grid.cell_size.size(); ++level) {
+    const double size = grid.cell_size[level];
+    // Bodies of a level reach half a cell at most.
+    const auto cells =
+        static_cast<std::int64_t>(std::min<double>(cells_an_axis, (reach + 0.5 * size) / size)) + 1;
+    const std::uint64_t centre = key_of(x.data(), grid.origin, level, size);
+    std::array<std::int64_t, 3> at{}, low{}, high{};
+    constexpr std::array<int, 3> shift = {x_shift, y_shift, 0};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      at[axis] = static_cast<std::int64_t>(centre >> shift[axis] & (cells_an_axis - 1));
+      low[axis] = std::max<std::int64_t>(0, at[axis] - cells);
+      high[axis] = std::min<std::int64_t>(cells_an_axis - 1, at[axis] + cells);
+    }
+    const std::uint64_t base = std::uint64_t{level} << level_shift;
+    for (std::int64_t i = low[0]; i <= high[0]; ++i)
+      for (std::int64_t j = low[1]; j <= high[1]; ++j) {
+        const std::uint64_t row =
+            base | static_cast<std::uint64_t>(i) << x_shift | static_cast<std::uint64_t>(j) << y_shift;
+        const std::uint64_t end = row | static_cast<std::uint64_t>(high[2]);
+        for (std::size_t c = first_cell(grid, row | static_cast<std::uint64_t>(low[2]));
+             c < grid.cells.size() && grid.cells[c].key <= end; ++c)
+          for (auto k = static_cast<std::size_t>(grid.cells[c].begin);
+               k < static_cast<std::size_t>(grid.cells[c].end); ++k) {
+            const CellGrid::Member& other = grid.members[k];
+            const double distance = reach + other.reach;
+            if (Domain::separation(x, Vec3(other.x)).squaredNorm() < distance * distance) return true;
+          }
+      }
+  }
+  return false;
+}
+
 std::vector<GrainPair> sort_pairs(std::span<const std::vector<GrainPair>> parts, std::size_t bodies) {
   std::vector<std::int32_t> offset(bodies + 1, 0);
   for (const auto& part : parts)

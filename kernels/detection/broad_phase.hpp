@@ -45,6 +45,9 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach);
 /// all cells every pair comes exactly once.
 void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs);
 
+/// Whether a sphere about x [m] of this reach [m] is nearer to any body of the grid than their reaches.
+bool meets_any(const CellGrid& grid, const Vec3& x, double reach);
+
 /// All pairs of `parts` in order of (first, second), by counting: the order does not depend on how cells were
 /// dealt to the parts.
 std::vector<GrainPair> sort_pairs(std::span<const std::vector<GrainPair>> parts, std::size_t bodies);

@@ -18,6 +18,14 @@ inline SurfacePoint wall_point(const Wall& wall, const Vec3& x, std::int32_t fea
   return {0, wall.normal.dot(domain.separation(x, wall.point)), wall.normal};
 }
 
+/// Whether a sphere overlaps a wall, or lies behind a plane.
+inline bool meets_wall(const Wall& wall, const Vec3& x, double radius, const Domain& domain = {}) {
+  if (wall.surface() == nullptr) return wall_point(wall, x, 0, domain).distance < radius;
+  std::vector<SurfacePoint> points;
+  wall.surface()->collide(x, radius, points);
+  return !points.empty();
+}
+
 /// By (wall, body, feature).
 inline bool before(const WallPair& a, const WallPair& b) {
   if (a.wall != b.wall) return a.wall < b.wall;

@@ -1,37 +1,18 @@
 #include "kernels/samples/sample.hpp"
 
-#include <Random123/philox.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
+#include "kernels/samples/detail/random_numbers.hpp"
+
 namespace talus {
 
-namespace {
-
-/// Two uniform numbers in [0, 1) with 53 random bits each, from (seed, index, draw).
-std::array<double, 2> uniform_pair(std::uint64_t seed, std::uint64_t index, std::uint32_t draw) {
-  using Generator = r123::Philox4x32;
-  const Generator::key_type key = {
-      {static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)}};
-  const Generator::ctr_type counter = {
-      {static_cast<std::uint32_t>(index), static_cast<std::uint32_t>(index >> 32), draw, 0}};
-  const Generator::ctr_type word = Generator()(counter, key);
-  const auto unit = [](std::uint64_t high, std::uint64_t low) {
-    return static_cast<double>((high << 32 | low) >> 11) * 0x1p-53;
-  };
-  return {unit(word[0], word[1]), unit(word[2], word[3])};
-}
-
-// Streams of one seed: radii and displacements must not be correlated.
-constexpr std::uint32_t radius_draw = 0;
-constexpr std::uint32_t jitter_draw = 1;
-constexpr std::uint32_t turn_draw = 3;  // and as many more as it takes
-
-}  // namespace
+using detail::jitter_draw;
+using detail::turn_draw;
+using detail::uniform_pair;
 
 double mass(const Sample& sample, std::size_t k) {
   if (sample.shape.number == 0) return sphere_mass(sample.radius[k], sample.density_of(k));
@@ -73,26 +54,6 @@ void append(const Sample& sample, Bodies& bodies) {
     std::copy_n(first, 3, bodies.velocity.back().u);
     if (sample.rotates) std::copy_n(first + 3, 3, bodies.velocity.back().w);
   }
-}
-
-std::vector<double> draw_radii(const SizeDistribution& sizes, std::size_t n, std::uint64_t seed) {
-  using Kind = SizeDistribution::Kind;
-  if (!(sizes.max > 0))
-    throw std::invalid_argument("largest radius must be > 0 m, got " + std::to_string(sizes.max));
-  if (sizes.kind == Kind::constant) return std::vector<double>(n, sizes.max);
-  if (!(sizes.min > 0 && sizes.min <= sizes.max))
-    throw std::invalid_argument("smallest radius must lie in (0, " + std::to_string(sizes.max) + "] m, got " +
-                                std::to_string(sizes.min));
-  std::vector<double> radii(n);
-  const double low = 1 / (sizes.min * sizes.min), high = 1 / (sizes.max * sizes.max);
-  for (std::size_t k = 0; k < n; ++k) {
-    const double u = uniform_pair(seed, k, radius_draw)[0];
-    // Inverse of the distribution function; for a density ~ r^-3 it is linear in r^-2.
-    const double r = sizes.kind == Kind::uniform ? sizes.min + u * (sizes.max - sizes.min)
-                                                 : 1 / std::sqrt(low - u * (low - high));
-    radii[k] = std::clamp(r, sizes.min, sizes.max);
-  }
-  return radii;
 }
 
 std::vector<Vec3> lattice(std::span<const double> radii, const Lattice& sites) {
@@ -137,6 +98,29 @@ std::vector<Vec3> lattice(std::span<const double> radii, const Lattice& sites) {
     }
     centres.push_back(x);
   }
+  return centres;
+}
+
+std::vector<Vec3> lattice_in(const Region& region, double radius, double spacing, std::size_t most) {
+  std::vector<Vec3> centres;
+  if (!(spacing >= 2 * radius * (1 - 1e-12)))
+    throw std::invalid_argument("lattice: spacing must be at least the largest diameter, " +
+                                std::to_string(2 * radius) + " m, got " + std::to_string(spacing));
+  const Bounds bounds = bounds_of(region);
+  std::array<std::size_t, 3> sites{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    const double room = bounds.high[a] - bounds.low[a] - 2 * radius;
+    if (room < 0) return centres;
+    sites[axis] = static_cast<std::size_t>(room / spacing + 1e-9) + 1;
+  }
+  for (std::size_t iz = 0; iz < sites[2]; ++iz)
+    for (std::size_t iy = 0; iy < sites[1]; ++iy)
+      for (std::size_t ix = 0; ix < sites[0] && centres.size() < most; ++ix) {
+        const Vec3 site(static_cast<double>(ix), static_cast<double>(iy), static_cast<double>(iz));
+        const Vec3 x = bounds.low + Vec3::Constant(radius) + spacing * site;
+        if (holds(region, x, radius * (1 - 1e-9))) centres.push_back(x);
+      }
   return centres;
 }
 

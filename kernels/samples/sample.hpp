@@ -16,6 +16,7 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/samples/size_distribution.hpp"
 #include "kernels/shapes/clump_motion.hpp"
+#include "kernels/shapes/region.hpp"
 
 namespace talus {
 
@@ -33,6 +34,7 @@ struct Sample {
   bool rotates = true;                          ///< false: spin mobility and R omega are 0
   ClumpMass shape;                              ///< of all grains; clumps are at rest, and turned at random
   std::uint64_t seed = 1;                       ///< of those turns
+  std::vector<BodyId> named;                    ///< bodies that the scene names, in its order
 
   std::size_t size() const { return x.size(); }
   double density_of(std::size_t k) const {
@@ -65,10 +67,6 @@ void add_grain(Bodies& bodies, const Grain& grain, const GrainKind& kind);
 
 /// Appends the grains of the sample, in order.
 void append(const Sample& sample, Bodies& bodies);
-
-/// n radii [m]; radius k depends on the distribution, `seed` and k only.
-/// Throws std::invalid_argument unless 0 < max and, except for `constant`, 0 < min <= max.
-std::vector<double> draw_radii(const SizeDistribution& sizes, std::size_t n, std::uint64_t seed);
 
 /// Centres [m], in the order of `radii`, of spheres deposited one by one into the box [0, length_x] x [0,
 /// length_y] with floor z = 0 (Voivret et al., Phys. Rev. E 76, 021301, 2007; section 4.1 of the paper): each
@@ -103,6 +101,11 @@ struct Lattice {
 /// floor and side walls. Throws std::invalid_argument if the spacing is too small or the base has no room for
 /// one grain.
 std::vector<Vec3> lattice(std::span<const double> radii, const Lattice& sites);
+
+/// Centres [m] of a simple cubic lattice that begins at the lower corner of the box around the region (a box
+/// or a cylinder): the first `most` of the sites in which a sphere of `radius` [m] lies in it as a whole, x
+/// fastest, then y, then z. Throws std::invalid_argument if the spacing [m] is less than 2 radius.
+std::vector<Vec3> lattice_in(const Region& region, double radius, double spacing, std::size_t most);
 
 /// Centres [m] of touching spheres stacked along z in the order of `radii`; the first stands on the floor at
 /// `foot`.

@@ -13,6 +13,7 @@
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/population.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/stiffness_memory.hpp"
@@ -106,6 +107,8 @@ struct CheckpointHead {
   double imbalance = 0;
 
   SampleSize size;
+  std::int64_t shares = 0;  ///< of each subdomain in the step's graph
+  PopulationState population;
 
   // Walls, in the order of the setup.
   std::vector<double> wall_points, wall_velocities, wall_then;  ///< 3 each
@@ -167,6 +170,8 @@ void each_member(Head& head, const Visit& visit) {
   visit("volume", head.size.volume);
   visit("size_orientation", head.size.orientation);
   visit("size_materials", head.size.materials);
+  visit("shares", head.shares);
+  head.population.each_number(visit);
   visit("wall_points", head.wall_points);
   visit("wall_velocities", head.wall_velocities);
   visit("wall_then", head.wall_then);

@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "kernels/bodies/index.hpp"
 #include "partition/partitioners.hpp"
-#include "runtime/step/decomposition.hpp"
 
 namespace talus {
 
@@ -117,27 +117,37 @@ Bodies deal_out(Sample sample, const DecompositionSettings& settings, const grap
   return bodies;
 }
 
-SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks,
-                          std::span<const Clump> clumps) {
+SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks, std::span<const Clump> clumps,
+                          const Decomposition* dealt) {
   const auto volume_of = [](double radius) { return sphere_mass(radius, 1); };
   const ClumpView shapes{own.shape, own.orientation, clumps};
   // The largest of each is wanted first; of the smallest radius the negative. The last two are flags.
   std::array<double, 5> most{0, -std::numeric_limits<double>::infinity(), 0,
                              own.orientation.empty() ? 0.0 : 1.0, own.material.empty() ? 0.0 : 1.0};
-  for (std::size_t k = 0; k < own.size(); ++k) {
+  std::vector<Slot> measured;
+  for (std::size_t k = 0; k < own.size(); ++k)
+    if (dealt == nullptr || counts(*dealt, k)) measured.push_back(static_cast<Slot>(k));
+  const auto mass_of = [&](std::size_t k) {
+    const double inverse =
+        dealt == nullptr ? own.velocity[k].inv_mass : whole_velocity(*dealt, own, k).inv_mass;
+    return inverse > 0 ? 1 / inverse : 0;
+  };
+  for (const Slot slot : measured) {
+    const std::size_t k = at(slot);
     most[0] = std::max(most[0], own.radius[k]);
     most[1] = std::max(most[1], shapes.is_clump(k) ? -own.radius[k] * shapes.of(k).smallest : -own.radius[k]);
-    most[2] = std::max(most[2], own.mass(k));
+    most[2] = std::max(most[2], mass_of(k));
   }
   ranks.max(most);
   ExactSum diameter(2 * most[0]), volume(volume_of(most[0])), mass(most[2]);
-  for (std::size_t k = 0; k < own.size(); ++k) {
+  for (const Slot slot : measured) {
+    const std::size_t k = at(slot);
     diameter.add(2 * own.radius[k]);
     volume.add(shapes.is_clump(k) ? own.radius[k] * own.radius[k] * own.radius[k] * shapes.of(k).volume
                                   : volume_of(own.radius[k]));
-    mass.add(own.mass(k));
+    mass.add(mass_of(k));
   }
-  std::int64_t bodies[1] = {static_cast<std::int64_t>(own.size())};
+  std::int64_t bodies[1] = {static_cast<std::int64_t>(measured.size())};
   ranks.sum(bodies);
   SampleSize size;
   size.bodies = bodies[0];

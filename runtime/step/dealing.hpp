@@ -7,6 +7,7 @@
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/samples/sample.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/step/decomposition.hpp"
 #include "runtime/step/setup.hpp"
 
 namespace talus {
@@ -29,7 +30,8 @@ struct SampleSize {
 };
 
 /// Collective; the same bits however the bodies are dealt to the ranks, and in whatever order they stand.
+/// `dealt`: how they are, where each rank has copies; null: each body stands once.
 SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks,
-                          std::span<const Clump> clumps = {});
+                          std::span<const Clump> clumps = {}, const Decomposition* dealt = nullptr);
 
 }  // namespace talus

@@ -84,6 +84,33 @@ struct WallReport {
   double work = 0;             ///< done on the grains since the run began [J]
 };
 
+/// One row of bodies.csv: a body that the scene names, at the end of a step.
+struct BodyReport {
+  std::string name;
+  Vec3 x = Vec3::Zero();      ///< [m]
+  Vec3 u = Vec3::Zero();      ///< [m/s]
+  Vec3 omega = Vec3::Zero();  ///< [rad/s]
+  Vec3 force = Vec3::Zero();  ///< of its contacts on it, mean over the step [N]: what its momentum gained,
+                              ///< less gravity
+};
+
+/// One row of inserted.csv: what an insertion has done since the beginning.
+struct InsertReport {
+  std::string name;
+  std::int64_t placed = 0;   ///< grains
+  double mass = 0;           ///< [kg] of these
+  std::int64_t waiting = 0;  ///< grains that are due, and for which no room was found yet
+  std::int64_t no_room = 0;  ///< steps in which room was missing for one grain or more
+};
+
+/// One row of removed.csv: what a removal has taken away since the beginning.
+struct RemoveReport {
+  std::string name;
+  std::string material;  ///< "" where materials have no names
+  std::int64_t count = 0;
+  double mass = 0;  ///< [kg]
+};
+
 /// One row of triaxial.csv; compression is positive for stresses, strains (28)-(30) are negative in
 /// compression as in the paper.
 struct TriaxialReport {

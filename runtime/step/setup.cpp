@@ -128,6 +128,32 @@ void validate_clumps(const Setup& setup) {
 
 }  // namespace
 
+namespace {
+
+void validate_grains(const Setup& setup) {
+  for (const InsertRule& rule : setup.inserts) {
+    const std::string where = fmt::format("insert '{}'", rule.name);
+    const std::string radii = fault_of(rule.radii), region = fault_of(rule.region);
+    require(radii.empty(), fmt::format("{}: {}", where, radii));
+    require(region.empty(), fmt::format("{}: {}", where, region));
+    require(rule.region.kind != Region::Kind::beyond, where + ": the region must be bounded");
+    require(has_room(rule.region, largest_radius(rule.radii)), where + ": no grain fits into the region");
+    require(rule.count || rule.mass || rule.rate || rule.mass_rate,
+            where + ": count, mass, rate or mass_rate is needed");
+    require(rule.density > 0 && rule.velocity.allFinite(), where + ": density or velocity makes no sense");
+    for (const Stage& stage : setup.stages)
+      require(stage.laws.knows(rule.material),
+              fmt::format("stage '{}': its laws do not have material {} of {}", stage.name, rule.material,
+                          where));
+  }
+  for (const RemoveRule& rule : setup.removes) {
+    const std::string region = fault_of(rule.region);
+    require(region.empty(), fmt::format("remove '{}': {}", rule.name, region));
+  }
+}
+
+}  // namespace
+
 void validate(const Setup& setup) {
   for (const Wall& wall : setup.walls) {
     require(wall.surface() != nullptr || std::abs(wall.normal.norm() - 1) < 1e-9,
@@ -138,6 +164,7 @@ void validate(const Setup& setup) {
     for (const MotionPart& part : wall.motion) validate_motion(fmt::format("wall '{}'", wall.name), part);
   }
   require(!setup.stages.empty(), "at least one stage is needed");
+  validate_grains(setup);
   for (const Stage& stage : setup.stages) {
     validate_time_step(stage);
     require(stage.gravity.allFinite(), fmt::format("stage '{}': gravity must be finite [m/s^2]", stage.name));

@@ -18,6 +18,7 @@
 #include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
+#include "runtime/step/grain_rules.hpp"
 
 namespace talus {
 
@@ -164,8 +165,18 @@ struct DecompositionSettings {
   bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
 };
 
+/// A body whose path is told step by step.
+struct NamedBody {
+  std::string name;
+  BodyId id{-1};
+};
+
 /// A simulation, apart from its grains.
 struct Setup {
+  std::vector<NamedBody> named;
+  std::vector<InsertRule> inserts;
+  std::vector<RemoveRule> removes;
+  std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   std::vector<Wall> walls;
   std::vector<WallGroup> groups = {};  ///< that walls name
   std::vector<Clump> clumps;           ///< shapes of bodies that are no spheres (Bodies::shape)

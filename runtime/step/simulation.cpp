@@ -9,6 +9,7 @@
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
+#include "runtime/step/named_bodies.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/stage_end.hpp"
 #include "runtime/step/stage_loads.hpp"
@@ -19,13 +20,37 @@
 
 namespace talus {
 
+namespace {
+
+/// Of a run that begins: no grain that will come is smaller than it says, and there are materials where some
+/// may come with one.
+SampleSize first_size(const Setup& setup, SampleSize size) {
+  size.smallest = smallest_ever(setup, size.bodies > 0 ? size.smallest : 0);
+  size.materials = size.materials || (!setup.inserts.empty() && !setup.material_names.empty());
+  return size;
+}
+
+/// Grains that may come, roughly: enough to share the work of a step among threads.
+std::int64_t expected_grains(const Setup& setup) {
+  constexpr std::int64_t unknown = 16384;
+  std::int64_t grains = 0;
+  for (const InsertRule& rule : setup.inserts) grains += rule.count.value_or(unknown);
+  return grains;
+}
+
+}  // namespace
+
 struct Simulation::Implementation {
   Implementation(Setup given, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks_)
       : setup(std::move(given)),
         ranks(ranks_),
         state(first_state(setup, std::move(bodies), ranks_)),
-        size(measure_sample(state.bodies, ranks_, setup.clumps)),
-        graph(state, parameters, setup, size.bodies, executor, ranks_) {
+        size(first_size(setup, measure_sample(state.bodies, ranks_, setup.clumps))),
+        population(setup, state.bodies, ranks_),
+        graph(state, parameters, setup,
+              StepGraph::shares_for(size.bodies + expected_grains(setup),
+                                    state.decomposition.partition.subdomains),
+              executor, ranks_) {
     state.decomposition.orientation = size.orientation;
     state.decomposition.materials = size.materials;
     state.decomposition.shapes = !setup.clumps.empty();
@@ -47,6 +72,7 @@ struct Simulation::Implementation {
     stage_steps = from.steps_of_stage;
     clock = from.clock;
     held = from.held;
+    population.go_on_from(from.population);
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
     lengths_at_start = from.lengths_of_box;
@@ -58,8 +84,9 @@ struct Simulation::Implementation {
         ranks(ranks_),
         state(restored_state(setup, from, ranks_)),
         size(from.head.size),
+        population(setup, from.head.population),
         report(from.head.report),
-        graph(state, parameters, setup, size.bodies, executor, ranks_) {
+        graph(state, parameters, setup, static_cast<std::uint32_t>(from.head.shares), executor, ranks_) {
     choose_distances();
     const CheckpointHead& head = from.head;
     stage_index = static_cast<std::size_t>(head.stage_index);
@@ -90,6 +117,8 @@ struct Simulation::Implementation {
     graph.save(to);
     CheckpointHead& head = to.head;
     head.size = size;
+    head.shares = graph.shares_of_subdomain();
+    head.population = population.state();
     head.stage_index = static_cast<std::int64_t>(stage_index);
     head.stage_steps = stage_steps;
     head.stage_begins = stage_begins;
@@ -133,7 +162,7 @@ struct Simulation::Implementation {
     if (parameters.time_step == 0) parameters.time_step = clock.step();
   }
 
-  double smallest_radius() const { return size.bodies > 0 ? size.smallest : 1; }
+  double smallest_radius() const { return std::isfinite(size.smallest) ? size.smallest : 1; }
 
   /// What the stage prescribes, but for its loads and its time step.
   void prescribe() {
@@ -168,6 +197,7 @@ struct Simulation::Implementation {
     }
     stage_steps = 0;
     held = 0;
+    population.begin_stage(report.time);
     lengths_at_start = Domain{}.lengths(state.walls);
   }
 
@@ -181,8 +211,27 @@ struct Simulation::Implementation {
     set_walls(setup, report.time, parameters.time_step, state);
     if (!stage().chooses_time_step) return;
     prepare_walls(report.time, parameters.time_step, state, ranks);
-    clock.choose(longest_time_step(state, setup, parameters, smallest_radius(), ranks));
+    double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
+    // Grains that come are not there yet.
+    if (const double speed = population.fastest(span()); speed > 0)
+      longest = std::min(longest, TimeStepRule{}.longest_way * smallest_radius() / speed);
+    clock.choose(longest);
     take_time_step(clock.step());
+  }
+
+  /// The step that is about to be made.
+  StepSpan span() const { return {report.time, report.time + parameters.time_step, &stage()}; }
+
+  /// Grains that come and go with the step.
+  void change_grains() {
+    if (!population.has_rules() || !population.change(span(), state, ranks)) return;
+    state.free.u.resize(state.bodies.size());
+    state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
+    const SampleSize now = measure_sample(state.bodies, ranks, setup.clumps, &state.decomposition);
+    size.bodies = now.bodies;
+    size.mean_diameter = now.mean_diameter;
+    size.total_mass = now.total_mass;
+    size.volume = now.volume;
   }
 
   /// Behind a step: time and steps of the stage.
@@ -194,6 +243,8 @@ struct Simulation::Implementation {
     }
     const StageEnd& end = stage().end;
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
+    const StepSpan last{report.time - report.time_step, report.time, &stage()};
+    if (held > 0 && population.expects_grains(last)) held = 0;
   }
 
   /// Loads and motions of the walls for the step: applied forces and free velocities.
@@ -229,6 +280,7 @@ struct Simulation::Implementation {
   const graph::Communicator& ranks;
   StepState state;
   SampleSize size;
+  Population population;
   StepParameters parameters;
   StepReport report;
   StepGraph graph;
@@ -239,6 +291,8 @@ struct Simulation::Implementation {
   std::int64_t stage_steps = 0;
   bool over = false;
   Vec3 lengths_at_start = Vec3::Zero();
+  NamedBodies named;
+  std::vector<BodyReport> named_reports;  ///< of the last step
 };
 
 Simulation::Simulation(Setup setup, Bodies bodies, graph::Executor& executor,
@@ -273,7 +327,7 @@ SavedState Simulation::save() const {
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
-          impl_->clock,        impl_->held,        impl_->stage_begins};
+          impl_->clock,        impl_->held,        impl_->stage_begins,     impl_->population.state()};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {
@@ -290,7 +344,9 @@ Checkpoint Simulation::checkpoint() const {
 const StepReport& Simulation::step() {
   const double start = graph::seconds_now();
   impl_->choose_time_step();
+  impl_->change_grains();
   impl_->load_walls();
+  impl_->named.begin_step(impl_->setup.named, impl_->state, impl_->ranks);
   const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
@@ -298,6 +354,8 @@ const StepReport& Simulation::step() {
   const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
+  impl_->named_reports =
+      impl_->named.end_step(impl_->setup.named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
   return impl_->report;
 }
@@ -358,6 +416,17 @@ std::vector<WallReport> Simulation::walls() const {
 
 std::vector<WallReport> Simulation::groups() const {
   return group_reports(impl_->setup, impl_->state, walls());
+}
+
+const std::vector<BodyReport>& Simulation::named_bodies() const {
+  return impl_->named_reports;
+}
+
+std::vector<InsertReport> Simulation::inserted() const {
+  return impl_->population.inserted();
+}
+std::vector<RemoveReport> Simulation::removed() const {
+  return impl_->population.removed();
 }
 
 std::optional<TriaxialReport> Simulation::triaxial() const {

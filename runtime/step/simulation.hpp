@@ -10,6 +10,7 @@
 #include "runtime/graph/executor.hpp"
 #include "runtime/step/checkpoint.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/population.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/solver_loop.hpp"
@@ -33,6 +34,7 @@ struct SavedState {
   StageClock clock = {};                                         ///< of a stage that chooses its time steps
   double held = 0;                        ///< time for which the stage's bound on equilibrium has held [s]
   std::vector<double> stage_begins = {};  ///< times of the run at which this stage and those before began [s]
+  PopulationState population = {};
 };
 
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
@@ -112,6 +114,11 @@ class Simulation {
   std::vector<WallReport> walls() const;
   /// Sums over the walls of each group, behind a step: forces, torques about the group's point, work.
   std::vector<WallReport> groups() const;
+  /// Bodies that the setup names, after the last step: those that are still there.
+  const std::vector<BodyReport>& named_bodies() const;
+  /// What insertions and removals have done so far; empty without any.
+  std::vector<InsertReport> inserted() const;
+  std::vector<RemoveReport> removed() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them

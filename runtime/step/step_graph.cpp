@@ -10,17 +10,13 @@
 
 namespace talus {
 
-namespace {
-
 /// Enough shares for any node to share, few enough that a task stays coarse.
-std::uint32_t lanes_for(std::size_t bodies) {
-  return static_cast<std::uint32_t>(std::clamp<std::size_t>(bodies / 512, 1, 64));
+std::uint32_t StepGraph::shares_for(std::int64_t bodies, std::int32_t subdomains) {
+  return static_cast<std::uint32_t>(std::clamp<std::int64_t>(bodies / std::max(1, subdomains) / 512, 1, 64));
 }
 
-}  // namespace
-
 StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup,
-                     std::int64_t bodies, graph::Executor& executor, const graph::Communicator& ranks)
+                     std::uint32_t shares, graph::Executor& executor, const graph::Communicator& ranks)
     : state_(state),
       parameters_(parameters),
       setup_(setup),
@@ -28,8 +24,7 @@ StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const S
       decomposition_(setup.decomposition),
       executor_(executor),
       ranks_(ranks),
-      shares_per_subdomain_(lanes_for(
-          static_cast<std::size_t>(bodies / std::max(1, state.decomposition.partition.subdomains)))),
+      shares_per_subdomain_(shares),
       shares_(shares_per_subdomain_ * static_cast<std::uint32_t>(state.decomposition.here.size())),
       loop_(state, parameters, setup.solver, setup.decomposition, ranks),
       left_(shares_),

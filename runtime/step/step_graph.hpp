@@ -50,9 +50,11 @@ struct StepSums {
 /// Each task declares what it reads and writes; the order above follows from that.
 class StepGraph {
  public:
-  /// Keeps references. `bodies`: of all ranks.
-  StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup, std::int64_t bodies,
+  /// Keeps references. `shares`: of each subdomain.
+  StepGraph(StepState& state, const StepParameters& parameters, const Setup& setup, std::uint32_t shares,
             graph::Executor& executor, const graph::Communicator& ranks);
+  /// Shares of a subdomain, from the bodies of all ranks that there are or may come.
+  static std::uint32_t shares_for(std::int64_t bodies, std::int32_t subdomains);
 
   /// One step: poses, velocities, walls, impulses of `state` go from the beginning to the end of the step.
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
@@ -72,6 +74,7 @@ class StepGraph {
   const SolverLoop& loop() const { return loop_; }
   const graph::Graph& graph() const { return graph_; }
   std::uint32_t shares() const { return shares_; }
+  std::uint32_t shares_of_subdomain() const { return shares_per_subdomain_; }
 
  private:
   void build();

@@ -146,11 +146,21 @@ struct Held<std::optional<T>> {
   static Value out(const std::optional<T>& member) { return member ? Held<T>::out(*member) : Value{}; }
   static void in(std::optional<T>& member, const Value& value) { Held<T>::in(member.emplace(), value); }
 };
+/// A list of any length: none in a Value.
+template <>
+struct Held<std::vector<double>> {
+  static Value out(const std::vector<double>& member) { return member.empty() ? Value{} : Value{member}; }
+  static void in(std::vector<double>& member, const Value& value) {
+    member = std::get<std::vector<double>>(value);
+  }
+};
 /// A value of the kind that members of type T are written as: the alternative, and the length of a list.
 template <class T>
 Value example_of() {
   if constexpr (std::is_same_v<T, Vec3>)
     return std::vector<double>(3);  // Vec3{} is not initialised
+  else if constexpr (std::is_same_v<T, std::vector<double>>)
+    return T{};
   else
     return Held<T>::out({});
 }

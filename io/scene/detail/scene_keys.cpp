@@ -5,8 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "io/scene/detail/grain_keys.hpp"
 #include "io/scene/detail/loading_keys.hpp"
 #include "io/scene/detail/material_keys.hpp"
+#include "io/scene/detail/sample_keys.hpp"
 #include "io/scene/detail/solver_keys.hpp"
 
 namespace talus::io::detail {
@@ -63,84 +65,6 @@ Section<Scene> top_keys() {
               "gravity", "m/s²", any, "Gravity in the stages that give none.",
               [](auto& s) -> auto& { return s.common.gravity; }),
           std::move(box),
-      }};
-}
-
-Section<SampleSpec> sample_keys() {
-  using Kind = SampleSpec::Kind;
-  using Radii = SizeDistribution::Kind;
-  const auto made = [](const SampleSpec& s) { return !s.from_file(); };
-  const auto lattice = [](const SampleSpec& s) { return s.kind == Kind::lattice; };
-  const auto one_size = [](const SampleSpec& s) { return !s.from_file() && s.radii.kind == Radii::constant; };
-  const auto sizes = [](const SampleSpec& s) { return !s.from_file() && s.radii.kind != Radii::constant; };
-  const std::string not_bodies = "kind is deposition or lattice";
-  auto material = bound<std::string, SampleSpec>(
-      "material", "", any, "Name of the grains' material.",
-      [](SampleSpec& sample, const std::string& name) { sample.material = name; },
-      [](const SampleSpec& s) { return s.material.empty() ? Value{} : Value{s.material}; });
-  return {
-      "[sample]",
-      "Where the grains come from. `deposition` lays each grain in the lowest place with three supports, on "
-      "z = 0 "
-      "between the sides of `base` (Voivret et al. 2007); `lattice` is simple cubic; `bodies` reads a CSV "
-      "file with the "
-      "columns `id,x,y,z,radius`, then perhaps `vx,vy,vz`, then perhaps `wx,wy,wz` (m, m/s, rad/s), then "
-      "perhaps `material`; `state` begins where a run was: spheres with their velocities, forces where "
-      "contacts are, and walls of the same names that have no place of their own.",
-      {
-          choice<SampleSpec>("kind", {"deposition", "lattice", "bodies", "state"},
-                             "Way of making the sample.", &SampleSpec::kind)
-              .need(),
-          key<SampleSpec>("count", "", countable, "Number of grains. A lattice may give `cells` instead.",
-                          &SampleSpec::count)
-              .only(not_bodies, made)
-              .blank_when_zero()
-              .or_else("none"),
-          key<SampleSpec>("base", "m", positive,
-                          "The sample stands on [0, base[0]] × [0, base[1]]; goes with `count`.",
-                          &SampleSpec::base)
-              .only(not_bodies, made)
-              .blank_when_zero()
-              .or_else("none"),
-          key<SampleSpec>("cells", "", countable, "Grains along x, y and z, instead of `count` and `base`.",
-                          &SampleSpec::cells)
-              .only("kind = lattice", lattice)
-              .blank_when_zero()
-              .or_else("none"),
-          key<SampleSpec>("spacing", "", at_least_one, "Distance of the centres over the largest diameter.",
-                          &SampleSpec::spacing)
-              .only("kind = lattice", lattice),
-          choice<SampleSpec>("shape", body_shapes(), &SampleSpec::shape).only(not_bodies, made),
-          choice<SampleSpec>(
-              "radius_distribution", {"constant", "uniform", "uniform_volume"},
-              "`uniform`: every radius is as likely; `uniform_volume`: every class of radii holds "
-              "the same volume of grains.",
-              [](auto& s) -> auto& { return s.radii.kind; })
-              .only(not_bodies, made),
-          key<SampleSpec>(
-              "radius", "m", positive,
-              "Radius of all grains: of the smallest sphere about its centre of mass that holds one.",
-              [](auto& s) -> auto& { return s.radii.max; })
-              .only("radius_distribution = constant", one_size)
-              .need(),
-          key<SampleSpec>(
-              "radius_min", "m", positive, "Smallest radius.", [](auto& s) -> auto& { return s.radii.min; })
-              .only("other distributions", sizes)
-              .need(),
-          key<SampleSpec>(
-              "radius_max", "m", positive, "Largest radius.", [](auto& s) -> auto& { return s.radii.max; })
-              .only("other distributions", sizes)
-              .need(),
-          key<SampleSpec>("file", "", any,
-                          "CSV file, or checkpoint or results.h5 of a run; a relative path begins at the "
-                          "folder of the scene.",
-                          &SampleSpec::file)
-              .only("kind = bodies or state", [](const SampleSpec& s) { return s.from_file(); })
-              .need(),
-          key<SampleSpec>("frame", "", not_negative, "Frame of a results.h5, from 0.", &SampleSpec::frame)
-              .only("kind = state", [](const SampleSpec& s) { return s.kind == Kind::state; })
-              .or_else("the last"),
-          std::move(material).or_else("the first, or those that a column of `file` names"),
       }};
 }
 
@@ -230,10 +154,11 @@ Section<CheckpointSpec> checkpoint_keys() {
 
 const SceneKeys& scene_keys() {
   static const SceneKeys keys = {
-      top_keys(),           material_keys(),    named_material_keys(), pair_keys(),         sample_keys(),
-      wall_keys(),          wall_motion_keys(), group_keys(),          group_motion_keys(), stage_keys(),
-      stage_end_keys(),     stage_load_keys(),  stage_pair_keys(),     detection_keys(),    solver_keys(),
-      decomposition_keys(), output_keys(),      checkpoint_keys()};
+      top_keys(),        material_keys(),     named_material_keys(), pair_keys(),          sample_keys(),
+      region_keys(),     insert_keys(),       remove_keys(),         wall_keys(),          wall_motion_keys(),
+      group_keys(),      group_motion_keys(), stage_keys(),          stage_end_keys(),     stage_load_keys(),
+      stage_pair_keys(), detection_keys(),    solver_keys(),         decomposition_keys(), output_keys(),
+      checkpoint_keys()};
   return keys;
 }
 

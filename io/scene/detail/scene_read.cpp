@@ -55,7 +55,8 @@ struct Reader {
 template <class T, class Element>
 std::vector<T> read_list(const toml::node& node, std::size_t length, const Reader& reader, Element element) {
   const toml::array* array = node.as_array();
-  if (!array || array->size() != length) reader.wrong_type(node);
+  const bool fits = array && (length > 0 ? array->size() == length : !array->empty());
+  if (!fits) reader.wrong_type(node);
   std::vector<T> values;
   for (const toml::node& entry : *array) values.push_back(element(entry));
   return values;

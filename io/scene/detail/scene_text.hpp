@@ -57,7 +57,7 @@ inline std::string type_text(const KeyText& key) {
       return fmt::format("list of {} integers", list.size());
     }
     std::string operator()(const std::vector<double>& list) const {
-      return fmt::format("list of {} reals", list.size());
+      return list.empty() ? "list of reals" : fmt::format("list of {} reals", list.size());
     }
   };
   return key.choices.empty() ? std::visit(Name{}, key.kind) : "one of " + listed(key.choices);

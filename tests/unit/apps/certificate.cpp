@@ -390,7 +390,7 @@ TEST(CertificateScenes, KeptAsFilesAreTheSameScene) {
   const Sample grains = build_sample(read);
   EXPECT_TRUE(std::ranges::equal(grains.x, made.grains.x));
   EXPECT_EQ(read.setup.stages.size(), made.scene.setup.stages.size());
-  made.scene.sample.file = read.sample.file;
+  made.scene.samples.front().file = read.samples.front().file;
   made.scene.output.directory = read.output.directory;
   EXPECT_EQ(io::resolved_scene(read), io::resolved_scene(made.scene));
   EXPECT_TRUE(is_certificate_name(made.scene.name + ".toml"));

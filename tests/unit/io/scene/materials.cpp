@@ -79,7 +79,7 @@ TEST(SceneMaterials, WallsAndSamplesNameTheirsAndElseHaveTheFirst) {
   const Scene scene = parse_scene(text, file);
   EXPECT_EQ(scene.setup.walls[0].material, 1);
   EXPECT_EQ(scene.setup.walls[1].material, 0);
-  EXPECT_EQ(scene.sample.material, "steel");
+  EXPECT_EQ(scene.samples.front().material, "steel");
 }
 
 TEST(SceneMaterials, StageChangesAllPairsOrOneOfThem) {

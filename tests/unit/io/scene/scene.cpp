@@ -29,7 +29,7 @@ TEST(Scene, BoxMakesSixWallsThatWallTablesChange) {
   EXPECT_EQ(lid.load.pressure, 1e4);
   EXPECT_TRUE(std::isnan(lid.point[2]));
   EXPECT_EQ(scene.output.directory, "out/small");
-  EXPECT_EQ(scene.sample.radii.max, 0.01);
+  EXPECT_EQ(scene.samples.front().radii.max, 0.01);
   EXPECT_EQ(scene.setup.stages[0].end.steps, 5);
 }
 
@@ -203,8 +203,8 @@ TEST(ResolvedScene, ReadsBackToTheSameScene) {
     EXPECT_EQ(again.setup.stages.back().time_step, scene.setup.stages.back().time_step);
     EXPECT_EQ(again.setup.stages.back().laws.between(material_of_grains, material_of_grains).friction,
               scene.setup.stages.back().laws.between(material_of_grains, material_of_grains).friction);
-    EXPECT_EQ(again.sample.count, scene.sample.count);
-    EXPECT_EQ(again.sample.file, scene.sample.file);
+    EXPECT_EQ(again.samples.front().count, scene.samples.front().count);
+    EXPECT_EQ(again.samples.front().file, scene.samples.front().file);
   }
 }
 
@@ -227,7 +227,7 @@ TEST(ResolvedScene, SpellsOutDefaultsAndKeepsPlacesBitForBit) {
 
 TEST(ShippedScenes, ReplicaIsTheStateOfTheArchive) {
   Scene scene = load_scene(shipped_path("replica-iso12k"));
-  const Sample sample = read_bodies(scene.sample.file, scene.density);
+  const Sample sample = read_bodies(scene.samples.front().file, scene.density);
   Bodies bodies;
   append(sample, bodies);
   ASSERT_EQ(bodies.size(), 12000u);

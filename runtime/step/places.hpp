@@ -1,0 +1,47 @@
+#pragma once
+
+/// Room for grains that come: random places in a region in which they overlap nobody.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/grain_rules.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// A grain in search of a place, and one that has found it.
+struct Seeker {
+  std::uint64_t number = 0;  ///< of the grain within its rule
+  double radius = 0;         ///< [m]
+};
+struct FoundPlace {
+  std::size_t seeker = 0;
+  Vec3 x = Vec3::Zero();  ///< [m]
+};
+
+/// What places depend on besides who is there.
+struct PlaceDraw {
+  std::uint64_t seed = 1;
+  std::uint32_t stream = 0;  ///< of the rule
+  std::int64_t round = 0;    ///< attempts that the rule has made before
+  int attempts = 1;          ///< for each seeker, at most
+};
+
+/// Spheres that are in the way [m].
+struct Spheres {
+  std::vector<Vec3> x;
+  std::vector<double> radius;
+};
+
+/// Collective, and the same on all ranks, however bodies are dealt to them: places in order of the attempts,
+/// at most one for a seeker. Each seeker tries one place after the other; of two that want the same room in
+/// the same attempt the one that stands first gets it. `taken`: grains that came already, known to all ranks.
+/// `rounds` counts the attempts that were made.
+std::vector<FoundPlace> find_places(const Region& region, std::span<const Seeker> seekers,
+                                    const PlaceDraw& draw, const StepState& state, const Spheres& taken,
+                                    const graph::Communicator& ranks, std::int64_t& rounds);
+
+}  // namespace talus

@@ -1,0 +1,133 @@
+#pragma once
+
+/// Grains that come and go between two steps.
+///
+/// Order within a step: loads of the stage, choice of the time step, removals, insertions, then detection,
+/// which finds the candidates anew if anybody came or went. A scene without rules does none of it.
+///
+/// The same on any ranks and threads: what is drawn is a function of the seed, the rule's number, the grain's
+/// number within its rule and the attempt. All ranks draw the same places; each says which of them its own
+/// bodies take up, and all then choose alike. A grain goes to the rank and subdomain in which it lies, and
+/// detection deals it out like any other. Ids go up and never come back.
+///
+/// Sizes stay as they were drawn: a grain for which there is no room waits, and is tried again, so that large
+/// grains are as frequent among those that came as in the distribution.
+
+#include <cstdint>
+#include <vector>
+
+#include "kernels/samples/size_distribution.hpp"
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/body_slots.hpp"
+#include "runtime/step/frame.hpp"
+#include "runtime/step/setup.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// What outlives a step, as numbers that a checkpoint can hold. Of i insertions, r removals and m materials.
+struct PopulationState {
+  std::int64_t next_id = 0;
+  std::int64_t unsorted = 0;                ///< grains that stand out of Morton order, one subdomain
+  double stage_began = 0;                   ///< [s]
+  std::vector<std::int64_t> drawn;          ///< i: grains that were ever due
+  std::vector<double> drawn_mass;           ///< i [kg]
+  std::vector<std::int64_t> placed;         ///< i
+  std::vector<double> placed_mass;          ///< i [kg]
+  std::vector<std::int64_t> no_room;        ///< i: steps in which a grain found no room
+  std::vector<std::int64_t> rounds;         ///< i: attempts that were ever made
+  std::vector<std::int64_t> window;         ///< i: grains that are tried at an occasion
+  std::vector<double> last;                 ///< i, then r: time of the last occasion [s]
+  std::vector<std::int64_t> waiting_count;  ///< i
+  std::vector<std::int64_t> waiting;        ///< numbers of grains that are due and not there, rule after rule
+  std::vector<std::int64_t> passed;         ///< r: times of RemoveRule::at that are over
+  std::vector<std::int64_t> removed;        ///< r x m
+  std::vector<double> removed_mass;         ///< r x m [kg]
+
+  /// visit(name, member) for each member.
+  template <class Visit>
+  void each_number(const Visit& visit) {
+    visit_all(*this, visit);
+  }
+  template <class Visit>
+  void each_number(const Visit& visit) const {
+    visit_all(*this, visit);
+  }
+
+ private:
+  template <class Self, class Visit>
+  static void visit_all(Self& self, const Visit& visit) {
+    visit("population_next_id", self.next_id);
+    visit("population_unsorted", self.unsorted);
+    visit("population_stage_began", self.stage_began);
+    visit("population_drawn", self.drawn);
+    visit("population_drawn_mass", self.drawn_mass);
+    visit("population_placed", self.placed);
+    visit("population_placed_mass", self.placed_mass);
+    visit("population_no_room", self.no_room);
+    visit("population_rounds", self.rounds);
+    visit("population_window", self.window);
+    visit("population_last", self.last);
+    visit("population_waiting_count", self.waiting_count);
+    visit("population_waiting", self.waiting);
+    visit("population_passed", self.passed);
+    visit("population_removed", self.removed);
+    visit("population_removed_mass", self.removed_mass);
+  }
+};
+
+/// The time step that is about to be made.
+struct StepSpan {
+  double begin = 0, end = 0;  ///< [s]
+  const Stage* stage = nullptr;
+};
+
+class Population {
+ public:
+  /// Keeps a reference. Collective: ids go on behind those of `bodies`, on all ranks.
+  Population(const Setup& setup, const Bodies& bodies, const graph::Communicator& ranks);
+  /// As of a checkpoint. Throws std::invalid_argument when it is of other rules.
+  Population(const Setup& setup, const PopulationState& state);
+  void go_on_from(const PopulationState& state);
+
+  bool has_rules() const { return !setup_.inserts.empty() || !setup_.removes.empty(); }
+  /// A stage has begun [s].
+  void begin_stage(double time) { now_.stage_began = time; }
+
+  /// Removes and inserts what the step begins with. True when bodies came or went: candidates are then to be
+  /// found anew. Collective.
+  bool change(const StepSpan& step, StepState& state, const graph::Communicator& ranks);
+
+  /// Whether an insertion has more to do, in the stage of the step and behind it.
+  bool expects_grains(const StepSpan& step) const;
+  /// The fastest that a grain may come in the step [m/s].
+  double fastest(const StepSpan& step) const;
+
+  std::vector<InsertReport> inserted() const;
+  std::vector<RemoveReport> removed() const;
+  PopulationState state() const;
+
+ private:
+  bool acts(const RuleTimes& times, const StepSpan& step) const;
+  bool is_occasion(const RuleTimes& times, std::size_t rule, const StepSpan& step);
+  double rule_time(const RuleTimes& times, double time) const;
+  double mass_of_grain(std::size_t rule, std::int64_t number) const;
+  double radius_of_grain(std::size_t rule, std::int64_t number) const;
+  std::vector<std::int64_t> leave(const StepSpan& step, const StepState& state,
+                                  const graph::Communicator& ranks);
+  void draw_due(std::size_t rule, const StepSpan& step);
+  void place_due(std::size_t rule, const StepState& state, const graph::Communicator& ranks,
+                 std::vector<NewGrain>& grains);
+  NewGrain made(std::size_t rule, std::int64_t number, const Vec3& x);
+
+  const Setup& setup_;
+  PopulationState now_;                             ///< but for who waits:
+  std::vector<std::vector<std::int64_t>> waiting_;  ///< per insertion
+  std::vector<RadiusSource> radii_;                 ///< likewise
+};
+
+/// Radius [m] below which no grain ever is: of the sample, whose smallest is given (0: there is none), and of
+/// all that is inserted.
+double smallest_ever(const Setup& setup, double smallest_of_sample);
+
+}  // namespace talus

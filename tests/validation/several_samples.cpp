@@ -1,0 +1,113 @@
+/// Scenes of several samples and bodies with names, from outside.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus::several_samples_test {
+namespace {
+
+using namespace test;
+
+const std::string ball_over_bed = R"(name = "ball"
+time_step = 5e-4
+gravity = [0, 0, -9.81]
+
+[[material]]
+name = "glass"
+density = 2500
+[[material]]
+name = "steel"
+density = 7800
+
+[[sample]]
+name = "bed"
+kind = "lattice"
+count = 60
+base = [0.06, 0.06]
+origin = [-0.03, -0.03, 0]
+radius = 0.005
+[[sample]]
+kind = "body"
+name = "ball"
+material = "steel"
+radius = 0.01
+position = [0, 0, 0.2]
+velocity = [0, 0, -1]
+
+[[wall]]
+name = "floor"
+side = "z-"
+
+[[stage]]
+end = { steps = 40 }
+)";
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+class SeveralSamples : public testing::Test {
+ protected:
+  Outcome run(const std::string& scene, const std::string& more = "--out out --force") {
+    write(folder_.path() / "scene.toml", scene);
+    return test::run(folder_.path(), "run scene.toml " + more);
+  }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+  ScratchDirectory folder_;
+};
+
+/// Nothing touches the ball: it falls as a body does, and feels no force.
+TEST_F(SeveralSamples, ABodyWithANameLeavesItsPath) {
+  ASSERT_EQ(run(ball_over_bed).code, 0);
+  const Table path = read_table(at("out/bodies.csv"));
+  ASSERT_EQ(path.rows.size(), 40u);
+  for (const std::size_t row : {std::size_t{0}, std::size_t{39}}) {
+    const double t = path.number(row, "time");
+    EXPECT_EQ(path.rows[row].at("body"), "ball");
+    EXPECT_NEAR(path.number(row, "vz"), -1 - 9.81 * t, 1e-12);
+    EXPECT_NEAR(path.number(row, "z"), 0.2 - t - 0.5 * 9.81 * t * t, 1e-12 + 0.5 * 9.81 * t * 5e-4);
+    EXPECT_NEAR(path.number(row, "force_z"), 0, 1e-10);
+  }
+}
+
+/// On the floor it weighs what its material says.
+TEST_F(SeveralSamples, TheForceOnARestingBodyIsItsWeight) {
+  std::string scene = with(ball_over_bed, "position = [0, 0, 0.2]", "position = [0.1, 0, 0.01]");
+  scene = with(scene, "velocity = [0, 0, -1]", "velocity = [0, 0, 0]");
+  ASSERT_EQ(run(scene).code, 0);
+  const Table path = read_table(at("out/bodies.csv"));
+  const double weight = 4.0 / 3 * M_PI * 1e-6 * 7800 * 9.81;
+  EXPECT_NEAR(path.number(39, "force_z"), weight, 1e-6 * weight);
+}
+
+TEST_F(SeveralSamples, TheSameBitsOnAnyRanksOfThreeSubdomains) {
+  ASSERT_EQ(run(ball_over_bed, "--out one --set decomposition.subdomains=3").code, 0);
+  ASSERT_EQ(run(ball_over_bed, "--out two --threads 1 --set decomposition.subdomains=3").code, 0);
+  EXPECT_EQ(summary(at("one"))["digest"], summary(at("two"))["digest"]);
+  EXPECT_EQ(content(at("one/bodies.csv")), content(at("two/bodies.csv")));
+}
+
+TEST_F(SeveralSamples, ARunGoesOnWithItsNamedBodies) {
+  ASSERT_EQ(run(ball_over_bed, "--out whole").code, 0);
+  ASSERT_EQ(run(ball_over_bed, "--out parts --resume --steps 17").code, 0);
+  ASSERT_EQ(run(ball_over_bed, "--out parts --resume").code, 0);
+  EXPECT_EQ(summary(at("whole"))["digest"], summary(at("parts"))["digest"]);
+  EXPECT_EQ(content(at("whole/bodies.csv")), content(at("parts/bodies.csv")));
+}
+
+TEST_F(SeveralSamples, ThatOverlapAreRefusedWithARemedyAndNothingIsWritten) {
+  const Outcome outcome = run(with(ball_over_bed, "position = [0, 0, 0.2]", "position = [0, 0, 0.015]"));
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.messages.find("samples 0 ('bed') and 1 ('ball') overlap"), std::string::npos)
+      << outcome.messages;
+  EXPECT_NE(outcome.messages.find("Move one of them"), std::string::npos);
+  EXPECT_FALSE(fs::exists(at("out")));
+}
+
+}  // namespace
+}  // namespace talus::several_samples_test
