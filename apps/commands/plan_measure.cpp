@@ -104,6 +104,7 @@ class Forms {
     setup.rotation = in;
     return setup;
   }
+  static bool may_be_pushed(const Wall& wall) { return wall.surface() == nullptr && wall.motion.empty(); }
   Setup pushed_walls(bool in) const {
     Setup setup = base_;
     const bool any = has_pushed_walls();
@@ -112,7 +113,8 @@ class Forms {
       if (!in && wall.load.pushed())
         wall.load = {.drive = WallDrive::velocity,
                      .velocity = 0.01 * smallest_ / first_time_step(setup) * wall.normal};
-      if (in && !any) wall.load = {.drive = WallDrive::force, .force = 9.81 * mass_, .mass = 0.1 * mass_};
+      if (in && !any && may_be_pushed(wall))
+        wall.load = {.drive = WallDrive::force, .force = 9.81 * mass_, .mass = 0.1 * mass_};
     }
     return setup;
   }
@@ -128,7 +130,7 @@ class Forms {
     return std::ranges::any_of(base_.walls, [](const Wall& wall) { return wall.load.pushed(); });
   }
   bool has_subdomains() const { return base_.decomposition.subdomains > 1; }
-  bool has_walls() const { return !base_.walls.empty(); }
+  bool has_walls() const { return std::ranges::any_of(base_.walls, may_be_pushed); }
 
  private:
   double first_time_step(const Setup& setup) const {

@@ -55,6 +55,9 @@ Sample grains_of(const Frame& frame, const io::Scene& scene) {
 
 void put_walls(io::Scene& scene, const Frame& frame, const std::string& file) {
   for (Wall& wall : scene.setup.walls) {
+    if (!wall.motion.empty())
+      throw std::invalid_argument(
+          fmt::format("wall '{}' moves by itself, and {} does not say how far it has come", wall.name, file));
     bool found = false;
     for (const WallReport& there : frame.walls)
       if (there.name == wall.name) {
