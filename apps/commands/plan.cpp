@@ -76,8 +76,11 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
        undone > 0 ? fmt::format("{:g} of an overlap per step, by ten sweeps behind the others", undone)
                   : "overlap_correction = 0: no sweeps of positions");
   print_laws(simulation);
-  line("moving walls", driven + pressed > 0,
-       fmt::format("{} driven, {} pushed of {}", driven, pressed, state.walls.size()));
+  const auto moved =
+      std::ranges::count_if(state.walls, [](const Wall& wall) { return !wall.motion.empty(); });
+  line("moving walls", driven + pressed + moved > 0,
+       fmt::format("{} driven, {} pushed, {} with a motion of {}", driven, pressed, moved,
+                   state.walls.size()));
   line("gluing of wall copies", pressed > 0,
        pressed > 0 ? "two tasks per subdomain and one for all" : "no wall of finite mass");
   line("chunk dependencies", threads > 1,

@@ -10,8 +10,10 @@ RecorderFeed::RecorderFeed(graph::Executor& executor, io::Recorder& recorder,
 
 void RecorderFeed::row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
   if (ranks_.rank() != 0) return;
+  std::vector<WallReport> walls = simulation.walls();
+  for (WallReport& group : simulation.groups()) walls.push_back(std::move(group));
   rows_.push_back({.step = simulation.report(),
-                   .walls = simulation.walls(),
+                   .walls = std::move(walls),
                    .triaxial = triaxial,
                    .bodies = simulation.named_bodies(),
                    .inserted = simulation.inserted(),

@@ -208,6 +208,13 @@ void print_resumption(const Terminal& terminal, const ResumePoint& point) {
   for (const io::SceneChange& change : point.changes) terminal.say("from here on {}", io::describe(change));
 }
 
+/// Rank 0 waits for this rank, and cannot write that the run has failed.
+void say_for_rank_0(const std::string& directory, const io::Provenance& provenance, io::Summary summary,
+                    const graph::Communicator& ranks) {
+  summary.message = fmt::format("rank {}: {}", ranks.rank(), summary.message);
+  io::write_run_json(directory + "/run.json", provenance, summary);
+}
+
 /// Fills in the provenance of the run, and runs.
 int run_scene(const RunOptions& options, const graph::Communicator& ranks, Terminal& terminal, Prepared run,
               double began) {
@@ -233,7 +240,8 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
     print_end(terminal, summary, scene.setup.solver, run.directory);
   else if (summary.status == "failed")
     terminal.warn("rank {}: {}", ranks.rank(), summary.message);
-  if (summary.status == "failed" && ranks.ranks() > 1) end_all(summary.exit_code, ranks);
+  if (summary.status == "failed" && ranks.ranks() > 1)
+    end_all(summary.exit_code, ranks, [&] { say_for_rank_0(run.directory, provenance, summary, ranks); });
   return summary.exit_code;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <exception>
 #include <set>
 #include <span>
 #include <sstream>
@@ -48,9 +49,17 @@ bool any_refused(const std::string& why, const graph::Communicator& ranks) {
   return !all.empty();
 }
 
-void end_all(int code, const graph::Communicator& ranks) {
+void end_all(int code, const graph::Communicator& ranks, const std::function<void()>& alone) {
+  constexpr double for_a_word = 1, for_files = 5;  // [s]
   std::fflush(nullptr);
-  ranks.meet(ranks.rank() == 0 ? 1 : 20);
+  const bool met = ranks.meet(ranks.rank() == 0 ? for_a_word : for_files);
+  if (!met && ranks.rank() != 0 && alone) {
+    try {
+      alone();
+    } catch (const std::exception&) {
+      // The reason is on stderr already; a folder that this rank cannot reach keeps what it says.
+    }
+  }
   ranks.abort(code);
 }
 

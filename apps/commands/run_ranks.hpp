@@ -2,6 +2,7 @@
 
 /// What the ranks of a run agree on before its first step, and how they end together when one fails.
 
+#include <functional>
 #include <string>
 
 #include "runtime/graph/communicator.hpp"
@@ -18,8 +19,9 @@ void share_walls(Setup& setup, const graph::Communicator& ranks);
 bool any_refused(const std::string& why, const graph::Communicator& ranks);
 
 /// Ends all ranks of a run that failed on this rank of several. Rank 0 has tables and run.json to write, in
-/// the middle of which it must not be killed: the others wait for it, but not for ever, since it may wait for
-/// them. It waits a moment for what they have to say. Does not return.
-void end_all(int code, const graph::Communicator& ranks);
+/// the middle of which it must not be killed: the others wait for it, but only seconds, since it may wait for
+/// them, and then nobody but `alone` says why the run ended. It waits a moment for what they have to say.
+/// Does not return.
+void end_all(int code, const graph::Communicator& ranks, const std::function<void()>& alone = {});
 
 }  // namespace talus

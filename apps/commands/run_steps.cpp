@@ -79,9 +79,14 @@ struct Advance {
   RunMemory memory;
   DueClock frames;
   WallLimit limit;
+  std::int64_t frames_given;         ///< those before a resumption among them
   std::optional<StatusFile> status;  ///< rank 0's
 
-  void write_frame() { feed.frame(simulation.frame(run.scene.output.contacts)); }
+  /// Frames are counted through all parts of a run, so that the same ones have contacts.
+  void write_frame() {
+    const io::OutputSpec& output = run.scene.output;
+    feed.frame(simulation.frame(output.contacts && frames_given++ % output.contacts_every == 0));
+  }
 
   /// Where the files of the results are, behind all that steps have given them.
   io::OutputMark mark() {
@@ -107,7 +112,7 @@ struct Stop {
 
 /// A step, its rows, and what follows from what is asked behind it. True: the run ends here.
 bool advance_step(Advance& all, Lines& lines, Stop& stop) {
-  const auto& [run, simulation, feed, recorder, keeper, memory, frames, limit, status] = all;
+  const auto& [run, simulation, feed, recorder, keeper, memory, frames, limit, given, status] = all;
   const RunOptions& options = run.options;
   const double before = graph::seconds_now();
   const StepReport& report = simulation.step();
@@ -255,6 +260,7 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
               memory,
               DueClock(scene.output.every_steps, scene.output.every, memory.frames_passed),
               WallLimit(run.granted ? std::optional(run.began + *run.granted) : std::nullopt),
+              static_cast<std::int64_t>(memory.mark.frame_times.size()),
               {}};
   if (ranks.rank() == 0) all.status.emplace(run.directory);
   summary.status = "done";
@@ -296,6 +302,8 @@ io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenFor
   io::OutputContext context = io::output_context(run.directory, run.scene.setup,
                                                  run.ranks.ranks() > 1 ? run.ranks : graph::one_rank());
   context.contacts = run.scene.output.contacts;
+  context.format = run.scene.output.format;
+  context.tables_every = run.scene.output.tables_every;
   context.provenance = run.provenance;
   io::Recorder recorder(std::move(context), run.scene.output.sinks);
   // The first fault is what to mend.

@@ -202,7 +202,7 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
     }
   }
   for (const Wall& wall : scene.setup.walls)
-    for (std::size_t k = 0; k < sample.size(); ++k)
+    for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < sample.size(); ++k)
       overlaps.add(depth_at(wall, sample.x[k], sample.radius[k]), sample.radius[k],
                    [&] { return fmt::format("grain {} and wall '{}'", id(k), wall.name); });
   if (overlaps.count == 0) return "";

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <unordered_map>
@@ -15,7 +16,7 @@ namespace {
 
 /// Numbers that decide which pairs are contacts. E: 0 with Newton's law, else the largest restitution.
 struct GapNumbers {
-  double h, alert, slow, E;
+  double h, alert, turning, slow, E;
 };
 
 /// A pair on its way through the step.
@@ -30,8 +31,11 @@ bool meets(const GapNumbers& numbers, const Approach& pair, double restitution, 
   if (pair.gap >= numbers.alert && pair.gap + numbers.h * pair.v_free >= 0) return false;
   bias = std::max(0.0, pair.gap) / numbers.h;
   if (restitution > 0 && std::abs(pair.v_n) > numbers.slow) {
-    if (pair.gap > 0) return false;
-    bias = restitution * pair.v_n;
+    const bool closes = pair.v_n < 0 && pair.gap + numbers.h * pair.v_free < 0;
+    if (pair.gap <= 0 || (closes && pair.gap < numbers.turning))
+      bias = restitution * pair.v_n;
+    else if (closes || restitution >= 1)
+      return false;
   }
   // Moreau's law: of the mean velocity (v + E v-)/(1 + E).
   if (numbers.E > 0) bias = std::max(0.0, bias - numbers.E * pair.v_n) / (1 + numbers.E);
@@ -43,6 +47,10 @@ void refuse_what_is_unknown(const StepInput& input) {
   for (const Wall& wall : input.walls)
     if (wall.surface() != nullptr)
       throw std::invalid_argument("the audit knows plane walls only; '" + wall.name + "' is none");
+  for (const Wall& wall : input.walls)
+    if (!wall.motion.empty() || wall.absent)
+      throw std::invalid_argument("the audit knows no walls that move by themselves or are absent: '" +
+                                  wall.name + "'");
   for (auto number : {&PairLaw::cohesion, &PairLaw::rolling_resistance})
     if (input.stage.laws.largest(number) > 0)
       throw std::invalid_argument("the audit knows neither cohesion nor rolling resistance");
@@ -55,7 +63,7 @@ class Builder {
     const double h = in_.stage.time_step;
     double smallest = INFINITY;
     for (double radius : in_.before.radius) smallest = std::min(smallest, radius);
-    numbers_ = {h, in_.setup.detection.alert > 0 ? in_.setup.detection.alert : 0.1 * smallest,
+    numbers_ = {h, in_.setup.detection.alert > 0 ? in_.setup.detection.alert : 0.1 * smallest, 0.5 * smallest,
                 2 * h * in_.stage.gravity.norm(),
                 in_.setup.solver.restitution_law == RestitutionLaw::moreau
                     ? in_.stage.laws.largest(&PairLaw::restitution)
@@ -80,6 +88,9 @@ class Builder {
     for (std::size_t s = 0; s < in_.bodies.size(); ++s)
       slots.emplace(static_cast<std::int64_t>(in_.bodies.id[s]), s);
     const bool turns = in_.stage.laws.largest(&PairLaw::friction) > 0 && in_.setup.rotation;
+    double farthest = 0;
+    for (const Vec3& x : in_.before.x) farthest = std::max(farthest, x.cwiseAbs().maxCoeff());
+    made_.rounding_speed = std::numeric_limits<double>::epsilon() * farthest / numbers_.h;
     for (std::size_t k = 0; k < n_; ++k) {
       const std::size_t s = slots.at(in_.before.id[k]);
       const double m = in_.bodies.mass(s), R = in_.before.radius[k];

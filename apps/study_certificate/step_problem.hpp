@@ -44,6 +44,7 @@ struct StepProblem {
   std::vector<double> wall_inv_mass;  ///< k [1/kg]; 0: fixed or driven
   std::vector<double> wall_load;      ///< k [N]
   double drive_speed = 0;             ///< largest of the driven walls [m/s]
+  double rounding_speed = 0;          ///< what rounding of positions is worth in a step [m/s]
   std::vector<StepContact> contacts;
 
   bool smooth() const;  ///< no contact has friction

@@ -38,11 +38,17 @@ struct Momenta {
   double all_exchanged() const { return std::accumulate(exchanged.begin(), exchanged.end(), 0.0); }
 };
 
+/// What is left of an error beyond what rounding of positions makes of it.
+double beyond_rounding(const StepProblem& problem, double mass, double error) {
+  return std::max(0.0, error - mass * problem.rounding_speed);
+}
+
 Momenta momenta(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   Momenta found;
   const Motion &exact = reference.motion, &free = problem.free;
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    found.wrong.push_back(problem.mass[k] * (end.after.u[k] - exact.u[k]).norm());
+    found.wrong.push_back(
+        beyond_rounding(problem, problem.mass[k], problem.mass[k] * (end.after.u[k] - exact.u[k]).norm()));
     found.exchanged.push_back(problem.mass[k] * (exact.u[k] - free.u[k]).norm());
   }
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {
@@ -115,7 +121,8 @@ TrueErrors true_errors(const StepProblem& problem, const Reference& reference, c
                                     mass * problem.drive_speed, floors.motion * mass * speed, 1e-300});
   for (std::size_t c = 0; c < problem.contacts.size(); ++c) {
     contact_unit = std::max(contact_unit, reference.r[c].norm());
-    contact_wrong = std::max(contact_wrong, (reference.r[c] - end.r[c]).norm());
+    contact_wrong = std::max(contact_wrong, beyond_rounding(problem, problem.mass[problem.contacts[c].first],
+                                                            (reference.r[c] - end.r[c]).norm()));
   }
   errors.velocity = momentum.all_wrong() / exchange;
   errors.wall_force = wall_wrong / std::max(wall_unit, floors.exchange * exchange);

@@ -8,9 +8,10 @@
 
 namespace talus::audit {
 
-/// True errors of a step, each relative. Let E be the momentum that the contacts exchange in the exact
-/// answer, sum m |u* - u_free| over grains and pushed walls, but at least a hundredth of the largest wall
-/// impulse (grains pressed between fixed walls gain nothing), and what a driven wall's speed gives to all.
+/// True errors of a step, each relative, without what rounding of positions is worth (a step at rest). Let E
+/// be the momentum that the contacts exchange in the exact answer, sum m |u* - u_free| over grains and pushed
+/// walls, but at least a hundredth of the largest wall impulse (grains pressed between fixed walls gain
+/// nothing), and what a driven wall's speed gives to all.
 struct TrueErrors {
   double velocity = 0;       ///< V: sum m |u - u*| over E
   double wall_force = 0;     ///< wf: largest error of a wall's impulse over the largest wall impulse or load

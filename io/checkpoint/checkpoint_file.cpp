@@ -2,18 +2,16 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstring>
-#include <exception>
 #include <span>
 #include <system_error>
 #include <type_traits>
 
 #include "io/checkpoint/number_text.hpp"
+#include "io/files/detail/all_or_none.hpp"
 #include "io/files/detail/descriptor.hpp"
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/hdf5_write.hpp"
@@ -23,6 +21,7 @@ namespace talus::io {
 
 namespace {
 
+using detail::all_or_none;
 using detail::demand;
 using detail::Hdf5Object;
 using detail::hold;
@@ -30,7 +29,7 @@ using detail::Place;
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they stand in memory");
 
-constexpr std::int64_t format_version = 1;
+constexpr std::int64_t format_version = 2;
 
 /// 64 bits of every byte and its place; no cryptography, but any flipped bit shows.
 std::uint64_t checksum(std::span<const std::byte> bytes) {
@@ -72,22 +71,14 @@ struct ColumnLayout {
   std::size_t row_bytes;
 };
 
-detail::ElementTypes types_of(const float*) {
-  return {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
-}
-template <class T>
-detail::ElementTypes types_of(const T* number) {
-  return detail::element_types(number);
-}
-
 std::vector<ColumnLayout> layout() {
   std::vector<ColumnLayout> columns;
   const CheckpointPart none;
   each_column(none, [&](const char* name, const auto& column) {
     using Row = typename std::remove_cvref_t<decltype(column)>::value_type;
     using Number = typename Element<Row>::Number;
-    columns.push_back(
-        {name, types_of(static_cast<const Number*>(nullptr)).file, Element<Row>::columns, sizeof(Row)});
+    columns.push_back({name, detail::element_types(static_cast<const Number*>(nullptr)).file,
+                       Element<Row>::columns, sizeof(Row)});
   });
   return columns;
 }
@@ -153,12 +144,9 @@ std::string read_bytes(Place place, const std::string& name) {
 /// Throws FileError where the disk has no room for so many bytes. Asked before HDF5 begins: a file whose
 /// closing has failed stays open in the library, and crashes it at exit.
 void demand_disk(const std::string& path, std::int64_t bytes) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (file < 0) throw FileError(path, "cannot be opened for writing: " + detail::last_error());
-  const bool refused = ::fallocate(file, 0, 0, bytes) != 0 && errno != EOPNOTSUPP && errno != ENOSYS;
-  const std::string why = refused ? detail::last_error() : "";
-  ::close(file);
-  if (refused) throw FileError(path, fmt::format("cannot get its {} bytes of the disk: {}", bytes, why));
+  detail::Descriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
+  file.demand_room(0, bytes);
+  file.close();
 }
 
 /// Of a file with these rows, and at least of what HDF5 puts around them.
@@ -236,21 +224,6 @@ void write_own_rows(const std::string& path, const Checkpoint& state, const std:
   file.close();
 }
 
-/// Runs `work` where `mine`; all ranks throw when it fails on one.
-template <class Work>
-void all_or_none(const graph::Communicator& ranks, const std::string& path, bool mine, const Work& work) {
-  std::exception_ptr failure;
-  try {
-    if (mine) work();
-  } catch (...) {
-    failure = std::current_exception();
-  }
-  double failed[1] = {failure ? 1.0 : 0.0};
-  ranks.max(failed);
-  if (failure) std::rethrow_exception(failure);
-  if (failed[0] > 0) throw FileError(path, "another rank could not write its part");
-}
-
 }  // namespace
 
 std::int64_t write_checkpoint(const std::filesystem::path& path, const CheckpointFile& content,
@@ -318,8 +291,8 @@ std::vector<Row> read_rows_of(Place place, const std::string& name, std::size_t 
   const Hdf5Object space = hold(H5Screate_simple(dimensions, extent, nullptr), H5Sclose, place.file, action);
   demand(H5Sselect_hyperslab(there.id(), H5S_SELECT_SET, start, nullptr, extent, nullptr), place.file,
          action);
-  demand(H5Dread(dataset.id(), types_of(static_cast<const Number*>(nullptr)).memory, space.id(), there.id(),
-                 H5P_DEFAULT, rows.data()),
+  demand(H5Dread(dataset.id(), detail::element_types(static_cast<const Number*>(nullptr)).memory, space.id(),
+                 there.id(), H5P_DEFAULT, rows.data()),
          place.file, action);
   return rows;
 }

@@ -179,4 +179,24 @@ void write_whole(const fs::path& path, std::string_view content) {
   write_whole(path, [&](const WriteText& out) { out(content); });
 }
 
+void write_whole_or_over(const fs::path& path, std::string_view content) {
+  try {
+    write_whole(path, content);
+  } catch (const FileError&) {
+    std::error_code unknown;
+    if (!fs::is_regular_file(path, unknown)) throw;
+    detail::Descriptor file(path, O_WRONLY);
+    file.demand_room(0, static_cast<std::int64_t>(content.size()));
+    file.write_at(0, content);
+    file.end_at(static_cast<std::int64_t>(content.size()));
+    file.close();
+  }
+}
+
+void reserve(const fs::path& path, std::int64_t bytes) {
+  detail::Descriptor file(path, O_WRONLY);
+  file.demand_room(0, bytes);
+  file.close();
+}
+
 }  // namespace talus::io

@@ -2,6 +2,7 @@
 
 /// The directory of a run: which files may be overwritten, and how files appear in it.
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -65,6 +66,12 @@ void check_output_files(const std::vector<std::filesystem::path>& inputs,
 /// Writes a whole file: under `path` + ".part", then renamed, so that a reader meets the old file or the new
 /// one and never half of one. Throws FileError naming `path`; the unfinished file is then removed.
 void write_whole(const std::filesystem::path& path, std::string_view content);
+/// The same; where the disk has no room for a second file, the text takes the place of that in the first, if
+/// it can. Throws FileError.
+void write_whole_or_over(const std::filesystem::path& path, std::string_view content);
+/// Keeps room on the disk for a file to become so long, where the file system can. Throws FileError where
+/// there is none.
+void reserve(const std::filesystem::path& path, std::int64_t bytes);
 
 /// The same for content that is made piece by piece: `content` calls its argument with the text in order.
 /// What it throws goes on, and the unfinished file is removed.

@@ -30,7 +30,7 @@ class FieldSink : public OutputSink {
 
   void resume(const OutputMark& mark) override {
     open();
-    for (const double time : mark.frame_times) note_frame(time);
+    for (const double time : mark.frame_times) note_frame(time, contacts_);
     if (ranks_.rank() != 0) return;
     // Where fields, or contacts, are asked for with the resumption, earlier frames have none.
     const auto missing = [&](const FieldFile& file) {
@@ -47,9 +47,10 @@ class FieldSink : public OutputSink {
 
   void frame(const Frame& part) override {
     write(grains_name(frames_), [&](const WriteText& out) { write_grains_vtp(part, ranks_, out); });
-    if (contacts_)
+    const bool forces = contacts_ && part.with_contacts;
+    if (forces)
       write(forces_name(frames_), [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
-    note_frame(part.time);
+    note_frame(part.time, forces);
     write_collections();
   }
 
@@ -57,9 +58,9 @@ class FieldSink : public OutputSink {
   static std::string grains_name(std::size_t frame) { return fmt::format("grains_{:06}.vtp", frame); }
   static std::string forces_name(std::size_t frame) { return fmt::format("forces_{:06}.vtp", frame); }
 
-  void note_frame(double time) {
+  void note_frame(double time, bool forces) {
     grain_files_.push_back({time, 0, grains_name(frames_)});
-    if (contacts_) force_files_.push_back({time, 0, forces_name(frames_)});
+    if (forces) force_files_.push_back({time, 0, forces_name(frames_)});
     ++frames_;
   }
   /// False where there is none of that number.

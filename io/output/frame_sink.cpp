@@ -9,13 +9,13 @@ namespace {
 class FrameSink : public OutputSink {
  public:
   explicit FrameSink(const OutputContext& context)
-      : path_(context.directory / "results.h5"), ranks_(context.ranks) {
+      : path_(context.directory / "results.h5"), ranks_(context.ranks), format_(context.format) {
     for (const Wall& wall : context.walls) wall_names_.push_back(wall.name);
   }
 
-  void open() override { results_.emplace(path_, wall_names_, ranks_); }
+  void open() override { results_.emplace(path_, wall_names_, ranks_, format_); }
   void resume(const OutputMark& mark) override {
-    results_.emplace(path_, wall_names_, ranks_, shared_writing(), mark.frame_times.size());
+    results_.emplace(path_, wall_names_, ranks_, format_, mark.frame_times.size());
   }
   void frame(const Frame& part) override { results_->append(part); }
 
@@ -23,6 +23,7 @@ class FrameSink : public OutputSink {
   std::filesystem::path path_;
   std::vector<std::string> wall_names_;
   const graph::Communicator& ranks_;
+  FrameFormat format_;
   std::optional<ResultsWriter> results_;
 };
 

@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "io/results/results.hpp"
 #include "io/results/run_json.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/error_history.hpp"
@@ -37,10 +38,15 @@ namespace talus::io {
 struct OutputContext {
   std::filesystem::path directory;                ///< prepared (prepare_output_directory)
   bool contacts = true;                           ///< false: frames hold no contacts
+  FrameFormat format = {};                        ///< of results.h5
+  std::int64_t tables_every = 1;                  ///< steps from line to line of walls.csv and triaxial.csv
   std::vector<Wall> walls = {};                   ///< in the order of Frame::walls
   std::map<std::string, int> axis_of_stage = {};  ///< 0, 1, 2: along which the strain of a stage is measured
   Provenance provenance = {};
   const graph::Communicator& ranks;  ///< outlives the sinks
+
+  /// Whether walls.csv and triaxial.csv, and what is drawn from them, have a line for that step.
+  bool has_table_line(std::int64_t step) const { return step % tables_every == 0; }
 };
 
 /// What a step leaves, besides frames.

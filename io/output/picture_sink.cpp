@@ -20,10 +20,10 @@ class PictureSink : public OutputSink {
       curve_.add(report);
   }
   void step(const StepRecord& record) override {
-    if (record.triaxial) curve_.add(*record.triaxial);
+    if (record.triaxial && context_.has_table_line(record.step.step)) curve_.add(*record.triaxial);
   }
   void frame(const Frame& part) override {
-    if (context_.contacts) draw_force_picture(part);
+    if (part.with_contacts) draw_force_picture(part);
     draw_triaxial_picture();
   }
   void close() override { draw_triaxial_picture(); }

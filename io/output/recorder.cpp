@@ -14,6 +14,7 @@ void drop_contacts(Frame& frame) {
   frame.contact_normal.clear();
   frame.contact_gap.clear();
   frame.contact_force.clear();
+  frame.with_contacts = false;
 }
 
 }  // namespace

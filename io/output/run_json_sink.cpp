@@ -1,5 +1,6 @@
 /// run.json: says "running" from the beginning, and what came of the run at its end.
 
+#include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
 
 namespace talus::io {
@@ -13,7 +14,11 @@ class RunJsonSink : public OutputSink {
         writes_(context.ranks.rank() == 0) {}
 
   void open() override {
-    if (writes_) write_run_json(path_, provenance_, Summary{});
+    if (!writes_) return;
+    write_run_json(path_, provenance_, Summary{});
+    // What came of the run must find room also when its results have filled the disk.
+    constexpr std::int64_t generous = 1 << 14;
+    reserve(path_, generous);
   }
   void end(const Summary& summary) override { write_run_json(path_, provenance_, summary); }
 

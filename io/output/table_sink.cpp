@@ -21,7 +21,7 @@ constexpr std::array<std::string (*)(), tables> headers{
 class TableSink : public OutputSink {
  public:
   explicit TableSink(const OutputContext& context)
-      : directory_(context.directory), writes_(context.ranks.rank() == 0) {}
+      : context_(context), directory_(context.directory), writes_(context.ranks.rank() == 0) {}
 
   void open() override {
     if (!writes_) return;
@@ -48,13 +48,7 @@ class TableSink : public OutputSink {
   /// All but steps.csv and walls.csv appear with their first line.
   void step(const StepRecord& record) override {
     append_steps_row(lines_of(steps), record.step);
-    for (const WallReport& wall : record.walls) append_walls_row(lines_of(walls), record.step, wall);
-    for (const BodyReport& body : record.bodies) append_bodies_row(lines_of(bodies), record.step, body);
-    for (const InsertReport& insert : record.inserted)
-      append_inserted_row(lines_of(inserted), record.step, insert);
-    for (const RemoveReport& remove : record.removed)
-      append_removed_row(lines_of(removed), record.step, remove);
-    if (record.triaxial) append_triaxial_row(lines_of(triaxial), *record.triaxial);
+    if (context_.has_table_line(record.step.step)) append_lines(record);
     for (const ErrorCheck& check : record.errors)
       append_error_history_row(lines_of(errors), record.step.step, check);
   }
@@ -69,11 +63,21 @@ class TableSink : public OutputSink {
   }
 
  private:
+  void append_lines(const StepRecord& record) {
+    for (const WallReport& wall : record.walls) append_walls_row(lines_of(walls), record.step, wall);
+    for (const BodyReport& body : record.bodies) append_bodies_row(lines_of(bodies), record.step, body);
+    for (const InsertReport& insert : record.inserted)
+      append_inserted_row(lines_of(inserted), record.step, insert);
+    for (const RemoveReport& remove : record.removed)
+      append_removed_row(lines_of(removed), record.step, remove);
+    if (record.triaxial) append_triaxial_row(lines_of(triaxial), *record.triaxial);
+  }
   std::string& lines_of(Table table) {
     if (!table_[table]) table_[table].emplace(directory_ / names[table], headers[table]());
     return table_[table]->pending();
   }
 
+  OutputContext context_;
   std::filesystem::path directory_;
   bool writes_;
   std::array<std::optional<CsvFile>, tables> table_;

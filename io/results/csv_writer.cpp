@@ -91,6 +91,10 @@ constexpr Column<WallRow> walls_columns[] = {
     {"force_x", [](std::string& t, const WallRow& r) { put(t, r.wall.force.x()); }},
     {"force_y", [](std::string& t, const WallRow& r) { put(t, r.wall.force.y()); }},
     {"force_z", [](std::string& t, const WallRow& r) { put(t, r.wall.force.z()); }},
+    {"torque_x", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.x()); }},
+    {"torque_y", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.y()); }},
+    {"torque_z", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.z()); }},
+    {"work", [](std::string& t, const WallRow& r) { put(t, r.wall.work); }},
 };
 
 constexpr Column<BodyRow> bodies_columns[] = {

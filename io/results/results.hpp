@@ -9,8 +9,10 @@
 ///   /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force [m,3]
 ///   /frames/000000/walls         position [w], velocity [w], force [w,3]
 ///
-/// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain: the
-/// low bits of doubles do not compress, and a plain array can be read by anything.
+/// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain
+/// unless FrameFormat says otherwise. Rank 0 lays a frame out, and every rank writes its rows at their
+/// places, beside HDF5: its own parallel writing is collective, and a rank whose disk is full would leave the
+/// others waiting in H5Fclose (docs/decisions/0025-checkpoints.md). Compressed rows all go through rank 0.
 ///
 /// HDF5 is not built for threads: one thread of the process at a time, for writer and readers alike.
 
@@ -18,7 +20,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -31,13 +32,18 @@ namespace talus::io {
 /// `orientation` and `material` may be empty.
 void validate(const Frame& frame);
 
-/// How several ranks write one file.
-enum class SharedWriting {
-  parallel,  ///< every rank its rows, through MPI; HDF5 must be built for it
-  gathered,  ///< rank 0, which gets the rows of the others in pieces
+/// What of a frame is kept, and how.
+struct FrameFormat {
+  enum class Precision { full, single };
+  Precision precision = Precision::full;  ///< of the reals of bodies and contacts
+  int compression = 0;                       ///< 0, or how hard shuffle and deflate try, 1 to 9
+  bool velocities = true;                    ///< u and omega of bodies
+  bool contact_geometry = true;              ///< point, normal and gap of contacts
 };
-/// Parallel where the HDF5 of this build can do it.
-SharedWriting shared_writing();
+
+namespace detail {
+struct FrameArray;
+}
 
 /// Writes results.h5 frame by frame; one file, of the same content for any number of ranks.
 /// The file is closed between frames, and not locked, so that it can be read while the run goes on. A frame
@@ -51,30 +57,31 @@ class ResultsWriter {
   /// Collective, as are the frames.
   /// With `kept` the file is there: its first frames stay, as many, the others are removed, and it goes on.
   ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
-                const graph::Communicator& ranks, SharedWriting way = shared_writing(),
+                const graph::Communicator& ranks, FrameFormat format = {},
                 std::optional<std::size_t> kept = {});
 
   /// Appends a frame, of which each rank has its part; frame.walls are those of the constructor, in the same
-  /// order. Throws FileError, with parallel writing on all ranks when one cannot write;
-  /// std::invalid_argument when the arrays do not fit together.
+  /// order. Throws FileError on all ranks when one cannot write; std::invalid_argument when the arrays do not
+  /// fit together.
   void append(const Frame& frame);
 
   std::size_t frames_written() const { return frames_; }
 
  private:
-  void append_here(const Frame& part, std::span<const std::int64_t> rows);
+  void append_here(const Frame& part, const std::vector<detail::FrameArray>& arrays);
 
   std::string path_;
   std::vector<std::string> wall_names_;
   const graph::Communicator& ranks_;
-  SharedWriting way_;
+  FrameFormat format_;
   std::size_t frames_ = 0;
 };
 
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);
 
-/// Frame `index`, bit for bit as it was written. Throws FileError when there is no such frame.
+/// Frame `index`, bit for bit as it was written. Throws FileError when there is no such frame, or its arrays
+/// were left out.
 Frame read_frame(const std::filesystem::path& path, std::size_t index);
 
 }  // namespace talus::io

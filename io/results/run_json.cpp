@@ -129,7 +129,7 @@ std::vector<Resumption> resumptions_in(const std::filesystem::path& path) {
 }
 
 void write_run_json(const std::filesystem::path& path, const Provenance& provenance, const Summary& summary) {
-  write_whole(path, run_json(provenance, summary));
+  write_whole_or_over(path, run_json(provenance, summary));
 }
 
 }  // namespace talus::io

@@ -2,69 +2,25 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <fstream>
 #include <string_view>
 #include <unordered_map>
 
 #include "io/files/detail/csv_cell.hpp"
 #include "io/files/output_directory.hpp"
-
-#include "io/scene/scene_error.hpp"
+#include "io/scene/detail/csv_fields.hpp"
 
 namespace talus::io {
 
 namespace {
 
+using detail::CsvPlace, detail::drop_utf8_mark, detail::number_in, detail::split, detail::trimmed;
+
 constexpr std::array<std::string_view, 11> columns = {"id", "x",  "y",  "z",  "radius", "vx",
                                                       "vy", "vz", "wx", "wy", "wz"};
 
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
-    text.remove_suffix(1);
-  return text;
-}
-
 /// Fields of a line, at most one more than there can be: enough to see that there are too many.
 using Fields = std::array<std::string_view, columns.size() + 2>;
-
-std::size_t split(std::string_view line, Fields& fields) {
-  std::size_t count = 0;
-  while (count < fields.size()) {
-    const std::size_t comma = line.find(',');
-    fields[count++] = trimmed(line.substr(0, comma));
-    if (comma == std::string_view::npos) break;
-    line.remove_prefix(comma + 1);
-  }
-  return count;
-}
-
-/// A line of the file being read, with what an error needs to say where it is.
-struct Place {
-  const std::string& file;
-  int line;
-  [[noreturn]] void fail(std::string_view column, const std::string& message) const {
-    throw SceneError(file, line, std::string(column), message);
-  }
-};
-
-template <class Number>
-Number number(std::string_view field, std::string_view column, const Place& place) {
-  Number value{};
-  const char* const first = field.data() + (field.starts_with('+') ? 1 : 0);  // from_chars takes no plus sign
-  const char* const last = field.data() + field.size();
-  const auto [end, error] = std::from_chars(first, last, value);
-  if (error == std::errc::result_out_of_range && end == last)
-    place.fail(column, fmt::format("{} is out of the range of numbers", field));
-  if (error != std::errc{} || end != last)
-    place.fail(column,
-               fmt::format("'{}' is not {}", field, std::is_integral_v<Number> ? "an integer" : "a number"));
-  if constexpr (std::is_floating_point_v<Number>)
-    if (!std::isfinite(value)) place.fail(column, fmt::format("must be finite, got {}", field));
-  return value;
-}
 
 /// Columns that the header announces.
 struct Header {
@@ -73,7 +29,7 @@ struct Header {
   std::size_t count() const { return numbers + (material ? 1 : 0); }
 };
 
-Header read_header(std::string_view line, const Place& place) {
+Header read_header(std::string_view line, const CsvPlace& place) {
   Fields fields;
   std::size_t count = split(line, fields);
   const bool material = count > 0 && count <= columns.size() + 1 && fields[count - 1] == "material";
@@ -87,7 +43,8 @@ Header read_header(std::string_view line, const Place& place) {
   return {count, material};
 }
 
-Material material_named(std::string_view name, std::span<const MaterialSpec> materials, const Place& place) {
+Material material_named(std::string_view name, std::span<const MaterialSpec> materials,
+                        const CsvPlace& place) {
   const auto found = std::ranges::find(materials, name, &MaterialSpec::name);
   if (found == materials.end())
     place.fail("material", fmt::format("no [[material]] of the scene is named '{}'", name));
@@ -106,12 +63,10 @@ Sample read_bodies(const std::string& path, double density, bool rotates,
   std::unordered_map<std::int64_t, int> line_of_id;
   Fields fields;
   Header header;
-  Place place{path, 0};
+  CsvPlace place{path, 0};
   for (std::string text; std::getline(in, text);) {
     ++place.line;
-    // Spreadsheets mark a text as UTF-8 by three bytes before it.
-    constexpr std::string_view mark = "\xef\xbb\xbf";
-    if (place.line == 1 && text.starts_with(mark)) text.erase(0, mark.size());
+    if (place.line == 1) drop_utf8_mark(text);
     const std::string_view line = trimmed(text);
     if (line.empty() || line.front() == '#') continue;
     if (header.numbers == 0) {
@@ -123,12 +78,12 @@ Sample read_bodies(const std::string& path, double density, bool rotates,
       place.fail("",
                  fmt::format("{} fields expected as in the header, got {}{}", header.count(),
                              found > header.count() ? "more than " : "", std::min(found, header.count())));
-    const auto id = number<std::int64_t>(fields[0], columns[0], place);
+    const auto id = number_in<std::int64_t>(fields[0], columns[0], place);
     if (id < 0) place.fail("id", fmt::format("must be >= 0, got {}", id));
     if (const auto [first, inserted] = line_of_id.emplace(id, place.line); !inserted)
       place.fail("id", fmt::format("{} stands already on line {}", id, first->second));
     std::array<double, columns.size()> value{};
-    for (std::size_t k = 1; k < count; ++k) value[k] = number<double>(fields[k], columns[k], place);
+    for (std::size_t k = 1; k < count; ++k) value[k] = number_in<double>(fields[k], columns[k], place);
     const double radius = value[4];
     if (radius <= 0) place.fail("radius", fmt::format("must be > 0 m, got {}", radius));
     sample.id.push_back(BodyId{id});

@@ -11,6 +11,7 @@
 
 #include "io/scene/detail/grain_read.hpp"
 #include "io/scene/detail/material_read.hpp"
+#include "io/scene/detail/motion_read.hpp"
 #include "io/scene/detail/sample_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
 #include "io/scene/detail/shape_keys.hpp"
@@ -35,14 +36,16 @@ class SceneReader {
 
   Scene read() && {
     read_table(root_, "", keys_.top,
-               {"material", "pair", "sample", "insert", "remove", "wall", "stage", "detection", "solver",
+               {"material", "pair", "sample", "insert", "remove", "wall", "group", "stage", "detection", "solver",
                 "decomposition", "output", "checkpoint"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
     read_samples(root_, folder_, scene_);
+    read_groups(root_, folder_, scene_);
     read_walls();
     read_stages();
+    check_motions(root_, scene_);
     read_grain_rules(root_, scene_);
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
@@ -105,9 +108,10 @@ class SceneReader {
     if (table.get("position") && table.get("point"))
       fail_at(*table.get("point"), path + ".point", "give position or point, not both");
     refuse_load(table, path, table["shape"].value_or(std::string("plane")));
-    read_table(table, path, keys_.wall, {}, wall);
+    read_table(table, path, keys_.wall, {"motion"}, wall);
     wall.material = read_material(table, path, scene_, material_of_walls);
     check_name(table, path, wall.name);
+    read_motion_of_wall(table, path, folder_, scene_, wall);
     if (wall.shape.name != "plane") {
       read_shape(table, path, wall);
       return;
@@ -129,12 +133,14 @@ class SceneReader {
               "a wall driven by pressure or force moves along its normal only");
   }
 
-  /// Surfaces stay where they are.
+  /// Surfaces are moved by motions alone.
   static void refuse_load(const toml::table& table, const std::string& path, const std::string& shape) {
     const toml::node* drive = table.get("drive");
     if (shape != "plane" && drive != nullptr && drive->value<std::string>() != "fixed")
       fail_at(*drive, path + ".drive",
-              fmt::format("only planes can be driven or pushed; a wall with shape = \"{}\" is fixed", shape));
+              fmt::format("only planes can be driven or pushed; a wall with shape = \"{}\" is moved by "
+                          "[[wall.motion]]",
+                          shape));
   }
 
   void read_shape(const toml::table& table, const std::string& path, Wall& wall) {
@@ -206,6 +212,9 @@ class SceneReader {
         if (earlier.first == load.first)
           fail_at(named, load_path + ".wall", fmt::format("this stage loads wall '{}' twice", load.first));
       refuse_load(*entry, load_path, walls[index].shape.name);
+      if (load.second.drive != WallDrive::fixed && !walls[index].motion.empty())
+        fail_at(named, load_path + ".wall",
+                fmt::format("wall '{}' has a motion, and that alone moves it", load.first));
       if (load.second.drive == WallDrive::pressure) require_face(index, *entry, load_path);
       in_force[index] = load.second;
       stage.loads.push_back(std::move(load));

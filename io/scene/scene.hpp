@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/output/sinks.hpp"
+#include "io/results/results.hpp"
 #include "io/scene/scene_error.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/size_distribution.hpp"
@@ -59,8 +60,11 @@ struct OutputSpec {
   std::string directory;                    ///< out/NAME unless given
   std::optional<double> every;              ///< [s] between frames
   std::optional<std::int64_t> every_steps;  ///< steps between frames
-  bool stage_frames = true;  ///< a frame at the ends of each stage, and where the run is stopped
-  bool contacts = true;      ///< contacts with forces in the frames
+  bool stage_frames = true;         ///< a frame at the ends of each stage, and where the run is stopped
+  bool contacts = true;             ///< contacts with forces in the frames
+  std::int64_t contacts_every = 1;  ///< of so many frames one has contacts, from the first
+  std::int64_t tables_every = 1;    ///< steps from line to line of walls.csv and triaxial.csv
+  FrameFormat format = {};          ///< of results.h5
   /// Names of the output sinks to write (io/output/sinks.hpp), besides those that always are.
   std::set<std::string> sinks = default_sinks();
 };

@@ -64,9 +64,11 @@ bool may_change(const std::string& key) {
     if (key.starts_with(front)) return true;
   if (key.starts_with("stage."))
     return key.find(".end.") != std::string::npos || key.find(".load.") != std::string::npos;
-  constexpr std::array<std::string_view, 5> loads{"drive", "pressure", "force", "velocity", "mass"};
+  constexpr std::array<std::string_view, 7> loads{"drive",  "pressure",           "force", "velocity", "mass",
+                                                  "weight", "tangential_velocity"};
   const std::string_view last = std::string_view(key).substr(key.rfind('.') + 1);
-  return key.starts_with("wall.") && std::ranges::find(loads, last) != loads.end();
+  return key.starts_with("wall.") && key.find(".motion.") == std::string::npos &&
+         std::ranges::find(loads, last) != loads.end();
 }
 
 }  // namespace
@@ -98,6 +100,10 @@ std::vector<std::string> input_files(const Scene& scene) {
     if (sample.kind == SampleSpec::Kind::bodies) files.push_back(sample.file);
   for (const Wall& wall : scene.setup.walls)
     if (!wall.shape.values.file.empty()) files.push_back(wall.shape.values.file);
+  for (const Wall& wall : scene.setup.walls)
+    for (const MotionPart& part : wall.motion)
+      if (!part.file.empty() && std::ranges::find(files, part.file) == files.end())
+        files.push_back(part.file);
   return files;
 }
 

@@ -13,7 +13,9 @@ namespace detail {
 
 std::string wall_conflict(const std::vector<Wall>& walls, std::size_t k) {
   constexpr double parallel = 1 - 1e-12;
+  const auto always = [](const Wall& wall) { return wall.from_stage.empty() && wall.until_stage.empty(); };
   for (std::size_t j = 0; j < k; ++j) {
+    if (!always(walls[j]) || !always(walls[k])) continue;
     const double cosine = walls[k].normal.dot(walls[j].normal);
     if (cosine > parallel)
       return fmt::format("walls '{}' and '{}' overlap: they face the same way", walls[j].name, walls[k].name);
@@ -113,7 +115,7 @@ void place_walls(Scene& scene, const Sample& grains) {
   for (std::size_t k = 0; k < walls.size(); ++k)
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);
   for (const Wall& wall : walls)
-    for (std::size_t k = 0; k < grains.size(); ++k)
+    for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < grains.size(); ++k)
       if (const double depth = depth_behind(wall, grains.x[k]); depth > 0)
         refuse(fmt::format("the centre of grain {} lies {} m behind wall '{}'",
                            static_cast<std::int64_t>(grains.id_of(k)), depth, wall.name));

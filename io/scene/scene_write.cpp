@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <set>
 
 #include "io/scene/detail/material_keys.hpp"
@@ -75,6 +76,13 @@ std::string resolved_scene(const Scene& scene) {
   for (const Wall& wall : scene.setup.walls) {
     write_section(out, keys.wall, wall);
     if (named) out += fmt::format("material = \"{}\"\n", scene.materials[wall.material].name);
+    const auto group = std::ranges::find(scene.setup.groups, wall.group, &WallGroup::name);
+    if (group != scene.setup.groups.end() && !group->motion.empty()) continue;
+    for (const MotionPart& part : wall.motion) write_section(out, keys.wall_motion, part);
+  }
+  for (const WallGroup& group : scene.setup.groups) {
+    write_section(out, keys.group, group);
+    for (const MotionPart& part : group.motion) write_section(out, keys.group_motion, part);
   }
   std::set<std::string> left_out;
   if (named)

@@ -37,7 +37,7 @@ double closing_rate(const Candidates& candidates, const Bodies& bodies, const Po
   for (const WallPair& pair : candidates.wall_pairs) {
     const Wall& wall = poses.walls[index(pair.wall)];
     const Touch touch = touch_wall(poses, wall, pair.body, pair.feature);
-    const Vec3 u = velocity_of(bodies, pair.body) - wall.velocity;
+    const Vec3 u = velocity_of(bodies, pair.body) - wall.velocity_at(touch.ball.centre);
     const double speed = wall.surface() == nullptr ? -touch.normal.dot(u) : u.norm();
     consider(speed + spin_of(bodies, pair.body), touch.gap);
   }

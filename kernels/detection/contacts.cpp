@@ -124,9 +124,10 @@ void convert_impulses(Candidates& candidates, ImpulseKind kind, std::span<const 
 
 std::size_t memory_used(const Contacts& contacts) {
   std::size_t bytes = 0;
-  for (const auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx,
-                             &contacts.ry, &contacts.rz, &contacts.rn, &contacts.mu, &contacts.cohesion,
-                             &contacts.mx, &contacts.my, &contacts.mz, &contacts.arm})
+  for (const auto* values :
+       {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx, &contacts.ry, &contacts.rz,
+        &contacts.rn, &contacts.mu, &contacts.cohesion, &contacts.mx, &contacts.my, &contacts.mz,
+        &contacts.arm, &contacts.vx, &contacts.vy, &contacts.vz})
     bytes += values->capacity() * sizeof(double);
   return bytes +
          (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +
@@ -134,7 +135,7 @@ std::size_t memory_used(const Contacts& contacts) {
           contacts.passed.capacity()) *
              4 +
          contacts.group.capacity() + contacts.levers.capacity() * sizeof(Levers) +
-         contacts.balls.capacity() * 2;
+         contacts.spin.capacity() * sizeof(Vec3) + contacts.balls.capacity() * 2;
 }
 
 }  // namespace talus

@@ -38,6 +38,11 @@ struct Contacts {
   std::vector<double> cohesion;    ///< c h [N s] (kernels/sweeps/cohesion.hpp); empty where nothing has any
   std::vector<double> mx, my, mz;  ///< moment of rolling resistance on the first body [N m s], and
   std::vector<double> arm;         ///< its bound over the normal impulse [m]; empty where nothing resists
+  std::vector<Vec3> spin;          ///< at walls that turn, where something resists rolling: of the wall's
+                                   ///< material [rad/s]; else empty
+  std::vector<double> vx, vy, vz;  ///< at walls: velocity of the wall's material at the contact beyond that
+                                   ///< of the wall [m/s], void between bodies; empty where no wall turns or
+                                   ///< has a surface that moves alone
   std::vector<double> mu;      ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Levers> levers;  ///< of contacts in chunks of blocks; empty where no body is a clump
   std::vector<std::uint16_t> balls;  ///< likewise: Candidates::balls
@@ -59,7 +64,19 @@ struct SingleContacts {
   std::vector<float> rx, ry, rz;  ///< impulse on the first body over `unit` [m/s]; empty without friction
   std::vector<float> rn;          ///< normal impulse over `unit` [m/s]; empty with friction
   std::vector<float> mu;          ///< as in Contacts
+  std::vector<float> vx, vy, vz;  ///< likewise
 };
+
+/// Drift of a wall's material at contact k; 0 where contacts have none.
+inline Vec3 drift_of(const Contacts& contacts, std::size_t k) {
+  if (contacts.vx.empty()) return Vec3::Zero();
+  return {contacts.vx[k], contacts.vy[k], contacts.vz[k]};
+}
+inline void set_drift(Contacts& contacts, std::size_t k, const Vec3& drift) {
+  contacts.vx[k] = drift[0];
+  contacts.vy[k] = drift[1];
+  contacts.vz[k] = drift[2];
+}
 
 /// Room for the contacts of `chunks`, of which there are none yet: the candidates stand in their order, with
 /// their bodies between grains. `friction` decides which impulses exist.

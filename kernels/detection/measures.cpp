@@ -1,5 +1,6 @@
 #include "kernels/detection/measures.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "kernels/detection/touch.hpp"
@@ -79,6 +80,27 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
   sums.penetration = penetration;
   sums.moment = Eigen::Map<const Eigen::Matrix3d>(moment);
   sums.normal_impulse = normal_impulse;
+  return sums;
+}
+
+WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
+                      const WallMeasure& measure) {
+  WallSums sums;
+  const auto begin = static_cast<std::size_t>(chunks.begin[chunk]);
+  const std::size_t end = begin + static_cast<std::size_t>(contacts.count[chunk]);
+  const Wall& wall = poses.walls[static_cast<std::size_t>(chunks.wall[chunk])];
+  for (std::size_t k = begin; k < end; ++k) {
+    const Vec3 r = contact_impulse(contacts, k);
+    if (r == Vec3::Zero()) continue;
+    const auto i = static_cast<std::size_t>(contacts.first[k]);
+    const Vec3 point =
+        chunks.kind[chunk] == ChunkKind::blocks
+            ? touch_of(poses, contacts, k, &wall).point
+            : Vec3(poses.x[i] - measure.half_step * Eigen::Map<const Vec3>(measure.velocity[i].u) -
+                   poses.radius[i] * contact_normal(contacts, k));
+    sums.torque += poses.domain.separation(point, measure.about).cross(r);
+    sums.drift += r.dot(drift_of(contacts, k));
+  }
   return sums;
 }
 

@@ -25,6 +25,18 @@ struct ContactSums {
   void add(const ContactSums& other);
 };
 
+/// What a wall does through its contacts.
+struct WallSums {
+  static constexpr std::size_t width = 4;
+  Vec3 torque = Vec3::Zero();  ///< on the grains, about a point, times the time that impulses act [N m s]
+  double drift = 0;            ///< sum of impulse . drift [J], what the wall's velocity leaves of its work
+
+  void add_to(double* numbers) const {
+    for (Eigen::Index c = 0; c < 3; ++c) numbers[c] += torque[c];
+    numbers[3] += drift;
+  }
+};
+
 /// Where bodies and walls are.
 struct Poses {
   std::span<const Vec3> x;         ///< per slot [m]
@@ -39,6 +51,19 @@ struct Poses {
 /// mass.
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              const Poses& poses);
+
+/// By what the sums of a wall go back from the end of the step to its middle, where impulses act.
+struct WallMeasure {
+  Vec3 about = Vec3::Zero();           ///< [m]
+  std::span<const Velocity> velocity;  ///< of the end of the step
+  double half_step = 0;                ///< [s]
+};
+
+/// Sums of chunk `chunk`, which is at a wall, with the poses of the end of the step. Impulses act on spheres
+/// at their surface, along the normal from their centres in the middle of the step; on balls of clumps where
+/// these stand in `poses`.
+WallSums measure_wall(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
+                      const WallMeasure& measure);
 
 /// Normal of a contact. Its impulse on the first body [N s], whatever the storage: as the law sees it,
 /// shifted by cohesion; and the one that the bodies feel.

@@ -96,6 +96,14 @@ double restitution_at(const ChunkPhase& phase, const WallPair& pair) {
   return phase.in.laws.laws()[materials_of(phase.in).law(pair)].restitution;
 }
 
+/// What the material of the wall has beyond the velocity of the wall, where contacts have room for it.
+void write_drift(const ChunkPhase& phase, const Vec3& n, std::size_t place, Contacts& contacts) {
+  if (contacts.vx.empty()) return;
+  const auto i = at(contacts.first[place]);
+  const Wall& wall = phase.in.walls[at(phase.chunks.wall[phase.chunk])];
+  set_drift(contacts, place, wall.drift_at(phase.in.x[i] - phase.in.radius[i] * n, n));
+}
+
 /// At a plane.
 void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
@@ -109,7 +117,7 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     const Slot body = pair.body;
     const std::size_t i = at(body);
     const double gap = wall.normal.dot(in.domain.separation(in.x[i], wall.point)) - in.radius[i];
-    const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity);
+    const double v_n = wall.normal.dot(Eigen::Map<const Vec3>(in.velocity[i].u) - wall.velocity_at(in.x[i]));
     through += std::min(0.0, gap - in.time_step * v_n) - gap > 0.5 * in.radius[i];
     const GapResult<double> found = solve_gap(rule, gap, v_n, v_n + fall, restitution_at(phase, pair));
     if (found.absent) continue;
@@ -118,6 +126,7 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
     contacts.ny[place] = wall.normal[1];
     contacts.nz[place] = wall.normal[2];
     contacts.first[place] = body;
+    write_drift(phase, wall.normal, place, contacts);
     contacts.first_record[place] = record_of(body);
     contacts.second[place] = -1;
     contacts.candidate[place++] = static_cast<std::int32_t>(k);
@@ -126,14 +135,14 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
   detail::close_groups(chunks, chunk, place, contacts);
 }
 
-/// True when a body that has come by `way` to `x` was deep in a surface on it: such a step is too long, and a
-/// thin surface may be behind the body by now.
-bool passed_surface(const Surface& surface, const Vec3& x, const Vec3& way, double radius) {
+/// True when a body that has come by `way`, as the wall sees it, to `x` was deep in a surface on it: such a
+/// step is too long, and a thin surface may be behind the body by now.
+bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius) {
   if (!detail::came_far(way, radius)) return false;
   std::vector<SurfacePoint> points;
   constexpr double most = 256;  // looks: a body that came further is told by its energy
   const double looks = std::ceil(std::min(most, 4 * way.norm() / radius));
-  for (double look = 0; look < looks; ++look) surface.collide(x - look / looks * way, 0.5 * radius, points);
+  for (double look = 0; look < looks; ++look) collide(wall, x - look / looks * way, 0.5 * radius, points);
   return !points.empty();
 }
 
@@ -141,7 +150,7 @@ bool passed_surface(const Surface& surface, const Vec3& x, const Vec3& way, doub
 void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);
-  const Surface& surface = *in.walls[at(chunks.wall[chunk])].surface();
+  const Wall& of = in.walls[at(chunks.wall[chunk])];
   std::int32_t through = 0;
   std::size_t place = begin;
   std::vector<SurfacePoint> points;
@@ -149,12 +158,15 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const WallPair& pair = candidates.wall_pairs[k - grains];
     const auto [wall, body, feature] = pair;
     const std::size_t i = at(body);
-    const Vec3 v = Eigen::Map<const Vec3>(in.velocity[i].u), free = v + in.time_step * in.gravity;
+    // Of a point that lies along the normal from the centre, too, the velocity along it is that at the
+    // centre.
+    const Vec3 u = Eigen::Map<const Vec3>(in.velocity[i].u), v = u - of.velocity_at(in.x[i]),
+               free = v + in.time_step * in.gravity;
     points.clear();
-    surface.collide(in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
+    collide(of, in.x[i], in.radius[i] + in.alert + in.time_step * free.norm(), points);
     const auto point = std::ranges::find(points, feature, &SurfacePoint::feature);
     if (point == points.end()) continue;
-    through += passed_surface(surface, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
+    through += passed_surface(of, in.x[i], in.time_step * v, in.radius[i]) ? 1 : 0;
     const GapResult<double> found = solve_gap(rule, point->distance - in.radius[i], point->normal.dot(v),
                                               point->normal.dot(free), restitution_at(phase, pair));
     if (found.absent) continue;
@@ -163,6 +175,7 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     contacts.ny[place] = point->normal[1];
     contacts.nz[place] = point->normal[2];
     contacts.first[place] = body;
+    write_drift(phase, point->normal, place, contacts);
     contacts.first_record[place] = record_of(body);
     contacts.second[place] = -1 - feature;
     contacts.candidate[place++] = static_cast<std::int32_t>(k);

@@ -52,10 +52,10 @@ bool compare(const NearEscapes& escapes, const Bodies& bodies, std::size_t s, co
 /// Appends the features of wall w, which is no plane, that a grain may touch.
 void compare_at_surface(const Escape& escape, std::int64_t w, const Wall& wall, const Margins& margins,
                         std::vector<Encounter>& needed) {
-  const Vec3 v = Eigen::Map<const Vec3>(escape.u) + margins.time_step * margins.gravity;
+  const Vec3 x = Eigen::Map<const Vec3>(escape.x);
+  const Vec3 v = Eigen::Map<const Vec3>(escape.u) - wall.velocity_at(x) + margins.time_step * margins.gravity;
   std::vector<SurfacePoint> points;
-  wall.surface()->collide(Eigen::Map<const Vec3>(escape.x),
-                          escape.radius + margins.alert + margins.time_step * v.norm(), points);
+  collide(wall, x, escape.radius + margins.alert + margins.time_step * v.norm(), points);
   for (const SurfacePoint& point : points)
     if (!stays_apart(point.distance - escape.radius - rounding * std::abs(point.distance),
                      point.normal.dot(v), margins.time_step, margins.alert))
@@ -112,12 +112,14 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
   for (const Escape& escape : skin_escapes)
     for (std::size_t w = 0; w < margins.walls.size(); ++w) {
       const Wall& wall = margins.walls[w];
+      if (wall.absent) continue;
       if (wall.surface() != nullptr) {
         compare_at_surface(escape, static_cast<std::int64_t>(w), wall, margins, needed);
         continue;
       }
       const double distance = wall.normal.dot(margins.domain.separation(Vec3(Map(escape.x)), wall.point));
-      const double v_n = wall.normal.dot(Map(escape.u) - wall.velocity - wall.gain + h * margins.gravity);
+      const double v_n = wall.normal.dot(Map(escape.u) - wall.velocity_at(Vec3(Map(escape.x))) - wall.gain +
+                                         h * margins.gravity);
       if (!stays_apart(distance - escape.radius - rounding * std::abs(distance), v_n, h, margins.alert))
         needed.push_back({-1 - static_cast<std::int64_t>(w), escape.id});
     }

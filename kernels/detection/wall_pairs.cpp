@@ -23,15 +23,17 @@ void find_at_plane(const Reaching& bodies, const Wall& wall, std::int32_t number
       pairs.push_back({number, static_cast<Slot>(s)});
 }
 
-void find_at_surface(const Reaching& bodies, const Surface& surface, std::int32_t number,
+void find_at_surface(const Reaching& bodies, const Wall& wall, std::int32_t number,
                      std::vector<WallPair>& pairs) {
+  const Surface& surface = *wall.surface();
   const Bounds bounds = surface.bounds();
   const std::size_t from = pairs.size();
   std::vector<std::int32_t> features;
   for (std::size_t s = 0; s < bodies.x.size(); ++s) {
-    if (!bounds.near(bodies.x[s], bodies.of(s))) continue;
+    const Vec3 x = wall.pose.back(bodies.x[s]);
+    if (!bounds.near(x, bodies.of(s))) continue;
     features.clear();
-    surface.near(bodies.x[s], bodies.of(s), features);
+    surface.near(x, bodies.of(s), features);
     for (const std::int32_t feature : features) pairs.push_back({number, static_cast<Slot>(s), feature});
   }
   const std::vector<WallPair> found(pairs.begin() + static_cast<std::ptrdiff_t>(from), pairs.end());
@@ -60,10 +62,11 @@ std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, std::span<const d
   std::vector<WallPair> pairs;
   for (std::size_t w = 0; w < walls.size(); ++w) {
     const auto number = static_cast<std::int32_t>(w);
+    if (walls[w].absent) continue;
     if (walls[w].surface() == nullptr)
       find_at_plane({x, reach, margin[w]}, walls[w], number, domain, pairs);
     else
-      find_at_surface({x, reach, margin[w]}, *walls[w].surface(), number, pairs);
+      find_at_surface({x, reach, margin[w]}, walls[w], number, pairs);
   }
   return pairs;
 }

@@ -14,15 +14,16 @@ namespace talus {
 
 /// The point of a wall, of one feature of its surface, for a sphere with its centre at x.
 inline SurfacePoint wall_point(const Wall& wall, const Vec3& x, std::int32_t feature, const Domain& domain) {
-  if (wall.surface() != nullptr) return wall.surface()->at(x, feature);
+  if (wall.surface() != nullptr) return point_at(wall, x, feature);
   return {0, wall.normal.dot(domain.separation(x, wall.point)), wall.normal};
 }
 
-/// Whether a sphere overlaps a wall, or lies behind a plane.
+/// Whether a sphere overlaps a wall that is there, or lies behind a plane.
 inline bool meets_wall(const Wall& wall, const Vec3& x, double radius, const Domain& domain = {}) {
+  if (wall.absent) return false;
   if (wall.surface() == nullptr) return wall_point(wall, x, 0, domain).distance < radius;
   std::vector<SurfacePoint> points;
-  wall.surface()->collide(x, radius, points);
+  collide(wall, x, radius, points);
   return !points.empty();
 }
 
@@ -42,7 +43,7 @@ inline bool begins_layer(std::span<const WallPair> pairs, std::size_t k) {
 std::vector<std::size_t> layered_order(std::span<const WallPair> pairs);
 
 /// The candidates at walls, in that order: bodies whose centre x [m] is nearer to a wall than their `reach`
-/// plus the wall's `margin` [m].
+/// plus the wall's `margin` [m]. A wall that is absent has none.
 std::vector<WallPair> find_wall_pairs(std::span<const Vec3> x, std::span<const double> reach,
                                       std::span<const Wall> walls, std::span<const double> margin,
                                       const Domain& domain = {});

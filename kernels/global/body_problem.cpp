@@ -134,7 +134,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     contact.first = pair[0];
     contact.second = pair[1];
     if (w >= 0) {
-      const Vec3& drive = source.walls[at(w)].free_velocity;
+      const Vec3 drive = source.walls[at(w)].free_velocity + drift_of(contacts, k);
       // Of a wall of finite mass only the normal velocity is an unknown.
       if (contact.second < 0) contact.drive = drive.norm();
       contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);

@@ -17,10 +17,12 @@ namespace {
 // The search. A site is a triple of supports; for a range of radii a grain can rest on it. All sites are born
 // when their youngest support is placed, and only shrink as later grains block them. Radii are cut into
 // classes, and each class keeps its sites in a heap, keyed by the height of the site for the smallest radius
-// of the class: as height grows with radius, that bounds from below what a grain of the class can get there.
-// To place a grain, sites leave the heap until the bound exceeds the best height found: exact for the grain's
-// own radius, and only the sites within a class width of the lowest are examined. A new grain does not update
-// the sites that it blocks: each site is checked against its neighbours when it is examined.
+// of the class. Height grows at least as fast as radius (resting_site.hpp), so that the key and what the
+// radius has beyond that of the class bound from below what a grain can get there. To place a grain, sites
+// leave the heap until the bound exceeds the best height found: exact for the grain's own radius, and only
+// the sites within a part of a class width of the lowest are examined; on a wide base that is many, and it is
+// what a deposition takes longest for. A new grain does not update the sites that it blocks: each site is
+// checked against its neighbours when it is examined.
 
 // Supports that are not grains; the lower number counts as the older.
 enum Plane : std::int32_t { floor_plane = -1, x_high = -2, x_low = -3, y_high = -4, y_low = -5 };
@@ -34,6 +36,7 @@ struct Site {
   std::array<std::int32_t, 3> support;  ///< descending: the youngest grain first, then planes
   std::int8_t side;                     ///< which of two places, for sites on the floor
   std::int32_t uses = 0;                ///< entries in heaps; the slot is free again at 0
+  std::int32_t version = 0;             ///< counts the changes of its range
   RadiusRange range;
 };
 
@@ -43,8 +46,9 @@ auto seniority(const Site& site) {
 }
 
 struct Entry {
-  double bound;  ///< no grain of the class rests lower on this site [m]
+  double bound;  ///< a grain of the class rests here at least so high, and what its radius is larger [m]
   std::int32_t site;
+  std::int32_t version = 0;  ///< of the site, for which the bound was found
 };
 struct Higher {
   bool operator()(const Entry& a, const Entry& b) const {
@@ -118,17 +122,21 @@ class Deposition {
     Vec3 best = Vec3::Constant(std::numeric_limits<double>::infinity());
     std::int32_t best_site = -1;
     aside_.clear();
-    while (!heap.empty() && heap.front().bound <= best[2]) {
+    // Less what rounding may hide: sites of equal height must all be examined.
+    const double rise = radius - class_low(c) - 1e-9 * largest_;
+    while (!heap.empty() && heap.front().bound + rise <= best[2]) {
       std::pop_heap(heap.begin(), heap.end(), Higher());
       Entry entry = heap.back();
       heap.pop_back();
       const std::int32_t id = entry.site;
-      if (!bound_in_class(site(id), c, entry.bound)) {
+      if (entry.version != site(id).version && !bound_in_class(site(id), c, entry.bound)) {
         release(id);
         continue;
       }
+      entry.version = site(id).version;
       aside_.push_back(entry);
-      if (entry.bound > best[2] || radius < site(id).range.low || radius > site(id).range.high) continue;
+      if (entry.bound + rise > best[2] || radius < site(id).range.low || radius > site(id).range.high)
+        continue;
       const Vec3 x = centre(site(id), radius);
       if (shrink_if_blocked(id, x, radius)) continue;
       if (best_site < 0 || x[2] < best[2] ||
@@ -204,12 +212,13 @@ class Deposition {
     if (plane == y_high) x[1] = ly_ - radius;
   }
 
-  /// The height below which no grain of class c rests on the site, if higher than `bound`; false if none ever
-  /// will.
+  /// The bound of an entry of class c for the site, if higher than `bound`; false if no grain of the class
+  /// will ever rest there.
   bool bound_in_class(const Site& s, std::size_t c, double& bound) const {
     if (s.range.low > s.range.high || s.range.high < class_low(c)) return false;
     if (c + 1 < heaps_.size() && s.range.low >= class_low(c + 1)) return false;
-    bound = std::max(bound, centre(s, std::max(s.range.low, class_low(c)))[2]);
+    const double from = std::max(s.range.low, class_low(c));
+    bound = std::max(bound, centre(s, from)[2] - (from - class_low(c)));
     return true;
   }
 
@@ -229,6 +238,7 @@ class Deposition {
     keep_clear(curve_of(site(id)), obstacle(blocker, base), 0, ranges_);
     // A grain in the middle of the range leaves two parts; the second becomes a site of its own.
     site(id).range = ranges_.empty() ? RadiusRange{1, 0} : ranges_[0];
+    ++site(id).version;
     for (std::size_t k = 1; k < ranges_.size(); ++k) {
       const Site whole = site(id);
       add_site(whole.support, whole.side, ranges_[k]);
@@ -280,6 +290,7 @@ class Deposition {
       SiteCurve curve;
       if (!site_curve(grains_.back().radius, first.obstacle, second.obstacle, side, curve)) return;
       ranges_.assign(1, {smallest_, largest_});
+      bound_root(ranges_[0], curve);
       keep_real(curve, ranges_);
       if (!on_floor && !ranges_.empty()) keep_stable(curve, first.obstacle, second.obstacle, 1e-12, ranges_);
       for (const Near& n : near_) {
@@ -300,7 +311,7 @@ class Deposition {
       id = free_.back();
       free_.pop_back();
     }
-    site(id) = {support, side, 0, range};
+    site(id) = {support, side, 0, 0, range};
     for (std::size_t c = 0; c < heaps_.size(); ++c) {
       Entry entry{-std::numeric_limits<double>::infinity(), id};
       if (!bound_in_class(site(id), c, entry.bound)) continue;

@@ -1,6 +1,7 @@
 #include "kernels/samples/resting_site.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -56,6 +57,19 @@ void keep_where(RadiusRanges& ranges, const Roots& roots, const Condition& holds
 void keep_positive(const SiteCurve& curve, const Vec3& k, double k0, double k1, double slack,
                    RadiusRanges& ranges) {
   const double alpha = k.dot(curve.a) + k0, beta = k.dot(curve.b) + k1, gamma = k.dot(curve.t);
+  if (ranges.empty()) return;
+  // Nothing to be found where the sign is that of all radii, beyond what rounding may change.
+  const double low = ranges.front().low, high = ranges.back().high;
+  const double least =
+      std::min(beta * low, beta * high) + std::min(gamma * curve.root_low, gamma * curve.root_high);
+  const double most =
+      std::max(beta * low, beta * high) + std::max(gamma * curve.root_low, gamma * curve.root_high);
+  const double doubt = 1e-9 * (std::abs(alpha) + std::abs(beta) * high + std::abs(gamma) * curve.root_high);
+  if (alpha + least > doubt) return;
+  if (alpha + most < -slack - doubt) {
+    ranges.clear();
+    return;
+  }
   const double g2 = gamma * gamma;
   const Roots roots = real_roots(beta * beta - g2 * curve.q2, 2 * alpha * beta - g2 * curve.q1,
                                  alpha * alpha - g2 * curve.q0);
@@ -70,8 +84,8 @@ Vec3 right_angle(const Vec3& d) {
 }  // namespace
 
 double SiteCurve::root(double r) const {
-  const double q = q0 + r * (q1 + r * q2);
-  return q > 0 ? std::sqrt(q) : 0;
+  const double square = q(r);
+  return square > 0 ? std::sqrt(square) : 0;
 }
 
 bool site_curve(double base_radius, const Obstacle& first, const Obstacle& second, int side,
@@ -89,9 +103,32 @@ bool site_curve(double base_radius, const Obstacle& first, const Obstacle& secon
   return true;
 }
 
+void bound_root(const RadiusRange& range, SiteCurve& curve) {
+  const double at_low = curve.q(range.low), at_high = curve.q(range.high);
+  double least = std::min(at_low, at_high), most = std::max(at_low, at_high);
+  const double slope_low = curve.q1 + 2 * range.low * curve.q2;
+  const double slope_high = curve.q1 + 2 * range.high * curve.q2;
+  if (slope_low * slope_high < 0) {
+    const double turn = curve.q(-0.5 * curve.q1 / curve.q2);
+    least = std::min(least, turn);
+    most = std::max(most, turn);
+  }
+  const double doubt =
+      1e-9 * (std::abs(curve.q0) + range.high * (std::abs(curve.q1) + range.high * std::abs(curve.q2)));
+  curve.q_low = least - doubt;
+  curve.q_high = most + doubt;
+  curve.root_low = curve.q_low > 0 ? std::sqrt(curve.q_low) : 0;
+  curve.root_high = curve.q_high > 0 ? std::sqrt(curve.q_high) : 0;
+}
+
 void keep_real(const SiteCurve& curve, RadiusRanges& ranges) {
+  if (curve.q_low > 0) return;
+  if (curve.q_high < 0) {
+    ranges.clear();
+    return;
+  }
   const Roots roots = real_roots(curve.q2, curve.q1, curve.q0);
-  keep_where(ranges, roots, [&](double r) { return curve.q0 + r * (curve.q1 + r * curve.q2) >= 0; });
+  keep_where(ranges, roots, [&](double r) { return curve.q(r) >= 0; });
 }
 
 void keep_clear(const SiteCurve& curve, const Obstacle& obstacle, double slack, RadiusRanges& ranges) {

@@ -14,6 +14,7 @@
 /// whose limits are roots of a quadratic. No iteration, no tolerance but rounding. At a stable site dz/dr >=
 /// 1: with e_z = sum lambda_i n_i, lambda_i >= 0 and n_i . dp/dr = 1, dz/dr = sum lambda_i >= |e_z|.
 
+#include <limits>
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
@@ -43,7 +44,13 @@ inline Obstacle wall_obstacle(const Vec3& inward, double distance) {
 struct SiteCurve {
   Vec3 a = Vec3::Zero(), b = Vec3::Zero(), t = Vec3::Zero();
   double q0 = 0, q1 = 0, q2 = 0;
+  /// Bounds of q, and of its root, for the radii in question (bound_root): most conditions hold, or do not,
+  /// for all of these, and need no roots.
+  double q_low = -std::numeric_limits<double>::infinity();
+  double q_high = std::numeric_limits<double>::infinity();
+  double root_low = 0, root_high = std::numeric_limits<double>::infinity();
 
+  double q(double r) const { return q0 + r * (q1 + r * q2); }
   double root(double r) const;
   Vec3 at(double r) const { return a + r * b + root(r) * t; }
 };
@@ -59,6 +66,10 @@ using RadiusRanges = std::vector<RadiusRange>;
 /// in line and leave no curve.
 bool site_curve(double base_radius, const Obstacle& first, const Obstacle& second, int side,
                 SiteCurve& curve);
+
+/// Fills the bounds of the curve for the radii of `range`, which all ranges that are kept of it lie in.
+/// Ranges come out the same without it, later.
+void bound_root(const RadiusRange& range, SiteCurve& curve);
 
 /// Keeps the radii for which the curve exists.
 void keep_real(const SiteCurve& curve, RadiusRanges& ranges);

@@ -18,6 +18,9 @@ class Disc final : public Surface {
     const Vec3 half = radius_ * (Vec3::Ones() - axis_.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
     return {centre_ - half, centre_ + half};
   }
+  bool turns_in_itself(const Vec3& axis, const Vec3& point) const override {
+    return detail::on_axis(axis, point, axis_, centre_);
+  }
   SurfacePoint at(const Vec3& centre, std::int32_t) const override {
     const Vec3 d = centre - centre_;
     Vec3 radial = d - d.dot(axis_) * axis_;

@@ -24,14 +24,20 @@ struct Bounds {
   }
 };
 
-/// The surface of a wall that is no plane. It does not move. A sphere may touch it in several points at once:
-/// each is a contact of its own, told by its feature. The functions here suit convex bodies and thin plates,
-/// which a sphere touches in one point, feature 0; other surfaces override `near` and `collide`.
+/// The surface of a wall that is no plane, in its first place (Wall::pose). A sphere may touch it in several
+/// points at once: each is a contact of its own, told by its feature. The functions here suit convex bodies
+/// and thin plates, which a sphere touches in one point, feature 0; other surfaces override `near` and
+/// `collide`.
 class Surface {
  public:
   virtual ~Surface() = default;
 
   virtual Bounds bounds() const = 0;
+  /// Whether it stays what it is, features included, when it turns about this axis (unit) through `point`.
+  virtual bool turns_in_itself(const Vec3& axis, const Vec3& point) const {
+    static_cast<void>(axis), static_cast<void>(point);
+    return false;
+  }
   /// The point of a feature for a sphere with this centre, at whatever distance.
   virtual SurfacePoint at(const Vec3& centre, std::int32_t feature) const = 0;
   /// Appends, ascending, every feature in which a sphere can touch that has its centre within a way s of

@@ -11,11 +11,38 @@ namespace {
 double opposite_distance(const std::vector<Wall>& walls, std::size_t index) {
   const Wall& wall = walls[index];
   for (std::size_t k = 0; k < walls.size(); ++k)
-    if (k != index && (walls[k].normal + wall.normal).norm() < 1e-12)
+    if (k != index && !walls[k].absent && (walls[k].normal + wall.normal).norm() < 1e-12)
       return (walls[k].point - wall.point).dot(wall.normal);
   return -1;
 }
 }  // namespace
+
+bool Wall::has_drift() const {
+  return std::ranges::any_of(motion,
+                             [](const MotionPart& part) { return part.surface_only || part.turns(); });
+}
+
+SurfacePoint point_at(const Wall& wall, const Vec3& centre, std::int32_t feature) {
+  SurfacePoint point = wall.surface()->at(wall.pose.back(centre), feature);
+  point.normal = wall.pose.turned(point.normal);
+  return point;
+}
+
+void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<SurfacePoint>& points) {
+  const std::size_t before = points.size();
+  wall.surface()->collide(wall.pose.back(centre), reach, points);
+  if (!wall.pose.moved) return;
+  for (std::size_t k = before; k < points.size(); ++k) points[k].normal = wall.pose.turned(points[k].normal);
+}
+
+void place(const Wall& first, const Pose& pose, Wall& wall) {
+  if (wall.surface() != nullptr) {
+    wall.pose = pose;
+    return;
+  }
+  wall.point = pose.of(first.point);
+  wall.normal = pose.moved ? Vec3(pose.turned(first.normal).normalized()) : first.normal;
+}
 
 double face_area(const std::vector<Wall>& walls, std::size_t index) {
   const Wall& wall = walls[index];
@@ -23,7 +50,9 @@ double face_area(const std::vector<Wall>& walls, std::size_t index) {
   double area = 1;
   int pairs = 0;
   for (std::size_t k = 0; k < walls.size(); ++k) {
-    if (walls[k].surface() != nullptr || std::abs(walls[k].normal.dot(wall.normal)) > 1e-12) continue;
+    if (walls[k].surface() != nullptr || walls[k].absent ||
+        std::abs(walls[k].normal.dot(wall.normal)) > 1e-12)
+      continue;
     bool counted = false;  // the opposite wall came first
     for (std::size_t earlier = 0; earlier < k; ++earlier)
       counted |= (walls[earlier].normal + walls[k].normal).norm() < 1e-12;
@@ -43,7 +72,8 @@ Vec3 box_lengths(const std::vector<Wall>& walls) {
   Vec3 lengths = Vec3::Zero();
   for (std::size_t k = 0; k < walls.size(); ++k)
     for (Eigen::Index axis = 0; axis < 3; ++axis)
-      if (walls[k].normal[axis] > 1 - 1e-12) lengths[axis] = std::max(0.0, opposite_distance(walls, k));
+      if (!walls[k].absent && walls[k].normal[axis] > 1 - 1e-12)
+        lengths[axis] = std::max(0.0, opposite_distance(walls, k));
   return lengths;
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/shapes/prescribed_motion.hpp"
 #include "kernels/shapes/shape.hpp"
 
 namespace talus {
@@ -19,18 +21,20 @@ enum class WallDrive {
 /// Load on a wall during a stage. Fields that the drive does not use are 0.
 struct WallLoad {
   WallDrive drive = WallDrive::fixed;
-  Vec3 velocity = Vec3::Zero();  ///< [m/s], drive velocity
+  Vec3 velocity = Vec3::Zero();  ///< [m/s], drive velocity; of a pushed wall along its face, prescribed
   double pressure = 0;           ///< [Pa] > 0 pushes along +normal, into the grains; drive pressure
   double force = 0;              ///< [N] > 0 pushes along +normal, into the grains; drive force
   double mass = 0;               ///< [kg] > 0; drives pressure and force
+  bool weight = false;           ///< gravity acts on that mass
 
   /// Free along the wall's normal.
   bool pushed() const { return drive == WallDrive::pressure || drive == WallDrive::force; }
 };
 
 /// A wall: a plane, whose half space normal . (x - point) < 0 is solid, or a surface
-/// (kernels/shapes/shape.hpp). A pressed wall has one degree of freedom, its displacement along `normal`;
-/// walls never rotate. Only planes move: a surface is fixed, its normal is 0, and its point has no meaning.
+/// (kernels/shapes/shape.hpp), whose normal is 0 and whose point has no meaning. A pressed wall has one
+/// degree of freedom, its displacement along `normal`. Any wall may have a prescribed `motion` instead of a
+/// load: a plane's point and normal then follow it, a surface stays in its first place and has a pose.
 struct Wall {
   std::string name;
   Vec3 point = Vec3::Zero();     ///< a point of the plane [m]
@@ -41,11 +45,49 @@ struct Wall {
   Vec3 gain = Vec3::Zero();      ///< what the load adds to it within the step, without contacts [m/s]
   WallShape shape = {};          ///< a plane unless it says otherwise
   Material material = material_of_walls;
+  std::vector<MotionPart> motion = {};  ///< prescribed; empty: the load alone moves it
+  Pose pose = {};                       ///< of its surface, now
+  Vec3 omega = Vec3::Zero();            ///< [rad/s] now, beside `velocity`, which then is that of the
+  Vec3 pivot = Vec3::Zero();            ///< point [m] here
+  RigidVelocity belt = {};              ///< of the material in its surface, against the surface
+  Vec3 torque_point = Vec3::Constant(std::nan(""));  ///< in its first place: about which its torque is told
+                                                     ///< [m]; not finite: found before the first step
+  std::string from_stage = {}, until_stage = {};  ///< there from, and until, the beginning of these; empty:
+                                                  ///< always
+  bool absent = false;                            ///< in this stage
+  std::string group = {};                         ///< that it is one of; empty: none
+
+  /// Its material may move otherwise than with `velocity` alone.
+  bool has_drift() const;
+  /// How its surface moves at a point c, in space [m/s]. Along a normal its material does the same.
+  Vec3 velocity_at(const Vec3& c) const {
+    return motion.empty() ? velocity : Vec3(velocity + omega.cross(c - pivot));
+  }
+  /// What its material has beyond `velocity` at a point c of contact with this normal [m/s]: of the belt what
+  /// lies in the surface.
+  Vec3 drift_at(const Vec3& c, const Vec3& n) const {
+    const Vec3 along = belt.at(c);
+    return omega.cross(c - pivot) + along - along.dot(n) * n;
+  }
   /// Null for a plane.
   const Surface* surface() const { return shape.surface.get(); }
   /// 1/M [1/kg] of a pushed wall; 0 for one that is fixed or driven, whatever mass its load names.
   double inv_mass() const { return load.pushed() && load.mass > 0 ? 1 / load.mass : 0; }
 };
+
+/// Walls that move as one and tell their force and torque as one.
+struct WallGroup {
+  std::string name;
+  Vec3 torque_point = Vec3::Constant(std::nan(""));  ///< as that of a wall
+  std::vector<MotionPart> motion = {};               ///< that its walls have
+};
+
+/// Surface::at and Surface::collide of a wall that has a surface, as it stands now, with a sphere in space.
+SurfacePoint point_at(const Wall& wall, const Vec3& centre, std::int32_t feature);
+void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<SurfacePoint>& points);
+
+/// Brings a wall to a pose of `first`, the wall in its first place.
+void place(const Wall& first, const Pose& pose, Wall& wall);
 
 /// Area of the face of wall `index` [m^2]: its own `area` if positive, else the product of the distances
 /// between the two pairs of opposite walls whose normals are orthogonal to it. Throws std::invalid_argument

@@ -23,7 +23,7 @@ Vec3 relative_velocity(const Contacts& contacts, std::size_t k, std::span<const 
                        const WallCopy* wall) {
   const Levers& levers = contacts.levers[k];
   const Vec3 v = surface_velocity(velocity[at(contacts.first[k])], levers.first);
-  if (wall != nullptr) return v - ConstMap(wall->velocity);
+  if (wall != nullptr) return v - (ConstMap(wall->velocity) + drift_of(contacts, k));
   return v - surface_velocity(velocity[at(contacts.second[k])], levers.second);
 }
 

@@ -11,7 +11,8 @@ namespace talus {
 
 namespace {
 
-/// A body as moments see it: a sphere of radius 1 that nothing turns stands in for a wall.
+/// A body as moments see it: a sphere of radius 1 that nothing turns stands in for a wall, whose own turning
+/// is with its contacts.
 struct Turning {
   double radius = 1;          ///< [m]
   double mobility = 0;        ///< 1/I [1/(kg m^2)]
@@ -26,7 +27,9 @@ Turning turning_of(std::span<const double> radius, std::span<const Velocity> vel
 
 /// Contact k between `a` and `b`.
 Rolling rolling_of(const Contacts& contacts, std::size_t k, const Turning& a, const Turning& b) {
-  const Vec3 n = contact_normal(contacts, k), rate = a.omega - b.omega;
+  const Vec3 n = contact_normal(contacts, k);
+  Vec3 rate = a.omega - b.omega;
+  if (!contacts.spin.empty() && contacts.second[k] < 0) rate -= contacts.spin[k];
   return {rate - rate.dot(n) * n, a.mobility + b.mobility,
           contacts.arm[k] * std::max(0.0, law_impulse(contacts, k).dot(n))};
 }
@@ -57,6 +60,10 @@ void find_arms(const NarrowPhase& in, const Candidates& candidates, const Chunks
     const double b = contacts.second[k] < 0 ? a : in.radius[at(contacts.second[k])];
     contacts.arm[k] = mu * (contacts.second[k] < 0 ? a : a * b / (a + b));
   }
+  if (contacts.spin.empty() || chunks.wall[chunk] < 0) return;
+  const Wall& wall = in.walls[at(chunks.wall[chunk])];
+  std::fill_n(contacts.spin.begin() + static_cast<std::ptrdiff_t>(begin), end - begin,
+              Vec3(wall.omega + wall.belt.omega));
 }
 
 void sweep_moments(Contacts& contacts, ContactRange range, std::span<const double> radius,

@@ -15,6 +15,7 @@ void allocate(SingleState& single, const Contacts& contacts, std::size_t bodies)
   for (std::vector<float>* part : {&c.rx, &c.ry, &c.rz}) part->resize(contacts.rx.size());
   c.rn.resize(contacts.rn.size());
   c.mu.resize(contacts.mu.size());
+  for (std::vector<float>* part : {&c.vx, &c.vy, &c.vz}) part->resize(contacts.vx.size());
   single.velocity.resize(bodies);
   single.last_v.resize(bodies);
 }
@@ -35,6 +36,9 @@ void narrow_geometry(const Contacts& contacts, ContactRange range, SingleContact
   round_numbers(contacts.nz, range, 1, single.nz);
   round_numbers(contacts.bias, range, 1, single.bias);
   round_numbers(contacts.mu, range, 1, single.mu);
+  round_numbers(contacts.vx, range, 1, single.vx);
+  round_numbers(contacts.vy, range, 1, single.vy);
+  round_numbers(contacts.vz, range, 1, single.vz);
 }
 
 void narrow_impulses(const Contacts& contacts, ContactRange range, SingleContacts& single) {
@@ -90,7 +94,8 @@ void widen_steps(double unit, ContactRange range, SweepSteps& steps) {
 std::size_t memory_used(const SingleState& single) {
   const SingleContacts& c = single.contacts;
   std::size_t numbers = 0;
-  for (const std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn, &c.mu})
+  for (const std::vector<float>* part :
+       {&c.nx, &c.ny, &c.nz, &c.bias, &c.rx, &c.ry, &c.rz, &c.rn, &c.mu, &c.vx, &c.vy, &c.vz})
     numbers += part->capacity();
   return numbers * sizeof(float) +
          sizeof(SingleVelocity) * (single.velocity.capacity() + single.last_v.capacity());

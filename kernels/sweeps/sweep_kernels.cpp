@@ -36,6 +36,7 @@ template <class Number, class Arrays, class Record>
 ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, ContactRange range,
                            std::span<Record> velocity) {
   constexpr std::size_t near = std::size_t{256} << 10;  // with fewer, asking costs more than it gains
+  const auto drift = [](const std::vector<Number>& v) { return v.empty() ? nullptr : v.data(); };
   return {arrays.nx.data(),
           arrays.ny.data(),
           arrays.nz.data(),
@@ -45,6 +46,9 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, Conta
           arrays.rz.data(),
           arrays.rn.data(),
           arrays.mu.data(),
+          drift(arrays.vx),
+          drift(arrays.vy),
+          drift(arrays.vz),
           contacts.first_record.data(),
           contacts.second_record.data(),
           contacts.group.data() + range.begin,

@@ -24,11 +24,13 @@ double Channel::wait() {
   return seconds_now() - start;
 }
 
-void Communicator::meet(double seconds) const {
-  if (ranks() == 1) return;
+bool Communicator::meet(double seconds) const {
+  if (ranks() == 1) return true;
   const double end = seconds_now() + seconds;
   const std::unique_ptr<Meeting> meeting = start_meeting();
-  while (!meeting->complete() && seconds_now() < end) std::this_thread::yield();
+  bool met = meeting->complete();
+  for (; !met && seconds_now() < end; met = meeting->complete()) std::this_thread::yield();
+  return met;
 }
 
 }  // namespace talus::graph

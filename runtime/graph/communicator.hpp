@@ -129,9 +129,9 @@ class Communicator {
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   virtual void progress() const {}
-  /// Returns when all ranks have called it, or after `seconds` if some have not come, since they are dead or
+  /// True when all ranks have called it; false after `seconds` if some have not come, since they are dead or
   /// wait for one that has failed. Nothing but abort() is left then.
-  void meet(double seconds) const;
+  bool meet(double seconds) const;
   /// Ends all ranks with exit code `code`: what is left when one of several ranks has failed and the others
   /// wait for it.
   [[noreturn]] virtual void abort(int code) const = 0;

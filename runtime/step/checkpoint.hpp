@@ -113,7 +113,9 @@ struct CheckpointHead {
   // Walls, in the order of the setup.
   std::vector<double> wall_points, wall_velocities, wall_then;  ///< 3 each
   std::vector<double> wall_impulses;                            ///< 3 each
-  std::vector<double> wall_applied, wall_margins;
+  std::vector<double> wall_torques;                             ///< 3 each
+  std::vector<double> wall_applied, wall_margins, wall_work;
+  double time_then = 0;            ///< of the run, of the places that the last broad phase saw [s]
   std::vector<double> wall_loads;  ///< numbers_of(load) of each, in force
 
   bool candidates_valid = false;
@@ -124,6 +126,7 @@ struct CheckpointHead {
 
   // Simulation.
   std::int64_t stage_index = 0, stage_steps = 0;
+  std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   bool over = false;
   double held = 0;
   double time_step = 0;
@@ -173,7 +176,10 @@ void each_member(Head& head, const Visit& visit) {
   visit("wall_velocities", head.wall_velocities);
   visit("wall_then", head.wall_then);
   visit("wall_impulses", head.wall_impulses);
+  visit("wall_torques", head.wall_torques);
   visit("wall_applied", head.wall_applied);
+  visit("wall_work", head.wall_work);
+  visit("time_then", head.time_then);
   visit("wall_margins", head.wall_margins);
   visit("wall_loads", head.wall_loads);
   visit("candidates_valid", head.candidates_valid);
@@ -183,6 +189,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("overlap_depths", head.overlap_depths);
   visit("stage_index", head.stage_index);
   visit("stage_steps", head.stage_steps);
+  visit("stage_begins", head.stage_begins);
   visit("over", head.over);
   visit("held", head.held);
   visit("time_step", head.time_step);
@@ -205,7 +212,7 @@ struct Checkpoint {
   std::vector<CheckpointPart> parts;  ///< of each
 };
 
-/// A load as 7 numbers: drive, velocity, pressure, force, mass.
+/// A load as 8 numbers: drive, velocity, pressure, force, mass, weight.
 std::vector<double> numbers_of(const WallLoad& load);
 
 /// The state as a part of a checkpoint: all but what StepGraph keeps.

@@ -136,10 +136,13 @@ void restore_walls(const CheckpointHead& head, StepState& state) {
     state.walls[w].point = vector_at(head.wall_points, w);
     state.walls[w].velocity = vector_at(head.wall_velocities, w);
     state.wall_states[w].impulse = vector_at(head.wall_impulses, w);
+    state.wall_states[w].torque = vector_at(head.wall_torques, w);
     state.wall_states[w].applied = head.wall_applied.at(w);
+    state.wall_states[w].work = head.wall_work.at(w);
   }
   for (std::size_t w = 0; 3 * w < head.wall_then.size(); ++w)
     state.wall_then.push_back(vector_at(head.wall_then, w));
+  state.time_then = head.time_then;
 }
 
 }  // namespace

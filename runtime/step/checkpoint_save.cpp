@@ -47,11 +47,14 @@ void save_walls(const StepState& state, CheckpointHead& head) {
     push_vector(wall.point, head.wall_points);
     push_vector(wall.velocity, head.wall_velocities);
     push_vector(state.wall_states[w].impulse, head.wall_impulses);
+    push_vector(state.wall_states[w].torque, head.wall_torques);
     head.wall_applied.push_back(state.wall_states[w].applied);
+    head.wall_work.push_back(state.wall_states[w].work);
     const std::vector<double> load = numbers_of(wall.load);
     head.wall_loads.insert(head.wall_loads.end(), load.begin(), load.end());
   }
   for (const Vec3& point : state.wall_then) push_vector(point, head.wall_then);
+  head.time_then = state.time_then;
 }
 
 SlotRange slots_of(const StepState& state, SubdomainPlace e) {
@@ -129,7 +132,8 @@ std::vector<double> numbers_of(const WallLoad& load) {
           load.velocity[2],
           load.pressure,
           load.force,
-          load.mass};
+          load.mass,
+          load.weight ? 1.0 : 0.0};
 }
 
 void save_state(const StepState& state, Checkpoint& to) {

@@ -8,6 +8,7 @@
 
 #include "kernels/shapes/clump_motion.hpp"
 #include "runtime/step/stage_loads.hpp"
+#include "runtime/step/wall_motions.hpp"
 
 namespace talus {
 
@@ -47,6 +48,7 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
   if ((setup.orientation || !setup.clumps.empty()) && state.bodies.orientation.empty())
     state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});
   state.walls = setup.walls;
+  simplify_motions(state.walls);
   state.clumps = setup.clumps;
   state.wall_states.resize(state.walls.size());
   state.free.u.resize(state.bodies.size());
@@ -56,6 +58,7 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
 StepState restored_state(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks) {
   validate(setup);
   StepState state = restore_state(setup, from, ranks);
+  simplify_motions(state.walls);
   demand_laws(setup, state.bodies);
   for (std::size_t k = 0; k <= static_cast<std::size_t>(from.head.stage_index); ++k)
     take_loads(setup.stages.at(k), state.walls);

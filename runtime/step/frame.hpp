@@ -77,9 +77,11 @@ void each_number(Report& report, const Visit& visit) {
 /// One row of walls.csv.
 struct WallReport {
   std::string name;
-  double position = 0;        ///< normal . point [m]
-  double velocity = 0;        ///< along the normal [m/s]
-  Vec3 force = Vec3::Zero();  ///< of the wall on the grains, mean over the step [N]
+  double position = 0;         ///< normal . point [m]
+  double velocity = 0;         ///< along the normal [m/s]
+  Vec3 force = Vec3::Zero();   ///< of the wall on the grains, mean over the step [N]
+  Vec3 torque = Vec3::Zero();  ///< likewise, about the wall's own point [N m] (Wall::torque_point)
+  double work = 0;             ///< done on the grains since the run began [J]
 };
 
 /// One row of bodies.csv: a body that the scene names, at the end of a step.
@@ -145,6 +147,7 @@ struct Frame {
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
+  bool with_contacts = true;  ///< false: its contacts, of which there may be some, are left out
 };
 
 struct StepState;

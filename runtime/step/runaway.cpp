@@ -25,7 +25,9 @@ std::string describe(const Bodies& bodies, Slot slot) {
 void check_walls_apart(const std::vector<Wall>& walls, const StepName& step) {
   for (const Wall& moving : walls)
     for (const Wall& other : walls)
-      if (moving.load.drive != WallDrive::fixed && (moving.normal + other.normal).norm() < 1e-12 &&
+      if (!moving.absent && !other.absent &&
+          (moving.load.drive != WallDrive::fixed || !moving.motion.empty()) &&
+          (moving.normal + other.normal).norm() < 1e-12 &&
           (other.point - moving.point).dot(moving.normal) < 0)
         throw RunawayError(
             fmt::format("{}: wall '{}' has passed wall '{}', which faces it. Are there grains "
@@ -64,8 +66,10 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
                     step.text(), describe(state.bodies, motion.fastest)));
   check_walls_apart(state.walls, step);
   double fastest_wall2 = 0;
-  for (const Wall& wall : state.walls)
-    fastest_wall2 = std::max(fastest_wall2, wall.load.velocity.squaredNorm());
+  for (std::size_t w = 0; w < state.walls.size(); ++w) {
+    const double speed = state.wall_states[w].material_speed;
+    fastest_wall2 = std::max({fastest_wall2, state.walls[w].load.velocity.squaredNorm(), speed * speed});
+  }
   const double energy = motion.energy.translation + motion.energy.rotation;
   const double supplied = motion.energy_free + wall_energy_free + sample.total_mass * fastest_wall2;
   if (energy > 100 * supplied && energy > 0)

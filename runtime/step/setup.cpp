@@ -17,13 +17,18 @@ void require(bool holds, const std::string& message) {
 
 void validate_load(const std::string& where, const Wall& wall, const WallLoad& load) {
   require(wall.surface() == nullptr || load.drive == WallDrive::fixed,
-          fmt::format("{}: only planes can be driven or pushed; a wall with shape = \"{}\" is fixed", where,
-                      wall.shape.name));
+          fmt::format("{}: only planes can be driven or pushed; a wall with shape = \"{}\" is moved "
+                      "by a motion",
+                      where, wall.shape.name));
+  require(wall.motion.empty() || load.drive == WallDrive::fixed,
+          where + ": it has a prescribed motion, and that alone moves it");
   require(load.velocity.allFinite(), where + ": velocity must be finite [m/s]");
   require(std::isfinite(load.pressure),
           fmt::format("{}: pressure must be finite [Pa], got {}", where, load.pressure));
   require(std::isfinite(load.force), fmt::format("{}: force must be finite [N], got {}", where, load.force));
   if (!load.pushed()) return;
+  require(std::abs(load.velocity.dot(wall.normal)) <= 1e-9 * load.velocity.norm(),
+          where + ": tangential_velocity must lie in its face: what is pushed is free along its normal");
   require(mass_is_sound(load.mass), fmt::format("{}: a pushed wall needs a mass of {} to {} kg, got {}",
                                                 where, least_mass, most_mass, load.mass));
 }
@@ -41,6 +46,19 @@ const Registry<Coupling>& couplings() {
 }
 
 namespace {
+
+void validate_motion(const std::string& where, const MotionPart& part) {
+  require(part.velocity.allFinite() && part.point.allFinite() && std::isfinite(part.rate) &&
+              std::isfinite(part.amplitude) && std::isfinite(part.frequency) && std::isfinite(part.phase),
+          where + ": numbers of its motion must be finite");
+  require(!part.turns() || std::abs(part.axis.norm() - 1) < 1e-9,
+          where + ": the axis of its motion must be a unit vector");
+  if (part.kind == MotionPart::Kind::oscillation)
+    require(std::abs(part.direction.norm() - 1) < 1e-9 && part.frequency > 0,
+            where + ": it oscillates along a unit vector with a frequency > 0");
+  if (part.kind == MotionPart::Kind::table)
+    require(part.table && part.table->t.size() > 1, where + ": the table of its motion needs two rows");
+}
 
 void validate_laws(const Stage& stage) {
   for (const PairLaw& law : stage.laws.laws()) {
@@ -143,6 +161,7 @@ void validate(const Setup& setup) {
     require(wall.point.allFinite() && wall.velocity.allFinite(),
             fmt::format("wall '{}': point and velocity must be finite", wall.name));
     validate_load(fmt::format("wall '{}'", wall.name), wall, wall.load);
+    for (const MotionPart& part : wall.motion) validate_motion(fmt::format("wall '{}'", wall.name), part);
   }
   require(!setup.stages.empty(), "at least one stage is needed");
   validate_grains(setup);

@@ -178,7 +178,8 @@ struct Setup {
   std::vector<RemoveRule> removes;
   std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   std::vector<Wall> walls;
-  std::vector<Clump> clumps;  ///< shapes of bodies that are no spheres (Bodies::shape)
+  std::vector<WallGroup> groups = {};  ///< that walls name
+  std::vector<Clump> clumps;           ///< shapes of bodies that are no spheres (Bodies::shape)
   std::vector<Stage> stages;
   DetectionSettings detection;
   SolverSettings solver;
@@ -188,6 +189,11 @@ struct Setup {
   bool allow_unconverged = false;  ///< true: steps over tolerance do not change the exit code
   std::uint64_t seed = 1;
 };
+
+/// Whether a wall is there in the first stage.
+inline bool stands_at_first(const Setup& setup, const Wall& wall) {
+  return wall.from_stage.empty() || setup.stages.empty() || wall.from_stage == setup.stages.front().name;
+}
 
 /// Throws std::invalid_argument with the name of the wall or stage, the value and its limit when the setup
 /// makes no sense.

@@ -15,16 +15,19 @@
 #include "runtime/step/stage_loads.hpp"
 #include "runtime/step/step_report.hpp"
 #include "runtime/step/time_step.hpp"
+#include "runtime/step/wall_motions.hpp"
+#include "runtime/step/wall_reports.hpp"
 
 namespace talus {
 
 namespace {
 
-/// Of a run that begins: no grain that will come is smaller than it says, and there are materials where some
-/// may come with one.
+/// Of a run that begins: no grain that will come is smaller than it says, and there are materials and
+/// orientations where some may come with one.
 SampleSize first_size(const Setup& setup, SampleSize size) {
   size.smallest = smallest_ever(setup, size.bodies > 0 ? size.smallest : 0);
   size.materials = size.materials || (!setup.inserts.empty() && !setup.material_names.empty());
+  size.orientation = size.orientation || setup.orientation || !setup.clumps.empty();
   return size;
 }
 
@@ -61,6 +64,7 @@ struct Simulation::Implementation {
     state.bodies = from.bodies;
     state.walls = from.walls;
     stage_index = from.stage_index;
+    stage_begins = from.stage_begins;
     begin_stage();
     state.walls = from.walls;
     state.candidates = from.candidates;
@@ -87,6 +91,7 @@ struct Simulation::Implementation {
     choose_distances();
     const CheckpointHead& head = from.head;
     stage_index = static_cast<std::size_t>(head.stage_index);
+    stage_begins = head.stage_begins;
     prescribe();
     parameters.time_step = head.time_step;
     clock = head.clock;
@@ -96,11 +101,14 @@ struct Simulation::Implementation {
     lengths_at_start = head.lengths_at_start;
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const std::vector<double> load = numbers_of(state.walls[w].load);
-      if (std::equal(load.begin(), load.end(), head.wall_loads.begin() + static_cast<std::ptrdiff_t>(7 * w)))
+      if (std::equal(load.begin(), load.end(),
+                     head.wall_loads.begin() + static_cast<std::ptrdiff_t>(load.size() * w)))
         continue;
       put_load(state.walls[w], state.walls);
       state.candidates_valid = false;  // a wall that is free now has chunks of another kind
     }
+    resolve_stages(setup, stage_index, stage_begins, state.walls);
+    set_walls(setup, report.time, parameters.time_step, state);
     graph.restore(from);
   }
 
@@ -114,6 +122,7 @@ struct Simulation::Implementation {
     head.population = population.state();
     head.stage_index = static_cast<std::int64_t>(stage_index);
     head.stage_steps = stage_steps;
+    head.stage_begins = stage_begins;
     head.over = over;
     head.held = held;
     head.time_step = parameters.time_step;
@@ -163,6 +172,8 @@ struct Simulation::Implementation {
   }
 
   void begin_stage() {
+    if (stage_begins.size() == stage_index) stage_begins.push_back(report.time);
+    resolve_stages(setup, stage_index, stage_begins, state.walls);
     take_loads(stage(), state.walls);
     for (Wall& wall : state.walls) put_load(wall, state.walls);
     wind_clock();
@@ -187,7 +198,6 @@ struct Simulation::Implementation {
     }
     stage_steps = 0;
     held = 0;
-    population.begin_stage(report.time);
     lengths_at_start = Domain{}.lengths(state.walls);
   }
 
@@ -198,7 +208,9 @@ struct Simulation::Implementation {
   }
 
   void choose_time_step() {
+    set_walls(setup, report.time, parameters.time_step, state);
     if (!stage().chooses_time_step) return;
+    prepare_walls(report.time, parameters.time_step, state, ranks);
     double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
     // Grains that come are not there yet.
     if (const double speed = population.fastest(span()); speed > 0)
@@ -208,7 +220,16 @@ struct Simulation::Implementation {
   }
 
   /// The step that is about to be made.
-  StepSpan span() const { return {report.time, report.time + parameters.time_step, &stage()}; }
+  StepSpan span() const {
+    return {report.time, report.time + parameters.time_step, &stage(), stage_begins[stage_index]};
+  }
+
+  /// Bodies whose paths are told: of the setup, then those that came.
+  std::vector<NamedBody> named_now() const {
+    std::vector<NamedBody> bodies = setup.named;
+    for (NamedBody& body : population.tracked()) bodies.push_back(std::move(body));
+    return bodies;
+  }
 
   /// Grains that come and go with the step.
   void change_grains() {
@@ -231,22 +252,16 @@ struct Simulation::Implementation {
     }
     const StageEnd& end = stage().end;
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
-    const StepSpan last{report.time - report.time_step, report.time, &stage()};
+    const StepSpan last{report.time - report.time_step, report.time, &stage(), stage_begins[stage_index]};
     if (held > 0 && population.expects_grains(last)) held = 0;
   }
 
-  /// Loads of the walls for the step: applied forces and free velocities.
+  /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
-    for (std::size_t w = 0; w < state.walls.size(); ++w) {
-      Wall& wall = state.walls[w];
-      WallState& wall_state = state.wall_states[w];
-      wall_state.applied = wall.load.drive == WallDrive::pressure
-                               ? wall.load.pressure * pressed_area(state.walls, w, next_step())
-                           : wall.load.drive == WallDrive::force ? wall.load.force
-                                                                 : 0;
-      wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
-      wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);
-    }
+    state.time = report.time;
+    demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
+    prepare_walls(report.time, parameters.time_step, state, ranks);
+    apply_loads(parameters, next_step(), state);
   }
 
   double strain(int axis) const {
@@ -281,6 +296,7 @@ struct Simulation::Implementation {
   StageClock clock;  ///< of a stage that chooses its time steps
   double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
+  std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   std::int64_t stage_steps = 0;
   bool over = false;
   Vec3 lengths_at_start = Vec3::Zero();
@@ -318,9 +334,9 @@ void Simulation::follow(trace::Order* order) {
 SavedState Simulation::save() const {
   if (impl_->state.decomposition.several())
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
-  return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates,  impl_->report,
-          impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start,  impl_->state.given_overlaps,
-          impl_->clock,        impl_->held,        impl_->population.state()};
+  return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
+          impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
+          impl_->clock,        impl_->held,        impl_->stage_begins,     impl_->population.state()};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {
@@ -339,7 +355,8 @@ const StepReport& Simulation::step() {
   impl_->choose_time_step();
   impl_->change_grains();
   impl_->load_walls();
-  impl_->named.begin_step(impl_->setup.named, impl_->state, impl_->ranks);
+  const std::vector<NamedBody> named = impl_->named_now();
+  impl_->named.begin_step(named, impl_->state, impl_->ranks);
   const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
@@ -348,7 +365,7 @@ const StepReport& Simulation::step() {
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
   impl_->named_reports =
-      impl_->named.end_step(impl_->setup.named, impl_->state, impl_->parameters, impl_->ranks);
+      impl_->named.end_step(named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
   return impl_->report;
 }
@@ -404,13 +421,11 @@ const graph::Graph& Simulation::step_graph() const {
 }
 
 std::vector<WallReport> Simulation::walls() const {
-  std::vector<WallReport> reports;
-  for (std::size_t w = 0; w < impl_->state.walls.size(); ++w) {
-    const Wall& wall = impl_->state.walls[w];
-    reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
-                       impl_->state.wall_states[w].impulse / impl_->parameters.impulse_time()});
-  }
-  return reports;
+  return wall_reports(impl_->state, impl_->parameters.impulse_time());
+}
+
+std::vector<WallReport> Simulation::groups() const {
+  return group_reports(impl_->setup, impl_->state, walls());
 }
 
 const std::vector<BodyReport>& Simulation::named_bodies() const {
@@ -455,6 +470,7 @@ Frame Simulation::frame(bool contacts) const {
   fill_frame(impl_->state, impl_->ranks, impl_->setup.rotation, contacts && frame.step > 0,
              impl_->parameters.impulse_time(), frame);
   frame.walls = walls();
+  frame.with_contacts = contacts;
   return frame;
 }
 

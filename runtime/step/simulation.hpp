@@ -32,7 +32,8 @@ struct SavedState {
   Vec3 lengths_of_box = Vec3::Zero();                            ///< at the beginning of the stage [m]
   std::optional<std::vector<GivenOverlap>> given_overlaps = {};  ///< of StepState
   StageClock clock = {};                                         ///< of a stage that chooses its time steps
-  double held = 0;  ///< time for which the stage's bound on equilibrium has held [s]
+  double held = 0;                        ///< time for which the stage's bound on equilibrium has held [s]
+  std::vector<double> stage_begins = {};  ///< times of the run at which this stage and those before began [s]
   PopulationState population = {};
 };
 
@@ -116,6 +117,8 @@ class Simulation {
   /// What insertions and removals have done so far; empty without any.
   std::vector<InsertReport> inserted() const;
   std::vector<RemoveReport> removed() const;
+  /// Sums over the walls of each group, behind a step: forces, torques about the group's point, work.
+  std::vector<WallReport> groups() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "runtime/step/runaway.hpp"
+
 namespace talus {
 
 void take_loads(const Stage& stage, std::span<Wall> walls) {
@@ -13,9 +15,37 @@ void take_loads(const Stage& stage, std::span<Wall> walls) {
 void put_load(Wall& wall, const std::vector<Wall>& walls) {
   if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
   if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
-  if (wall.load.pushed()) wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+  if (wall.load.pushed()) {
+    wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
+    if (wall.load.velocity != Vec3::Zero()) wall.velocity += wall.load.velocity;
+  }
   if (wall.load.drive == WallDrive::pressure)
     face_area(walls, static_cast<std::size_t>(&wall - walls.data()));
+}
+
+namespace {
+
+/// What wall w is pushed with, along its normal [N].
+double push_on(const std::vector<Wall>& walls, std::size_t w, const Vec3& gravity, const StepName& step) {
+  const Wall& wall = walls[w];
+  if (wall.absent || !wall.load.pushed()) return 0;
+  const double push = wall.load.drive == WallDrive::pressure
+                          ? wall.load.pressure * pressed_area(walls, w, step)
+                          : wall.load.force;
+  return wall.load.weight ? push + wall.load.mass * gravity.dot(wall.normal) : push;
+}
+
+}  // namespace
+
+void apply_loads(const StepParameters& parameters, const StepName& step, StepState& state) {
+  for (std::size_t w = 0; w < state.walls.size(); ++w) {
+    Wall& wall = state.walls[w];
+    WallState& wall_state = state.wall_states[w];
+    wall_state.applied = push_on(state.walls, w, parameters.gravity, step);
+    if (wall.absent && wall.load.pushed()) wall.velocity.setZero();
+    wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
+    wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);
+  }
 }
 
 StepParameters parameters_of(const Setup& setup, const Stage& stage, StepParameters now) {

@@ -50,6 +50,14 @@ struct WallState {
   std::vector<ChunkId> copies;         ///< chunks here that hold a copy, ascending; filled before the sweeps
   std::int64_t copies_everywhere = 0;  ///< on all ranks
   Vec3 impulse = Vec3::Zero();         ///< of the wall on the grains [N s], from the last check
+  Pose middle, end;  ///< of a wall with a prescribed motion, in the middle and at the end of the step
+  double speed = 0;  ///< of it: the largest with which a point of its surface nears a grain [m/s]
+  double material_speed = 0;  ///< the largest of any point of its material near a grain [m/s]
+  double farthest = 0;        ///< of a plane that turns: distance of the farthest grain from its pivot [m]
+  Vec3 own_point = Vec3::Zero();      ///< in the middle of the step, about which its torque is told [m]
+  Vec3 mean_velocity = Vec3::Zero();  ///< of the step [m/s]
+  Vec3 torque = Vec3::Zero();         ///< of the last step, on the grains, times its impulse time [N m s]
+  double work = 0;                    ///< done on the grains since the run began [J]
 };
 
 /// All that a step reads and writes. Sizes: n bodies, c candidates, k chunks.
@@ -62,6 +70,8 @@ struct StepState {
   std::vector<Vec3> x_then;            ///< n: centres at the last broad phase [m]
   std::vector<double> reach_then;      ///< n: reach at the last broad phase [m]
   std::vector<Vec3> wall_then;         ///< points of the walls at the last broad phase [m]
+  double time = 0;                     ///< of the run as the step begins [s]
+  double time_then = 0;                ///< of the run, of the places that the last broad phase saw [s]
   Candidates candidates;               ///< c
   Chunks chunks;                       ///< k
   Decomposition decomposition;

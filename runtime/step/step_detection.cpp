@@ -15,6 +15,7 @@
 #include "runtime/graph/clock.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/task_kinds.hpp"
+#include "runtime/step/wall_motions.hpp"
 
 namespace talus {
 
@@ -42,17 +43,22 @@ void StepGraph::predict_share(std::uint32_t share) {
 
 /// Margin of a wall: what brings a grain nearer to it and is not in the grain's own margin. That is the way
 /// of the wall, what gravity adds to the grain's speed within a step, and what the load adds to the wall's.
-double StepGraph::margin_of(const Wall& wall) const {
+double StepGraph::margin_of(std::size_t w) const {
   const double h = parameters_.time_step;
-  return contact_margin(wall.velocity.norm(), h, parameters_.alert) +
+  const Wall& wall = state_.walls[w];
+  const double speed = wall.motion.empty() ? wall.velocity.norm() : state_.wall_states[w].speed;
+  return contact_margin(speed, h, parameters_.alert) +
          h * (h * parameters_.gravity.norm() + wall.gain.norm());
 }
 
 bool StepGraph::walls_left_margin() const {
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const Wall& wall = state_.walls[w];
-    const double moved = std::abs(wall.normal.dot(wall.point - state_.wall_then[w]));
-    if (margin_of(wall) + moved > wall_margin_[w]) return true;
+    if (wall.absent) continue;
+    const double moved = wall.motion.empty()
+                             ? std::abs(wall.normal.dot(wall.point - state_.wall_then[w]))
+                             : way_since(setup_.walls[w], wall, state_.wall_states[w], state_.time_then);
+    if (margin_of(w) + moved > wall_margin_[w]) return true;
   }
   return false;
 }
@@ -94,7 +100,15 @@ bool StepGraph::candidates_hold() const {
 
 void StepGraph::make_cells() {
   const double h = parameters_.time_step;
-  for (Wall& wall : state_.walls) wall.point += 0.5 * h * wall.velocity;
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    Wall& wall = state_.walls[w];
+    WallState& wall_state = state_.wall_states[w];
+    if (wall.motion.empty())
+      wall.point += 0.5 * h * wall.velocity;
+    else
+      place(setup_.walls[w], wall_state.middle, wall);
+    wall_state.own_point = own_point(setup_.walls[w], wall, wall_state.middle);
+  }
   if (steps_ == partitioned_ + 1 || imbalance_before_ < imbalance_then_) imbalance_then_ = imbalance_before_;
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
@@ -110,9 +124,10 @@ void StepGraph::make_cells() {
   }
   state_.wall_then.clear();
   wall_margin_.clear();
-  for (const Wall& wall : state_.walls) {
-    state_.wall_then.push_back(wall.point);
-    wall_margin_.push_back(half_skin + margin_of(wall));
+  state_.time_then = state_.time + 0.5 * h;
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    state_.wall_then.push_back(state_.walls[w].point);
+    wall_margin_.push_back(half_skin + margin_of(w));
   }
   // What the last step found is in the impulses of the candidates; detection works in its room.
   const auto make_room = [this] {
@@ -217,6 +232,10 @@ void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
   if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
     state_.contacts.cohesion.resize(state_.candidates.size());
+  const bool drifts = std::ranges::any_of(state_.walls, &Wall::has_drift);
+  for (auto* values : {&state_.contacts.vx, &state_.contacts.vy, &state_.contacts.vz})
+    values->resize(drifts ? state_.candidates.size() : 0);
+  state_.contacts.spin.resize(drifts ? state_.contacts.arm.size() : 0, Vec3::Zero());
 }
 
 /// What is kept per slot follows the copies to their new places.

@@ -19,6 +19,7 @@ StepGraph::StepGraph(StepState& state, const StepParameters& parameters, const S
                      std::uint32_t shares, graph::Executor& executor, const graph::Communicator& ranks)
     : state_(state),
       parameters_(parameters),
+      setup_(setup),
       settings_(setup.solver),
       decomposition_(setup.decomposition),
       executor_(executor),

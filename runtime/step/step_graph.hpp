@@ -99,10 +99,11 @@ class StepGraph {
   template <class Otherwise>
   std::vector<double> copies_of_walls(const std::vector<WallCopy>& copies, const Otherwise& otherwise) const;
   void measure_share(std::uint32_t share);
+  void take_wall_sums(std::span<const double> sums);
   void sum_up();
   SlotRange range_of_share(std::size_t count, std::uint32_t share) const;
   SlotRange slots(std::uint32_t share) const;
-  double margin_of(const Wall& wall) const;
+  double margin_of(std::size_t w) const;
   bool walls_left_margin() const;
   bool out_of_balance() const;
   std::vector<double> work() const;
@@ -110,6 +111,7 @@ class StepGraph {
 
   StepState& state_;
   const StepParameters& parameters_;
+  const Setup& setup_;
   const SolverSettings& settings_;
   const DecompositionSettings& decomposition_;
   graph::Executor& executor_;
@@ -135,6 +137,7 @@ class StepGraph {
   std::vector<std::vector<GrainPair>> pairs_;
   std::vector<MotionSums> motion_;
   std::vector<ContactSums> contact_sums_;  ///< per chunk
+  std::vector<WallSums> wall_sums_;        ///< per chunk
   StepSums sums_;
 };
 

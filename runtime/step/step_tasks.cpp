@@ -145,10 +145,15 @@ void StepGraph::finish_walls() {
       copies_of_walls(state_.copies, [](const WallState& wall) -> const Vec3& { return wall.free_velocity; });
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     Wall& wall = state_.walls[w];
+    WallState& wall_state = state_.wall_states[w];
     const Vec3 before = wall.velocity;
     wall.velocity = Eigen::Map<const Vec3>(&velocities[3 * w]);
     if (parameters_.reflection > 0) wall.velocity += parameters_.reflection * (wall.velocity - before);
-    wall.point += 0.5 * parameters_.time_step * wall.velocity;
+    wall_state.mean_velocity = 0.5 * (before + wall.velocity);
+    if (wall.motion.empty())
+      wall.point += 0.5 * parameters_.time_step * wall.velocity;
+    else
+      place(setup_.walls[w], wall_state.end, wall);
   }
   if (loop_.positions().found()) {
     const Vec3 stays = Vec3::Zero();
@@ -159,15 +164,20 @@ void StepGraph::finish_walls() {
       state_.walls[w].point += Eigen::Map<const Vec3>(&moved[3 * w]);
   }
   contact_sums_.resize(state_.chunks.size());
+  wall_sums_.resize(state_.chunks.size());
 }
 
 void StepGraph::measure_share(std::uint32_t share) {
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
-    contact_sums_[c] =
-        measure_contacts(state_.contacts, state_.chunks, c,
-                         {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)});
+    const Poses poses{state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)};
+    contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c, poses);
+    wall_sums_[c] = {};
+    if (const std::int32_t w = state_.chunks.wall[c]; w >= 0)
+      wall_sums_[c] = measure_wall(state_.contacts, state_.chunks, c, poses,
+                                   {state_.wall_states[static_cast<std::size_t>(w)].own_point,
+                                    state_.bodies.velocity, 0.5 * parameters_.time_step});
   }
 }
 
@@ -219,6 +229,16 @@ void add_row(const double* row, bool here, StepSums& sums) {
 
 }  // namespace
 
+/// Torques, and the work of the step: impulses are those of the iterations, 1 / (1 + E) of all.
+void StepGraph::take_wall_sums(std::span<const double> sums) {
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    WallState& wall = state_.wall_states[w];
+    const double* const of = &sums[WallSums::width * w];
+    wall.torque = Eigen::Map<const Vec3>(of);
+    wall.work += (1 + parameters_.reflection) * (wall.impulse.dot(wall.mean_velocity) + of[3]);
+  }
+}
+
 void StepGraph::sum_up() {
   const Decomposition& all = state_.decomposition;
   std::vector<MotionSums> motion(all.here.size());
@@ -227,15 +247,24 @@ void StepGraph::sum_up() {
     motion[share / shares_per_subdomain_].add(motion_[share]);
   for (std::size_t c = 0; c < contact_sums_.size(); ++c)
     contacts[static_cast<std::size_t>(state_.chunks.subdomain[c])].add(contact_sums_[c]);
-  std::vector<double> rows(all.here.size() * row_width);
+  const std::size_t width = row_width + WallSums::width * state_.walls.size();
+  std::vector<double> rows(all.here.size() * width);
   for (const SubdomainPlace e : all.here.indices())
-    write_row(all.here[e], motion[e.at()], contacts[e.at()], &rows[e.at() * row_width]);
+    write_row(all.here[e], motion[e.at()], contacts[e.at()], &rows[e.at() * width]);
+  for (std::size_t c = 0; c < wall_sums_.size(); ++c)
+    if (const std::int32_t w = state_.chunks.wall[c]; w >= 0)
+      wall_sums_[c].add_to(&rows[static_cast<std::size_t>(state_.chunks.subdomain[c]) * width + row_width +
+                                 WallSums::width * static_cast<std::size_t>(w)]);
   rows = ranks_.gather_records(std::span<const double>(rows));
   Per<SubdomainId, const double*> by_subdomain(static_cast<std::size_t>(all.partition.subdomains));
-  for (std::size_t k = 0; k < rows.size(); k += row_width)
+  for (std::size_t k = 0; k < rows.size(); k += width)
     by_subdomain[SubdomainId(static_cast<std::int32_t>(rows[k]))] = &rows[k];
-  for (const SubdomainId e : by_subdomain.indices())
+  std::vector<double> of_walls(width - row_width, 0.0);
+  for (const SubdomainId e : by_subdomain.indices()) {
     add_row(by_subdomain[e], all.rank_of[e] == ranks_.rank(), sums_);
+    for (std::size_t k = 0; k < of_walls.size(); ++k) of_walls[k] += by_subdomain[e][row_width + k];
+  }
+  take_wall_sums(of_walls);
   sums_.candidates = all_candidates_;
   contacts_before_ = loop_.result().contacts;
   imbalance_before_ = loop_.imbalance();

@@ -27,8 +27,24 @@ double fastest(const StepState& state) {
   double speed2 = 0;
   for (const Velocity& v : state.bodies.velocity) speed2 = std::max(speed2, square(v.u));
   double speed = std::sqrt(speed2);
-  for (const Wall& wall : state.walls) speed = std::max(speed, wall.normal.dot(wall.velocity));
+  for (std::size_t w = 0; w < state.walls.size(); ++w)
+    speed = std::max(speed, state.walls[w].motion.empty() ? state.walls[w].normal.dot(state.walls[w].velocity)
+                                                          : state.wall_states[w].speed);
   return speed;
+}
+
+/// Of gravity and of walls that oscillate [m/s^2].
+double acceleration_of(const StepState& state, const StepParameters& parameters) {
+  double walls = 0;
+  for (const Wall& wall : state.walls) walls = std::max(walls, largest_acceleration(wall.motion));
+  return parameters.gravity.norm() + walls;
+}
+
+/// In which a wall's oscillation is followed, infinity where none oscillates [s].
+double shortest_time(const StepState& state, const TimeStepRule& rule) {
+  double period = std::numeric_limits<double>::infinity();
+  for (const Wall& wall : state.walls) period = std::min(period, shortest_period(wall.motion));
+  return period / rule.steps_of_period;
 }
 
 }  // namespace
@@ -61,7 +77,8 @@ double longest_time_step(const StepState& state, const Setup& setup, const StepP
     return rate > 0 ? 1 / rate : std::numeric_limits<double>::infinity();
   };
   return std::min({inverse(rates[0]), inverse(rates[1] / (rule.longest_way * smallest)),
-                   std::sqrt(2 * unseen * inverse(parameters.gravity.norm()))});
+                   std::sqrt(2 * unseen * inverse(acceleration_of(state, parameters))),
+                   shortest_time(state, rule)});
 }
 
 StageClock::StageClock(const TimeStepBounds& bounds, std::optional<double> end, double begin)

@@ -25,6 +25,8 @@ struct TimeStepRule {
   /// Way of the fastest body, or wall into the grains, in a step, in (0, 0.5]: candidates are known that far,
   /// and two bodies that go in by more have passed one another (StepReport::passed).
   double longest_way = 0.5;
+  /// Steps in a period of a wall that oscillates, at least; > 2, so that it is seen at all.
+  double steps_of_period = 20;
   /// Where the scene gives no shortest time step, the longest over it, >= 1.
   double range = 1024;
 };

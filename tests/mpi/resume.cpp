@@ -105,7 +105,9 @@ TEST_F(Resumed, AnywhereOnAnyRanksEndInTheSameBits) {
       "--set material.restitution=0.4 --set gravity='[0,0,-9.81]' --set decomposition.exchange=ccs",
       "--set solver.overlap_correction=0.2 --set solver.method=admm --set orientation=true",
       "--set time_step=auto --set gravity='[0,0,-9.81]' --set output.pictures=true --set "
-      "solver.tolerance=0.02 --set solver.max_iterations=400 --error-history 1:100"};
+      "solver.tolerance=0.02 --set solver.max_iterations=400 --error-history 1:100 --set "
+      "output.tables_every=5 "
+      "--set output.contacts_every=2 --set output.compression=1 --set output.precision=single"};
   constexpr int steps = 24;
   for (const std::string& keys : scenes) {
     const std::string line = "run scene.toml " + keys;

@@ -5,19 +5,10 @@
 #include "io/results/results.hpp"
 #include "tests/mpi/launcher.hpp"
 #include "tests/unit/mesh_makers.hpp"
+#include "tests/unit/stl_text.hpp"
 
 namespace talus::test {
 namespace {
-
-std::string stl_text(const std::vector<Triangle>& triangles) {
-  std::string text = "solid funnel\n";
-  for (const Triangle& triangle : triangles) {
-    text += "facet normal 0 0 0\nouter loop\n";
-    for (const Vec3& p : triangle) text += fmt::format("vertex {} {} {}\n", p[0], p[1], p[2]);
-    text += "endloop\nendfacet\n";
-  }
-  return text + "endsolid\n";
-}
 
 /// Grains that fall through a funnel of triangles onto a plate in a tube.
 const std::string funnel_scene = R"(name = "funnel"

@@ -229,7 +229,8 @@ TEST_F(Command, WritesEveryFileOfItsPageAndTheyRead) {
     EXPECT_EQ(steps.rows[k].at("converged"), "1");
   }
   const Table walls = read_table(at("results/walls.csv"));
-  EXPECT_EQ(walls.header, "step,time,wall,position,velocity,force_x,force_y,force_z");
+  EXPECT_EQ(walls.header,
+            "step,time,wall,position,velocity,force_x,force_y,force_z,torque_x,torque_y,torque_z,work");
   EXPECT_EQ(walls.rows.size(), 12U * 6U);
   const Table triaxial = read_table(at("results/triaxial.csv"));
   ASSERT_EQ(triaxial.rows.size(), 12U);

@@ -82,6 +82,8 @@ class Experiment {
   void steps(std::int64_t count) {
     for (std::int64_t k = 0; k < count; ++k) simulation_.step();
   }
+  /// Goes on to the next stage, if this one has ended.
+  bool next_stage() { return simulation_.begin_next_stage(); }
   const Simulation& simulation() const { return simulation_; }
   double time() const { return simulation_.report().time; }
 

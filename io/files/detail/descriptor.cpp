@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -47,11 +48,22 @@ void Descriptor::write_at(std::int64_t place, std::string_view bytes) {
   }
 }
 
+void Descriptor::demand_room(std::int64_t from, std::int64_t bytes) {
+  if (::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, from, bytes) == 0) return;
+  if (errno == EOPNOTSUPP || errno == ENOSYS) return;
+  throw FileError(path_.string(),
+                  "cannot get " + std::to_string(bytes) + " bytes of the disk: " + last_error());
+}
+
 void Descriptor::cut(std::int64_t bytes) {
   const off_t length = ::lseek(descriptor_, 0, SEEK_END);
   if (length < bytes)
     throw FileError(path_.string(), "is shorter than the checkpoint says; begin anew in another directory");
-  if (length > bytes && ::ftruncate(descriptor_, bytes) != 0)
+  if (length > bytes) end_at(bytes);
+}
+
+void Descriptor::end_at(std::int64_t bytes) {
+  if (::ftruncate(descriptor_, bytes) != 0)
     throw FileError(path_.string(), "cannot be cut back: " + last_error());
 }
 

@@ -25,8 +25,13 @@ class Descriptor {
 
   /// The same at a place of the file [byte], of one that is not open for appending.
   void write_at(std::int64_t place, std::string_view bytes);
+  /// Gets the disk's room for `bytes` from there on, without making the file longer, where the file system
+  /// can tell. Throws FileError where there is none, before anything is half written.
+  void demand_room(std::int64_t from, std::int64_t bytes);
   /// Keeps the first `bytes` of the file. Throws FileError, also when it has less.
   void cut(std::int64_t bytes);
+  /// Gives the file that length [byte]. Throws FileError.
+  void end_at(std::int64_t bytes);
   /// Returns when the disk has all that was written. Throws FileError.
   void sync();
 

@@ -8,7 +8,7 @@
 
 namespace talus::io::detail {
 
-Hdf5Object file_access(const std::string& file, bool together) {
+Hdf5Object file_access(const std::string& file) {
   Hdf5Object access = hold(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, file, "preparing HDF5");
   demand(H5Pset_file_locking(access.id(), false, true), file, "preparing HDF5");
   // Metadata leave the cache when the file is closed and not before, so that a kill while the arrays of a
@@ -20,13 +20,6 @@ Hdf5Object file_access(const std::string& file, bool together) {
   cache.incr_mode = H5C_incr__off;
   cache.flash_incr_mode = H5C_flash_incr__off;
   cache.decr_mode = H5C_decr__off;
-#ifdef H5_HAVE_PARALLEL
-  if (together) {
-    demand(H5Pset_fapl_mpio(access.id(), MPI_COMM_WORLD, MPI_INFO_NULL), file, "preparing HDF5 for MPI");
-  }
-#else
-  if (together) throw FileError(file, "cannot be written by several ranks: this HDF5 is built without MPI");
-#endif
   demand(H5Pset_mdc_config(access.id(), &cache), file, "preparing HDF5");
   return access;
 }

@@ -12,9 +12,8 @@
 namespace talus::io::detail {
 
 /// File access for a file that is opened and closed again and again: not locked, and its directory reaches
-/// the disk when it is closed and not before, so that a kill in between finds it as it was. `together`: it is
-/// opened by all ranks at once; throws FileError when this HDF5 cannot.
-Hdf5Object file_access(const std::string& file, bool together = false);
+/// the disk when it is closed and not before, so that a kill in between finds it as it was.
+Hdf5Object file_access(const std::string& file);
 
 /// The group and the file that every write or read needs.
 struct Place {
@@ -33,6 +32,9 @@ struct ElementTypes {
 };
 inline ElementTypes element_types(const double*) {
   return {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE};
+}
+inline ElementTypes element_types(const float*) {
+  return {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
 }
 inline ElementTypes element_types(const std::int64_t*) {
   return {H5T_STD_I64LE, H5T_NATIVE_INT64};

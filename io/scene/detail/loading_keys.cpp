@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "io/scene/detail/material_keys.hpp"
+#include "io/scene/detail/motion_keys.hpp"
 #include "io/scene/detail/shape_keys.hpp"
 
 namespace talus::io::detail {
@@ -25,6 +26,7 @@ std::vector<Key<WallLoad>> load_keys() {
   const auto driven_by = [](WallDrive drive) {
     return [drive](const WallLoad& load) { return load.drive == drive; };
   };
+  const auto pushed = [](const WallLoad& load) { return load.pushed(); };
   return {
       choice<WallLoad>("drive", {"fixed", "velocity", "pressure", "force"},
                        "What moves the wall. Walls driven by pressure or force are free along their normal.",
@@ -41,7 +43,18 @@ std::vector<Key<WallLoad>> load_keys() {
           .need(),
       key<WallLoad>("mass", "kg", sound_mass, "Inertia of the wall.", &WallLoad::mass)
           .or_auto(0, "a tenth of the mass of the grains")
-          .only("drive = pressure or force", [](const WallLoad& load) { return load.pushed(); }),
+          .only("drive = pressure or force", pushed),
+      key<WallLoad>("weight", "", any,
+                    "true: gravity acts on that mass, along the normal; a lid is a wall with force = 0, its "
+                    "mass and weight = true.",
+                    &WallLoad::weight)
+          .only("drive = pressure or force", pushed),
+      bound<Vec3, WallLoad>(
+          "tangential_velocity", "m/s", any,
+          "Velocity along its face, whatever it costs: shear under a load.",
+          [](WallLoad& load, const Vec3& velocity) { load.velocity = velocity; },
+          [](const WallLoad& load) { return Held<Vec3>::out(load.velocity); })
+          .only("drive = pressure or force", pushed),
   };
 }
 
@@ -103,7 +116,16 @@ Section<Wall> wall_keys() {
   auto material = bound<std::string, Wall>(
       "material", "", any, "Name of its material.", [](Wall&, const std::string&) {},
       [](const Wall&) -> Value { return {}; });
-  std::vector<Key<Wall>> all = {std::move(name).need(), std::move(material).or_else("the first")};
+  std::vector<Key<Wall>> all = {
+      std::move(name).need(),
+      std::move(material).or_else("the first"),
+      name_key<Wall>("group", "Name of the [[group]] that it moves and reports with.", &Wall::group)
+          .or_else("none"),
+      from_stage_key<Wall>("Stage with whose beginning the wall appears."),
+      until_stage_key<Wall>("Stage with whose beginning the wall vanishes, as the gate of a dam."),
+      torque_point_key<Wall>(
+          "a point of the axis of its first motion that turns, else that of its group, else "
+          "the point of a plane, and the middle of the box around a surface")};
   for (std::vector<Key<Wall>>* some : {&shapes, &keys})
     for (Key<Wall>& one : *some) all.push_back(std::move(one));
   return {"[[wall]]", "A wall. Its load holds from the beginning, until a stage changes it.", std::move(all)};

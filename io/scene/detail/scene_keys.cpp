@@ -95,6 +95,21 @@ std::vector<Key<OutputSpec>> sink_keys() {
   return keys;
 }
 
+std::vector<Key<FrameFormat>> format_keys() {
+  return {choice<FrameFormat>("precision", {"double", "single"},
+                              "Of the reals of grains and contacts in results.h5. A state that another run "
+                              "begins from is best kept in double.",
+                              &FrameFormat::precision),
+          key<FrameFormat>("compression", "", Range{.low = 0, .high = 9},
+                           "How hard results.h5 is compressed (HDF5's shuffle and deflate); 0: not at all.",
+                           &FrameFormat::compression),
+          key<FrameFormat>("velocities", "", any, "false: results.h5 has no u and no omega.",
+                           &FrameFormat::velocities),
+          key<FrameFormat>("contact_geometry", "", any,
+                           "false: of contacts, results.h5 has bodies and force alone.",
+                           &FrameFormat::contact_geometry)};
+}
+
 Section<OutputSpec> output_keys() {
   std::vector<Key<OutputSpec>> keys = {
       key<OutputSpec>("directory", "", any, "Where results go, unless the command line says otherwise.",
@@ -106,7 +121,15 @@ Section<OutputSpec> output_keys() {
                       "A frame at the beginning and at the end of each stage, and where the run is stopped.",
                       &OutputSpec::stage_frames),
       key<OutputSpec>("contacts", "", any, "Write the contacts and their forces with each frame.",
-                      &OutputSpec::contacts)};
+                      &OutputSpec::contacts),
+      key<OutputSpec>("contacts_every", "", countable,
+                      "Contacts in each of so many frames only, from the first on.",
+                      &OutputSpec::contacts_every)
+          .only("contacts", [](const OutputSpec& o) { return o.contacts; }),
+      key<OutputSpec>("tables_every", "", countable,
+                      "Steps from line to line of the tables; steps.csv has all of them.",
+                      &OutputSpec::tables_every)};
+  for (auto& format_key : within(format_keys(), &OutputSpec::format)) keys.push_back(std::move(format_key));
   for (auto& sink_key : sink_keys()) keys.push_back(std::move(sink_key));
   return {"[output]", "What is written, and when. Frames come at the first of `every` and `every_steps`.",
           std::move(keys)};
@@ -131,10 +154,11 @@ Section<CheckpointSpec> checkpoint_keys() {
 
 const SceneKeys& scene_keys() {
   static const SceneKeys keys = {
-      top_keys(),           material_keys(),   named_material_keys(), pair_keys(),      sample_keys(),
-      region_keys(),        insert_keys(),     remove_keys(),         wall_keys(),      stage_keys(),
-      stage_end_keys(),     stage_load_keys(), stage_pair_keys(),     detection_keys(), solver_keys(),
-      decomposition_keys(), output_keys(),     checkpoint_keys()};
+      top_keys(),         material_keys(),   named_material_keys(), pair_keys(),         sample_keys(),
+      region_keys(),      insert_keys(),     remove_keys(),         wall_keys(),         wall_motion_keys(),
+      group_keys(),       group_motion_keys(), stage_keys(),        stage_end_keys(),    stage_load_keys(),
+      stage_pair_keys(),  detection_keys(),  solver_keys(),         decomposition_keys(), output_keys(),
+      checkpoint_keys()};
   return keys;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "io/scene/detail/loading_keys.hpp"
+#include "io/scene/detail/motion_keys.hpp"
 #include "io/scene/detail/scene_key.hpp"
 #include "io/scene/scene.hpp"
 
@@ -16,6 +17,9 @@ struct SceneKeys {
   Section<InsertRule> insert;
   Section<RemoveRule> remove;
   Section<Wall> wall;
+  Section<MotionPart> wall_motion;
+  Section<WallGroup> group;
+  Section<MotionPart> group_motion;
   Section<Stage> stage;
   Section<StageEnd> stage_end;
   Section<NamedLoad> stage_load;
@@ -32,6 +36,7 @@ template <class Keys, class F>
 void for_each_section(Keys&& keys, F&& f) {
   f(keys.top), f(keys.material), f(keys.named_material), f(keys.pair), f(keys.sample);
   f(keys.region), f(keys.insert), f(keys.remove), f(keys.wall);
+  f(keys.wall_motion), f(keys.group), f(keys.group_motion);
   f(keys.stage), f(keys.stage_end), f(keys.stage_load), f(keys.stage_pair);
   f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output), f(keys.checkpoint);
 }

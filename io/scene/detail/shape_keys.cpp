@@ -81,7 +81,8 @@ std::vector<Key<Wall>> shape_keys() {
         if (name != "plane") wall.normal.setZero();
       },
       [](const Wall& wall) -> Value { return wall.shape.name; });
-  shape.meaning = "What the wall looks like. " + sentences + ". Walls that are no planes do not move.";
+  shape.meaning =
+      "What the wall looks like. " + sentences + ". Walls that are no planes are moved by `motion` alone.";
   shape.choices = names;
   std::vector<Key<Wall>> keys = {std::move(shape)};
   for (const ShapeEntry* entry : wall_shapes())

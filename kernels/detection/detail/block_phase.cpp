@@ -58,7 +58,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   Meeting meeting{touch_wall(poses, wall, pair.body, pair.feature), {}, {}, {}, pair.body, -1 - pair.feature};
   const Touch& touch = meeting.touch;
   meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[at(pair.body)]);
-  meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity;
+  meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity_at(touch.point);
   meeting.fall = in.time_step * in.gravity - wall.gain;
   // The wall in place of a body as large as the ball, whose surface it is.
   const double way = in.time_step * touch.normal.dot(meeting.v);
@@ -69,13 +69,12 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
 /// Whether a surface has, for this ball and in this step, the feature that the candidate is of: near an edge
 /// another one counts (kernels/shapes/surface.hpp).
 bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
-  const Surface* surface = in.walls[at(pair.wall)].surface();
-  if (surface == nullptr) return true;
+  const Wall& wall = in.walls[at(pair.wall)];
+  if (wall.surface() == nullptr) return true;
   const auto balls = static_cast<std::int32_t>(in.clumps.balls(at(pair.body)));
   std::vector<SurfacePoint> points;
-  surface->collide(meeting.touch.ball.centre,
-                   meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(),
-                   points);
+  collide(wall, meeting.touch.ball.centre,
+          meeting.touch.ball.radius + in.alert + in.time_step * (meeting.v + meeting.fall).norm(), points);
   return std::ranges::find(points, pair.feature / balls, &SurfacePoint::feature) != points.end();
 }
 
@@ -122,7 +121,11 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     const GapResult<double> found =
         solve_gap(rule, meeting.touch.gap, v_n, v_n + meeting.touch.normal.dot(meeting.fall),
                   law_at(in.laws, candidates, materials, k).restitution);
-    if (!found.absent) write(meeting, found.bias, k, place++, contacts);
+    if (found.absent) continue;
+    if (wall && !contacts.vx.empty())
+      set_drift(contacts, place,
+                in.walls[at(chunks.wall[chunk])].drift_at(meeting.touch.point, meeting.touch.normal));
+    write(meeting, found.bias, k, place++, contacts);
   }
   contacts.passed[chunk] = through;
   close_groups(chunks, chunk, place, contacts);

@@ -41,6 +41,9 @@ class Revolution final : public Surface {
     return box;
   }
 
+  bool turns_in_itself(const Vec3& axis, const Vec3& point) const override {
+    return on_axis(axis, point, axis_, given_.end[0]);
+  }
   SurfacePoint at(const Vec3& centre, std::int32_t feature) const override {
     return given_.shell ? on_shell(centre, feature) : on_solid(centre);
   }

@@ -32,6 +32,7 @@ template <class Mu>
 struct ErrorRule {
   Mu friction;
   const WholeView& whole;
+  const ContactView& contacts;
 };
 
 /// As many lanes as are meant.
@@ -74,12 +75,12 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
   return total;
 }
 
-/// Adds up the error of up to W contacts, whose bodies are a, b.
+/// Adds up the error of up to W contacts from `at` on, whose bodies are a, b.
 template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grains>
-[[gnu::always_inline]] inline void error_block(const Slice<double>& c, Only only, const Grains& a,
-                                               const Grains& b, const Rule& rule,
-                                               ErrorLanes<Lanes<W>>& sums) {
+[[gnu::always_inline]] inline void error_block(std::size_t at, Only only, const Grains& a, const Grains& b,
+                                               const Rule& rule, ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
+  const Slice<double> c = slice(rule.contacts, at);
   const WholeView& of = rule.whole;
   const Space<V> n = load_normal<V>(c, 0, only);
   Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
@@ -88,7 +89,9 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
     if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second, lanes_of<W>(only), of.parts);
   }
   if constexpr (AtWall) {
-    m.du = m.du - Space<V>{V{} + of.wall[0], V{} + of.wall[1], V{} + of.wall[2]};
+    Space<V> wall{V{} + of.wall[0], V{} + of.wall[1], V{} + of.wall[2]};
+    add_drift<V>(rule.contacts, at, only, wall);
+    m.du = m.du - wall;
     m.w_nn = m.w_nn + of.wall_inv_mass;
     sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(c, 0, only, n);
   }
@@ -107,7 +110,7 @@ template <bool Friction, bool AtWall, int W, class Mu>
 [[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
                                                    const WholeView& whole) {
   const ContactView c = view;
-  const ErrorRule<Mu> rule{Mu{mu}, whole};
+  const ErrorRule<Mu> rule{Mu{mu}, whole, c};
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
   // At a wall nothing is read of b.
@@ -116,14 +119,13 @@ template <bool Friction, bool AtWall, int W, class Mu>
   };
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (8 / W)) {
     if (!AtWall && (k - c.begin) % group_size == 0) prefetch_group(c, k, bodies);
-    error_block<Friction, AtWall, W>(slice(c, k), AllLanes{}, first_of(c, k, bodies), second(k), rule,
-                                     sums[lanes]);
+    error_block<Friction, AtWall, W>(k, AllLanes{}, first_of(c, k, bodies), second(k), rule, sums[lanes]);
   }
   if (const std::size_t rest = c.end - k; rest > 0) {
     // A lane without a contact sees no motion, and so no error.
     SpareGrains<Lanes<W>> spare(AtWall ? whole.wall : nullptr);
     const FewRecords<const double, W> a(first_of(c, k, bodies), rest, spare), b(second(k), rest, spare);
-    error_block<Friction, AtWall, W>(slice(c, k), FirstLanes{rest}, a, b, rule, sums[lanes]);
+    error_block<Friction, AtWall, W>(k, FirstLanes{rest}, a, b, rule, sums[lanes]);
   }
   return add_lanes<W>(sums);
 }

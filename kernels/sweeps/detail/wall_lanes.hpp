@@ -47,12 +47,24 @@ struct SplitWall {
   }
 };
 
-/// The copies of a wall that a block of contacts meets.
+/// The copies of a wall that a block of contacts meets, and where that block begins.
 template <class V>
 struct WallPart {
   SplitWall<V>& wall;
   std::size_t part;
+  const ContactViewOf<NumberOf<V>>& contacts;
+  std::size_t k;
 };
+
+/// What the material of a wall has beyond the velocity of the wall, in the lanes of contacts from `k` on;
+/// nothing where no wall has any.
+template <class V, class Only>
+[[gnu::always_inline]] inline void add_drift(const ContactViewOf<NumberOf<V>>& c, std::size_t k, Only only,
+                                             Space<V>& velocity) {
+  if (c.vx)
+    velocity = velocity +
+               Space<V>{load<V>(c.vx + k, 0, only), load<V>(c.vy + k, 0, only), load<V>(c.vz + k, 0, only)};
+}
 
 /// A block of W grains against as many copies of a wall.
 template <bool Friction, class V, class Grains, class Rule, class Only>
@@ -60,7 +72,9 @@ template <bool Friction, class V, class Grains, class Rule, class Only>
                                                     const Target<NumberOf<V>>& out, const Grains& a,
                                                     const Rule& rule, Only only, WallPart<V> at) {
   Meeting<V> m = gather<Friction, false>(a, a, V{});
-  m.du = m.du - (at.wall.velocity + at.wall.gained[at.part]);
+  Space<V> wall = at.wall.velocity + at.wall.gained[at.part];
+  add_drift<V>(at.contacts, at.k, only, wall);
+  m.du = m.du - wall;
   Approach<V> contact = approach_of<Friction>(c, 0, only, m);
   contact.w_nn = contact.w_nn + at.wall.inv_mass;
   const Space<V> dr = renew_impulse<Friction>(c, out, 0, only, contact, rule);
@@ -80,12 +94,12 @@ template <bool Friction, class V, class Rule, class Number>
   std::size_t k = c.begin, part = 0;
   for (; k + W <= c.end; k += W, part = (part + 1) % (wall_lanes / W))
     sweep_wall_block<Friction, V>(slice(c, k), target(r, k), first_of(c, k, bodies), rule.from(k), AllLanes{},
-                                  {split, part});
+                                  {split, part, c, k});
   if (k < c.end) {
     SpareGrains<V> spare;
     const FewRecords<Number, W> a(first_of(c, k, bodies), c.end - k, spare);
     sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, rule.from(k), FirstLanes{c.end - k},
-                                  {split, part});
+                                  {split, part, c, k});
   }
   split.glue(wall);
 }

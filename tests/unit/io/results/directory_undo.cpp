@@ -82,7 +82,7 @@ TEST(DirectoryUndo, IsTakenBackByAWriterThatGoesOn) {
   damage.write("\0\0\0\0\0\0\0\0", 8);
   damage.close();
   std::ofstream(undo, std::ios::binary) << kept;
-  io::ResultsWriter again(path, {"floor"}, graph::one_rank(), io::shared_writing(), 4);
+  io::ResultsWriter again(path, {"floor"}, graph::one_rank(), {}, 4);
   again.append(frame_of(17));
   ASSERT_EQ(io::frame_count(path), 5U);
   EXPECT_EQ(io::read_frame(path, 3).step, 3);

@@ -181,7 +181,9 @@ TEST(Csv, HeadersAreThosePromised) {
             "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,jump,"
             "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
             "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged\n");
-  EXPECT_EQ(walls_csv_header(), "step,time,wall,position,velocity,force_x,force_y,force_z\n");
+  EXPECT_EQ(walls_csv_header(),
+            "step,time,wall,position,velocity,force_x,force_y,force_z,torque_x,torque_y,"
+            "torque_z,work\n");
   EXPECT_EQ(triaxial_csv_header(),
             "step,time,stage,strain_x,strain_y,strain_z,strain_volume,strain_shear,solid_fraction,stress_x,"
             "stress_y,"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <map>
@@ -14,6 +15,7 @@
 #include "io/pictures/picture.hpp"
 #include "io/results/results.hpp"
 #include "io/results/vtk.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
 namespace talus::io {
@@ -50,6 +52,69 @@ void expect_same(const Frame& a, const Frame& b) {
     EXPECT_EQ(a.walls[k].velocity, b.walls[k].velocity);
     EXPECT_EQ(a.walls[k].force, b.walls[k].force);
   }
+}
+
+/// Grains and contacts enough for several chunks.
+Frame many_grains() {
+  Frame frame = three_grains();
+  const std::size_t n = 40000;
+  frame.omega.clear();
+  frame.orientation.clear();
+  frame.material.clear();
+  frame.id.resize(n);
+  frame.x.resize(n);
+  frame.radius.assign(n, 0.01);
+  frame.u.resize(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double t = 0.1 * static_cast<double>(k);
+    frame.id[k] = static_cast<std::int64_t>(k);
+    frame.x[k] = {std::sin(t), std::cos(t), t};
+    frame.u[k] = {t, 1 / (1 + t), -t};
+  }
+  return frame;
+}
+
+TEST(Results, CompressedReadBackBitForBit) {
+  const ScratchDirectory scratch;
+  const Frame frame = many_grains();
+  ResultsWriter plain(scratch / "plain.h5", {"bottom", "left"});
+  ResultsWriter small(scratch / "small.h5", {"bottom", "left"}, graph::one_rank(), {.compression = 3});
+  for (int k = 0; k < 2; ++k) {
+    plain.append(frame);
+    small.append(frame);
+    expect_same(read_frame(scratch / "small.h5", static_cast<std::size_t>(k)), frame);
+  }
+  EXPECT_LT(fs::file_size(scratch / "small.h5"), fs::file_size(scratch / "plain.h5") * 8 / 10);
+}
+
+TEST(Results, InSinglePrecisionAreTheNearestFloats) {
+  const ScratchDirectory scratch;
+  const Frame frame = many_grains();
+  for (const int compression : {0, 1}) {
+    ResultsWriter writer(scratch / "results.h5", {"bottom", "left"}, graph::one_rank(),
+                         {.precision = FrameFormat::Precision::single, .compression = compression});
+    writer.append(frame);
+    const Frame read = read_frame(scratch / "results.h5", 0);
+    EXPECT_EQ(read.id, frame.id);
+    ASSERT_EQ(read.x.size(), frame.x.size());
+    for (std::size_t k = 0; k < frame.x.size(); ++k)
+      for (int axis = 0; axis < 3; ++axis)
+        ASSERT_EQ(read.x[k][axis], static_cast<double>(static_cast<float>(frame.x[k][axis]))) << k;
+    EXPECT_EQ(read.walls[0].position, frame.walls[0].position) << "walls stay in full";
+    EXPECT_LT(fs::file_size(scratch / "results.h5"), 40000U * (8 + 4 * 7) + 60000U);
+  }
+}
+
+TEST(Results, WithoutVelocitiesOrGeometrySayWhatIsMissing) {
+  const ScratchDirectory scratch;
+  ResultsWriter(scratch / "still.h5", {"bottom", "left"}, graph::one_rank(), {.velocities = false})
+      .append(three_grains());
+  EXPECT_NE(message_of<FileError>([&] { read_frame(scratch / "still.h5", 0); }).find("bodies/u"),
+            std::string::npos);
+  ResultsWriter(scratch / "flat.h5", {"bottom", "left"}, graph::one_rank(), {.contact_geometry = false})
+      .append(three_grains());
+  EXPECT_NE(message_of<FileError>([&] { read_frame(scratch / "flat.h5", 0); }).find("contacts/point"),
+            std::string::npos);
 }
 
 TEST(Results, ReadBackBitForBit) {

@@ -86,8 +86,8 @@ TEST(WallShapes, ValuesThatMakeNoSurfaceAreRefusedByName) {
                  "wall 'w': axis must not be zero");
 }
 
-TEST(WallShapes, OnlyPlanesMove) {
-  const std::string said = "only planes can be driven or pushed; a wall with shape = \"disc\" is fixed";
+TEST(WallShapes, OnlyPlanesAreDrivenOrPushed) {
+  const std::string said = "only planes can be driven or pushed; a wall with shape = \"disc\" is moved by";
   expect_refused(scene_with_wall(disc + "\ndrive = \"velocity\"\nvelocity = [0, 0, 1]"), said);
   expect_refused(scene_with_wall(disc, "[[stage.load]]\nwall = \"w\"\ndrive = \"force\"\nforce = 1\n"), said);
 }

@@ -1,0 +1,149 @@
+/// Walls that move by themselves, on several ranks and stopped in motion: same bits as on one, straight on.
+
+#include "tests/mpi/launcher.hpp"
+#include "tests/unit/mesh_makers.hpp"
+#include "tests/unit/stl_text.hpp"
+
+namespace talus::test {
+namespace {
+
+/// Grains in a mesh that turns and shakes, with a rolling resistance, on a belt behind a gate that opens.
+const std::string moving_scene = R"(name = "moving"
+time_step = 1e-3
+gravity = [0, 0, -9.81]
+allow_unconverged = true
+[material]
+density = 2600
+friction = 0.3
+wall_friction = 0.5
+[sample]
+kind = "lattice"
+cells = [5, 5, 6]
+spacing = 1.02
+radius = 0.01
+[[group]]
+name = "hopper"
+[[group.motion]]
+kind = "rotation"
+axis = [0.1, 0, 1]
+point = [0.05, 0.05, 0]
+rate = 3.0
+from_stage = "turn"
+[[group.motion]]
+kind = "oscillation"
+direction = [1, 0, 1]
+amplitude = 1e-3
+frequency = 30
+[[wall]]
+name = "funnel"
+shape = "mesh"
+file = "funnel.stl"
+group = "hopper"
+[[wall]]
+name = "gate"
+shape = "disc"
+centre = [0.05, 0.05, -0.055]
+axis = [0, 0, 1]
+radius = 0.03
+until_stage = "turn"
+[[wall]]
+name = "drum"
+shape = "cylinder"
+start = [0.05, 0.05, -0.2]
+end = [0.05, 0.05, -0.06]
+radius = 0.06
+inside = true
+[[wall.motion]]
+kind = "rotation"
+axis = [0, 0, 1]
+point = [0.05, 0.05, 0]
+rate = -4
+[[wall]]
+name = "floor"
+side = "z-"
+position = -0.12
+[[wall.motion]]
+kind = "table"
+file = "way.csv"
+[[wall.motion]]
+kind = "velocity"
+velocity = [0.1, 0.05, 0]
+surface_only = true
+[[wall]]
+name = "lid"
+side = "z+"
+position = 0.2
+drive = "force"
+force = 0
+mass = 0.1
+weight = true
+tangential_velocity = [0.1, 0, 0]
+[[stage]]
+name = "settle"
+end = { steps = 60 }
+[[stage]]
+name = "turn"
+end = { steps = 100 }
+[solver]
+max_iterations = 60
+[decomposition]
+repartition_every = 7
+[output]
+every_steps = 80
+pictures = false
+)";
+
+class MotionsOnRanks : public OnRanks {
+ protected:
+  void SetUp() override {
+    std::vector<Triangle> triangles = funnel_mesh(0.03, 0.09, 0.06, 0.01, 16);
+    for (Triangle& triangle : triangles)
+      for (Vec3& p : triangle) p += Vec3(0.05, 0.05, -0.06);
+    write(at("funnel.stl"), stl_text(triangles));
+    write(at("way.csv"), "t,vx,vy,vz,angle\n0,0,0,0,0\n0.1,0,0,0.05,0.02\n0.2,0,0,0,0.04\n");
+    std::string scene = moving_scene;
+    const std::string turning = "file = \"way.csv\"";
+    scene.replace(scene.find(turning), turning.size(),
+                  turning + "\naxis = [0, 1, 0]\npoint = [0.05, 0.05, -0.12]");
+    write(at("scene.toml"), scene);
+  }
+};
+
+TEST_F(MotionsOnRanks, ChangeNoBitWithRanksAndThreads) {
+  for (const int subdomains : {1, 4}) {
+    const std::string command = fmt::format("run scene.toml --set decomposition.subdomains={}", subdomains);
+    const std::string one = fmt::format("one{}", subdomains);
+    const Outcome alone = run(1, fmt::format("{} --out {} --threads 1", command, one));
+    ASSERT_EQ(alone.code, 0) << alone.messages;
+    for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {3, 2}}) {
+      if (ranks > subdomains) continue;
+      const std::string out = fmt::format("s{}r{}x{}", subdomains, ranks, threads);
+      const Outcome other = run(ranks, fmt::format("{} --out {} --threads {}", command, out, threads));
+      ASSERT_EQ(other.code, 0) << out << ": " << other.messages;
+      EXPECT_EQ(digest_of(out), digest_of(one)) << out;
+      EXPECT_EQ(file(out, "walls.csv"), file(one, "walls.csv")) << out;
+    }
+  }
+}
+
+TEST_F(MotionsOnRanks, GoOnFromACheckpointInMotion) {
+  for (const char* keys :
+       {"", "--set time_step=auto --set stage.0.end.steps=40 --set stage.1.end.steps=60"}) {
+    const std::string command = fmt::format("run scene.toml {} --set decomposition.subdomains=2 ", keys);
+    const Outcome straight = run(1, command + "--force --out straight --threads 1");
+    ASSERT_EQ(straight.code, 0) << straight.messages;
+    std::filesystem::remove_all(at("parts"));
+    for (const int stop : {13, 60, 77}) {
+      const Outcome part =
+          run(stop == 60 ? 2 : 1, fmt::format("{} --resume --out parts --steps {}", command, stop));
+      ASSERT_EQ(part.code, 0) << part.messages;
+    }
+    const Outcome rest = run(2, command + "--resume --out parts --threads 1");
+    ASSERT_EQ(rest.code, 0) << rest.messages;
+    EXPECT_EQ(digest_of("parts"), digest_of("straight")) << keys;
+    EXPECT_EQ(file("parts", "walls.csv"), file("straight", "walls.csv")) << keys;
+  }
+}
+
+}  // namespace
+}  // namespace talus::test
