@@ -35,6 +35,7 @@ struct InsertRule {
   std::optional<double> mass;            ///< no more than so much in all [kg]
   std::optional<double> rate;            ///< grains a second
   std::optional<double> mass_rate;       ///< [kg/s]
+  bool track = false;                    ///< the paths of its grains are told step by step
   int attempts = 200;                    ///< places that are tried for a grain at an occasion, >= 1
   RuleTimes times;
 };

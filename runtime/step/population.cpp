@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "runtime/step/places.hpp"
@@ -18,6 +19,11 @@ constexpr double rounding = 1e-9;
 /// Streams of insertions lie behind those of samples.
 constexpr std::uint32_t first_stream = 0x8000;
 constexpr std::int64_t all_at_once = std::int64_t{1} << 40, fewest_at_once = 16;
+
+/// On the clock of a rule.
+double rule_time(const RuleTimes& times, const StepSpan& step, double time) {
+  return times.stage.empty() ? time : time - step.stage_began;
+}
 
 /// A body that goes.
 struct Leaving {
@@ -66,6 +72,7 @@ void Population::go_on_from(const PopulationState& state) {
       state.placed_mass.size() != i || state.no_room.size() != i || state.rounds.size() != i ||
       state.window.size() != i || state.waiting_count.size() != i || state.waiting.size() != waiting ||
       state.last.size() != i + r || state.passed.size() != r ||
+      state.tracked_rule.size() != state.tracked_id.size() ||
       state.removed.size() != r * materials_of(setup_) ||
       state.removed_mass.size() != r * materials_of(setup_))
     throw std::invalid_argument("the checkpoint has other insertions and removals than the scene");
@@ -88,15 +95,11 @@ PopulationState Population::state() const {
   return state;
 }
 
-/// On the clock of a rule.
-double Population::rule_time(const RuleTimes& times, double time) const {
-  return times.stage.empty() ? time : time - now_.stage_began;
-}
-
 bool Population::acts(const RuleTimes& times, const StepSpan& step) const {
   if (!times.stage.empty() && times.stage != step.stage->name) return false;
   const double tiny = rounding * (step.end - step.begin);
-  return rule_time(times, step.end) > times.from + tiny && rule_time(times, step.begin) < times.until - tiny;
+  return rule_time(times, step, step.end) > times.from + tiny &&
+         rule_time(times, step, step.begin) < times.until - tiny;
 }
 
 bool Population::is_occasion(const RuleTimes& times, std::size_t rule, const StepSpan& step) {
@@ -117,7 +120,7 @@ double Population::mass_of_grain(std::size_t rule, std::int64_t number) const {
 /// Grains that are due by the end of the step begin to wait.
 void Population::draw_due(std::size_t i, const StepSpan& step) {
   const InsertRule& rule = setup_.inserts[i];
-  const double time = std::min(rule_time(rule.times, step.end), rule.times.until) - rule.times.from;
+  const double time = std::min(rule_time(rule.times, step, step.end), rule.times.until) - rule.times.from;
   const auto within = [](double amount, double limit) { return amount <= limit * (1 + rounding); };
   for (;;) {
     const auto next = static_cast<double>(now_.drawn[i] + 1);
@@ -139,6 +142,10 @@ NewGrain Population::made(std::size_t i, std::int64_t number, const Vec3& x) {
   for (Eigen::Index k = 0; k < 3; ++k) {
     grain.velocity[static_cast<std::size_t>(k)] = rule.velocity[k];
     grain.velocity[static_cast<std::size_t>(k + 3)] = spin[k];
+  }
+  if (rule.track) {
+    now_.tracked_rule.push_back(static_cast<std::int64_t>(i));
+    now_.tracked_id.push_back(static_cast<std::int64_t>(grain.grain.id));
   }
   ++now_.placed[i];
   now_.placed_mass[i] += mass_of_grain(i, number);
@@ -185,7 +192,7 @@ std::vector<std::int64_t> Population::leave(const StepSpan& step, const StepStat
   std::vector<std::size_t> acting;
   for (std::size_t r = 0; r < setup_.removes.size(); ++r) {
     const RemoveRule& rule = setup_.removes[r];
-    const double tiny = rounding * (step.end - step.begin), time = rule_time(rule.times, step.end);
+    const double tiny = rounding * (step.end - step.begin), time = rule_time(rule.times, step, step.end);
     bool due = rule.at.empty();
     if (acts(rule.times, step))
       for (auto& passed = now_.passed[r]; passed < static_cast<std::int64_t>(rule.at.size()) &&
@@ -247,7 +254,7 @@ bool Population::expects_grains(const StepSpan& step) const {
   for (std::size_t i = 0; i < setup_.inserts.size(); ++i) {
     const InsertRule& rule = setup_.inserts[i];
     if (!rule.times.stage.empty() && rule.times.stage != step.stage->name) continue;
-    if (rule_time(rule.times, step.end) >= rule.times.until) continue;
+    if (rule_time(rule.times, step, step.end) >= rule.times.until) continue;
     if (!waiting_[i].empty()) return true;
     const bool all_drawn =
         (rule.count && now_.drawn[i] >= *rule.count) ||
@@ -262,6 +269,19 @@ double Population::fastest(const StepSpan& step) const {
   for (const InsertRule& rule : setup_.inserts)
     if (acts(rule.times, step)) speed = std::max(speed, rule.velocity.norm());
   return speed;
+}
+
+std::vector<NamedBody> Population::tracked() const {
+  std::vector<NamedBody> bodies;
+  std::vector<std::int64_t> before(setup_.inserts.size(), 0);
+  for (std::size_t k = 0; k < now_.tracked_id.size(); ++k) {
+    const auto i = static_cast<std::size_t>(now_.tracked_rule[k]);
+    const InsertRule& rule = setup_.inserts[i];
+    ++before[i];
+    bodies.push_back({rule.count == 1 ? rule.name : rule.name + "-" + std::to_string(before[i]),
+                      BodyId{now_.tracked_id[k]}});
+  }
+  return bodies;
 }
 
 std::vector<InsertReport> Population::inserted() const {

@@ -29,7 +29,6 @@ namespace talus {
 struct PopulationState {
   std::int64_t next_id = 0;
   std::int64_t unsorted = 0;                ///< grains that stand out of Morton order, one subdomain
-  double stage_began = 0;                   ///< [s]
   std::vector<std::int64_t> drawn;          ///< i: grains that were ever due
   std::vector<double> drawn_mass;           ///< i [kg]
   std::vector<std::int64_t> placed;         ///< i
@@ -43,6 +42,8 @@ struct PopulationState {
   std::vector<std::int64_t> passed;         ///< r: times of RemoveRule::at that are over
   std::vector<std::int64_t> removed;        ///< r x m
   std::vector<double> removed_mass;         ///< r x m [kg]
+  std::vector<std::int64_t> tracked_rule;   ///< of each grain whose path is told: its insertion
+  std::vector<std::int64_t> tracked_id;     ///< likewise
 
   /// visit(name, member) for each member.
   template <class Visit>
@@ -59,7 +60,6 @@ struct PopulationState {
   static void visit_all(Self& self, const Visit& visit) {
     visit("population_next_id", self.next_id);
     visit("population_unsorted", self.unsorted);
-    visit("population_stage_began", self.stage_began);
     visit("population_drawn", self.drawn);
     visit("population_drawn_mass", self.drawn_mass);
     visit("population_placed", self.placed);
@@ -73,6 +73,8 @@ struct PopulationState {
     visit("population_passed", self.passed);
     visit("population_removed", self.removed);
     visit("population_removed_mass", self.removed_mass);
+    visit("population_tracked_rule", self.tracked_rule);
+    visit("population_tracked_id", self.tracked_id);
   }
 };
 
@@ -80,6 +82,7 @@ struct PopulationState {
 struct StepSpan {
   double begin = 0, end = 0;  ///< [s]
   const Stage* stage = nullptr;
+  double stage_began = 0;  ///< [s]
 };
 
 class Population {
@@ -91,9 +94,6 @@ class Population {
   void go_on_from(const PopulationState& state);
 
   bool has_rules() const { return !setup_.inserts.empty() || !setup_.removes.empty(); }
-  /// A stage has begun [s].
-  void begin_stage(double time) { now_.stage_began = time; }
-
   /// Removes and inserts what the step begins with. True when bodies came or went: candidates are then to be
   /// found anew. Collective.
   bool change(const StepSpan& step, StepState& state, const graph::Communicator& ranks);
@@ -103,6 +103,8 @@ class Population {
   /// The fastest that a grain may come in the step [m/s].
   double fastest(const StepSpan& step) const;
 
+  /// Bodies that came from an insertion that is tracked, named after it: NAME, or NAME-1, NAME-2, ...
+  std::vector<NamedBody> tracked() const;
   std::vector<InsertReport> inserted() const;
   std::vector<RemoveReport> removed() const;
   PopulationState state() const;
@@ -110,7 +112,6 @@ class Population {
  private:
   bool acts(const RuleTimes& times, const StepSpan& step) const;
   bool is_occasion(const RuleTimes& times, std::size_t rule, const StepSpan& step);
-  double rule_time(const RuleTimes& times, double time) const;
   double mass_of_grain(std::size_t rule, std::int64_t number) const;
   double radius_of_grain(std::size_t rule, std::int64_t number) const;
   std::vector<std::int64_t> leave(const StepSpan& step, const StepState& state,

@@ -60,7 +60,8 @@ const StepReport& Simulation::step() {
   impl_->choose_time_step();
   impl_->change_grains();
   impl_->load_walls();
-  impl_->named.begin_step(impl_->setup.named, impl_->state, impl_->ranks);
+  const std::vector<NamedBody> named = impl_->named_now();
+  impl_->named.begin_step(named, impl_->state, impl_->ranks);
   const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
@@ -68,8 +69,7 @@ const StepReport& Simulation::step() {
   const DeepestOverlap overlap = find_deepest_overlap(impl_->state, outcome.sums.contacts.deepest,
                                                       impl_->setup.solver.overlap_tolerance, impl_->ranks);
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
-  impl_->named_reports =
-      impl_->named.end_step(impl_->setup.named, impl_->state, impl_->parameters, impl_->ranks);
+  impl_->named_reports = impl_->named.end_step(named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
   return impl_->report;
 }

@@ -62,6 +62,9 @@ Section<InsertRule> insert_keys() {
   keys.push_back(key<R>("velocity", "m/s", any, "Velocity with which grains come.", &R::velocity));
   keys.push_back(key<R>("angular_velocity", "rad/s", any, "Angular velocity with which grains come.",
                         &R::angular_velocity));
+  keys.push_back(key<R>("track", "", any,
+                        "true: write the paths of its grains, of which there are few, to bodies.csv.",
+                        &R::track));
   keys.push_back(key<R>("attempts", "", countable,
                         "Places that are tried for a grain in a step. One that finds no room waits, and is "
                         "tried again in the next step.",

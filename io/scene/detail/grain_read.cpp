@@ -52,6 +52,10 @@ void check_amount(const toml::table& table, const std::string& path, const Inser
     fail_at(*table.get("mass_rate"), path + ".mass_rate", "give rate or mass_rate, not both");
   if (!rule.count && !rule.mass && !rule.rate && !rule.mass_rate)
     fail_at(table, path, fmt::format("insert '{}' needs count, mass, rate or mass_rate", rule.name));
+  constexpr std::int64_t few = 100;
+  if (rule.track && rule.count.value_or(few + 1) > few)
+    fail_at(*table.get("track"), path + ".track",
+            fmt::format("writes every grain in every step: give a count of {} at most", few));
   for (const double radius : {smallest_radius(rule.radii), largest_radius(rule.radii)})
     if (const double mass = sphere_mass(radius, rule.density); !mass_is_sound(mass))
       fail_at(

@@ -20,10 +20,11 @@
 
 namespace talus {
 
-/// Of a run that begins: no grain that will come is smaller than it says, and there are materials where some
-/// may come with one.
+/// Of a run that begins: no grain that will come is smaller than it says, and there are materials and
+/// orientations where some may come with one.
 inline SampleSize first_size(const Setup& setup, SampleSize size) {
   size.smallest = smallest_ever(setup, size.bodies > 0 ? size.smallest : 0);
+  size.orientation = size.orientation || setup.orientation || !setup.clumps.empty();
   size.materials = size.materials || (!setup.inserts.empty() && !setup.material_names.empty());
   return size;
 }
@@ -193,7 +194,6 @@ struct Simulation::Implementation {
     }
     stage_steps = 0;
     held = 0;
-    population.begin_stage(report.time);
     lengths_at_start = Domain{}.lengths(state.walls);
   }
 
@@ -216,7 +216,16 @@ struct Simulation::Implementation {
   }
 
   /// The step that is about to be made.
-  StepSpan span() const { return {report.time, report.time + parameters.time_step, &stage()}; }
+  StepSpan span() const {
+    return {report.time, report.time + parameters.time_step, &stage(), stage_begins[stage_index]};
+  }
+
+  /// Bodies whose paths are told: of the setup, then those that came.
+  std::vector<NamedBody> named_now() const {
+    std::vector<NamedBody> bodies = setup.named;
+    for (NamedBody& body : population.tracked()) bodies.push_back(std::move(body));
+    return bodies;
+  }
 
   /// Grains that come and go with the step.
   void change_grains() {
@@ -239,7 +248,7 @@ struct Simulation::Implementation {
     }
     const StageEnd& end = stage().end;
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
-    const StepSpan last{report.time - report.time_step, report.time, &stage()};
+    const StepSpan last{report.time - report.time_step, report.time, &stage(), stage_begins[stage_index]};
     if (held > 0 && population.expects_grains(last)) held = 0;
   }
 

@@ -225,8 +225,9 @@ TEST(Population, TheSameBitsOnAnyThreads) {
 }
 
 TEST(Population, TheSameBitsOnAnyRanks) {
-  for (const int subdomains : {4}) {
-    const talus::Setup setup = busy_setup(subdomains, 110);
+  for (const bool orientation : {false, true}) {
+    talus::Setup setup = busy_setup(4, 110);
+    setup.orientation = orientation;
     const std::uint64_t one = run(setup);
     for (const int ranks : {2, 3, 4}) {
       std::uint64_t digest = 0;
