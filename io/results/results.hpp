@@ -36,9 +36,9 @@ void validate(const Frame& frame);
 struct FrameFormat {
   enum class Precision { full, single };
   Precision precision = Precision::full;  ///< of the reals of bodies and contacts
-  int compression = 0;                       ///< 0, or how hard shuffle and deflate try, 1 to 9
-  bool velocities = true;                    ///< u and omega of bodies
-  bool contact_geometry = true;              ///< point, normal and gap of contacts
+  int compression = 0;                    ///< 0, or how hard shuffle and deflate try, 1 to 9
+  bool velocities = true;                 ///< u and omega of bodies
+  bool contact_geometry = true;           ///< point, normal and gap of contacts
 };
 
 namespace detail {

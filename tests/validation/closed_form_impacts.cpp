@@ -108,8 +108,8 @@ TEST(BouncingBall, StopsAfterTheSumOfItsFlights) {
     const double stop = std::sqrt(2 * height / g_earth) * (1 + e) / (1 - e);
     for (double h : {1e-3, 2.5e-4}) {
       const Bounces found = bounce(height, e, h, 1.3 * stop);
-      // Impacts slower than 2 h g do not bounce any more: of the series, a few steps are missing. And the ball
-      // turns up to h v above the floor, which makes flights longer.
+      // Impacts slower than 2 h g do not bounce any more: of the series, a few steps are missing. And the
+      // ball turns up to h v above the floor, which makes flights longer.
       EXPECT_NEAR(found.stopped_at, stop, 15 * h / (1 - e)) << "e = " << e << ", h = " << h;
     }
   }

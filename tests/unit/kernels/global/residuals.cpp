@@ -53,7 +53,8 @@ TEST(Residuals, OfAGrainThatSlidesAreThoseOfCoulomb) {
   problem.impulse[0] = Vec3(0, 0, 0.01);
   const Residuals residuals = residuals_of_whole(problem);
   EXPECT_NEAR(residuals.scale, 3, 1e-12);
-  // r - rho (v + mu |v| n) goes along the edge of the polar cone: what is nearest to it lies on the cone's edge.
+  // r - rho (v + mu |v| n) goes along the edge of the polar cone: what is nearest to it lies on the cone's
+  // edge.
   EXPECT_NEAR(residuals.contact[0][0] * 3, 0.01 * 0.25 / std::sqrt(1 + 0.25 * 0.25), 1e-12);
   problem.impulse[0] = Vec3(-0.0025, 0, 0.01);
   EXPECT_LT(residuals_of_whole(problem).contact[0][0], 1e-15);
