@@ -95,7 +95,7 @@ def drum_scene(data, out):
     write_grains(out / "grains.csv", rows(data / "drum-spheres.csv"),
                  lambda s: "M2" if float(s["radius"]) > 0.0015 else "M1")
     return f"""name = "drum"
-time_step = 2e-4
+time_step = 1e-3
 gravity = [0, 0, -9.8]
 {MATERIALS}{pairs()}
 [sample]
@@ -112,8 +112,8 @@ rate = -2.0
 name = "shell"
 group = "drum"
 shape = "cylinder"
-start = [0, -0.031, 0]
-end = [0, 0.031, 0]
+start = [0, -0.03, 0]
+end = [0, 0.03, 0]
 radius = 0.1
 inside = true
 material = "steel"
@@ -135,9 +135,10 @@ end = {{ time = 5.0 }}
 [solver]
 tolerance = 1e-2
 balance_tolerance = 0.2
+overlap_tolerance = 0.3
 overlap_correction = 0.1
 [output]
-every = 0.1
+every = 0.05
 fields = false
 contacts = false
 pictures = false
