@@ -1,6 +1,7 @@
 #include "kernels/clusters/cluster_problem.hpp"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <map>
 #include <utility>
@@ -76,12 +77,11 @@ void write_body(std::vector<double>& to, std::int32_t cluster, const BodyUnknown
   write(to, body.free.w);
 }
 
-void write_contact(std::vector<double>& to, std::int32_t cluster, const ContactEquation& c, Place place,
-                   Place first, Place second, const Vec3& impulse) {
+/// `places`: of the contact, of its first and of its second body.
+void write_contact(std::vector<double>& to, std::int32_t cluster, const ContactEquation& c,
+                   const std::array<Place, 3>& places, const Vec3& impulse) {
   to.push_back(cluster);
-  write(to, place);
-  write(to, first);
-  write(to, second);
+  for (const Place& place : places) write(to, place);
   to.insert(to.end(), {c.mu, c.drive, static_cast<double>(c.wall), c.levers == nullptr ? 0.0 : 1.0});
   write(to, c.normal);
   write(to, c.offset);
@@ -167,8 +167,8 @@ std::vector<Pieces> pieces_of_spanning(const BodyParts& parts, const Clusters& c
       const std::int32_t number = spanning(c.first);
       if (number < 0) continue;
       const Place second = c.second < 0 ? Place{-1, -1} : places[p][at(c.second)];
-      write_contact(contacts[p], number, c, {parts[p].subdomain, static_cast<std::int32_t>(k)},
-                    places[p][at(c.first)], second, parts[p].impulse[k]);
+      const Place own{parts[p].subdomain, static_cast<std::int32_t>(k)};
+      write_contact(contacts[p], number, c, {own, places[p][at(c.first)], second}, parts[p].impulse[k]);
       contacts[p].resize((contacts[p].size() + contact_width - 1) / contact_width * contact_width, 0.0);
     }
   });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -57,15 +58,15 @@ std::vector<GrainPair> rivals(std::span<const Try> tries, std::span<const Seeker
 
 }  // namespace
 
-std::vector<FoundPlace> find_places(const Region& region, std::span<const Seeker> seekers,
-                                    const PlaceDraw& draw, const StepState& state, const Spheres& taken,
-                                    const graph::Communicator& ranks, std::int64_t& rounds) {
+FoundPlaces find_places(const Region& region, std::span<const Seeker> seekers, const PlaceDraw& draw,
+                        const StepState& state, const Spheres& taken, const graph::Communicator& ranks) {
   std::vector<FoundPlace> found;
   double largest = 0;
   for (const Seeker& seeker : seekers) largest = std::max(largest, seeker.radius);
   Spheres spheres = in_the_way(region, largest, state, taken);
   std::vector<char> has_place(seekers.size(), 0);
-  for (std::int64_t round = 0; round < draw.attempts && found.size() < seekers.size();) {
+  std::int64_t round = 0;
+  while (round < draw.attempts && found.size() < seekers.size()) {
     const std::int64_t together = std::clamp<std::int64_t>(
         static_cast<std::int64_t>(tries_at_once / (seekers.size() - found.size())), 1, draw.attempts - round);
     std::vector<Try> tries;
@@ -75,7 +76,6 @@ std::vector<FoundPlace> find_places(const Region& region, std::span<const Seeker
             place.found)
           tries.push_back({k, place.x});
     round += together;
-    rounds += together;
     const CellGrid grid = build_cells(spheres.x, spheres.radius);
     std::vector<double> blocked(tries.size(), 0);
     for (std::size_t t = 0; t < tries.size(); ++t) {
@@ -100,7 +100,7 @@ std::vector<FoundPlace> find_places(const Region& region, std::span<const Seeker
       spheres.radius.push_back(seekers[tries[t].seeker].radius);
     }
   }
-  return found;
+  return {std::move(found), round};
 }
 
 }  // namespace talus

@@ -21,6 +21,10 @@ struct FoundPlace {
   std::size_t seeker = 0;
   Vec3 x = Vec3::Zero();  ///< [m]
 };
+struct FoundPlaces {
+  std::vector<FoundPlace> places;  ///< in order of the attempts, at most one for a seeker
+  std::int64_t rounds = 0;         ///< attempts that were made
+};
 
 /// What places depend on besides who is there.
 struct PlaceDraw {
@@ -36,12 +40,10 @@ struct Spheres {
   std::vector<double> radius;
 };
 
-/// Collective, and the same on all ranks, however bodies are dealt to them: places in order of the attempts,
-/// at most one for a seeker. Each seeker tries one place after the other; of two that want the same room in
-/// the same attempt the one that stands first gets it. `taken`: grains that came already, known to all ranks.
-/// `rounds` counts the attempts that were made.
-std::vector<FoundPlace> find_places(const Region& region, std::span<const Seeker> seekers,
-                                    const PlaceDraw& draw, const StepState& state, const Spheres& taken,
-                                    const graph::Communicator& ranks, std::int64_t& rounds);
+/// Collective, and the same on all ranks, however bodies are dealt to them. Each seeker tries one place after
+/// the other; of two that want the same room in the same attempt the one that stands first gets it. `taken`:
+/// grains that came already, known to all ranks.
+FoundPlaces find_places(const Region& region, std::span<const Seeker> seekers, const PlaceDraw& draw,
+                        const StepState& state, const Spheres& taken, const graph::Communicator& ranks);
 
 }  // namespace talus

@@ -170,8 +170,8 @@ void Population::place_due(std::size_t i, const StepState& state, const graph::C
   }
   const PlaceDraw draw{setup_.seed, first_stream + static_cast<std::uint32_t>(i), now_.rounds[i],
                        rule.attempts};
-  const std::vector<FoundPlace> places =
-      find_places(rule.region, seekers, draw, state, taken, ranks, now_.rounds[i]);
+  const auto [places, rounds] = find_places(rule.region, seekers, draw, state, taken, ranks);
+  now_.rounds[i] += rounds;
   for (const FoundPlace& place : places) {
     grains.push_back(made(i, waiting[place.seeker], place.x));
     waiting[place.seeker] = -1;
