@@ -86,10 +86,10 @@ class Answers {
     });
   }
 
-  StepError error(double enough) const {
+  StepError error(double enough, double walls) const {
     StepError error;
     error.velocity = largest([&](std::size_t c) { return velocity_error(c); });
-    error.wall = wall_error();
+    error.wall = wall_error(walls);
     const double most = largest([&](std::size_t c) { return largest_impulse(c); });
     const auto contact = [&](std::size_t c) { return contact_error(c, most); };
     error.contact = largest(contact);
@@ -155,8 +155,8 @@ class Answers {
     const double interest = thresholds_.interest;
     return change / std::max({largest_impulse(c), interest * most, interest * scales_[c]});
   }
-  /// Impulses of walls and their changes, over the largest impulse of a wall: the largest.
-  double wall_error() const {
+  /// Changes of the impulses of walls over the largest impulse of a wall, at least `least`: the largest.
+  double wall_error(double least) const {
     const double walls = largest([&](std::size_t c) {
       double count = 0;
       for (const ContactEquation& k : clusters_[c].problem.contacts) count = std::max(count, k.wall + 1.0);
@@ -174,7 +174,7 @@ class Answers {
           Eigen::Map<Vec3>(&row[6 * at(wall) + 3]) += change;
         }
     });
-    double scale = 0, error = 0;
+    double scale = least, error = 0;
     for (std::size_t w = 0; w < n; ++w) {
       scale = larger(scale, Eigen::Map<const Vec3>(&sum[6 * w]).norm());
       error = larger(error, Eigen::Map<const Vec3>(&sum[6 * w + 3]).norm());
@@ -211,7 +211,7 @@ StepError step_error(std::span<const BodyProblem> problems, const PartLink& link
   for (const BodyProblem& problem : problems) graphs.push_back(graph_of(problem));
   Answers answers(parts, cluster_problems(parts, clusters_of(graphs, link)), thresholds);
   answers.solve(goal);
-  return answers.error(goal.enough);
+  return answers.error(goal.enough, goal.walls);
 }
 
 StepError step_error(const BodyProblem& problem, const ErrorGoal& goal,

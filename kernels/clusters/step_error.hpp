@@ -40,6 +40,8 @@ struct ErrorGoal {
   double enough = 0;  ///< relative error that is not told apart from less
   double still =
       0;  ///< [m/s]: velocities that rounding of positions makes in gaps; slower bodies are at rest
+  double walls =
+      0;  ///< [N s]: largest impulse of a wall, from all its contacts; more than from small clusters
 };
 
 /// The distance to an answer of every cluster (cluster_solver.hpp), all of which must be small. Without

@@ -229,7 +229,9 @@ SmallError GlobalSolver::small_error(double enough, double farthest) {
   const Whole span(*this);
   problems_ = checked(true);
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
-  StepError error = step_error(problems_, *link_, {enough, still});
+  double walls = 0;
+  for (const WallState& wall : state_.wall_states) walls = std::max(walls, wall.impulse.norm());
+  StepError error = step_error(problems_, *link_, {enough, still, walls});
   change_ = std::move(error.change);
   mends_ = error.mends;
   return {error.relative(), error.solved};

@@ -91,6 +91,16 @@ TEST(StepError, IsNoneWhereTheLawHoldsAndWhereThereIsNoContact) {
   EXPECT_LT(step_error(problem, {.enough = 1e-4}).relative(), 1e-9);
 }
 
+// A grain that hardly touches a wall on which a large bed stands: what is missing there is nothing to the
+// wall, and all of what the small clusters give it.
+TEST(StepError, OfAWallIsMeasuredByAllThatStandsOnIt) {
+  BodyProblem problem = wedge(0.5, 0);
+  const double whole = fall / (2 * std::sin(0.5));
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4}).wall, 1, 1e-3);
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4, .walls = 1000 * whole}).wall, 1e-3, 1e-5);
+  EXPECT_NEAR(step_error(problem, {.enough = 1e-4, .walls = 1000 * whole}).contact, 1, 1e-3);
+}
+
 /// Pressed apart by more than its weight asks for, a pair has to open: contacts that would pull are let go.
 TEST(StepError, SeesContactsThatHaveToOpen) {
   BodyProblem problem;
