@@ -75,7 +75,8 @@ struct KineticEnergy {
 };
 KineticEnergy kinetic_energy(std::span<const Velocity> velocity);
 
-/// Permutes every array: new slot k holds what stood in order[k]. `order` is a permutation of 0..n-1.
+/// Permutes every array: new slot k holds what stood in order[k]. `order` is a permutation of 0..n-1, or a
+/// part of one: bodies that it does not name are dropped.
 void reorder(Bodies& bodies, std::span<const Slot> order);
 
 /// Slots in Morton order of the centres: close in space, close in memory. Ties are broken by id.

@@ -7,7 +7,7 @@
 
 #include "kernels/clusters/contact_matrix.hpp"
 #include "kernels/delassus/delassus_auto.hpp"
-#include "kernels/global/stiffness.hpp"
+#include "kernels/global/natural_map.hpp"
 #include "kernels/law/friction_cone.hpp"
 
 namespace talus {
@@ -37,10 +37,8 @@ LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impuls
   for (std::size_t k = 0; k < impulse.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
     const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
-    const double m = effective_mass(problem, c);
-    const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
-    defect.residual2 +=
-        (impulse[k] - project_on_cone(impulse[k] - m * shifted, c.normal, c.mu)).squaredNorm() / m;
+    const NaturalMap map = natural_map_of(problem, c, impulse[k], v);
+    defect.residual2 += (impulse[k] - map.carried).squaredNorm() / map.m;
     defect.energy += c.offset.dot(impulse[k]);
   }
   return defect;

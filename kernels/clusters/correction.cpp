@@ -8,8 +8,8 @@
 
 #include "kernels/bodies/larger.hpp"
 #include "kernels/clusters/firm_contacts.hpp"
+#include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
-#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -60,10 +60,8 @@ double see_states(const BodyProblem& problem, std::span<const Twist> motion, Act
     const ContactEquation& c = problem.contacts[k];
     const Vec3 r = problem.impulse[k] + set.change[k];
     const Vec3 v = set.velocity[k] + constrained(c, relative_velocity(c, motion));
-    const double m = effective_mass(problem, c);
-    set.shift[k] = c.mu * tangential(c, v).norm();
-    const Vec3 aim = r - m * (v + set.shift[k] * c.normal);
-    const Vec3 carried = project_on_cone(aim, c.normal, c.mu);
+    const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
+    set.shift[k] = shift;
     wrong += (r - carried).norm();
     if (carried == Vec3::Zero()) {
       set.state[k] = ContactState::open;

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "kernels/global/body_solver.hpp"
+#include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
-#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -33,9 +33,8 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceTh
     if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
       wishes.pressed += std::abs(c.normal.dot(r));
     wishes.fastest = std::max(wishes.fastest, c.offset.norm());
-    const double m = effective_mass(problem, c);
-    const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
-    const Vec3 carried = project_on_cone(r - m * shifted, c.normal, c.mu);
+    const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
+    const Vec3 shifted = v + shift * c.normal;
     const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
     Vec3 change = y - c.mu * slip.norm() * c.normal - v;
     const double most = c.mu * c.normal.dot(carried);

@@ -7,8 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "kernels/global/stiffness.hpp"
-#include "kernels/law/friction_cone.hpp"
+#include "kernels/global/natural_map.hpp"
 
 namespace talus {
 
@@ -63,12 +62,10 @@ Residuals residuals_of(const BodyParts& parts) {
     for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
       const Vec3 v = approach(c, V[p]), &r = problem.impulse[k];
-      const double m = effective_mass(problem, c);
-      const Vec3 shifted = v + c.mu * tangential(c, v).norm() * c.normal;
-      const Vec3 asked = project_on_cone(r - m * shifted, c.normal, c.mu) - r;
-      add_force(c, asked, change[p]);
-      out.contact[p].push_back(asked.norm() / m);
-      row[impulse2] += r.squaredNorm() / (m * m);
+      const NaturalMap map = natural_map_of(problem, c, r, v);
+      add_force(c, map.carried - r, change[p]);
+      out.contact[p].push_back(map.residual(r));
+      row[impulse2] += r.squaredNorm() / (map.m * map.m);
       if (c.normal.dot(r) > 0 || c.normal.dot(v) < 0) row[velocity2] += v.squaredNorm();
       row[contacts] += 1;
     }

@@ -38,13 +38,7 @@ void rearrange(std::span<const Slot> order, StepState& state) {
   Bodies& bodies = state.bodies;
   std::vector<Slot> place(bodies.size(), -1);
   for (std::size_t k = 0; k < order.size(); ++k) place[at(order[k])] = static_cast<Slot>(k);
-  permute(bodies.id, order);
-  permute(bodies.x, order);
-  permute(bodies.radius, order);
-  permute(bodies.velocity, order);
-  permute(bodies.orientation, order);
-  permute(bodies.material, order);
-  permute(bodies.shape, order);
+  reorder(bodies, order);
   Decomposition& all = state.decomposition;
   permute(all.multiplicity, order);
   permute(all.parts, order);

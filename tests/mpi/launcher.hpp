@@ -4,8 +4,12 @@
 
 #include <fmt/format.h>
 
+#include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "io/results/results.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
 
@@ -18,18 +22,39 @@ inline std::string launcher(int ranks) {
          std::to_string(ranks);
 }
 
-class OnRanks : public testing::Test {
+class OnRanks : public CommandTest {
  protected:
   /// Without mpirun when `ranks` is 1.
   Outcome run(int ranks, const std::string& arguments, const std::string& environment = "") const {
     return test::run(folder_.path(), arguments,
                      environment + " " + (ranks > 1 ? launcher(ranks) : std::string()));
   }
+  /// Ranks and threads of each.
+  using Layouts = std::vector<std::pair<int, int>>;
+  /// Runs scene.toml in so many subdomains, alone as `one` and then on each layout that has no more ranks:
+  /// each ends well, with the digest and the walls.csv of the one alone. also(out): what else is compared.
+  void expect_same_bits(int subdomains, const Layouts& layouts, const std::string& one,
+                        const std::function<void(const std::string& out)>& also = {}) const {
+    const std::string command = fmt::format("run scene.toml --set decomposition.subdomains={}", subdomains);
+    const Outcome alone = run(1, fmt::format("{} --out {} --threads 1", command, one));
+    ASSERT_EQ(alone.code, 0) << alone.messages;
+    for (const auto& [ranks, threads] : layouts) {
+      if (ranks > subdomains) continue;
+      const std::string out = fmt::format("s{}r{}x{}", subdomains, ranks, threads);
+      const Outcome other = run(ranks, fmt::format("{} --out {} --threads {}", command, out, threads));
+      ASSERT_EQ(other.code, 0) << out << ": " << other.messages;
+      EXPECT_EQ(digest_of(out), digest_of(one)) << out;
+      EXPECT_EQ(file(out, "walls.csv"), file(one, "walls.csv")) << out;
+      if (also) also(out);
+    }
+  }
+  /// The last frame of results.h5.
+  Frame last_frame(const std::string& out) const {
+    const fs::path path = at(out) / "results.h5";
+    return io::read_frame(path, io::frame_count(path) - 1);
+  }
   std::string digest_of(const std::string& out) const { return summary(at(out)).at("digest"); }
   std::string file(const std::string& out, const std::string& name) const { return content(at(out) / name); }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
-
-  ScratchDirectory folder_;
 };
 
 /// 300 grains between a moving lid and five fixed walls, in six subdomains, dealt out anew every third step.

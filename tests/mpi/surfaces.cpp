@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "io/results/results.hpp"
 #include "tests/mpi/launcher.hpp"
 #include "tests/unit/mesh_makers.hpp"
 #include "tests/unit/stl_text.hpp"
@@ -59,35 +58,22 @@ pictures = false
 class SurfacesOnRanks : public OnRanks {
  protected:
   void SetUp() override {
-    std::vector<Triangle> triangles = funnel_mesh(0.03, 0.09, 0.06, 0.01, 16);
-    for (Triangle& triangle : triangles)
-      for (Vec3& p : triangle) p += Vec3(0.05, 0.05, -0.06);
     // Its grains stand above the funnel's mouth.
-    write(at("funnel.stl"), stl_text(triangles));
+    write(at("funnel.stl"),
+          stl_text(moved(funnel_mesh(0.03, 0.09, 0.06, 0.01, 16), Vec3(0.05, 0.05, -0.06))));
     write(at("scene.toml"), funnel_scene);
   }
 };
 
 TEST_F(SurfacesOnRanks, ChangeNoBitWithRanksAndThreads) {
-  for (const int subdomains : {2, 8}) {
-    const std::string command = fmt::format("run scene.toml --set decomposition.subdomains={}", subdomains);
-    const std::string one = fmt::format("one{}", subdomains);
-    const Outcome alone = run(1, fmt::format("{} --out {} --threads 1", command, one));
-    ASSERT_EQ(alone.code, 0) << alone.messages;
-    for (const auto& [ranks, threads] : {std::pair{1, 2}, {2, 1}, {2, 2}}) {
-      const std::string out = fmt::format("s{}r{}x{}", subdomains, ranks, threads);
-      const Outcome other = run(ranks, fmt::format("{} --out {} --threads {}", command, out, threads));
-      ASSERT_EQ(other.code, 0) << out << ": " << other.messages;
-      EXPECT_EQ(digest_of(out), digest_of(one)) << out;
-      EXPECT_EQ(file(out, "walls.csv"), file(one, "walls.csv")) << out;
-      const std::size_t last = io::frame_count(at(one) / "results.h5") - 1;
-      const Frame a = io::read_frame(at(one) / "results.h5", last),
-                  b = io::read_frame(at(out) / "results.h5", last);
-      EXPECT_EQ(a.contact_bodies, b.contact_bodies) << out;
-      EXPECT_EQ(a.contact_force, b.contact_force) << out;
-    }
-  }
-  const Frame end = io::read_frame(at("one8") / "results.h5", io::frame_count(at("one8") / "results.h5") - 1);
+  for (const int subdomains : {2, 8})
+    expect_same_bits(subdomains, {{1, 2}, {2, 1}, {2, 2}}, fmt::format("one{}", subdomains),
+                     [&](const std::string& out) {
+                       const Frame a = last_frame(fmt::format("one{}", subdomains)), b = last_frame(out);
+                       EXPECT_EQ(a.contact_bodies, b.contact_bodies) << out;
+                       EXPECT_EQ(a.contact_force, b.contact_force) << out;
+                     });
+  const Frame end = last_frame("one8");
   for (const std::int64_t w : {0, 2})
     EXPECT_TRUE(std::ranges::any_of(end.contact_bodies, [&](const auto& pair) { return pair[1] == -1 - w; }))
         << "grains touch wall " << w;

@@ -61,4 +61,11 @@ inline std::vector<Triangle> funnel_mesh(double bottom, double top, double heigh
   return triangles;
 }
 
+/// The same triangles elsewhere.
+inline std::vector<Triangle> moved(std::vector<Triangle> triangles, const Vec3& by) {
+  for (Triangle& triangle : triangles)
+    for (Vec3& p : triangle) p += by;
+  return triangles;
+}
+
 }  // namespace talus::test

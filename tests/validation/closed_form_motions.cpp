@@ -4,30 +4,16 @@
 
 #include <algorithm>
 
+#include "tests/unit/motion_makers.hpp"
 #include "tests/validation/experiment.hpp"
 
 namespace talus::validation::closed_form_motions_test {
 namespace {
 
+using test::oscillation;
+using test::rotation;
+
 constexpr double h = 1e-3;
-
-MotionPart rotation(const Vec3& axis, const Vec3& point, double rate) {
-  MotionPart part;
-  part.kind = MotionPart::Kind::rotation;
-  part.axis = axis.normalized();
-  part.point = point;
-  part.rate = rate;
-  return part;
-}
-
-MotionPart oscillation(const Vec3& direction, double amplitude, double frequency) {
-  MotionPart part;
-  part.kind = MotionPart::Kind::oscillation;
-  part.direction = direction.normalized();
-  part.amplitude = amplitude;
-  part.frequency = frequency;
-  return part;
-}
 
 MotionPart belt(const Vec3& velocity) {
   MotionPart part;

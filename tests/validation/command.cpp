@@ -15,20 +15,14 @@ namespace {
 
 using namespace test;
 
-class Command : public testing::Test {
+class Command : public CommandTest {
  protected:
-  Outcome run(const std::string& arguments, const std::string& before = "") {
-    return test::run(folder_.path(), arguments, before);
-  }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
   std::size_t entries() const {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), {}));
   }
   bool says(const Outcome& outcome, const std::string& words) const {
     return outcome.messages.find(words) != std::string::npos;
   }
-
-  ScratchDirectory folder_;
 };
 
 // ---- bad input: exit code 2, nothing written

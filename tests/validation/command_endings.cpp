@@ -18,13 +18,7 @@ using namespace test;
 
 const std::string scenes = TALUS_SOURCE_DIR "/apps/scenes/";
 
-class Ending : public testing::Test {
- protected:
-  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
-
-  ScratchDirectory folder_;
-};
+class Ending : public CommandTest {};
 
 TEST_F(Ending, WithMissedTolerancesIsThreeAndMarkedUnlessAllowed) {
   write(at("scene.toml"), column_scene);

@@ -18,6 +18,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/unit/io/results/output_helpers.hpp"
+
 namespace talus::test {
 
 namespace fs = std::filesystem;
@@ -98,6 +100,17 @@ inline Table read_table(const fs::path& path) {
 inline nlohmann::json summary(const fs::path& results) {
   return nlohmann::json::parse(content(results / "run.json")).at("summary");
 }
+
+/// A folder of its own for each test, and the command run in it.
+class CommandTest : public testing::Test {
+ protected:
+  Outcome run(const std::string& arguments, const std::string& before = "") const {
+    return test::run(folder_.path(), arguments, before);
+  }
+  fs::path at(const std::string& name) const { return folder_.path() / name; }
+
+  ScratchDirectory folder_;
+};
 
 /// A pressed box of grains with friction: walls of finite mass, contacts, two stages. Some 0.1 s a run.
 inline const std::string pressed_box = R"(name = "box"

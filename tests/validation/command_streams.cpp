@@ -14,7 +14,7 @@ namespace {
 
 using namespace test;
 
-class Streams : public testing::Test {
+class Streams : public CommandTest {
  protected:
   /// Exit code of a shell line in the folder of the test; "talus" in it is the command.
   int shell(const std::string& line) const {
@@ -23,9 +23,6 @@ class Streams : public testing::Test {
     const int status = std::system(("bash -c '" + escaped(whole) + "'").c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
-
-  ScratchDirectory folder_;
 
  private:
   static std::string escaped(const std::string& text) {

@@ -14,18 +14,14 @@ namespace {
 
 using namespace test;
 
-class Tolerances : public testing::Test {
+class Tolerances : public CommandTest {
  protected:
-  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
   double largest(const std::string& results, const std::string& column) const {
     const Table steps = read_table(at(results) / "steps.csv");
     double most = 0;
     for (std::size_t k = 0; k < steps.rows.size(); ++k) most = std::max(most, steps.number(k, column));
     return most;
   }
-
-  ScratchDirectory folder_;
 };
 
 // 400 grains at rest on the floor, and far from them a column of 210, ids 1000 to 1209, that stands on grain

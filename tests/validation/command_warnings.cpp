@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/unit/replaced.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus {
@@ -14,10 +15,8 @@ namespace {
 
 using namespace test;
 
-class Warnings : public testing::Test {
+class Warnings : public CommandTest {
  protected:
-  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
   /// All warnings of a dry run of the scene.
   std::string of(const std::string& scene) {
     write(at("scene.toml"), scene);
@@ -28,11 +27,6 @@ class Warnings : public testing::Test {
       if (line.find("warning") != std::string::npos) found += line + "\n";
     return found;
   }
-  static std::string replaced(std::string text, const std::string& what, const std::string& with) {
-    return text.replace(text.find(what), what.size(), with);
-  }
-
-  ScratchDirectory folder_;
 };
 
 TEST_F(Warnings, AreNoneWhereNothingIsOdd) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/unit/replaced.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::grains_command_test {
@@ -51,18 +52,12 @@ position = 0
 end = { steps = 200 }
 )";
 
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
-}
-
-class Grains : public testing::Test {
+class Grains : public CommandTest {
  protected:
   Outcome run(const std::string& scene, const std::string& more) {
     write(folder_.path() / "scene.toml", scene);
     return test::run(folder_.path(), "run scene.toml --threads 1 " + more);
   }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
-  ScratchDirectory folder_;
 };
 
 TEST_F(Grains, TablesCountWhatCameAndWent) {
@@ -91,7 +86,7 @@ TEST_F(Grains, ARunThatWasStoppedGoesOnToTheSameBitsAndTables) {
 }
 
 TEST_F(Grains, WithoutRoomTheRunGoesOnAndSaysSo) {
-  const Outcome outcome = run(with(rain, "count = 40", "count = 4000"), "--out out");
+  const Outcome outcome = run(replaced(rain, "count = 40", "count = 4000"), "--out out");
   EXPECT_EQ(outcome.code, 0) << outcome.messages;
   EXPECT_NE(outcome.messages.find("insert 'sand' had no room for a grain in 1"), std::string::npos)
       << outcome.messages;
@@ -101,8 +96,8 @@ TEST_F(Grains, WithoutRoomTheRunGoesOnAndSaysSo) {
 }
 
 TEST_F(Grains, ARegionBehindAWallIsWarnedOf) {
-  const Outcome outcome = run(with(rain, "low = [0.05, -0.04, 0], high = [0.1, 0.04, 0.05]",
-                                   "low = [0.05, -0.04, -0.1], high = [0.1, 0.04, 0]"),
+  const Outcome outcome = run(replaced(rain, "low = [0.05, -0.04, 0], high = [0.1, 0.04, 0.05]",
+                                       "low = [0.05, -0.04, -0.1], high = [0.1, 0.04, 0]"),
                               "--out out --dry-run");
   EXPECT_EQ(outcome.code, 0);
   EXPECT_NE(outcome.messages.find("insert 'sand' lies in or behind walls"), std::string::npos)
@@ -126,8 +121,9 @@ name = "z-"
 end = { steps = 1 }
 )";
   EXPECT_NE(run(deposition, "--out out --dry-run").messages.find("sorted by size"), std::string::npos);
-  EXPECT_EQ(run(with(deposition, "0.001", "0.004"), "--out out --dry-run").messages.find("sorted by size"),
-            std::string::npos);
+  EXPECT_EQ(
+      run(replaced(deposition, "0.001", "0.004"), "--out out --dry-run").messages.find("sorted by size"),
+      std::string::npos);
 }
 
 }  // namespace

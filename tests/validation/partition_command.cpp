@@ -20,12 +20,8 @@ std::vector<std::string> ways() {
   return names;
 }
 
-class PartitionCommand : public testing::Test {
+class PartitionCommand : public CommandTest {
  protected:
-  Outcome run(const std::string& arguments, const std::string& before = "") {
-    return test::run(folder_.path(), arguments, before);
-  }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
   std::vector<std::int32_t> field(const std::string& file, const std::string& name) const {
     return array_of<std::int32_t>(content(at(file)), name);
   }
@@ -45,8 +41,6 @@ class PartitionCommand : public testing::Test {
     }
     return numbers;
   }
-
-  ScratchDirectory folder_;
 };
 
 using Numbers = std::vector<std::int64_t>;

@@ -20,7 +20,7 @@ namespace {
 
 using namespace test;
 
-class Resume : public testing::Test {
+class Resume : public CommandTest {
  protected:
   void SetUp() override {
     write(at("scene.toml"), pressed_box);
@@ -28,10 +28,6 @@ class Resume : public testing::Test {
     endless.replace(endless.rfind("steps = 6"), 9, "steps = 1000000000");
     write(at("endless.toml"), endless);
   }
-  Outcome run(const std::string& arguments, const std::string& before = "") {
-    return test::run(folder_.path(), arguments, before);
-  }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
   std::size_t checkpoints(const std::string& directory) const {
     return io::checkpoints_in(at(directory)).size();
   }
@@ -57,8 +53,6 @@ class Resume : public testing::Test {
     }
     return status;
   }
-
-  ScratchDirectory folder_;
 };
 
 TEST_F(Resume, AfterSignalsThatAskForAnEnd) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/unit/replaced.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::several_samples_test {
@@ -47,18 +48,12 @@ side = "z-"
 end = { steps = 40 }
 )";
 
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
-}
-
-class SeveralSamples : public testing::Test {
+class SeveralSamples : public CommandTest {
  protected:
   Outcome run(const std::string& scene, const std::string& more = "--out out --force") {
     write(folder_.path() / "scene.toml", scene);
     return test::run(folder_.path(), "run scene.toml " + more);
   }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
-  ScratchDirectory folder_;
 };
 
 /// Nothing touches the ball: it falls as a body does, and feels no force.
@@ -77,8 +72,8 @@ TEST_F(SeveralSamples, ABodyWithANameLeavesItsPath) {
 
 /// On the floor it weighs what its material says.
 TEST_F(SeveralSamples, TheForceOnARestingBodyIsItsWeight) {
-  std::string scene = with(ball_over_bed, "position = [0, 0, 0.2]", "position = [0.1, 0, 0.01]");
-  scene = with(scene, "velocity = [0, 0, -1]", "velocity = [0, 0, 0]");
+  std::string scene = replaced(ball_over_bed, "position = [0, 0, 0.2]", "position = [0.1, 0, 0.01]");
+  scene = replaced(scene, "velocity = [0, 0, -1]", "velocity = [0, 0, 0]");
   ASSERT_EQ(run(scene).code, 0);
   const Table path = read_table(at("out/bodies.csv"));
   const double weight = 4.0 / 3 * M_PI * 1e-6 * 7800 * 9.81;
@@ -101,7 +96,7 @@ TEST_F(SeveralSamples, ARunGoesOnWithItsNamedBodies) {
 }
 
 TEST_F(SeveralSamples, ThatOverlapAreRefusedWithARemedyAndNothingIsWritten) {
-  const Outcome outcome = run(with(ball_over_bed, "position = [0, 0, 0.2]", "position = [0, 0, 0.015]"));
+  const Outcome outcome = run(replaced(ball_over_bed, "position = [0, 0, 0.2]", "position = [0, 0, 0.015]"));
   EXPECT_EQ(outcome.code, 2);
   EXPECT_NE(outcome.messages.find("samples 0 ('bed') and 1 ('ball') overlap"), std::string::npos)
       << outcome.messages;

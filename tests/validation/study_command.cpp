@@ -25,11 +25,9 @@ std::vector<std::size_t> rows_where(const Table& table, Is is) {
   return found;
 }
 
-class StudyError : public testing::Test {
+class StudyError : public CommandTest {
  protected:
   void SetUp() override { write(at("scene.toml"), pressed_box); }
-  Outcome run(const std::string& arguments) { return test::run(folder_.path(), arguments); }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
   /// true_error.csv of the first step of a column of so many grains.
   Table first_step(const std::string& scene, int grains, const std::string& methods,
                    const std::string& tolerance) {
@@ -40,7 +38,6 @@ class StudyError : public testing::Test {
     EXPECT_EQ(outcome.code, 0) << outcome.messages;
     return read_table(at("s/true_error.csv"));
   }
-  ScratchDirectory folder_;
 };
 
 // A grain at rest in a wedge, which pushes on either wall with ten times its weight: ten sweeps leave it

@@ -12,7 +12,7 @@ namespace {
 
 using namespace test;
 
-class StudyScaling : public testing::Test {
+class StudyScaling : public CommandTest {
  protected:
   void SetUp() override { write(at("scene.toml"), pressed_box); }
   Outcome run(const std::string& arguments, const std::string& before = "") {
@@ -20,8 +20,6 @@ class StudyScaling : public testing::Test {
     return test::run(folder_.path(), arguments,
                      "env -u OMPI_ALLOW_RUN_AS_ROOT -u OMPI_ALLOW_RUN_AS_ROOT_CONFIRM " + before);
   }
-  fs::path at(const std::string& name) const { return folder_.path() / name; }
-  ScratchDirectory folder_;
 };
 
 constexpr const char* small = "study scaling scene.toml --out s --steps 2:3 --subdomains 1,4 ";

@@ -6,9 +6,12 @@
 #include <string>
 
 #include "io/scene/scene.hpp"
+#include "tests/unit/replaced.hpp"
 
 namespace talus::io::grain_rules_test {
 namespace {
+
+using test::replaced;
 
 const std::string before = R"(time_step = 1e-3
 [[material]]
@@ -41,10 +44,6 @@ at = [0.5, 1]
 material = "glass"
 region = { shape = "beyond", point = [0, 0, -1], normal = [0, 0, -1] }
 )";
-
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
-}
 
 TEST(GrainRules, AreReadAndASceneWithAnInsertionNeedsNoSample) {
   const Scene scene = parse_scene(before + insert + remove, "rules.toml");
@@ -81,19 +80,20 @@ TEST(GrainRules, MistakesAreNamedWithARemedy) {
     EXPECT_NE(error.find(part), std::string::npos) << part << " is not in: " << error;
     EXPECT_NE(error.find("rules.toml:"), std::string::npos) << "no line: " << error;
   };
-  expect(with(insert, "rate = 100", "rate = 0"), "insert[0].rate: must be > 0");
-  expect(with(insert, "\"steel\"", "\"steal\""), "did you mean 'steel'");
-  expect(with(insert, "stage = \"fill\"", "stage = \"full\""), "did you mean 'fill'");
-  expect(with(with(insert, "rate = 100\n", ""), "count = 50\n", ""), "needs count, mass, rate or mass_rate");
-  expect(with(insert, "count = 50", "mass_rate = 3"), "not both");
-  expect(with(insert, "until = 2", "until = 2\nfrom = 3"), "must be later than from");
-  expect(with(insert, "radius = 0.1 }", "radius = 0.0015 }"), "has no room for the largest grain");
-  expect(with(insert, "region = {", "regions = {"), "unknown key");
+  expect(replaced(insert, "rate = 100", "rate = 0"), "insert[0].rate: must be > 0");
+  expect(replaced(insert, "\"steel\"", "\"steal\""), "did you mean 'steel'");
+  expect(replaced(insert, "stage = \"fill\"", "stage = \"full\""), "did you mean 'fill'");
+  expect(replaced(replaced(insert, "rate = 100\n", ""), "count = 50\n", ""),
+         "needs count, mass, rate or mass_rate");
+  expect(replaced(insert, "count = 50", "mass_rate = 3"), "not both");
+  expect(replaced(insert, "until = 2", "until = 2\nfrom = 3"), "must be later than from");
+  expect(replaced(insert, "radius = 0.1 }", "radius = 0.0015 }"), "has no room for the largest grain");
+  expect(replaced(insert, "region = {", "regions = {"), "unknown key");
   expect("[[insert]]\ncount = 1\nradius = 1\n", "insert[0].region: missing");
   expect(insert + insert, "another insert is named 'rain'");
-  expect(insert + with(remove, "[0.5, 1]", "[1, 0.5]"), "times must ascend");
-  expect(insert + with(remove, "\"beyond\", point = [0, 0, -1], normal = [0, 0, -1]",
-                       "\"disc\", centre = [0, 0, 0], radius = 1"),
+  expect(insert + replaced(remove, "[0.5, 1]", "[1, 0.5]"), "times must ascend");
+  expect(insert + replaced(remove, "\"beyond\", point = [0, 0, -1], normal = [0, 0, -1]",
+                           "\"disc\", centre = [0, 0, 0], radius = 1"),
          "'disc' cannot be used here");
 }
 

@@ -6,9 +6,12 @@
 #include <utility>
 
 #include "io/scene/scene.hpp"
+#include "tests/unit/replaced.hpp"
 
 namespace talus::io {
 namespace {
+
+using test::replaced;
 
 const std::string file = "materials.toml";
 
@@ -26,10 +29,6 @@ side = "z-"
 [[stage]]
 end = { steps = 5 }
 )" + stage;
-}
-
-std::string with(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
 }
 
 const std::string two = R"(
@@ -74,8 +73,8 @@ TEST(SceneMaterials, PairThatIsGivenHasWhatItSaysAndTheRestByTheRule) {
 }
 
 TEST(SceneMaterials, WallsAndSamplesNameTheirsAndElseHaveTheFirst) {
-  std::string text = with(scene_with(two), "#wall", "material = \"steel\"\n[[wall]]\nname = \"z+\"");
-  text = with(text, "#sample", "material = \"steel\"");
+  std::string text = replaced(scene_with(two), "#wall", "material = \"steel\"\n[[wall]]\nname = \"z+\"");
+  text = replaced(text, "#sample", "material = \"steel\"");
   const Scene scene = parse_scene(text, file);
   EXPECT_EQ(scene.setup.walls[0].material, 1);
   EXPECT_EQ(scene.setup.walls[1].material, 0);
@@ -95,8 +94,8 @@ TEST(SceneMaterials, StageChangesAllPairsOrOneOfThem) {
 
 TEST(SceneMaterials, ResolvedSceneGivesTheSameSceneBack) {
   std::string text =
-      with(scene_with(two, "restitution = 0.1\n[[stage.pair]]\nmaterial = \"glass\"\nfriction = 0.3\n"),
-           "#wall", "material = \"steel\"");
+      replaced(scene_with(two, "restitution = 0.1\n[[stage.pair]]\nmaterial = \"glass\"\nfriction = 0.3\n"),
+               "#wall", "material = \"steel\"");
   const Scene scene = parse_scene(text, file);
   const std::string resolved = resolved_scene(scene);
   const Scene again = parse_scene(resolved, file);
@@ -112,8 +111,8 @@ TEST(SceneMaterials, MistakesAreNamedWithTheirLineAndWhatWasMeant) {
       {scene_with(two + "[[pair]]\nmaterial = \"steel\"\n"), "stands here already"},
       {scene_with(two + "[[material]]\nname = \"glass\"\ndensity = 1\n"), "named 'glass' already"},
       {scene_with(two + "[[pair]]\nmaterial = \"glass\"\nwith = \"steel\"\nfriction = -1\n"), "must be"},
-      {with(scene_with(two), "#wall", "material = \"wood\""), "no material is named 'wood'"},
-      {with(scene_with("[material]\ndensity = 1\n"), "#wall", "material = \"wood\""), "[[material]]"},
+      {replaced(scene_with(two), "#wall", "material = \"wood\""), "no material is named 'wood'"},
+      {replaced(scene_with("[material]\ndensity = 1\n"), "#wall", "material = \"wood\""), "[[material]]"},
       {scene_with("[material]\ndensity = 1\n[[pair]]\nmaterial = \"a\"\n"), "[[material]]"},
       {scene_with(two, "wall_friction = 0.3\n"), "stage.pair"},
   };

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/scene/scene.hpp"
+#include "tests/unit/replaced.hpp"
 
 namespace talus::io::scene_test {
 
@@ -46,8 +47,21 @@ end = { steps = 5 }
   return text;
 }
 
-inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
+using test::replaced;
+
+/// A grain and a wall `w`, of which `wall` says more, and then what follows: stages.
+inline std::string scene_with_wall(const std::string& wall, const std::string& stages) {
+  return R"(name = "walls"
+[material]
+density = 2600
+[sample]
+kind = "lattice"
+cells = [1, 1, 1]
+radius = 0.01
+[[wall]]
+name = "w"
+)" + wall +
+         "\n" + stages;
 }
 
 /// Line (from 1) on which `needle` stands.

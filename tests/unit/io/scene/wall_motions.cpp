@@ -8,6 +8,7 @@
 
 #include "io/scene/motion_file.hpp"
 #include "io/scene/scene.hpp"
+#include "tests/unit/io/scene/scene_text.hpp"
 
 namespace talus::io::wall_motions_test {
 namespace {
@@ -16,19 +17,7 @@ const std::string disc = "shape = \"disc\"\ncentre = [0, 0, -1]\naxis = [0, 0, 1
 const std::string turning = "kind = \"rotation\"\naxis = [0, 0, 2]\npoint = [1, 0, 0]\nrate = 3.5\n";
 
 std::string scene_of(const std::string& wall, const std::string& more = "") {
-  return R"(name = "motions"
-[material]
-density = 2600
-[sample]
-kind = "lattice"
-cells = [1, 1, 1]
-radius = 0.01
-[[wall]]
-name = "w"
-)" + wall +
-         more +
-         R"(
-[[stage]]
+  return scene_test::scene_with_wall(wall + more, R"([[stage]]
 name = "first"
 time_step = 1e-3
 end = { time = 0.5 }
@@ -36,7 +25,7 @@ end = { time = 0.5 }
 name = "second"
 time_step = 1e-3
 end = { steps = 500 }
-)";
+)");
 }
 
 class WallMotions : public ::testing::Test {

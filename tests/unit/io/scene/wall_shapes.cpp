@@ -8,26 +8,13 @@
 
 #include "io/scene/scene.hpp"
 #include "kernels/samples/sample.hpp"
+#include "tests/unit/io/scene/scene_text.hpp"
 
 namespace talus::io {
 namespace {
 
 std::string scene_with_wall(const std::string& wall, const std::string& stage = "") {
-  return R"(name = "shapes"
-[material]
-density = 2600
-[sample]
-kind = "lattice"
-cells = [1, 1, 1]
-radius = 0.01
-[[wall]]
-name = "w"
-)" + wall +
-         R"(
-[[stage]]
-time_step = 1e-3
-end = { steps = 1 }
-)" + stage;
+  return scene_test::scene_with_wall(wall, "[[stage]]\ntime_step = 1e-3\nend = { steps = 1 }\n" + stage);
 }
 
 const std::string tube =

@@ -7,78 +7,10 @@
 
 #include <string>
 
-#include "runtime/step/simulation.hpp"
-#include "tests/unit/dense_sample.hpp"
+#include "tests/unit/runtime/step/cut_boxes.hpp"
 
 namespace talus::decomposition_test {
 namespace {
-
-using test::Random;
-using test::uniform;
-
-struct Variant {
-  const char* name;
-  Coupling coupling;
-  ExchangeScheme exchange;
-  PartitionKind partitioner;
-};
-const std::vector<Variant> variants = {
-    {"nscdd, dcs, boxes", Coupling::nscdd, ExchangeScheme::dcs, PartitionKind::boxes},
-    {"nscdd, ccs, rcb", Coupling::nscdd, ExchangeScheme::ccs, PartitionKind::rcb},
-    {"nscdd, dcs, metis", Coupling::nscdd, ExchangeScheme::dcs, PartitionKind::metis},
-    {"alternating, dcs, boxes", Coupling::alternating, ExchangeScheme::dcs, PartitionKind::boxes},
-    {"alternating, dcs, metis", Coupling::alternating, ExchangeScheme::dcs, PartitionKind::metis},
-    {"alternating, ccs, rcb", Coupling::alternating, ExchangeScheme::ccs, PartitionKind::rcb},
-    {"schwarz, dcs, fitted", Coupling::schwarz, ExchangeScheme::dcs, PartitionKind::fitted},
-    {"schwarz, ccs, boxes", Coupling::schwarz, ExchangeScheme::ccs, PartitionKind::boxes},
-};
-
-/// 6 x 6 x 6 grains in a box whose lid and two sides press with 20 kPa.
-talus::Setup pressed_box(double friction, std::int64_t steps) {
-  return test::pressed_setup(test::box_of_walls(0, 6 * 0.021), friction, steps, 2e4, 1);
-}
-
-Bodies lattice(int edge, std::uint64_t seed) {
-  Random random(seed);
-  Bodies bodies;
-  for (int k = 0; k < edge * edge * edge; ++k) {
-    const Vec3 site(k % edge + 0.5, k / edge % edge + 0.5, k / (edge * edge) + 0.5);
-    add_sphere(bodies, BodyId{k}, 0.021 * site + test::uniform_vector(random, -4e-4, 4e-4),
-               uniform(random, 0.008, 0.01), 2600);
-  }
-  return bodies;
-}
-
-void choose(talus::Setup& setup, const Variant& variant, int subdomains) {
-  setup.decomposition.coupling = variant.coupling;
-  setup.decomposition.exchange = variant.exchange;
-  setup.decomposition.partitioner = variant.partitioner;
-  setup.decomposition.subdomains = subdomains;
-}
-
-struct Outcome {
-  std::uint64_t digest = 0;
-  StepReport last;
-  std::vector<WallReport> walls;
-  std::int64_t unconverged = 0, migrants = 0;
-  double coordination = 0;
-};
-
-Outcome run(const talus::Setup& setup, Bodies bodies, graph::ExecutorOptions options = {.threads = 1}) {
-  graph::Executor executor(options);
-  Simulation simulation(setup, std::move(bodies), executor);
-  Outcome outcome;
-  while (!simulation.finished()) {
-    outcome.last = simulation.step();
-    if (!outcome.last.converged) ++outcome.unconverged;
-    outcome.migrants += outcome.last.migrants;
-    outcome.walls = simulation.walls();
-    if (const auto triaxial = simulation.triaxial()) outcome.coordination = triaxial->coordination;
-    simulation.begin_next_stage();
-  }
-  outcome.digest = simulation.digest();
-  return outcome;
-}
 
 TEST(ChunkTarget, IsSmallInSmallSamplesAndGrowsInLargeSubdomains) {
   EXPECT_EQ(chunk_target(0, 0), 64);
@@ -321,75 +253,6 @@ TEST(Decomposition, BearsSubdomainsWithLittleOrNothingInThem) {
     EXPECT_EQ(piled.unconverged, 0) << name_of(kind);
     EXPECT_EQ(run(rest(40, kind), corner, {.threads = 3}).digest, piled.digest) << name_of(kind);
   }
-}
-
-/// Dense below, loose above: a cut into equal numbers of grains leaves the contacts unequal.
-Bodies settled_below() {
-  Bodies bodies = lattice(6, 5);
-  for (std::size_t s = 0; s < bodies.size(); ++s)
-    if (bodies.x[s][2] > 0.063) bodies.x[s][2] += bodies.x[s][2] - 0.063;
-  return bodies;
-}
-
-/// What is cut anew after the first step is so at once, or never.
-talus::Setup settling(std::int64_t steps) {
-  talus::Setup setup = pressed_box(0.3, steps);
-  setup.walls = test::box_of_walls(0, 0.19);
-  setup.stages[0].gravity = Vec3(0, 0, -9.81);
-  choose(setup, variants[1], 4);
-  setup.decomposition.balance = BalanceBy::contacts;
-  setup.decomposition.repartition_every = 1000;
-  setup.decomposition.max_imbalance = 1e9;
-  return setup;
-}
-
-TEST(Decomposition, CutsSpaceByGrainsUntilItKnowsTheContacts) {
-  EXPECT_GT(run(settling(1), settled_below()).last.imbalance, 1.2);
-  EXPECT_LT(run(settling(2), settled_below()).last.imbalance, 1.1);
-}
-
-TEST(Decomposition, CutsSpaceAnewAtOnceWhenContactsAreOutOfBalance) {
-  talus::Setup setup = settling(30);
-  const double left_alone = run(setup, settled_below()).last.imbalance;
-  setup.decomposition.max_imbalance = 0.1;
-  const double cut_anew = run(setup, settled_below()).last.imbalance;
-  EXPECT_GT(left_alone, 1.2);
-  EXPECT_LT(cut_anew, 1.1);
-}
-
-// A row of three: the middle one has two neighbours and the copies of both cuts.
-TEST(Decomposition, CountsTheGluingAmongTheWork) {
-  talus::Setup setup = pressed_box(0.3, 3);
-  setup.walls = test::box_of_walls(0, 0.19);
-  choose(setup, variants[0], 3);
-  setup.decomposition.partitioner = PartitionKind::fitted;
-  setup.decomposition.boxes = {1, 1, 3};
-  std::vector<std::vector<int>> contacts;
-  for (const BalanceBy balance : {BalanceBy::contacts, BalanceBy::work}) {
-    setup.decomposition.balance = balance;
-    graph::Executor executor({.threads = 1});
-    Simulation simulation(setup, lattice(6, 5), executor);
-    for (int k = 0; k < 3; ++k) simulation.step();
-    const Chunks& chunks = simulation.state().chunks;
-    std::vector<int>& of = contacts.emplace_back(3, 0);
-    for (std::size_t c = 0; c < chunks.size(); ++c)
-      of[static_cast<std::size_t>(chunks.subdomain[c])] += chunks.begin[c + 1] - chunks.begin[c];
-  }
-  EXPECT_NEAR(contacts[0][1], contacts[0][0], 5);
-  EXPECT_LT(contacts[1][1], 0.9 * contacts[1][0]);
-  EXPECT_LT(contacts[1][1], 0.9 * contacts[1][2]);
-}
-
-TEST(Decomposition, BalancesByMeasuredTimeWhenAskedTo) {
-  talus::Setup setup = pressed_box(0.3, 8);
-  choose(setup, variants[1], 4);
-  setup.decomposition.balance = BalanceBy::time;
-  setup.decomposition.repartition_every = 2;
-  setup.solver.tolerance = 1e-4;
-  const Outcome outcome = run(setup, lattice(6, 5));
-  EXPECT_EQ(outcome.unconverged, 0);
-  EXPECT_LT(outcome.last.imbalance, 2.5);  // every subdomain has its share, if not an equal one
-  EXPECT_GT(outcome.last.contacts, 250);
 }
 
 TEST(Decomposition, CarriesOrientationsAndStagesAlong) {

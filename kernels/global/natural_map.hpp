@@ -1,0 +1,30 @@
+#pragma once
+
+/// How far one contact of a problem over bodies is from its law: the natural map in De Saxce's form, with rho
+/// = 1/W_nn (docs/theory.md, "Error").
+
+#include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
+
+namespace talus {
+
+/// A contact under the impulse r [N s] at the velocity v + b n [m/s], of which without friction the normal
+/// part counts (`constrained`).
+struct NaturalMap {
+  double m;      ///< 1/W_nn [kg]
+  double shift;  ///< mu |v_t| [m/s]
+  Vec3 aim;      ///< r - m (v + (b + shift) n) [N s]
+  Vec3 carried;  ///< what is nearest to it on the cone [N s]: r where the law holds
+
+  /// |r - carried| W_nn [m/s].
+  double residual(const Vec3& r) const { return (r - carried).norm() / m; }
+};
+
+inline NaturalMap natural_map_of(const BodyProblem& problem, const ContactEquation& c, const Vec3& r,
+                                 const Vec3& velocity) {
+  const double m = effective_mass(problem, c), shift = c.mu * tangential(c, velocity).norm();
+  const Vec3 aim = r - m * (velocity + shift * c.normal);
+  return {m, shift, aim, project_on_cone(aim, c.normal, c.mu)};
+}
+
+}  // namespace talus
