@@ -73,6 +73,10 @@ void Population::go_on_from(const PopulationState& state) {
       state.window.size() != i || state.waiting_count.size() != i || state.waiting.size() != waiting ||
       state.last.size() != i + r || state.passed.size() != r ||
       state.tracked_rule.size() != state.tracked_id.size() ||
+      std::ranges::any_of(state.waiting_count, [](std::int64_t count) { return count < 0; }) ||
+      std::ranges::any_of(
+          state.tracked_rule,
+          [&](std::int64_t rule) { return rule < 0 || static_cast<std::size_t>(rule) >= i; }) ||
       state.removed.size() != r * materials_of(setup_) ||
       state.removed_mass.size() != r * materials_of(setup_))
     throw std::invalid_argument("the checkpoint has other insertions and removals than the scene");

@@ -89,6 +89,26 @@ std::uint64_t run(const talus::Setup& setup, Bodies bodies = {}, int threads = 1
   return simulation.digest();
 }
 
+/// Rain, grains at once beside it, and two removals.
+talus::Setup busy_setup(int subdomains, std::int64_t steps) {
+  talus::Setup setup = floor_setup(steps);
+  setup.inserts.push_back(rain(2000));
+  setup.inserts.push_back(rain(0));
+  setup.inserts.back().name = "blocks";
+  setup.inserts.back().rate.reset();
+  setup.inserts.back().count = 60;
+  setup.inserts.back().times.from = 0.02;
+  setup.inserts.back().region = box({0.1, 0, 0}, {0.2, 0.1, 0.1});
+  setup.removes.push_back(removal(box({-1, -1, -1}, {0.05, 1, 0.03})));
+  setup.removes.back().times.interval = 0.004;
+  setup.removes.push_back(removal(below(0.02)));
+  setup.removes.back().name = "sweep";
+  setup.removes.back().at = {0.05, 0.09};
+  setup.decomposition.subdomains = subdomains;
+  setup.decomposition.repartition_every = 3;
+  return setup;
+}
+
 /// Rain at a rate, and a hole in the floor's corner: what came less what went is there, to the grain.
 TEST(Population, NumberAndMassAreKept) {
   talus::Setup setup = floor_setup(400);
@@ -181,6 +201,75 @@ TEST(Population, GrainsWithoutRoomWaitAndComeLater) {
   EXPECT_EQ(last.placed + last.waiting, 1500);
 }
 
+/// A ball that stays takes most of the region, and one place a step is tried: each grain gets another chance
+/// at another place, until it has come.
+TEST(Population, GrainsWithoutRoomTryOtherPlacesLater) {
+  talus::Setup setup = floor_setup(400);
+  setup.stages.front().gravity = Vec3::Zero();
+  setup.inserts.push_back(rain(0));
+  InsertRule& rule = setup.inserts.front();
+  rule.rate.reset();
+  rule.count = 12;
+  rule.attempts = 1;
+  rule.velocity = Vec3::Zero();
+  rule.radii.kind = SizeDistribution::Kind::constant;
+  rule.radii.min = rule.radii.max = 0.002;
+  Bodies bodies;
+  add_sphere(bodies, BodyId{0}, Vec3(0.05, 0.05, 0.125), 0.05, density);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, std::move(bodies), executor);
+  simulation.step();
+  EXPECT_LT(simulation.inserted().front().placed, 12);
+  while (!simulation.finished()) {
+    simulation.step();
+    simulation.begin_next_stage();
+  }
+  EXPECT_EQ(simulation.inserted().front().placed, 12);
+}
+
+/// They are solid spheres in whichever subdomain they land, also behind a repartition.
+TEST(Population, GrainsThatComeTurnAsOthersDoInSubdomains) {
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(busy_setup(4, 60), Bodies{}, executor);
+  while (!simulation.finished()) {
+    simulation.step();
+    const StepState& state = simulation.state();
+    for (std::size_t s = 0; s < state.bodies.size(); ++s) {
+      const Velocity v = whole_velocity(state.decomposition, state.bodies, s);
+      ASSERT_NEAR(v.spin_mobility, 2.5 * v.inv_mass, 1e-12 * v.inv_mass) << simulation.report().step;
+    }
+    simulation.begin_next_stage();
+  }
+  EXPECT_GT(simulation.bodies(), 50);
+}
+
+/// What a damaged checkpoint, or that of another scene, has too much or too little of is not read.
+TEST(Population, ACheckpointOfOtherRulesIsRefused) {
+  talus::Setup setup = floor_setup(1);
+  setup.inserts = {rain(100), rain(200)};
+  setup.removes = {removal(below(0))};
+  Population population(setup, Bodies{}, graph::one_rank());
+  const PopulationState right = population.state();
+  EXPECT_NO_THROW(population.go_on_from(right));
+  int arrays = 0;
+  PopulationState wrong = right;
+  wrong.each_number([&](const char* name, auto& member) {
+    if constexpr (requires { member.push_back({}); }) {
+      ++arrays;
+      member.push_back({});
+      EXPECT_THROW(population.go_on_from(wrong), std::invalid_argument) << name;
+      member.pop_back();
+    }
+  });
+  EXPECT_EQ(arrays, 15);
+  wrong.tracked_rule = {2};
+  wrong.tracked_id = {0};
+  EXPECT_THROW(population.go_on_from(wrong), std::invalid_argument) << "there are two insertions";
+  wrong = right;
+  wrong.waiting_count = {1, -1};
+  EXPECT_THROW(population.go_on_from(wrong), std::invalid_argument);
+}
+
 /// Large grains are not left out because they fit less often.
 TEST(Population, RadiiThatComeAreThoseOfTheDistribution) {
   talus::Setup setup = floor_setup(300);
@@ -196,25 +285,6 @@ TEST(Population, RadiiThatComeAreThoseOfTheDistribution) {
   std::ranges::sort(radii);
   std::ranges::sort(drawn);
   EXPECT_EQ(radii, drawn);
-}
-
-talus::Setup busy_setup(int subdomains, std::int64_t steps) {
-  talus::Setup setup = floor_setup(steps);
-  setup.inserts.push_back(rain(2000));
-  setup.inserts.push_back(rain(0));
-  setup.inserts.back().name = "blocks";
-  setup.inserts.back().rate.reset();
-  setup.inserts.back().count = 60;
-  setup.inserts.back().times.from = 0.02;
-  setup.inserts.back().region = box({0.1, 0, 0}, {0.2, 0.1, 0.1});
-  setup.removes.push_back(removal(box({-1, -1, -1}, {0.05, 1, 0.03})));
-  setup.removes.back().times.interval = 0.004;
-  setup.removes.push_back(removal(below(0.02)));
-  setup.removes.back().name = "sweep";
-  setup.removes.back().at = {0.05, 0.09};
-  setup.decomposition.subdomains = subdomains;
-  setup.decomposition.repartition_every = 3;
-  return setup;
 }
 
 TEST(Population, TheSameBitsOnAnyThreads) {
