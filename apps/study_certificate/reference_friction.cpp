@@ -189,10 +189,11 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   const std::size_t contacts = sweeps.contacts();
   Vector r(static_cast<Eigen::Index>(3 * contacts));
   for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
-  // Newton's method ends quickly where it begins with the right contacts sliding, sticking and open; sweeps
-  // find those. Each time that it falls short they get eight times as many.
+  // Newton's method begins at the run's own impulses: where several answers stand side by side sweeps may walk
+  // from one to another. It ends quickly where the right contacts slide, stick and are open; sweeps find those
+  // where it falls short, each time eight times as many.
   std::int64_t left = limits.contact_solves / static_cast<std::int64_t>(2 * contacts + 1);
-  for (std::int64_t passes = plain_passes; left > 0; passes *= 8) {
+  for (std::int64_t passes = 0; left > 0; passes = std::max(plain_passes, 8 * passes)) {
     accelerate(sweeps, r, std::min(left, passes), limits.residual);
     left -= passes;
     std::vector<Vec3> impulses(contacts);

@@ -157,11 +157,13 @@ class Builder {
     for (std::size_t w = 0; w < in_.walls.size(); ++w) {
       const Wall& wall = in_.walls[w];
       const Vec3 middle = wall.point + numbers_.h / 2 * wall.velocity;
+      // Of the whole step: free velocities of the problem are the mean ones of an impact.
+      const Vec3 gained = numbers_.h * (in_.stage.gravity - in_.loads[w] * wall.inv_mass() * wall.normal);
       for (std::size_t i = 0; i < n_; ++i) {
         const PairLaw& pair = law(material_[i], wall.material);
         const Approach approach{wall.normal.dot(middle_[i] - middle) - in_.before.radius[i],
                                 wall.normal.dot(in_.before.u[i] - wall.velocity),
-                                wall.normal.dot(made_.free.u[i] - made_.free.walls[w])};
+                                wall.normal.dot(in_.before.u[i] - wall.velocity + gained)};
         double bias = 0;
         if (meets(numbers_, approach, pair.restitution, bias))
           made_.contacts.push_back(
