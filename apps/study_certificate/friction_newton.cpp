@@ -14,7 +14,7 @@ namespace {
 /// and larger where they lead astray.
 constexpr double first_shift = 1e-3, least_shift = 1e-10, most_shift = 10;
 /// Of Newton's steps around one centre.
-constexpr int inner_steps = 8, halvings = 4;
+constexpr int inner_steps = 40, halvings = 4;
 /// Part of the law's residual to which a problem around a centre is solved.
 constexpr double inner_part = 1e-2;
 /// Impulses that grow so many times over what the step can ask for: there is no answer.
@@ -233,16 +233,23 @@ NewtonResult FrictionNewton::improve(std::vector<Vec3>& r, const Goal& goal) con
   return result;
 }
 
-void FrictionNewton::go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, const Goal& goal) const {
+bool FrictionNewton::go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, double unit,
+                                double enough) const {
   const Vector centre = scaled(run);
-  Vector s = scaled(r);
-  double shift = first_shift;
-  for (int k = 0; k < goal.most && shift >= least_shift; ++k, shift /= 10) {
-    if (!solve_near(centre, shift, inner_part * goal.enough * goal.unit, s)) return;
-    if (law(s, s, 0).cwiseAbs().maxCoeff() > goal.enough * goal.unit) continue;
+  Vector s = centre;
+  // Large shifts hold s near the centre, and each answer leads to that of the next shift.
+  for (double shift = most_shift; shift >= least_shift; shift /= 10) {
+    if (!solve_near(centre, shift, inner_part * enough * unit, s)) return false;
+    if (law(s, s, 0).cwiseAbs().maxCoeff() > enough * unit) continue;
     r = unscaled(s);
-    return;
+    return true;
   }
+  return false;
+}
+
+double FrictionNewton::apart(std::span<const Vec3> a, std::span<const Vec3> b) const {
+  const Vector s = scaled(a) - scaled(b);
+  return std::sqrt(std::max(0.0, s.dot(W_ * s)));
 }
 
 }  // namespace talus::audit

@@ -41,10 +41,11 @@ class FrictionNewton {
     int most;
   };
   NewtonResult improve(std::vector<Vec3>& r, const Goal& goal) const;
-  /// Of the answers that redundant contacts leave, one next to the impulses `run`, met to `enough` over
-  /// `unit`: proximal steps about them with ever smaller shifts, the first from the answer r. Where none
-  /// comes out r stays.
-  void go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, const Goal& goal) const;
+  /// Of the impulses that meet the law to `enough` over `unit`, as redundant contacts leave many, those next
+  /// to `run`: proximal steps about them with ever smaller shifts. False where none come out, and r stays.
+  bool go_next_to(std::span<const Vec3> run, std::vector<Vec3>& r, double unit, double enough) const;
+  /// Difference of the velocities under two sets of impulses, in the kinetic norm [J^1/2].
+  double apart(std::span<const Vec3> a, std::span<const Vec3> b) const;
 
  private:
   using Matrix = Eigen::SparseMatrix<double>;

@@ -86,11 +86,15 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
   Reference whole;
   whole.found = Found::answer;
   whole.r.assign(run.size(), Vec3::Zero());
+  whole.exact = whole.r;
   double error2 = 0, exchanged2 = 0;
   for (const Part& part : split(problem, run)) {
     const Reference own = part.problem.smooth() ? solve_smooth(part.problem, part.run, limits)
                                                 : solve_frictional(part.problem, part.run, limits);
-    for (std::size_t c = 0; c < part.contacts.size(); ++c) whole.r[part.contacts[c]] = own.r[c];
+    for (std::size_t c = 0; c < part.contacts.size(); ++c) {
+      whole.r[part.contacts[c]] = own.r[c];
+      whole.exact[part.contacts[c]] = own.exact[c];
+    }
     whole.residual = std::max(whole.residual, own.residual);
     error2 += own.error * own.error;
     exchanged2 += own.exchanged * own.exchanged;
@@ -102,7 +106,7 @@ Reference solve_reference(const StepProblem& problem, std::span<const Vec3> run,
   exchanged2 = std::max(exchanged2, limits.motion * limits.motion * motion2);
   whole.error = std::sqrt(error2);
   whole.exchanged = std::sqrt(exchanged2);
-  whole.motion = motion_under(problem, whole.r);
+  whole.motion = motion_under(problem, whole.exact);
   return whole;
 }
 

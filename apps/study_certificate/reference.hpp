@@ -21,6 +21,10 @@ struct ReferenceLimits {
   double pumped = 1e6;  ///< impulses that grow so many times over what the step can ask for have no answer
   double velocities = 1e-8;  ///< error() of velocities that are known though the law is not met
   double nearly = 1e-6;      ///< residual up to which that may be
+  /// Of redundant contacts gaps that contradict one another decide which carry, however little. So forces are
+  /// compared with the nearest impulses that meet the law to this residual and whose velocities are exact to
+  /// that part of what the impulses change, in the kinetic norm: the answer to gaps that differ so little.
+  double forces = 1e-5, forces_velocities = 1e-5;
   double motion = 1e-9;     ///< least exchange, over what all bodies have, kinetic norm: below it is rounding
   double speeds = 1e-4;     ///< least unit of residuals, over the speeds of bodies: below it is rounding
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
@@ -31,8 +35,7 @@ struct ReferenceLimits {
 /// What a search has come to.
 enum class Found {
   answer,      ///< the law is met: velocities and forces are known
-  velocities,  ///< velocities are known; of redundant contacts, which rounding has over-determined, forces
-               ///< are not
+  velocities,  ///< velocities are known, forces are not
   nothing,     ///< the search failed
   no_answer,   ///< there is none: walls close on grains that cannot get away
 };
@@ -40,11 +43,12 @@ enum class Found {
 /// An answer and how well it is known.
 struct Reference {
   Found found = Found::nothing;
-  std::string why = {};      ///< where no answer was found
-  std::vector<Vec3> r = {};  ///< impulses of the problem's contacts [N s]
-  Motion motion = {};        ///< under them
-  double residual = 0;       ///< of the law (natural map), the largest, over the run's largest impulse or the
-                             ///< largest speed of approach; where there is no answer unavoidable_approach
+  std::string why = {};          ///< where no answer was found
+  std::vector<Vec3> exact = {};  ///< impulses of the problem's contacts [N s]
+  Motion motion = {};            ///< velocities under them
+  std::vector<Vec3> r = {};      ///< the impulses next to the run's that forces are compared with [N s]
+  double residual = 0;  ///< of the law (natural map), the largest, over the run's largest impulse or the
+                        ///< largest speed of approach; where there is no answer unavoidable_approach
   /// Error of the velocities in the kinetic norm [J^1/2], a bound without friction, with friction the next
   /// step of Newton's method; and the norm of what the contacts change, at least a hundredth of the largest
   /// impulse.

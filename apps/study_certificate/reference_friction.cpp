@@ -176,12 +176,25 @@ double accelerate(Sweeps& sweeps, Vector& r, std::int64_t most, double enough) {
   return least;
 }
 
+/// Forces next to the run's (ReferenceLimits::forces). False where there are none.
+bool take_forces(const FrictionNewton& newton, std::span<const Vec3> run, double unit,
+                 const ReferenceLimits& limits, Reference& reference) {
+  for (double enough = limits.forces; enough >= limits.residual; enough /= 10) {
+    std::vector<Vec3> r;
+    if (!newton.go_next_to(run, r, unit, enough)) return false;
+    if (newton.apart(r, reference.exact) > limits.forces_velocities * reference.exchanged) continue;
+    reference.r = r;
+    return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run,
                            const ReferenceLimits& limits) {
   Reference reference;
-  reference.r.assign(run.begin(), run.end());
+  reference.exact.assign(run.begin(), run.end());
   reference.residual = reference.error = reference.exchanged = 1;
   Sweeps sweeps(problem);
   const FrictionNewton newton(problem, limits.speeds);
@@ -189,9 +202,9 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   const std::size_t contacts = sweeps.contacts();
   Vector r(static_cast<Eigen::Index>(3 * contacts));
   for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
-  // Newton's method begins at the run's own impulses: where several answers stand side by side sweeps may walk
-  // from one to another. It ends quickly where the right contacts slide, stick and are open; sweeps find those
-  // where it falls short, each time eight times as many.
+  // Newton's method begins at the run's own impulses: where several answers stand side by side sweeps may
+  // walk from one to another. It ends quickly where the right contacts slide, stick and are open; sweeps find
+  // those where it falls short, each time eight times as many.
   std::int64_t left = limits.contact_solves / static_cast<std::int64_t>(2 * contacts + 1);
   for (std::int64_t passes = 0; left > 0; passes = std::max(plain_passes, 8 * passes)) {
     accelerate(sweeps, r, std::min(left, passes), limits.residual);
@@ -203,20 +216,22 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
     reference.residual = result.residual;
     reference.error = result.next;
     reference.exchanged = result.exchanged;
-    reference.r = impulses;
+    reference.exact = impulses;
     if (result.residual <= limits.residual) reference.found = Found::answer;
     if (reference.found == Found::answer) break;
   }
-  reference.motion = motion_under(problem, reference.r);
+  reference.motion = motion_under(problem, reference.exact);
+  reference.r = reference.exact;
+  const bool nearly = reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly;
   if (reference.found == Found::answer) {
-    newton.go_next_to(run, reference.r, {goal.unit, limits.residual, limits.proximal_steps});
-    return reference;
-  }
-  if (const double approach = unavoidable_approach(problem, limits); approach > 0) {
+    take_forces(newton, run, goal.unit, limits, reference);
+  } else if (const double approach = unavoidable_approach(problem, limits); approach > 0) {
     reference.found = Found::no_answer;
     reference.residual = approach;
     reference.why = "no velocities are admissible";
-  } else if (reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly) {
+  } else if (nearly && take_forces(newton, run, goal.unit, limits, reference)) {
+    reference.found = Found::answer;
+  } else if (nearly) {
     reference.found = Found::velocities;
     reference.why = "redundant contacts: forces are not known";
   } else {

@@ -189,17 +189,21 @@ bool find_impulses(const Dual& dual, const ReferenceLimits& limits, Real enough,
   return true;
 }
 
-/// Of the answers that redundant contacts leave, one next to `start`, met to `enough`: steps from there with
-/// ever less weight on the distance. `answer` where none comes out.
-Vector next_to(const Dual& dual, const ReferenceLimits& limits, Real enough, const Vector& start,
+/// Of the answers that redundant contacts leave, one next to `start` (ReferenceLimits::forces): steps from
+/// there with ever less weight on the distance. `answer` where none comes out.
+Vector next_to(const Dual& dual, const ReferenceLimits& limits, Real unit, const Vector& start,
                const Vector& answer) {
   std::vector<char> carry;
   for (const Real value : answer) carry.push_back(value > 0);
+  const auto kinetic2 = [&](const Vector& s) { return s.dot(dual.W * s); };
+  const Real apart2 = limits.forces_velocities * limits.forces_velocities *
+                      std::max(kinetic2(answer),
+                               floor_of_exchange * floor_of_exchange * answer.maxCoeff() * answer.maxCoeff());
   Vector next;
   for (Real shift = first_shift; shift >= least_shift; shift /= 10) {
     if (!Pivots(dual.W, dual.q - shift * start, shift, limits.pivots).solve(carry, next)) return answer;
     next = next.cwiseMax(Real{0}).eval();
-    if (met_by(dual, next).residual <= enough) return next;
+    if (met_by(dual, next).residual <= limits.forces * unit && kinetic2(next - answer) <= apart2) return next;
   }
   return answer;
 }
@@ -248,8 +252,9 @@ Reference solve_smooth(const StepProblem& problem, std::span<const Vec3> run, co
                   problem.contacts[static_cast<std::size_t>(c)].normal);
     return r;
   };
-  reference.motion = motion_under(problem, impulses(s));
-  reference.r = impulses(next_to(dual, limits, limits.residual * unit, start, s));
+  reference.exact = impulses(s);
+  reference.motion = motion_under(problem, reference.exact);
+  reference.r = impulses(next_to(dual, limits, unit, start, s));
   if (s.maxCoeff() > limits.pumped * unit) {
     reference.found = Found::no_answer;
     reference.why = "no velocities are admissible";

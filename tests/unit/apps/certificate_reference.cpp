@@ -63,9 +63,12 @@ struct Step {
   }
 };
 
+/// With the exact forces in place of those next to a run's.
 Reference solved(const StepProblem& problem) {
   const std::vector<Vec3> nothing(problem.contacts.size(), Vec3::Zero());
-  return solve_reference(problem, nothing);
+  Reference answer = solve_reference(problem, nothing);
+  answer.r = answer.exact;
+  return answer;
 }
 
 Step wedge(double half_angle) {
@@ -137,6 +140,28 @@ TEST(CertificateReference, AGrainThrownOnAFloorSlidesBackByFrictionOrSticks) {
     EXPECT_NEAR(answer.motion.u[0][0], slides ? along - mu * down : 5.0 / 7 * along, 1e-9 * along);
     EXPECT_NEAR(answer.motion.u[0][2], 0, 1e-9);
   }
+}
+
+TEST(CertificateReference, AsksRedundantContactsForTheirShareOnlyWhereGapsTellIt) {
+  // Two floors, the second lower by a part of g h^2: the first carries all. A run that has shared the weight
+  // is wrong, unless it takes a change of the gaps to find out that no step before has kept to.
+  for (const double friction : {0.0, 0.3})
+    for (const double lower : {1e-8, 1e-3}) {
+      Step step(g, friction);
+      step.grain({0, 0, R}, R);
+      step.wall(Vec3::Zero(), Vec3::UnitZ());
+      step.wall({0, 0, -lower * g * h * h}, Vec3::UnitZ());
+      const StepProblem problem = step.problem();
+      ASSERT_EQ(problem.contacts.size(), 2U);
+      const Vec3 weight(0, 0, mass_of(R) * g * h);
+      const std::vector<Vec3> shared(2, weight / 2);
+      const Reference answer = solve_reference(problem, shared);
+      ASSERT_EQ(answer.found, Found::answer) << friction << ' ' << lower;
+      const Vec3 first = lower < 1e-5 ? Vec3(weight / 2) : weight;
+      EXPECT_NEAR((answer.r[0] - first).norm() / weight.norm(), 0, 1e-3) << friction << ' ' << lower;
+      EXPECT_NEAR((answer.r[0] + answer.r[1] - weight).norm() / weight.norm(), 0, 1e-3);
+      EXPECT_LT(answer.motion.u[0].norm(), 1e-6 * g * h);
+    }
 }
 
 /// A pile in a corner, in motion, so that some contacts open and others close.
