@@ -24,9 +24,9 @@ constexpr double rounding = 1e-6;
 /// A reference has to be known to this part of what the step claims.
 constexpr double sharpness = 0.1;
 
-/// Of what is asked for: what the law may leave and velocities may be off by where forces are compared
+/// Of what is asked for: what the law may leave, and what velocities may be off by, where forces are compared
 /// (ReferenceLimits::forces). The step before has left the gaps uncertain by a hundred times as much.
-constexpr double slack = 1e-2;
+constexpr double slack_of_law = 1e-2, slack_of_velocities = 1e-1;
 
 /// What a step begins from.
 struct Start {
@@ -66,7 +66,8 @@ void judge(const StepProblem& problem, const Start& start, const Frame& after, c
     return;
   }
   ReferenceLimits own = limits;
-  own.forces = own.forces_velocities = slack * step.asked;
+  own.forces = slack_of_law * step.asked;
+  own.forces_velocities = slack_of_velocities * step.asked;
   const Reference reference = solve_reference(problem, run.r, own);
   step.residual = reference.residual;
   step.uncertainty = reference.uncertainty();
