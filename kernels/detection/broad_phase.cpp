@@ -94,6 +94,17 @@ void sort_by_key(std::vector<Entry>& entries) {
   }
 }
 
+/// Bodies side by side.
+struct Others {
+  std::span<const CellGrid::Member> members;
+  std::span<const Slot> slots;
+};
+/// Bodies [begin, end) of a grid.
+Others others_of(const CellGrid& grid, std::size_t begin, std::size_t end) {
+  return {std::span(grid.members).subspan(begin, end - begin),
+          std::span(grid.slots).subspan(begin, end - begin)};
+}
+
 /// Appends pairs without a branch: each pair tested is written, and the next one overwrites it unless it was
 /// near enough. The length of the list is known at the end only.
 class PairList {
@@ -103,18 +114,18 @@ class PairList {
   PairList(const PairList&) = delete;
   PairList& operator=(const PairList&) = delete;
 
-  /// Appends the pairs of body a with bodies [begin, end) of `grid` that are near enough.
-  void add(const CellGrid& grid, std::size_t a, std::size_t begin, std::size_t end) {
-    if (size_ + (end - begin) > pairs_.size()) pairs_.resize(2 * (size_ + end - begin));
+  /// Appends the pairs of body a of `grid` with those `others` that are near enough.
+  void add(const CellGrid& grid, std::size_t a, const Others& others) {
+    const std::size_t count = others.members.size();
+    if (size_ + count > pairs_.size()) pairs_.resize(2 * (size_ + count));
     const CellGrid::Member one = grid.members[a];
     const Slot slot = grid.slots[a];
     GrainPair* next = pairs_.data() + size_;
-    for (std::size_t b = begin; b < end; ++b) {
-      const CellGrid::Member& other = grid.members[b];
-      const Vec3 d =
-          Domain::separation(Vec3(one.x[0], one.x[1], one.x[2]), Vec3(other.x[0], other.x[1], other.x[2]));
+    for (std::size_t b = 0; b < count; ++b) {
+      const CellGrid::Member& other = others.members[b];
+      const Vec3 d = Vec3(one.x[0], one.x[1], one.x[2]) - Vec3(other.x[0], other.x[1], other.x[2]);
       const double distance = one.reach + other.reach;
-      *next = {std::min(slot, grid.slots[b]), std::max(slot, grid.slots[b])};
+      *next = {std::min(slot, others.slots[b]), std::max(slot, others.slots[b])};
       next += d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < distance * distance ? 1 : 0;
     }
     size_ = static_cast<std::size_t>(next - pairs_.data());
@@ -152,11 +163,37 @@ constexpr std::array<std::uint64_t, 4> rows_behind = {one_y, one_x - one_y, one_
 constexpr std::array<std::uint64_t, 9> rows_around = {
     0 - one_x - one_y, 0 - one_x, one_y - one_x, 0 - one_y, 0, one_y, one_x - one_y, one_x, one_x + one_y};
 
-/// The rows around the cell of a level in which the last body asked for lies: neighbours often share it.
-struct Around {
-  std::uint64_t key = 0;  ///< of no cell
-  std::array<Row, rows_around.size()> rows;
-};
+/// Pairs of the bodies of cells [begin, end) that stand in finer levels with those of `level`. They are taken
+/// by the cell of that level in which they lie, in order, so that its neighbours are found once, by going on
+/// from those of the last one.
+void find_larger(const CellGrid& grid, std::size_t begin, std::size_t end, std::size_t level,
+                 PairList& list) {
+  std::vector<Entry> below;
+  for (std::size_t c = begin; c < end && grid.cells[c].key >> level_shift < level; ++c)
+    for (std::int32_t a = grid.cells[c].begin; a < grid.cells[c].end; ++a)
+      below.push_back(
+          {key_of(grid.members[static_cast<std::size_t>(a)].x, grid.origin, level, grid.cell_size[level]),
+           a});
+  if (below.empty()) return;
+  sort_by_key(below);
+  std::array<std::size_t, rows_around.size()> cell;
+  for (std::size_t r = 0; r < cell.size(); ++r) cell[r] = first_cell(grid, below[0].key + rows_around[r] - 1);
+  std::vector<CellGrid::Member> members;
+  std::vector<Slot> slots;
+  for (std::size_t k = 0; k < below.size(); ++k) {
+    if (k == 0 || below[k].key != below[k - 1].key) {
+      members.clear();
+      slots.clear();
+      for (std::size_t r = 0; r < cell.size(); ++r) {
+        const Row row = row_at(grid, below[k].key + rows_around[r], cell[r]);
+        const Others others = others_of(grid, row.begin, row.end);
+        members.insert(members.end(), others.members.begin(), others.members.end());
+        slots.insert(slots.end(), others.slots.begin(), others.slots.end());
+      }
+    }
+    if (!slots.empty()) list.add(grid, static_cast<std::size_t>(below[k].slot), {members, slots});
+  }
+}
 
 }  // namespace
 
@@ -211,32 +248,21 @@ void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::v
   std::array<std::size_t, rows_behind.size()> cell;
   for (std::size_t r = 0; r < cell.size(); ++r)
     cell[r] = first_cell(grid, grid.cells[begin].key + rows_behind[r] - 1);
-  std::vector<Around> around(grid.cell_size.size());
   for (std::size_t c = begin; c < end; ++c) {
     const std::uint64_t key = grid.cells[c].key;
     const auto from = static_cast<std::size_t>(grid.cells[c].begin),
                to = static_cast<std::size_t>(grid.cells[c].end);
     const bool next = c + 1 < grid.cells.size() && grid.cells[c + 1].key == key + 1;
     const std::size_t own = next ? static_cast<std::size_t>(grid.cells[c + 1].end) : to;
-    for (std::size_t a = from; a < to; ++a) list.add(grid, a, a + 1, own);
+    for (std::size_t a = from; a < to; ++a) list.add(grid, a, others_of(grid, a + 1, own));
     for (std::size_t r = 0; r < cell.size(); ++r) {
       const Row row = row_at(grid, key + rows_behind[r], cell[r]);
-      for (std::size_t a = from; a < to && row.begin < row.end; ++a) list.add(grid, a, row.begin, row.end);
+      const Others others = others_of(grid, row.begin, row.end);
+      for (std::size_t a = from; a < to && row.begin < row.end; ++a) list.add(grid, a, others);
     }
-    for (std::size_t level = (key >> level_shift) + 1; level < grid.cell_size.size(); ++level)
-      for (std::size_t a = from; a < to; ++a) {
-        Around& there = around[level];
-        const std::uint64_t centre = key_of(grid.members[a].x, grid.origin, level, grid.cell_size[level]);
-        if (there.key != centre) {
-          there.key = centre;
-          for (std::size_t r = 0; r < rows_around.size(); ++r) {
-            std::size_t first = first_cell(grid, centre + rows_around[r] - 1);
-            there.rows[r] = row_at(grid, centre + rows_around[r], first);
-          }
-        }
-        for (const Row& row : there.rows) list.add(grid, a, row.begin, row.end);
-      }
   }
+  for (std::size_t level = 1; level < grid.cell_size.size(); ++level)
+    find_larger(grid, begin, end, level, list);
 }
 
 bool meets_any(const CellGrid& grid, const Vec3& x, double reach) {
