@@ -1,10 +1,12 @@
 /// The tables of a run as CSV: a line for each step, wall, named body, insertion, removal, triaxial report
-/// and check of the error.
+/// and check of the error; and columns.json, which says what their columns mean.
 
 #include <algorithm>
 #include <array>
 
+#include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
+#include "io/results/column_dictionary.hpp"
 #include "io/results/csv_writer.hpp"
 
 namespace talus::io {
@@ -25,6 +27,7 @@ class TableSink : public OutputSink {
 
   void open() override {
     if (!writes_) return;
+    write_whole(directory_ / "columns.json", columns_json());
     lines_of(steps);
     lines_of(walls);
   }
@@ -84,11 +87,13 @@ class TableSink : public OutputSink {
 
 }  // namespace
 
-const SinkKind table_sink{
-    SinkUse::always,
-    [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
-      return std::make_unique<TableSink>(context);
-    },
-    [](const std::string& name) { return std::find(names.begin(), names.end(), name) != names.end(); }};
+const SinkKind table_sink{SinkUse::always,
+                          [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+                            return std::make_unique<TableSink>(context);
+                          },
+                          [](const std::string& name) {
+                            return name == "columns.json" ||
+                                   std::find(names.begin(), names.end(), name) != names.end();
+                          }};
 
 }  // namespace talus::io

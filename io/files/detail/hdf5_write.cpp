@@ -85,6 +85,7 @@ void write_names(Place place, const char* name, const std::vector<std::string>& 
     demand(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, texts.data()), place.file,
            action);
   }
+  write_attribute({dataset.id(), place.file}, "units", std::string("1"));
 }
 
 void close_file(Hdf5Object& file, const std::string& path) {

@@ -72,6 +72,7 @@ void write_array(Place place, const char* name, const char* units,
               NumberTable{element_types(static_cast<const T*>(nullptr)), values.data(), values.size(), N});
 }
 
+/// Texts, with the attribute `units` = "1".
 void write_names(Place place, const char* name, const std::vector<std::string>& values);
 Hdf5Object create_group(Place place, const std::string& name);
 

@@ -1,0 +1,201 @@
+"""One frame of results.h5: grains, contacts and walls at an output time."""
+
+from __future__ import annotations
+
+import time as clock
+from functools import cached_property
+from pathlib import Path
+from typing import Callable, TypeVar
+
+import h5py
+import numpy as np
+
+T = TypeVar("T")
+
+FORMAT, FORMAT_VERSION = "talus-results", 1
+# The program writes a frame within milliseconds, and names it when it is whole. A reader that looks in between may
+# meet a directory of the file that changes; it looks again.
+RETRIES, RETRY_WAIT = 20, 0.05  # [1], [s]
+
+
+class MissingData(LookupError):
+    """A frame or an array that the run has not written; the message says which key of the scene writes it."""
+
+
+class NotThere(KeyError):
+    """What a directory of the file should have and has not: at this moment, or for good."""
+
+
+def text(value: object) -> str:
+    """A text attribute or cell of an HDF5 file."""
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
+    """What `read` returns of a results.h5 that may be written at this moment.
+
+    Raises MissingData where there is no file, ValueError where it is of another format.
+    """
+    for attempt in range(RETRIES):
+        try:
+            with h5py.File(path, "r", locking=False) as file:
+                kind, version = text(file.attrs.get("format", "")), int(file.attrs.get("format_version", 0))
+                if kind != FORMAT:
+                    raise ValueError(f"{path}: no results of Talus (its attribute 'format' is '{kind}')")
+                if version != FORMAT_VERSION:
+                    raise ValueError(f"{path}: format {version} of results.h5; this package reads format "
+                                     f"{FORMAT_VERSION}: use the package of the Talus that wrote it")
+                return read(file)
+        except FileNotFoundError:
+            raise MissingData(f"{path}: no such file; the run has not come to its first frame") from None
+        except MissingData:
+            raise
+        except (OSError, KeyError, RuntimeError) as error:
+            if attempt + 1 == RETRIES and isinstance(error, NotThere):
+                raise MissingData(error.args[0]) from None
+            if attempt + 1 == RETRIES:
+                raise OSError(f"{path}: cannot be read: {error}; where a run was killed, `talus run ... --resume` "
+                              "mends the file") from error
+            clock.sleep(RETRY_WAIT)
+    raise AssertionError("unreachable")
+
+
+class Frame:
+    """Grains, contacts and walls at one output time, in SI units. Arrays are read when they are asked for, and kept.
+
+    Grains stand in order of `ids` (shape n), contacts in order of their ids (shape m).
+    """
+
+    def __init__(self, path: Path, index: int, step: int, time: float, stage: str) -> None:
+        self._path = path
+        self.index = index  #: number of the frame, from 0
+        self.step = step  #: time step behind which it was written
+        self.time = time  #: [s]
+        self.stage = stage  #: name of the stage
+
+    def __repr__(self) -> str:
+        return f"<Frame {self.index}: step {self.step}, {self.time:.6g} s, stage '{self.stage}'>"
+
+    def array(self, name: str) -> np.ndarray:
+        """Any array of the frame by its name in results.h5 (docs/formats.md): "bodies/x", "walls/force"."""
+
+        def read(file: h5py.File) -> np.ndarray:
+            group = file.get(f"frames/{self.index:06}")
+            if group is None or int(group.attrs["step"]) != self.step:
+                raise NotThere(f"{self._path}: frame {self.index} of step {self.step} is no longer there: the run went on "
+                               "from a checkpoint before it; ask the run for its frames again")
+            if name not in group:
+                hint = _WRITTEN_BY.get(name, "")
+                raise MissingData(f"{self._path}: frame {self.index} has no '{name}'{hint}")
+            values: np.ndarray = group[name][()]
+            return values
+
+        return read_file(self._path, read)
+
+    @cached_property
+    def ids(self) -> np.ndarray:
+        """Identity of each grain for the whole run, ascending; shape (n,)."""
+        return self.array("bodies/id")
+
+    @cached_property
+    def positions(self) -> np.ndarray:
+        """Centres [m]; shape (n, 3)."""
+        return self.array("bodies/x")
+
+    @cached_property
+    def radii(self) -> np.ndarray:
+        """Radii [m], of a clump that of the sphere that holds it; shape (n,)."""
+        return self.array("bodies/radius")
+
+    @cached_property
+    def velocities(self) -> np.ndarray:
+        """Velocities of the centres [m/s]; shape (n, 3)."""
+        return self.array("bodies/u")
+
+    @cached_property
+    def angular_velocities(self) -> np.ndarray:
+        """Angular velocities [rad/s]; shape (n, 3)."""
+        return self.array("bodies/omega")
+
+    @cached_property
+    def orientations(self) -> np.ndarray:
+        """Unit quaternions (w, x, y, z); shape (n, 4)."""
+        return self.array("bodies/orientation")
+
+    @cached_property
+    def materials(self) -> np.ndarray:
+        """Number of each grain's [[material]], from 0; shape (n,)."""
+        return self.array("bodies/material")
+
+    @cached_property
+    def contacts(self) -> np.ndarray:
+        """Ids of the two bodies of each active contact; the second is -(1 + k) at wall k; shape (m, 2)."""
+        return self.array("contacts/bodies")
+
+    @cached_property
+    def forces(self) -> np.ndarray:
+        """Force on the first body of each contact, mean over the step [N]; shape (m, 3)."""
+        return self.array("contacts/force")
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Points of contact [m]; shape (m, 3)."""
+        return self.array("contacts/point")
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals from the second body to the first; shape (m, 3)."""
+        return self.array("contacts/normal")
+
+    @cached_property
+    def gaps(self) -> np.ndarray:
+        """Gaps at the end of the step [m], negative where bodies overlap; shape (m,)."""
+        return self.array("contacts/gap")
+
+    @property
+    def normal_forces(self) -> np.ndarray:
+        """Normal components of `forces` [N], positive where bodies press on each other; shape (m,)."""
+        return np.einsum("ij,ij->i", self.forces, self.normals)
+
+    @property
+    def between_grains(self) -> np.ndarray:
+        """True for contacts of two grains, False for those with a wall; shape (m,)."""
+        return self.contacts[:, 1] >= 0
+
+    @cached_property
+    def walls(self) -> np.ndarray:
+        """Walls as a structured array: `name`, `position` [m] and `velocity` [m/s] along the normal, `force` (3) [N]."""
+
+        def read(file: h5py.File) -> list[str]:
+            return [text(name) for name in file["walls/name"][()]]
+
+        names = read_file(self._path, read)
+        walls = np.empty(len(names), dtype=[("name", np.array(names or [""]).dtype), ("position", "f8"),
+                                            ("velocity", "f8"), ("force", "f8", 3)])
+        walls["name"] = names
+        for column in ("position", "velocity", "force"):
+            walls[column] = self.array(f"walls/{column}")
+        return walls
+
+    def rows(self, ids: np.ndarray) -> np.ndarray:
+        """Rows of `positions` and the like at which the grains of these ids stand, of any shape.
+
+        Raises MissingData for an id that no grain of this frame has, above all that of a wall (negative).
+        """
+        ids = np.asarray(ids)
+        rows = np.minimum(np.searchsorted(self.ids, ids), max(len(self.ids) - 1, 0))
+        if ids.size and (len(self.ids) == 0 or not np.array_equal(self.ids[rows], ids)):
+            raise MissingData(f"{self._path}: frame {self.index} lacks a grain of the ids asked for; walls have negative "
+                              "ids: choose contacts by `between_grains` first")
+        return rows
+
+
+_WRITTEN_BY = {
+    "bodies/u": " (the scene says output.velocities = false)",
+    "bodies/omega": " (the scene says rotation = false, or output.velocities = false)",
+    "bodies/orientation": " (the scene does not say orientation = true)",
+    "bodies/material": " (the materials of the scene have no names)",
+    "contacts/point": " (the scene says output.contact_geometry = false)",
+    "contacts/normal": " (the scene says output.contact_geometry = false)",
+    "contacts/gap": " (the scene says output.contact_geometry = false)",
+}

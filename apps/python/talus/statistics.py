@@ -1,0 +1,110 @@
+"""Statistics of packings: fabric, forces, distances. Functions of arrays; a `Frame` has these as attributes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def fabric_tensor(normals: ArrayLike) -> np.ndarray:
+    """Fabric tensor F_ij = <n_i n_j> over contacts (Satake 1982): symmetric, of trace 1, I/3 where no direction is
+    preferred.
+
+    normals: unit vectors, shape (m, 3), of either sign; `frame.normals[frame.between_grains]`.
+    Raises ValueError where there is no contact.
+    """
+    n = np.asarray(normals, dtype=float).reshape(-1, 3)
+    if len(n) == 0:
+        raise ValueError("the fabric of no contact is not defined")
+    return n.T @ n / len(n)
+
+
+def anisotropy(fabric: ArrayLike) -> float:
+    """Anisotropy of a fabric tensor, a = 5 sqrt(3/2 D:D) with its deviator D = F - I/3 tr F; 0 without direction.
+
+    Where normals are distributed about an axis as (1 + a (3 cos² - 1)/2)/4π over the sphere, |a| comes out.
+    """
+    f = np.asarray(fabric, dtype=float)
+    deviator = f - np.eye(3) * np.trace(f) / 3
+    return float(5 * np.sqrt(1.5 * np.sum(deviator * deviator)))
+
+
+def force_distribution(forces: ArrayLike, bins: int | ArrayLike = 40) -> tuple[np.ndarray, np.ndarray]:
+    """Probability density P of f = F/<F>, of unit integral over the bins.
+
+    forces: magnitudes [N], shape (m,); zeros and negative ones are left out: these contacts carry nothing.
+    bins: number of bins between 0 and the largest f, or edges of f [1]. Returns centres of the bins and P, both [1].
+    Raises ValueError where no force is positive.
+    """
+    f = np.asarray(forces, dtype=float).ravel()
+    f = f[f > 0]
+    if len(f) == 0:
+        raise ValueError("no contact carries a force")
+    f = f / f.mean()
+    edges = np.linspace(0, f.max(), bins + 1) if isinstance(bins, int) else np.asarray(bins, dtype=float)
+    counts, edges = np.histogram(f, edges)
+    return 0.5 * (edges[1:] + edges[:-1]), counts / (max(counts.sum(), 1) * np.diff(edges))
+
+
+def pair_correlation(
+    positions: ArrayLike,
+    low: ArrayLike,
+    high: ArrayLike,
+    r_max: float,
+    bins: int = 100,
+    periodic: ArrayLike = (False, False, False),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pair correlation g(r) up to r_max: density of centres at a distance r from a centre, over the mean density.
+
+    positions: centres [m], shape (n, 3). low, high: corners of the box that holds them [m]; a box of periodic directions
+    is the cell. In the others only grains farther than r_max from both faces are counted from, so that every shell is
+    whole; the mean density is that of the box. bins: shells of equal thickness.
+    Returns the mean radius of each shell [m] and g [1]; time and memory grow as n times the neighbours within r_max.
+
+    Raises ValueError where r_max is no distance of this box: more than half of it.
+    """
+    x, low, high = np.asarray(positions, float).reshape(-1, 3), np.asarray(low, float), np.asarray(high, float)
+    size, wraps = high - low, np.broadcast_to(np.asarray(periodic, bool), 3)
+    if not 0 < r_max <= 0.5 * size.min():
+        raise ValueError(f"r_max = {r_max} m: must be above 0 and at most half of the box, {0.5 * size.min()} m")
+    inner = np.all(wraps | ((x >= low + r_max) & (x <= high - r_max)), axis=1)
+    edges = np.linspace(0, r_max, bins + 1)
+    counts = np.zeros(bins)
+    for first, second in _near_pairs(x - low, size, wraps, r_max, np.flatnonzero(inner)):
+        d = x[second] - x[first]
+        d -= np.where(wraps, size * np.round(d / size), 0)
+        counts += np.histogram(np.sqrt(np.einsum("ij,ij->i", d, d)), edges)[0]
+    shells = 4 / 3 * np.pi * np.diff(edges**3)
+    density = len(x) / size.prod()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return 0.5 * (edges[1:] + edges[:-1]), counts / (inner.sum() * density * shells)
+
+
+def _near_pairs(
+    x: np.ndarray, size: np.ndarray, wraps: np.ndarray, reach: float, origins: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pairs (origin, other) within 3 x 3 x 3 cells at least as wide as `reach`; each pair once for its origin."""
+    cells = np.maximum((size / reach).astype(int), 1)
+    place = np.clip((x / size * cells).astype(int), 0, cells - 1)
+    key = np.ravel_multi_index(place.T, cells)
+    order = np.argsort(key, kind="stable")
+    starts = np.searchsorted(key[order], np.arange(cells.prod() + 1))
+    for shift in itertools.product(*[_shifts(c, w) for c, w in zip(cells, wraps)]):
+        there = place[origins] + shift
+        inside = np.all(wraps | ((there >= 0) & (there < cells)), axis=1)
+        source = origins[inside]
+        cell = np.ravel_multi_index((there[inside] % cells).T, cells)
+        count = starts[cell + 1] - starts[cell]
+        first = np.repeat(source, count)
+        offset = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        second = order[np.repeat(starts[cell], count) + offset]
+        other = first != second
+        yield first[other], second[other]
+
+
+def _shifts(cells: int, wraps: bool) -> list[int]:
+    """Neighbouring cells along one direction; of two periodic ones both neighbours are the same."""
+    return [0] if cells == 1 else [0, 1] if cells == 2 and wraps else [-1, 0, 1]

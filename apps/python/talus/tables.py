@@ -1,0 +1,56 @@
+"""CSV tables of a run as numpy structured arrays."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from pathlib import Path
+
+import numpy as np
+
+# Columns that hold whole numbers. Types do not follow from the values: a velocity may be "0" in every row.
+INTEGERS = frozenset({
+    "step", "candidates", "contacts", "active", "iterations", "worst_contact_body", "worst_contact_with", "worst_body",
+    "overlap_body", "overlap_with", "migrants", "placed", "waiting", "no_room", "count",
+})
+FLAGS = frozenset({"converged"})
+TEXTS = frozenset({"wall", "body", "insert", "remove", "material", "stage", "probe", "name"})
+
+
+def read_table(path: str | os.PathLike[str]) -> np.ndarray:
+    """The rows of a CSV table that Talus wrote, as a structured array: `table["time"]` [s], `table[-1]`.
+
+    Counters are int64, `converged` is bool, names are str, everything else float64. A last line without its end, of a
+    run that goes on or was killed, is left out. Units: docs/formats.md, and `Run.units`.
+
+    Raises FileNotFoundError, and ValueError naming the file for a table with rows of unequal length.
+    """
+    path = Path(path)
+    with path.open(encoding="utf-8", newline="") as file:
+        text = file.read()
+    text = text[: text.rfind("\n") + 1]
+    header, _, body = text.partition("\n")
+    names = next(csv.reader([header]), [])
+    if not names:
+        raise ValueError(f"{path}: no header line; the table is empty or of another program")
+    rows = [row for row in csv.reader(io.StringIO(body)) if row]
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(names):
+            raise ValueError(f"{path}: row {number} has {len(row)} cells, the header {len(names)}")
+    columns = [_column(name, [row[k] for row in rows]) for k, name in enumerate(names)]
+    table = np.empty(len(rows), dtype=[(name, column.dtype) for name, column in zip(names, columns)])
+    for name, column in zip(names, columns):
+        table[name] = column
+    return table
+
+
+def _column(name: str, cells: list[str]) -> np.ndarray:
+    if name in TEXTS:
+        return np.array(cells, dtype=np.str_)
+    try:
+        if name in FLAGS:
+            return np.array([cell == "1" for cell in cells], dtype=bool)
+        return np.array(cells, dtype=np.str_).astype(np.int64 if name in INTEGERS else np.float64)
+    except ValueError:  # a column of text that this package does not know by name
+        return np.array(cells, dtype=np.str_)

@@ -1,0 +1,34 @@
+"""Runs that several tests look at."""
+
+import copy
+import pathlib
+
+import pytest
+
+import talus
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+# Sixty grains fall into a box: contacts with walls and between grains, frames and every table of a box.
+HEAP = {
+    "name": "heap",
+    "gravity": [0, 0, -9.81],
+    "time_step": 1e-3,
+    "box": True,
+    "material": {"density": 2600, "friction": 0.35},
+    "sample": {"kind": "deposition", "count": 60, "base": [0.08, 0.08], "radius_distribution": "uniform",
+               "radius_min": 0.008, "radius_max": 0.01},
+    "stage": [{"name": "rest", "end": {"steps": 30}}],
+    "output": {"every_steps": 10},
+    "checkpoint": {"every_steps": 5},
+}
+
+
+@pytest.fixture
+def heap():
+    return copy.deepcopy(HEAP)
+
+
+@pytest.fixture(scope="session")
+def heap_run(tmp_path_factory):
+    return talus.run(copy.deepcopy(HEAP), tmp_path_factory.mktemp("runs") / "heap", threads=1, progress=False)

@@ -1,0 +1,151 @@
+"""Scenes and runs: what Python writes the program reads, and what the program says Python raises."""
+
+import os
+import signal
+import threading
+import time
+import tomllib
+
+import numpy as np
+import pytest
+
+import talus
+from talus.toml_text import toml_text
+
+from conftest import ROOT
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "apps/scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_scenes_that_ship_are_written_as_they_were_read(path):
+    scene = talus.Scene.load(path)
+    assert tomllib.loads(scene.to_toml()) == tomllib.loads(path.read_text())
+
+
+def test_values_of_toml_survive():
+    value = {"a": 0.1, "b": 1e-300, "c": [1, 2.5], "text": 'quote " \\ \n ü \x01', "flag": True, "t": {"x y": [{"k": 1}, {}]},
+             "np": np.float64(0.25), "array": np.array([1.0, 2.0]), "inf": float("inf")}
+    back = tomllib.loads(toml_text(value))
+    assert back.pop("array") == [1.0, 2.0] and back.pop("np") == 0.25
+    assert back == {key: value[key] for key in back} and set(back) == set(value) - {"array", "np"}
+    with pytest.raises(TypeError, match="material.density"):
+        toml_text({"material": {"density": None}})
+
+
+def test_keys_are_those_of_set(heap):
+    scene = talus.Scene(heap)
+    scene["stage.rest.friction"] = 0.1
+    scene["solver.tolerance"] = 1e-5
+    assert scene["stage.0.friction"] == 0.1 and scene["solver"] == {"tolerance": 1e-5}
+    with pytest.raises(KeyError, match="no element 'shear'; there are 1: rest"):
+        scene["stage.shear.friction"] = 0.1
+    assert "solver" not in heap, "a scene has its own copy"
+
+
+def test_the_program_checks_a_scene(heap):
+    resolved = talus.Scene(heap).check()
+    assert resolved["solver.tolerance"] > 0 and len(resolved["wall"]) == 6
+    heap["material"]["frction"] = 0.1
+    with pytest.raises(talus.SceneError, match="material.frction: unknown key; did you mean 'friction'"):
+        talus.Scene(heap).check()
+
+
+def test_files_of_a_scene_are_found_from_another_folder(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "grains.csv").write_text("id,x,y,z,radius\n0,0.5,0.5,0.5,0.1\n")
+    scene = talus.Scene({"time_step": 1e-3, "box": True, "material": {"density": 2600},
+                         "sample": {"kind": "bodies", "file": "data/grains.csv"},
+                         "stage": [{"name": "one", "end": {"steps": 1}}]}, folder=tmp_path)
+    run = talus.run(scene, tmp_path / "elsewhere" / "out", threads=1, progress=False)
+    assert run.frame(-1).radii.tolist() == [0.1]
+
+
+def test_errors_carry_message_and_exit_code(heap, tmp_path):
+    heap["material"]["friction"] = -1
+    with pytest.raises(talus.RunError, match="material.friction: must be >= 0") as raised:
+        talus.run(heap, tmp_path / "bad", progress=False)
+    assert raised.value.exit_code == 2 and "must be >= 0" in raised.value.message
+    with pytest.raises(FileNotFoundError):
+        talus.run(heap, tmp_path / "bad", program=tmp_path / "no-talus")
+
+
+def test_results_are_not_overwritten(heap_run, heap):
+    before = heap_run.summary["digest"]
+    with pytest.raises(talus.RunError, match="not empty") as raised:
+        talus.run(heap, heap_run.directory, progress=False)
+    assert raised.value.exit_code == 2 and heap_run.summary["digest"] == before
+    heap["seed"] = 5
+    with pytest.raises(FileExistsError, match="holds another scene"):
+        talus.run(heap, heap_run.directory, progress=False)
+
+
+def test_missed_steps_are_a_flag(heap, tmp_path):
+    run = talus.run(heap, tmp_path / "missed", threads=1, progress=False,
+                    settings={"solver": {"method": "nlgs", "max_iterations": 1}})
+    assert run.missed > 0 and run.summary["exit_code"] == 3 and run.status == "done"
+
+
+def test_ranks_give_the_bits_of_one(heap, tmp_path):
+    settings = {"decomposition": {"subdomains": 2}}
+    digests = {talus.run(heap, tmp_path / f"ranks{n}", ranks=n, threads=1, progress=False,
+                         settings=settings).summary["digest"] for n in (1, 2)}
+    assert len(digests) == 1
+
+
+def test_an_error_of_several_ranks_is_said_once(heap, tmp_path):
+    heap["materal"] = {}
+    with pytest.raises(talus.RunError) as raised:
+        talus.run(heap, tmp_path / "bad", ranks=2, threads=1, progress=False)
+    assert raised.value.exit_code == 2 and raised.value.message.count("materal") == 1
+    assert "mpirun" not in raised.value.message
+
+
+def test_progress_is_told(heap, tmp_path):
+    heap["stage"][0]["end"]["steps"] = 10**9
+    told = []
+    with pytest.raises(talus.Stopped) as raised:
+        talus.run(heap, tmp_path / "told", threads=1, progress=told.append, options=["--max-walltime", "0:00:03"])
+    assert raised.value.exit_code == 75
+    steps = [status["step"] for status in told if status.get("step")]
+    assert steps and steps == sorted(steps) and all("heartbeat" in status for status in told)
+
+
+def test_an_interrupt_stops_the_run_behind_a_checkpoint(heap, tmp_path):
+    heap["stage"][0]["end"]["steps"] = 10**9
+
+    def interrupt():
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline and not list((tmp_path / "run").glob("checkpoint_*.h5")):
+            time.sleep(0.05)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        talus.run(heap, tmp_path / "run", threads=1, progress=False)
+    run = talus.open(tmp_path / "run")
+    assert run.status == "stopped" and run.summary["exit_code"] == 75
+
+
+def test_a_sweep_is_a_product_with_a_table(heap, tmp_path):
+    swept = talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.1, 0.5], jobs=2,
+                        measure={"grains": lambda run: len(run.frame(-1).ids)})
+    table = swept.table
+    assert table["material.friction"].tolist() == [0.1, 0.5, 0.1, 0.5]
+    assert table["stage.rest.end.steps"].tolist() == table["steps"].tolist() == [5, 5, 7, 7]
+    assert table["grains"].tolist() == [60] * 4 and len(set(table["digest"])) == 4
+    assert all(run.scene["material"]["friction"] == mu for run, mu in zip(swept.runs, table["material.friction"]))
+    assert len(talus.read_table(tmp_path / "sweep" / "sweep.csv")) == 4
+    again = talus.sweep(heap, tmp_path / "sweep", {"stage.rest.end.steps": [5, 7]}, friction=[0.1, 0.5], resume=True)
+    assert again.table["digest"].tolist() == table["digest"].tolist()
+
+
+def test_a_sweep_says_which_key_it_does_not_know(heap, tmp_path):
+    with pytest.raises(talus.SceneError, match="frictoin: no key of the scene"):
+        talus.sweep(heap, tmp_path / "sweep", frictoin=[1])
+    with pytest.raises(talus.SceneError, match="must be >= 0"):
+        talus.sweep(heap, tmp_path / "sweep", friction=[0.1, -1])
+    assert not (tmp_path / "sweep").exists(), "nothing is run before all scenes are sound"
+
+
+def test_a_run_that_fails_leaves_a_row_and_the_others(heap, tmp_path):
+    swept = talus.sweep(heap, tmp_path / "sweep", {"seed": [1, 2]}, options=["--dump-fclib", "99"])
+    assert swept.table["exit_code"].tolist() == [1, 1] and all(swept.errors) and swept.runs == [None, None]

@@ -1,0 +1,190 @@
+"""A run is read as it was written: tables, frames, and errors that say what is missing."""
+
+import csv
+import json
+import shutil
+import threading
+
+import h5py
+import numpy as np
+import pytest
+
+import talus
+
+
+def test_a_table_holds_what_another_reader_reads(heap_run):
+    with open(heap_run.directory / "walls.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(heap_run.walls) == len(rows) == 30 * 6
+    assert heap_run.walls.dtype.names == tuple(rows[0])
+    assert [str(name) for name in heap_run.walls["wall"][:6]] == ["x-", "x+", "y-", "y+", "z-", "z+"]
+    assert heap_run.walls["force_z"].tolist() == [float(row["force_z"]) for row in rows]
+
+
+def test_types_of_columns_do_not_depend_on_their_values(heap_run):
+    steps = heap_run.steps
+    assert steps["step"].dtype == np.int64 and steps["converged"].dtype == bool
+    assert steps["jump"].dtype == np.float64  # 0 in every row
+
+
+def test_the_grains_gain_the_momentum_that_walls_and_gravity_give(heap_run):
+    frame, walls = heap_run.frame(-1), heap_run.walls
+    mass = 2600 * 4 / 3 * np.pi * frame.radii**3
+    from_walls = 1e-3 * walls["force_z"].sum()  # time step times the forces of all steps
+    gained = from_walls - 9.81 * mass.sum() * frame.time
+    assert gained == pytest.approx(mass @ frame.velocities[:, 2], abs=1e-6 * from_walls)
+
+
+def test_forces_of_contacts_add_up_to_those_of_the_walls(heap_run):
+    frame = heap_run.frame(-1)
+    for k, wall in enumerate(frame.walls):
+        with_wall = frame.contacts[:, 1] == -(1 + k)
+        total = frame.forces[with_wall].sum(axis=0)
+        assert np.allclose(total, wall["force"], rtol=1e-9, atol=1e-9 * np.abs(frame.forces).max()), wall["name"]
+
+
+def test_contacts_touch_where_positions_radii_and_normals_say(heap_run):
+    frame = heap_run.frame(-1)
+    pairs = frame.contacts[frame.between_grains]
+    first, second = frame.rows(pairs[:, 0]), frame.rows(pairs[:, 1])
+    branch = frame.positions[first] - frame.positions[second]
+    distance = np.linalg.norm(branch, axis=1)
+    gap = distance - frame.radii[first] - frame.radii[second]
+    assert np.allclose(gap, frame.gaps[frame.between_grains], atol=1e-4 * frame.radii.min())
+    assert np.allclose(branch / distance[:, None], frame.normals[frame.between_grains], atol=1e-2)
+    assert np.all(frame.normal_forces > 0)
+
+
+def test_frames_are_those_of_the_output_times(heap_run):
+    assert [frame.step for frame in heap_run.frames] == [0, 10, 20, 30]
+    assert np.allclose(heap_run.frames.times, [0, 0.01, 0.02, 0.03])
+    assert heap_run.frame(-1).index == 3 and heap_run.frame(0).stage == "rest"
+    assert [frame.step for frame in heap_run.frames[1:3]] == [10, 20]
+
+
+def test_summary_is_that_of_the_program(heap_run):
+    assert heap_run.status == "done" and heap_run.summary["steps"] == 30
+    assert heap_run.json == json.loads((heap_run.directory / "run.json").read_text())
+    assert heap_run.missed == heap_run.summary["unconverged_steps"]
+    assert heap_run.scene["material"]["friction"] == 0.35
+
+
+def test_every_column_has_its_unit(heap_run):
+    units = heap_run.units("walls")
+    assert tuple(units) == heap_run.walls.dtype.names
+    assert units["force_z"] == "N" and units["torque_x"] == "N m" and units["time"] == "s"
+
+
+def test_every_column_of_every_table_is_in_the_dictionary(heap_run):
+    assert {"steps", "walls", "triaxial"} <= set(heap_run.tables)
+    for name in heap_run.tables:
+        assert tuple(heap_run.units(name)) == heap_run.table(name).dtype.names
+
+
+def test_every_array_of_a_frame_has_its_unit(heap_run):
+    units = {}
+    with h5py.File(heap_run.directory / "results.h5") as file:
+        file.visititems(lambda name, item: units.update({name: item.attrs["units"].decode()})
+                        if isinstance(item, h5py.Dataset) else None)
+    assert len(units) == 1 + 4 * 13  # the names of the walls, and the arrays of each frame
+    assert units["frames/000003/bodies/u"] == "m/s" and units["frames/000000/contacts/force"] == "N"
+
+
+def test_a_line_cut_by_a_kill_is_left_out(heap_run, tmp_path):
+    text = (heap_run.directory / "steps.csv").read_text()
+    (tmp_path / "steps.csv").write_text(text[:-7])
+    assert len(talus.read_table(tmp_path / "steps.csv")) == 29
+
+
+def test_quoted_names_are_read(tmp_path):
+    (tmp_path / "walls.csv").write_text('step,wall,work\n1,"a ""left"", tilted\nwall",0\n')
+    assert talus.read_table(tmp_path / "walls.csv")["wall"][0] == 'a "left", tilted\nwall'
+
+
+def test_a_folder_that_is_no_run_is_named_with_the_runs_in_it(heap_run, tmp_path):
+    with pytest.raises(FileNotFoundError, match="no such directory"):
+        talus.open(tmp_path / "none")
+    with pytest.raises(talus.NotARun, match="no run of Talus"):
+        talus.open(tmp_path)
+    with pytest.raises(talus.NotARun, match="there are runs in it: heap"):
+        talus.open(heap_run.directory.parent)
+
+
+def test_what_is_missing_is_said(heap_run):
+    with pytest.raises(talus.MissingData, match="no frame 7; it has frames 0 to 3"):
+        heap_run.frame(7)
+    with pytest.raises(talus.MissingData, match="no bodies.csv; there are: .*steps"):
+        heap_run.table("bodies")
+    with pytest.raises(AttributeError, match="no inserted.csv"):
+        heap_run.inserted
+    with pytest.raises(talus.MissingData, match="orientation = true"):
+        heap_run.frame(0).orientations
+    with pytest.raises(talus.MissingData, match="walls have negative ids"):
+        heap_run.frame(-1).rows(np.array([-1]))
+
+
+def test_other_formats_are_refused(heap_run, tmp_path):
+    other = tmp_path / "run"
+    shutil.copytree(heap_run.directory, other)
+    with h5py.File(other / "results.h5", "a") as file:
+        file.attrs["format_version"] = 0
+    with pytest.raises(ValueError, match="format 0 of results.h5; this package reads format 1"):
+        talus.open(other).frames
+    (other / "results.h5").unlink()
+    assert len(talus.open(other).frames) == 0
+    with pytest.raises(talus.MissingData, match="it has none yet"):
+        talus.open(other).frame(-1)
+
+
+def test_a_run_is_read_while_it_goes_on_and_after_it_is_resumed(heap, tmp_path):
+    heap["stage"][0]["end"]["steps"] = 400
+    heap["output"]["every_steps"] = 2
+    out = tmp_path / "live"
+    seen = []
+
+    def look():
+        while True:
+            if (out / "run.json").exists():
+                run = talus.open(out)
+                frames = run.frames
+                seen.append(len(frames))
+                try:
+                    assert not len(frames) or np.isfinite(frames[-1].positions).all()
+                except talus.MissingData:  # the frame of the stop: the run that goes on from before it has cut it off
+                    assert resumed.is_set()
+                if "steps" in run.tables:
+                    steps = run.steps["step"]  # read once: the next look may see more
+                    assert steps.tolist() == list(range(1, len(steps) + 1))
+            if done.is_set():
+                return
+
+    done, resumed = threading.Event(), threading.Event()
+    failure = []
+
+    def watch():
+        try:
+            look()
+        except BaseException as error:  # what a thread raises is lost otherwise
+            failure.append(error)
+
+    reader = threading.Thread(target=watch)
+    reader.start()
+    try:
+        with pytest.raises(talus.Stopped):
+            talus.run(heap, out, threads=1, progress=False,
+                      options=["--max-walltime", "0:00:03", "--set", "stage.0.end.steps=1000000"])
+        run = talus.open(out)
+        assert run.status == "stopped"
+        steps = run.summary["steps"]
+        cut = run.frame(-1)
+        resumed.set()
+        talus.run(heap, out, threads=1, progress=False, resume=True,
+                  options=["--set", f"stage.0.end.steps={steps + 40}"])
+    finally:
+        done.set()
+        reader.join()
+    assert not failure, failure
+    with pytest.raises(talus.MissingData, match="no longer there"):
+        talus.Frame(out / "results.h5", cut.index, cut.step - 1, cut.time, cut.stage).positions
+    assert run.status == "done" and len(run.steps) == steps + 40 and run.frame(-1).step == steps + 40
+    assert len(set(seen)) > 2, "the reader never met a run that goes on"
