@@ -11,7 +11,7 @@
 #include "apps/shared/sample_join.hpp"
 #include "apps/shared/state_sample.hpp"
 #include "io/scene/bodies_file.hpp"
-#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/images.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/samples/sample.hpp"
 
@@ -138,7 +138,7 @@ void check(const io::Scene& scene, const Sample& sample) {
 
 /// By how much a sphere overlaps a wall [m]; 0 or less where it does not.
 double depth_at(const Wall& wall, const Vec3& x, double radius) {
-  if (wall.surface() == nullptr) return radius - wall_point(wall, x, 0, Domain{}).distance;
+  if (wall.surface() == nullptr) return radius - wall_point(wall, x, 0, {}).distance;
   std::vector<SurfacePoint> points;
   wall.surface()->collide(x, radius, points);
   double depth = 0;
@@ -183,6 +183,7 @@ Sample build_sample(const io::Scene& scene, std::optional<Sample> state) {
   }
   Sample sample = parts.size() == 1 ? std::move(parts.front()) : join_samples(scene, std::move(parts));
   check(scene, sample);
+  for (Vec3& x : sample.x) x = scene.setup.domain.wrap(x);
   return sample;
 }
 
@@ -191,12 +192,10 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   const auto id = [&](std::size_t k) { return static_cast<std::int64_t>(sample.id_of(k)); };
   // Samples that are made have none between grains.
   if (std::ranges::any_of(scene.samples, &io::SampleSpec::from_file)) {
-    const CellGrid grid = build_cells(sample.x, sample.radius);
-    std::vector<GrainPair> pairs;
-    find_pairs(grid, 0, grid.cells.size(), pairs);
-    for (const GrainPair& pair : pairs) {
+    for (const GrainPair& pair : near_pairs(scene.setup.domain, sample.x, sample.radius)) {
       const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
-      overlaps.add(sample.radius[a] + sample.radius[b] - Domain{}.separation(sample.x[a], sample.x[b]).norm(),
+      overlaps.add(sample.radius[a] + sample.radius[b] -
+                       scene.setup.domain.separation(sample.x[a], sample.x[b]).norm(),
                    std::min(sample.radius[a], sample.radius[b]),
                    [&] { return fmt::format("grains {} and {}", id(a), id(b)); });
     }

@@ -78,6 +78,13 @@ struct CheckpointSpec {
   std::optional<std::int64_t> archive_every;  ///< each of so many is kept for good
 };
 
+/// A [cell]. Lengths are 0 where there is none.
+struct CellSpec {
+  Vec3 lengths = Vec3::Zero();  ///< [m]; 0 along an axis that does not repeat
+  Vec3 origin = Vec3::Zero();   ///< [m]
+  Vec3 shears = Vec3::Zero();   ///< [m] xy, xz, yz
+};
+
 /// A [[material]].
 struct MaterialSpec {
   std::string name;
@@ -112,6 +119,7 @@ struct Scene {
   double density = 0;                   ///< [kg/m^3] of the only material; 0 where materials have names
   std::vector<MaterialSpec> materials;  ///< by name; empty with [material]
   std::vector<SampleSpec> samples;      ///< none where all grains are inserted
+  CellSpec cell;                        ///< of setup.domain
   Stage common;  ///< time_step, gravity and law of the stages that give none themselves; its other fields are
                  ///< not used
   Setup setup;

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "kernels/detection/domain.hpp"
-
 namespace talus {
 
 namespace {
@@ -111,8 +109,7 @@ class PairList {
     GrainPair* next = pairs_.data() + size_;
     for (std::size_t b = begin; b < end; ++b) {
       const CellGrid::Member& other = grid.members[b];
-      const Vec3 d =
-          Domain::separation(Vec3(one.x[0], one.x[1], one.x[2]), Vec3(other.x[0], other.x[1], other.x[2]));
+      const Vec3 d = Vec3(one.x[0], one.x[1], one.x[2]) - Vec3(other.x[0], other.x[1], other.x[2]);
       const double distance = one.reach + other.reach;
       *next = {std::min(slot, grid.slots[b]), std::max(slot, grid.slots[b])};
       next += d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < distance * distance ? 1 : 0;
@@ -265,7 +262,7 @@ bool meets_any(const CellGrid& grid, const Vec3& x, double reach) {
                k < static_cast<std::size_t>(grid.cells[c].end); ++k) {
             const CellGrid::Member& other = grid.members[k];
             const double distance = reach + other.reach;
-            if (Domain::separation(x, Vec3(other.x)).squaredNorm() < distance * distance) return true;
+            if ((x - Vec3(other.x)).squaredNorm() < distance * distance) return true;
           }
       }
   }

@@ -75,7 +75,7 @@ ContactRow contact_row(const StepState& state, const Active& active, double impu
   const Slot second = state.contacts.second[k];
   const auto j = static_cast<std::size_t>(std::max(second, 0));
   const std::int32_t wall = state.chunks.wall[static_cast<std::size_t>(active.chunk)];
-  const Touch touch = touch_of({bodies.x, bodies.radius, state.walls, clumps_of(state)}, state.contacts, k,
+  const Touch touch = touch_of(poses_of(state), state.contacts, k,
                                wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)]);
   ContactRow row;
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
