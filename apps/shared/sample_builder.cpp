@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 
 #include "apps/shared/patience.hpp"
@@ -14,6 +15,7 @@
 #include "kernels/detection/images.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/samples/sample.hpp"
+#include "kernels/samples/scatter.hpp"
 
 namespace talus {
 
@@ -22,10 +24,14 @@ namespace {
 /// What fits a Slot.
 constexpr std::int64_t most_grains = 2147483647;
 
-std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<double>& radii) {
-  const double spacing = sample.spacing * 2 * *std::max_element(radii.begin(), radii.end());
+std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<double>& radii,
+                                std::uint64_t seed) {
+  const double diameter = 2 * *std::max_element(radii.begin(), radii.end());
+  const double spacing = sample.spacing * diameter;
   Lattice sites;
   sites.spacing = spacing;
+  sites.jitter = 0.5 * sample.noise * (spacing - diameter);
+  sites.seed = seed;
   sites.length_x = sample.cells[0] > 0 ? static_cast<double>(sample.cells[0]) * spacing : sample.base[0];
   sites.length_y = sample.cells[1] > 0 ? static_cast<double>(sample.cells[1]) * spacing : sample.base[1];
   return lattice(radii, sites);
@@ -45,10 +51,11 @@ void demand_memory(const io::Scene& scene, double grains) {
                     grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
 }
 
-std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double>& radii) {
+std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double>& radii,
+                            std::uint64_t seed) {
   std::vector<Vec3> places;
   if (spec.kind == io::SampleSpec::Kind::lattice) {
-    places = lattice_sites(spec, radii);
+    places = lattice_sites(spec, radii, seed);
   } else {
     Patience patience;
     places = deposit(radii, spec.base[0], spec.base[1], [&](std::size_t placed) {
@@ -78,6 +85,18 @@ std::vector<Vec3> sites_in_region(const io::Scene& scene, const io::SampleSpec& 
   return sites;
 }
 
+std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std::vector<double>& radii) {
+  const io::SampleSpec& spec = scene.samples[k];
+  const Domain& domain = scene.setup.domain;
+  const Bounds box =
+      spec.region ? bounds_of(*spec.region) : Bounds{domain.low, domain.low + domain.edges()};
+  try {
+    return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)});
+  } catch (const std::invalid_argument& error) {
+    throw io::SceneError(scene.source_file, 0, fmt::format("sample[{}].count", k), error.what());
+  }
+}
+
 void set_velocity(const io::SampleSpec& spec, Sample& sample) {
   if (spec.velocity.isZero(0) && spec.angular_velocity.isZero(0)) return;
   const Vec3& u = spec.velocity;
@@ -104,13 +123,17 @@ Sample make_part(const io::Scene& scene, std::size_t k) {
     sample.x = {spec.position};
     sample.radius = draw(1);
     sample.named = {BodyId{0}};
+  } else if (spec.kind == Kind::random) {
+    demand_memory(scene, static_cast<double>(spec.count));
+    sample.radius = draw(static_cast<std::size_t>(spec.count));
+    sample.x = random_places(scene, k, sample.radius);
   } else if (spec.region) {
     sample.x = sites_in_region(scene, spec, fmt::format("sample[{}].region", k));
     sample.radius = draw(sample.x.size());
   } else {
     demand_memory(scene, static_cast<double>(spec.grains()));
     sample.radius = draw(static_cast<std::size_t>(spec.grains()));
-    sample.x = places_of(spec, sample.radius);
+    sample.x = places_of(spec, sample.radius, scene.setup.seed);
   }
   set_velocity(spec, sample);
   return sample;

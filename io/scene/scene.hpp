@@ -30,6 +30,7 @@ struct SampleSpec {
     bodies,      ///< read from `file` (io/scene/bodies_file.hpp)
     state,       ///< where an earlier run was: a checkpoint, or a frame of a results.h5, in `file`
     body,        ///< one sphere
+    random,      ///< at random places, none in another, of `region` or the periodic cell
   };
   Kind kind = Kind::deposition;
   std::string name;        ///< of a body, whose path is written; for the rest what overrides may call it
@@ -38,8 +39,9 @@ struct SampleSpec {
       base{};  ///< [m] the sample stands on [0, base[0]] x [0, base[1]] from `origin`; 0 for other lattices
   Vec3 origin = Vec3::Zero();           ///< [m] lower corner of deposition and lattice
   std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given otherwise
-  std::optional<Region> region;         ///< that a lattice fills
+  std::optional<Region> region;         ///< that a lattice fills, or random grains stand in
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
+  double noise = 0;                     ///< lattice: largest displacement over half the gap of two sites
   BodyShape shape = BodyShape::sphere;  ///< of the grains; their radius is that of Clump
   SizeDistribution radii;
   Vec3 position = Vec3::Zero();          ///< [m] of a body
@@ -50,7 +52,7 @@ struct SampleSpec {
   std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names
 
   bool from_file() const { return kind == Kind::bodies || kind == Kind::state; }
-  /// Grains of a deposition or a lattice; 0 for a lattice that fills its region.
+  /// Grains of a sample that is made; 0 for a lattice that fills its region.
   std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
 };
 

@@ -38,6 +38,9 @@ struct Domain {
     return d;
   }
 
+  /// The image of x that is nearest to `to` [m]; x itself, to the bit, between walls.
+  Vec3 image_near(const Vec3& to, const Vec3& x) const { return repeats ? Vec3(to + separation(x, to)) : x; }
+
   /// Halfway along that way [m]: the same point for (a, b) and (b, a), bit for bit.
   Vec3 midpoint(const Vec3& a, const Vec3& b) const;
 
