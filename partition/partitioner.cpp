@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "kernels/detection/domain.hpp"
 #include "partition/partitioners.hpp"
 
 namespace talus {
@@ -41,15 +40,15 @@ PartitionKind partition_kind(std::string_view name) {
 }
 
 PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainPair> grain_pairs,
-                                 std::span<const WallPair> wall_pairs) {
+                                 std::span<const WallPair> wall_pairs, const Domain& domain) {
   PartitionPoints points;
   points.x.reserve(grain_pairs.size() + wall_pairs.size());
   points.half.reserve(grain_pairs.size() + wall_pairs.size());
   for (const GrainPair& pair : grain_pairs) {
     const Vec3 &first = x[static_cast<std::size_t>(pair.first)],
                &second = x[static_cast<std::size_t>(pair.second)];
-    points.x.push_back(Domain{}.midpoint(first, second));
-    points.half.push_back(0.5 * Domain{}.separation(first, second));
+    points.x.push_back(domain.midpoint(first, second));
+    points.half.push_back(0.5 * domain.separation(first, second));
   }
   for (const WallPair& pair : wall_pairs) {
     points.x.push_back(x[static_cast<std::size_t>(pair.body)]);

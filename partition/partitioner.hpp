@@ -14,6 +14,7 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "kernels/detection/domain.hpp"
 #include "kernels/registry.hpp"
 #include "partition/frame.hpp"
 #include "partition/reduction.hpp"
@@ -52,7 +53,7 @@ struct PartitionPoints {
 
 /// Points of candidates in their order: grain pairs, then wall pairs. `x` are the centres [m]; unit weights.
 PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainPair> grain_pairs,
-                                 std::span<const WallPair> wall_pairs);
+                                 std::span<const WallPair> wall_pairs, const Domain& domain = {});
 
 /// Binary tree of cuts, root first. A cut compares keys: the integer coordinate along `axis`, then those of
 /// the two axes that follow cyclically, so that even points of one plane of a lattice can be divided.

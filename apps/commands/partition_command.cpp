@@ -16,7 +16,7 @@
 #include "io/pictures/picture.hpp"
 #include "io/results/vtk.hpp"
 #include "io/scene/scene.hpp"
-#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/images.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "partition/interface.hpp"
 #include "partition/load_table.hpp"
@@ -39,10 +39,16 @@ struct ContactPairs {
 ContactPairs find_contacts(const io::Scene& scene, const Bodies& bodies, int threads) {
   ContactPairs contacts;
   const double smallest = *std::min_element(bodies.radius.begin(), bodies.radius.end());
-  contacts.alert = scene.setup.detection.alert > 0 ? scene.setup.detection.alert : 0.1 * smallest;
+  contacts.alert = alert_distance(scene.setup.detection, smallest);
   std::vector<double> reach;
   for (double radius : bodies.radius) reach.push_back(radius + 0.5 * contacts.alert);
 
+  const std::vector<double> margin(scene.setup.walls.size(), contacts.alert);
+  contacts.walls = find_wall_pairs(bodies.x, bodies.radius, scene.setup.walls, margin);
+  if (scene.setup.domain.repeats) {
+    contacts.grains = near_pairs(scene.setup.domain, bodies.x, reach);
+    return contacts;
+  }
   const CellGrid cells = build_cells(bodies.x, reach);
   const auto shares = static_cast<std::size_t>(threads);
   std::vector<std::vector<GrainPair>> parts(shares);
@@ -55,9 +61,6 @@ ContactPairs find_contacts(const io::Scene& scene, const Bodies& bodies, int thr
     });
   executor.run(detection);
   contacts.grains = sort_pairs(parts, bodies.size());
-
-  const std::vector<double> margin(scene.setup.walls.size(), contacts.alert);
-  contacts.walls = find_wall_pairs(bodies.x, bodies.radius, scene.setup.walls, margin);
   return contacts;
 }
 
@@ -184,7 +187,8 @@ int partition_command(const PartitionCommandOptions& options) {
   try {
     const int threads = options.threads > 0 ? options.threads : omp_get_num_procs();
     const ContactPairs contacts = find_contacts(scene, bodies, threads);
-    const PartitionPoints points = candidate_points(bodies.x, contacts.grains, contacts.walls);
+    const PartitionPoints points =
+        candidate_points(bodies.x, contacts.grains, contacts.walls, scene.setup.domain);
     if (points.x.empty())
       print_error("talus: warning: no grain touches another: there are no contacts to share out\n");
     std::vector<Cut> cuts;

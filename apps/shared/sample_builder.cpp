@@ -5,15 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
 
 #include "apps/shared/patience.hpp"
 #include "apps/shared/sample_join.hpp"
 #include "apps/shared/state_sample.hpp"
 #include "io/scene/bodies_file.hpp"
-#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/images.hpp"
 #include "kernels/detection/wall_pairs.hpp"
 #include "kernels/samples/sample.hpp"
+#include "kernels/samples/scatter.hpp"
 
 namespace talus {
 
@@ -22,10 +24,14 @@ namespace {
 /// What fits a Slot.
 constexpr std::int64_t most_grains = 2147483647;
 
-std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<double>& radii) {
-  const double spacing = sample.spacing * 2 * *std::max_element(radii.begin(), radii.end());
+std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<double>& radii,
+                                std::uint64_t seed) {
+  const double diameter = 2 * *std::max_element(radii.begin(), radii.end());
+  const double spacing = sample.spacing * diameter;
   Lattice sites;
   sites.spacing = spacing;
+  sites.jitter = 0.5 * sample.noise * (spacing - diameter);
+  sites.seed = seed;
   sites.length_x = sample.cells[0] > 0 ? static_cast<double>(sample.cells[0]) * spacing : sample.base[0];
   sites.length_y = sample.cells[1] > 0 ? static_cast<double>(sample.cells[1]) * spacing : sample.base[1];
   return lattice(radii, sites);
@@ -45,10 +51,11 @@ void demand_memory(const io::Scene& scene, double grains) {
                     grains, grains * bytes_made / 1e9, grains * bytes_run / 1e9, there / 1e9));
 }
 
-std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double>& radii) {
+std::vector<Vec3> places_of(const io::SampleSpec& spec, const std::vector<double>& radii,
+                            std::uint64_t seed) {
   std::vector<Vec3> places;
   if (spec.kind == io::SampleSpec::Kind::lattice) {
-    places = lattice_sites(spec, radii);
+    places = lattice_sites(spec, radii, seed);
   } else {
     Patience patience;
     places = deposit(radii, spec.base[0], spec.base[1], [&](std::size_t placed) {
@@ -78,6 +85,18 @@ std::vector<Vec3> sites_in_region(const io::Scene& scene, const io::SampleSpec& 
   return sites;
 }
 
+std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std::vector<double>& radii) {
+  const io::SampleSpec& spec = scene.samples[k];
+  const Domain& domain = scene.setup.domain;
+  const Bounds box =
+      spec.region ? bounds_of(*spec.region) : Bounds{domain.low, domain.low + domain.edges()};
+  try {
+    return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)});
+  } catch (const std::invalid_argument& error) {
+    throw io::SceneError(scene.source_file, 0, fmt::format("sample[{}].count", k), error.what());
+  }
+}
+
 void set_velocity(const io::SampleSpec& spec, Sample& sample) {
   if (spec.velocity.isZero(0) && spec.angular_velocity.isZero(0)) return;
   const Vec3& u = spec.velocity;
@@ -104,13 +123,17 @@ Sample make_part(const io::Scene& scene, std::size_t k) {
     sample.x = {spec.position};
     sample.radius = draw(1);
     sample.named = {BodyId{0}};
+  } else if (spec.kind == Kind::random) {
+    demand_memory(scene, static_cast<double>(spec.count));
+    sample.radius = draw(static_cast<std::size_t>(spec.count));
+    sample.x = random_places(scene, k, sample.radius);
   } else if (spec.region) {
     sample.x = sites_in_region(scene, spec, fmt::format("sample[{}].region", k));
     sample.radius = draw(sample.x.size());
   } else {
     demand_memory(scene, static_cast<double>(spec.grains()));
     sample.radius = draw(static_cast<std::size_t>(spec.grains()));
-    sample.x = places_of(spec, sample.radius);
+    sample.x = places_of(spec, sample.radius, scene.setup.seed);
   }
   set_velocity(spec, sample);
   return sample;
@@ -138,7 +161,7 @@ void check(const io::Scene& scene, const Sample& sample) {
 
 /// By how much a sphere overlaps a wall [m]; 0 or less where it does not.
 double depth_at(const Wall& wall, const Vec3& x, double radius) {
-  if (wall.surface() == nullptr) return radius - wall_point(wall, x, 0, Domain{}).distance;
+  if (wall.surface() == nullptr) return radius - wall_point(wall, x, 0, {}).distance;
   std::vector<SurfacePoint> points;
   wall.surface()->collide(x, radius, points);
   double depth = 0;
@@ -183,6 +206,7 @@ Sample build_sample(const io::Scene& scene, std::optional<Sample> state) {
   }
   Sample sample = parts.size() == 1 ? std::move(parts.front()) : join_samples(scene, std::move(parts));
   check(scene, sample);
+  for (Vec3& x : sample.x) x = scene.setup.domain.wrap(x);
   return sample;
 }
 
@@ -191,12 +215,10 @@ std::string describe_overlaps(const io::Scene& scene, const Sample& sample) {
   const auto id = [&](std::size_t k) { return static_cast<std::int64_t>(sample.id_of(k)); };
   // Samples that are made have none between grains.
   if (std::ranges::any_of(scene.samples, &io::SampleSpec::from_file)) {
-    const CellGrid grid = build_cells(sample.x, sample.radius);
-    std::vector<GrainPair> pairs;
-    find_pairs(grid, 0, grid.cells.size(), pairs);
-    for (const GrainPair& pair : pairs) {
+    for (const GrainPair& pair : near_pairs(scene.setup.domain, sample.x, sample.radius)) {
       const auto a = static_cast<std::size_t>(pair.first), b = static_cast<std::size_t>(pair.second);
-      overlaps.add(sample.radius[a] + sample.radius[b] - Domain{}.separation(sample.x[a], sample.x[b]).norm(),
+      overlaps.add(sample.radius[a] + sample.radius[b] -
+                       scene.setup.domain.separation(sample.x[a], sample.x[b]).norm(),
                    std::min(sample.radius[a], sample.radius[b]),
                    [&] { return fmt::format("grains {} and {}", id(a), id(b)); });
     }

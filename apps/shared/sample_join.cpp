@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "kernels/bodies/release.hpp"
-#include "kernels/detection/broad_phase.hpp"
-#include "kernels/detection/domain.hpp"
+#include "kernels/detection/images.hpp"
 
 namespace talus {
 
@@ -23,17 +22,15 @@ std::string name_of(const io::Scene& scene, std::size_t k) {
 }
 
 void refuse_overlaps(const io::Scene& scene, const Sample& sample, const std::vector<std::size_t>& part_of) {
-  const CellGrid grid = build_cells(sample.x, sample.radius);
-  std::vector<GrainPair> pairs;
-  find_pairs(grid, 0, grid.cells.size(), pairs);
+  const Domain& domain = scene.setup.domain;
   std::size_t count = 0;
   double worst = 0;
   GrainPair deepest{};
-  for (const GrainPair& pair : pairs) {
+  for (const GrainPair& pair : near_pairs(domain, sample.x, sample.radius)) {
     const std::size_t a = at(pair.first), b = at(pair.second);
     if (part_of[a] == part_of[b]) continue;
     const double depth =
-        sample.radius[a] + sample.radius[b] - Domain{}.separation(sample.x[a], sample.x[b]).norm();
+        sample.radius[a] + sample.radius[b] - domain.separation(sample.x[a], sample.x[b]).norm();
     if (depth <= rounding * std::min(sample.radius[a], sample.radius[b])) continue;
     ++count;
     if (depth > worst) {

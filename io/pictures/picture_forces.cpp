@@ -32,13 +32,15 @@ struct Force {
 /// What is seen: the grains of the slab and the forces between them, weak ones first.
 struct ForceSlab : detail::Slab {
   std::vector<Force> forces;
-  double mean_force = 0;  ///< of `forces` [N]
+  double mean_force = 0;     ///< of `forces` [N]
+  std::size_t contacts = 0;  ///< one across a face of a periodic cell is drawn on both sides
 };
 
 constexpr double picture_side = 760, margin_left = 40, margin_right = 40, margin_top = 84, margin_bottom = 84;
 
 ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& options) {
-  ForceSlab slab{detail::cut_slab(frame, options.thickness), {}, 0};
+  ForceSlab slab{detail::cut_slab(frame, options.thickness), {}, 0, 0};
+  std::vector<Force> others;
   const auto inside = [&](std::size_t k) { return slab.holds(frame.x[k]); };
   const detail::BodyIndex index(frame.id);
   for (std::size_t k = 0; k < frame.contact_bodies.size(); ++k) {
@@ -50,13 +52,17 @@ ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& opt
     }
     const std::size_t b = second < 0 ? a : index.at(second);
     if (!inside(a) || !inside(b)) continue;
-    const Vec3& end = second < 0 ? frame.contact_point[k] : frame.x[b];
-    slab.forces.push_back({{frame.x[a].x(), frame.x[a].z()},
-                           {end.x(), end.z()},
-                           frame.contact_force[k].dot(frame.contact_normal[k])});
+    const Vec3 &begin = frame.x[a], &other = second < 0 ? frame.contact_point[k] : frame.x[b];
+    const Vec3 end = frame.domain.image_near(begin, other);
+    const double normal = frame.contact_force[k].dot(frame.contact_normal[k]);
+    slab.forces.push_back({{begin.x(), begin.z()}, {end.x(), end.z()}, normal});
+    if (const Vec3 shift = other - end; second >= 0 && shift.norm() > frame.radius[a])
+      others.push_back({{begin.x() + shift.x(), begin.z() + shift.z()}, {other.x(), other.z()}, normal});
   }
+  slab.contacts = slab.forces.size();
   for (const Force& force : slab.forces) slab.mean_force += force.normal;
   if (!slab.forces.empty()) slab.mean_force /= static_cast<double>(slab.forces.size());
+  slab.forces.insert(slab.forces.end(), others.begin(), others.end());
   // Strong chains on top; equal forces keep the order of the frame, so that the same frame gives the same
   // file.
   std::ranges::stable_sort(slab.forces, {}, &Force::normal);
@@ -109,6 +115,17 @@ void draw_walls(Svg& svg, const View& view, const Frame& frame, std::span<const 
   }
 }
 
+/// The faces of a periodic cell along x and z.
+void draw_cell(Svg& svg, const View& view, const Domain& domain) {
+  const Vec3 &low = domain.low, high = low + domain.edges();
+  for (const double x : {low.x(), high.x()})
+    if (domain.cell.xx > 0)
+      svg.line(view.x(x), view.y(view.z_low), view.x(x), view.y(view.z_high), {style::soft_ink, 1});
+  for (const double z : {low.z(), high.z()})
+    if (domain.cell.zz > 0)
+      svg.line(view.x(view.x_low), view.y(z), view.x(view.x_high), view.y(z), {style::soft_ink, 1});
+}
+
 /// Width of a line [px]: proportional to the force, five mean forces are as wide as 0.6 mean radii.
 double line_width(double normal, const ForceSlab& slab, const View& view) {
   return std::clamp(normal / slab.mean_force, 0.0, 5.0) / 5 * 0.6 * slab.mean_radius * view.scale;
@@ -159,7 +176,7 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
   svg.text(margin_left, 56,
            fmt::format("slab of {} about y = {}, seen along y: {} grains, {} contacts",
                        detail::with_unit(2 * slab.half, "m"), detail::with_unit(slab.middle, "m"),
-                       slab.grains.size(), slab.forces.size()),
+                       slab.grains.size(), slab.contacts),
            {13, style::soft_ink});
   svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.7")", style::grain_edge));
   for (const std::size_t k : slab.grains) {
@@ -174,6 +191,7 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
   }
   svg.end_group();
   draw_walls(svg, view, frame, walls);
+  draw_cell(svg, view, frame.domain);
   draw_legend(svg, slab, view, bottom + 16);
   return svg.finish();
 }

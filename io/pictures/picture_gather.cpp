@@ -46,6 +46,7 @@ Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, co
   all.step = part.step;
   all.time = part.time;
   all.stage = part.stage;
+  all.domain = part.domain;
   all.walls = part.walls;
   append_parts(part.id, ranks, all.id);
   append_parts(part.x, ranks, all.x);

@@ -283,7 +283,10 @@ void write_forces_vtp(const Frame& part, const graph::Communicator& ranks, const
     ends.reserve(6 * contacts);
     for (std::size_t k = 0; k < contacts; ++k) {
       const auto [first, second] = part.contact_bodies[k];
-      for (const Vec3& end : {centres.of(first), second < 0 ? part.contact_point[k] : centres.of(second)})
+      const Vec3 begin = centres.of(first);
+      // Across a face of a periodic cell the line goes on outside.
+      for (const Vec3& end :
+           {begin, part.domain.image_near(begin, second < 0 ? part.contact_point[k] : centres.of(second))})
         for (int axis = 0; axis < 3; ++axis) ends.push_back(static_cast<float>(end[axis]));
     }
     file.points(ends);

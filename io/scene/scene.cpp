@@ -16,6 +16,7 @@
 #include "io/scene/detail/scene_read.hpp"
 #include "io/scene/detail/shape_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
+#include "runtime/step/cell.hpp"
 
 namespace talus::io {
 
@@ -36,17 +37,19 @@ class SceneReader {
 
   Scene read() && {
     read_table(root_, "", keys_.top,
-               {"material", "pair", "sample", "insert", "remove", "wall", "group", "stage", "detection",
-                "solver", "decomposition", "output", "checkpoint"},
+               {"material", "pair", "cell", "sample", "insert", "remove", "wall", "group", "stage",
+                "detection", "solver", "decomposition", "output", "checkpoint"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
+    read_cell();
     read_samples(root_, folder_, scene_);
     read_groups(root_, folder_, scene_);
     read_walls();
     read_stages();
     check_motions(root_, scene_);
     read_grain_rules(root_, scene_);
+    check_by_cell([&] { validate_cell(scene_.setup); });
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
     read_decomposition();
@@ -68,6 +71,23 @@ class SceneReader {
     if (!node->is_table()) fail_at(*node, name, fmt::format("must be a table: write [{}]", name));
     return *node->as_table();
   }
+  /// What the cell has no room for is told at its line.
+  template <class Check>
+  void check_by_cell(const Check& check) const {
+    try {
+      check();
+    } catch (const std::invalid_argument& error) {
+      fail_at(*root_.get("cell"), "cell", error.what());
+    }
+  }
+
+  void read_cell() {
+    if (!root_.get("cell")) return;
+    CellSpec& cell = scene_.cell;
+    read_table(table_at(root_, "cell"), "cell", keys_.cell, {}, cell);
+    check_by_cell([&] { scene_.setup.domain = periodic_domain(cell.lengths, cell.origin, cell.shears); });
+  }
+
   void read_walls() {
     std::vector<Wall>& walls = scene_.setup.walls;
     if (!scene_.materials.empty())
@@ -158,7 +178,7 @@ class SceneReader {
 
   void require_face(std::size_t wall, const toml::table& at, const std::string& path) {
     try {
-      face_area(scene_.setup.walls, wall);
+      face_area(scene_.setup.walls, wall, scene_.setup.domain.edges());
     } catch (const std::invalid_argument& error) {
       fail_at(at, path, error.what());
     }
@@ -250,7 +270,7 @@ class SceneReader {
       fail_at(*node, end_path, fmt::format("stage '{}' never ends: give {}", stage.name, conditions));
     if (end.strain && !bounded(end.strain_axis))
       fail_at(*node, end_path + ".strain",
-              fmt::format("no two walls bound the sample along {}", "xyz"[end.strain_axis]));
+              fmt::format("neither two walls nor a cell bound the sample along {}", "xyz"[end.strain_axis]));
     const bool pushed = std::any_of(in_force.begin(), in_force.end(), [](const WallLoad& load) {
       return (load.drive == WallDrive::pressure && load.pressure > 0) ||
              (load.drive == WallDrive::force && load.force > 0);
@@ -265,7 +285,7 @@ class SceneReader {
       return std::any_of(scene_.setup.walls.begin(), scene_.setup.walls.end(),
                          [&](const Wall& wall) { return wall.normal[axis] == direction; });
     };
-    return faces(1) && faces(-1);
+    return scene_.setup.domain.edges()[axis] > 0 || (faces(1) && faces(-1));
   }
 
   const toml::table& root_;

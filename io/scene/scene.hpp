@@ -30,6 +30,7 @@ struct SampleSpec {
     bodies,      ///< read from `file` (io/scene/bodies_file.hpp)
     state,       ///< where an earlier run was: a checkpoint, or a frame of a results.h5, in `file`
     body,        ///< one sphere
+    random,      ///< at random places, none in another, of `region` or the periodic cell
   };
   Kind kind = Kind::deposition;
   std::string name;        ///< of a body, whose path is written; for the rest what overrides may call it
@@ -38,8 +39,9 @@ struct SampleSpec {
       base{};  ///< [m] the sample stands on [0, base[0]] x [0, base[1]] from `origin`; 0 for other lattices
   Vec3 origin = Vec3::Zero();           ///< [m] lower corner of deposition and lattice
   std::array<std::int64_t, 3> cells{};  ///< grains along x, y, z; 0 for a lattice given otherwise
-  std::optional<Region> region;         ///< that a lattice fills
+  std::optional<Region> region;         ///< that a lattice fills, or random grains stand in
   double spacing = 1.05;                ///< lattice: distance of centres over largest diameter, >= 1
+  double noise = 0;                     ///< lattice: largest displacement over half the gap of two sites
   BodyShape shape = BodyShape::sphere;  ///< of the grains; their radius is that of Clump
   SizeDistribution radii;
   Vec3 position = Vec3::Zero();          ///< [m] of a body
@@ -50,7 +52,7 @@ struct SampleSpec {
   std::string material;  ///< of the grains, by name; empty: the first, or those that `file` names
 
   bool from_file() const { return kind == Kind::bodies || kind == Kind::state; }
-  /// Grains of a deposition or a lattice; 0 for a lattice that fills its region.
+  /// Grains of a sample that is made; 0 for a lattice that fills its region.
   std::int64_t grains() const { return count > 0 ? count : cells[0] * cells[1] * cells[2]; }
 };
 
@@ -76,6 +78,13 @@ struct CheckpointSpec {
   std::optional<std::int64_t> every_steps;    ///< steps
   int keep = 2;                               ///< of the last ones
   std::optional<std::int64_t> archive_every;  ///< each of so many is kept for good
+};
+
+/// A [cell]. Lengths are 0 where there is none.
+struct CellSpec {
+  Vec3 lengths = Vec3::Zero();  ///< [m]; 0 along an axis that does not repeat
+  Vec3 origin = Vec3::Zero();   ///< [m]
+  Vec3 shears = Vec3::Zero();   ///< [m] xy, xz, yz
 };
 
 /// A [[material]].
@@ -112,6 +121,7 @@ struct Scene {
   double density = 0;                   ///< [kg/m^3] of the only material; 0 where materials have names
   std::vector<MaterialSpec> materials;  ///< by name; empty with [material]
   std::vector<SampleSpec> samples;      ///< none where all grains are inserted
+  CellSpec cell;                        ///< of setup.domain
   Stage common;  ///< time_step, gravity and law of the stages that give none themselves; its other fields are
                  ///< not used
   Setup setup;

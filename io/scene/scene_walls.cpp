@@ -5,7 +5,7 @@
 #include "io/scene/detail/scene_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
 #include "io/scene/scene.hpp"
-#include "kernels/detection/domain.hpp"
+#include "runtime/step/cell.hpp"
 
 namespace talus::io {
 
@@ -51,7 +51,7 @@ double automatic_position(const Wall& wall, int axis, const std::vector<SampleSp
 
 /// How deep a centre lies in what is solid behind a wall [m]; 0 or less elsewhere.
 double depth_behind(const Wall& wall, const Vec3& x) {
-  if (wall.surface() == nullptr) return wall.normal.dot(Domain{}.separation(wall.point, x));
+  if (wall.surface() == nullptr) return wall.normal.dot((wall.point - x));
   std::vector<SurfacePoint> points;
   wall.surface()->collide(x, 0, points);
   double depth = 0;
@@ -67,6 +67,16 @@ void give_masses(Setup& setup, double mass) {
   for (Wall& wall : setup.walls) give_mass(wall.load, mass);
   for (Stage& stage : setup.stages)
     for (auto& [name, load] : stage.loads) give_mass(load, mass);
+}
+
+void demand_room_in_cell(const Scene& scene, const Sample& grains) {
+  if (!scene.setup.domain.repeats || grains.size() == 0) return;
+  const auto [smallest, largest] = std::ranges::minmax(grains.radius);
+  try {
+    check_cell(scene.setup.domain, largest, candidate_margin(scene.setup.detection, smallest));
+  } catch (const std::invalid_argument& error) {
+    throw SceneError(scene.source_file, 0, "cell.lengths", error.what());
+  }
 }
 
 }  // namespace
@@ -111,6 +121,7 @@ void place_walls(Scene& scene, const Sample& grains) {
       refuse(fmt::format("wall '{}' needs a position: no grains are there yet to place it by", wall.name));
 
   give_masses(scene.setup, automatic_wall_mass(grains));
+  demand_room_in_cell(scene, grains);
 
   for (std::size_t k = 0; k < walls.size(); ++k)
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);

@@ -65,6 +65,7 @@ std::string resolved_scene(const Scene& scene) {
   std::string out;
   write_section(out, keys.top, scene);
   write_materials(out, scene);
+  if (scene.setup.domain.repeats) write_section(out, keys.cell, scene.cell);
   write_samples(out, scene);
   write_grain_rules(out, scene);
   write_section(out, keys.detection, scene.setup.detection);

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "kernels/detection/domain.hpp"
-
 namespace talus {
 
 namespace {
@@ -291,7 +289,7 @@ bool meets_any(const CellGrid& grid, const Vec3& x, double reach) {
                k < static_cast<std::size_t>(grid.cells[c].end); ++k) {
             const CellGrid::Member& other = grid.members[k];
             const double distance = reach + other.reach;
-            if (Domain::separation(x, Vec3(other.x)).squaredNorm() < distance * distance) return true;
+            if ((x - Vec3(other.x)).squaredNorm() < distance * distance) return true;
           }
       }
   }

@@ -1,48 +1,91 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
-#include <concepts>
+#include <cstdint>
 #include <vector>
 
+#include "kernels/bodies/types.hpp"
 #include "kernels/detection/separation.hpp"
 #include "kernels/shapes/walls.hpp"
 
 namespace talus {
 
-/// The space that the sample stands in. It is the only owner of x_i - x_j: detection, measures, output and
-/// samples ask it, so that another kind of space is one more type with these functions, and no change
-/// elsewhere.
+/// The space that the sample stands in: between walls, or a cell that repeats itself along some axes
+/// (docs/theory.md, "Periodic cells"). It is the only owner of x_i - x_j: detection, measures, output and
+/// samples ask it. Inner loops take the space as a type (with_space): between walls a difference is a
+/// subtraction there, without a branch.
 ///
-///   separation(a, b)   from b to a along the shortest way [m]: the plain difference in a walled domain, that
-///                      of the nearest images in a periodic one
-///   midpoint(a, b)     halfway along that way [m]
-///   wrap(x)            the image of x that is stored [m]; x itself where there are no images
-///   lengths(walls)     extent along x, y, z [m]; 0 along an axis that nothing bounds
-///   volume(walls)      of the space that the grains may fill [m^3]; 0 where nothing bounds it
-///   strain(now, then)  logarithmic strain between two lengths of an axis (28); 0 where either is not bounded
-///
-/// A domain is chosen when the program is compiled, as `Domain`: inner loops take it as a type, and the
-/// walled one is a subtraction there, without a branch. A domain with a state of its own (the edges of a
-/// periodic cell) keeps it as members and makes these functions members; the objects are passed wherever a
-/// difference is taken (NarrowPhase, Margins, PairView), and are empty today.
-template <class D>
-concept DomainKind = requires(const D& domain, const Vec3& a, const std::vector<Wall>& walls) {
-  { domain.separation(a, a) } -> std::convertible_to<Vec3>;
-  { domain.midpoint(a, a) } -> std::convertible_to<Vec3>;
-  { domain.wrap(a) } -> std::convertible_to<Vec3>;
-  { domain.lengths(walls) } -> std::convertible_to<Vec3>;
-  { domain.volume(walls) } -> std::convertible_to<double>;
-  { domain.strain(1.0, 1.0) } -> std::convertible_to<double>;
-};
+/// The cell is a brick, from `low` on: sheared edges say where its images stand, not which points are stored.
+struct Domain {
+  PeriodicSpace cell;       ///< all 0 between walls
+  Vec3 low = Vec3::Zero();  ///< lower corner of the brick [m]; 0 along an axis of walls
+  bool repeats = false;     ///< along any axis
 
-/// Bounded by walls alone, or by nothing.
-struct WalledDomain : WalledSpace {
-  static Vec3 lengths(const std::vector<Wall>& walls) { return box_lengths(walls); }
-  static double volume(const std::vector<Wall>& walls) { return box_volume(walls); }
+  /// Edges of the brick [m]; 0 along an axis of walls.
+  Vec3 edges() const { return {cell.xx, cell.yy, cell.zz}; }
+
+  /// work(space): the type that inner loops need.
+  template <class Work>
+  auto with_space(const Work& work) const {
+    return repeats ? work(cell) : work(WalledSpace{});
+  }
+
+  /// From b to a along the shortest way [m]: between the nearest of their images.
+  Vec3 separation(const Vec3& a, const Vec3& b) const {
+    Vec3 d = a - b;
+    if (repeats) cell.shorten(d[0], d[1], d[2]);
+    return d;
+  }
+
+  /// The image of x that is nearest to `to` [m]; x itself, to the bit, between walls.
+  Vec3 image_near(const Vec3& to, const Vec3& x) const { return repeats ? Vec3(to + separation(x, to)) : x; }
+
+  /// Halfway along that way [m]: the same point for (a, b) and (b, a), bit for bit.
+  Vec3 midpoint(const Vec3& a, const Vec3& b) const;
+
+  /// The image of x that lies in the brick [m], but for rounding; x itself between walls.
+  Vec3 wrap(const Vec3& x) const;
+
+  /// Extent along x, y, z [m]; 0 along an axis that nothing bounds.
+  Vec3 lengths(const std::vector<Wall>& walls) const;
+
+  /// Of the space that the grains may fill [m^3]; 0 where nothing bounds it, or where a wall that is no plane
+  /// takes room in it.
+  double volume(const std::vector<Wall>& walls) const;
+
+  /// Logarithmic strain between two lengths of an axis (28); 0 where either is not bounded.
   static double strain(double now, double then) { return then > 0 && now > 0 ? std::log(now / then) : 0; }
-};
-static_assert(DomainKind<WalledDomain>);
 
-using Domain = WalledDomain;
+  /// Calls visit(k, image) for each image x + k_x a + k_y b + k_z c of x, a point of the brick, that lies
+  /// within `margin` [m] of it along every axis, or within an edge where that is less; k = 0 is one of them.
+  template <class Visit>
+  void each_image(const Vec3& x, double margin, const Visit& visit) const;
+};
+
+/// A cell with the edges `lengths` [m], 0 along an axis of walls, and the shears (xy, xz, yz) [m] of
+/// PeriodicSpace. Throws std::invalid_argument unless lengths are finite and >= 0, one of them is positive,
+/// and shears are between axes that repeat.
+Domain periodic_domain(const Vec3& lengths, const Vec3& low = Vec3::Zero(),
+                       const Vec3& shears = Vec3::Zero());
+
+template <class Visit>
+void Domain::each_image(const Vec3& x, double margin, const Visit& visit) const {
+  // Numbers of images along an axis, with the coordinate of the one at hand.
+  const auto along = [&](Eigen::Index axis, double at, double edge, const auto& each) {
+    if (edge == 0) return each(0.0);
+    const double most = std::min(margin, edge);
+    const double from = low[axis] - most - at, to = low[axis] + edge + most - at;
+    for (double k = std::ceil(from / edge); k <= to / edge; ++k) each(k);
+  };
+  along(2, x[2], cell.zz, [&](double c) {
+    const Vec3 up = x + c * Vec3(cell.xz, cell.yz, cell.zz);
+    along(1, up[1], cell.yy, [&](double b) {
+      const Vec3 beside = up + b * Vec3(cell.xy, cell.yy, 0);
+      along(0, beside[0], cell.xx,
+            [&](double a) { visit(Vec3(a, b, c), Vec3(beside + a * Vec3(cell.xx, 0, 0))); });
+    });
+  });
+}
 
 }  // namespace talus

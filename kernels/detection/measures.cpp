@@ -65,17 +65,21 @@ ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std
       add(k, point.distance * point.normal, point.distance - radius[i], radius[i]);
     }
   } else {
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::size_t next = std::min(k + ahead, end - 1);
-      for (const Slot slot : {contacts.first[next], contacts.second[next]}) {
-        __builtin_prefetch(&x[static_cast<std::size_t>(slot)]);
-        __builtin_prefetch(&radius[static_cast<std::size_t>(slot)]);
+    poses.domain.with_space([&](const auto& space) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const std::size_t next = std::min(k + ahead, end - 1);
+        for (const Slot slot : {contacts.first[next], contacts.second[next]}) {
+          __builtin_prefetch(&poses.x[static_cast<std::size_t>(slot)]);
+          __builtin_prefetch(&poses.radius[static_cast<std::size_t>(slot)]);
+        }
+        const auto i = static_cast<std::size_t>(contacts.first[k]),
+                   j = static_cast<std::size_t>(contacts.second[k]);
+        const double radius_i = poses.radius[i], radius_j = poses.radius[j];
+        Vec3 branch = poses.x[i] - poses.x[j];
+        space.shorten(branch[0], branch[1], branch[2]);
+        add(k, branch, branch.norm() - radius_i - radius_j, std::min(radius_i, radius_j));
       }
-      const auto i = static_cast<std::size_t>(contacts.first[k]),
-                 j = static_cast<std::size_t>(contacts.second[k]);
-      const Vec3 branch = domain.separation(x[i], x[j]);
-      add(k, branch, branch.norm() - radius[i] - radius[j], std::min(radius[i], radius[j]));
-    }
+    });
   }
   sums.penetration = penetration;
   sums.moment = Eigen::Map<const Eigen::Matrix3d>(moment);

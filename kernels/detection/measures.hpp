@@ -43,7 +43,7 @@ struct Poses {
   std::span<const double> radius;  ///< per slot [m]
   std::span<const Wall> walls;
   ClumpView clumps = {};
-  [[no_unique_address]] Domain domain = {};
+  Domain domain = {};
 };
 
 /// Sums of chunk `chunk` with the poses of the end of the step. The branch of a wall contact goes from the

@@ -20,17 +20,17 @@ struct Pairing {
   Vec3 v;  ///< u_i - u_j
   double radius_i, radius_j;
 };
-Pairing meet(const PairView& pairs, std::size_t k) {
+Pairing meet(const PairView& pairs, const Domain& domain, std::size_t k) {
   const std::size_t i = at(pairs.first[k]), j = at(pairs.second[k]);
   using Map = Eigen::Map<const Vec3>;
-  return {pairs.domain.separation(Vec3(Map(pairs.x + 3 * i)), Vec3(Map(pairs.x + 3 * j))),
+  return {domain.separation(Vec3(Map(pairs.x + 3 * i)), Vec3(Map(pairs.x + 3 * j))),
           Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
 }
 
-std::int32_t count_passed(const PairView& pairs, double time_step) {
+std::int32_t count_passed(const PairView& pairs, const Domain& domain, double time_step) {
   std::int32_t through = 0;
   for (std::size_t k = 0; k < pairs.count; ++k) {
-    const Pairing pair = meet(pairs, k);
+    const Pairing pair = meet(pairs, domain, k);
     through += detail::passed(pair.d, time_step * pair.v, pair.radius_i + pair.radius_j,
                               std::min(pair.radius_i, pair.radius_j));
   }
@@ -82,11 +82,11 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
                        second,
                        count,
                        restitution.empty() ? nullptr : restitution.data(),
-                       in.domain};
+                       in.domain.repeats ? &in.domain.cell : nullptr};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
   const bool far = kernel_of(set)(pairs, rule, target);
-  contacts.passed[chunk] = far ? count_passed(pairs, in.time_step) : 0;
+  contacts.passed[chunk] = far ? count_passed(pairs, in.domain, in.time_step) : 0;
   const detail::ChunkPlaces places{chunks, chunk, contacts, contact};
   if (!detail::repair_groups(places)) detail::deal_groups(places);
 }

@@ -26,7 +26,7 @@ struct NarrowPhase {
   double reflection = 0;                    ///< E of the step (kernels/law/restitution_law.hpp)
   std::span<const Material> material = {};  ///< of the bodies; empty: material_of_grains
   ClumpView clumps = {};
-  [[no_unique_address]] Domain domain = {};
+  Domain domain = {};
 };
 
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.

@@ -69,7 +69,8 @@ void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& mar
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Vec3& x = bodies.x[s];
     const double need = need_of(bodies, s, margins);
-    if (need + margins.domain.separation(x, margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
+    // Its way: no position is wrapped between two broad phases.
+    if (need + (x - margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
     const double* u = bodies.velocity[s].u;
     skin_escapes.push_back({static_cast<std::int64_t>(bodies.id[s]),
                             bodies.radius[s],
@@ -104,7 +105,8 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
     for (const Escape& escape : skin_escapes) {
       const Map at(escape.x);
       const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = escape.need + most;
-      if (!(d2 * (1 - rounding) >= reached * reached)) near.push_back(&escape);
+      // Of a periodic cell any of its images may be near.
+      if (margins.domain.repeats || !(d2 * (1 - rounding) >= reached * reached)) near.push_back(&escape);
     }
     for (std::size_t s = begin; s < end; ++s)
       if (compare({near, widest}, bodies, s, margins, needed)) left[s] = 1;

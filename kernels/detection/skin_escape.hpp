@@ -44,7 +44,7 @@ struct Margins {
   double alert;                        ///< [m]
   Vec3 gravity = Vec3::Zero();         ///< [m/s^2]
   std::span<const Wall> walls = {};    ///< at the middle of the step
-  [[no_unique_address]] Domain domain = {};
+  Domain domain = {};
 };
 
 /// Appends the grains of the range that are no longer within their reach of then.

@@ -44,7 +44,7 @@ void place(const Wall& first, const Pose& pose, Wall& wall) {
   wall.normal = pose.moved ? Vec3(pose.turned(first.normal).normalized()) : first.normal;
 }
 
-double face_area(const std::vector<Wall>& walls, std::size_t index) {
+double face_area(const std::vector<Wall>& walls, std::size_t index, const Vec3& period) {
   const Wall& wall = walls[index];
   if (wall.area > 0) return wall.area;
   double area = 1;
@@ -61,6 +61,11 @@ double face_area(const std::vector<Wall>& walls, std::size_t index) {
     area *= distance;
     ++pairs;
   }
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (period[axis] > 0) {
+      area *= period[axis];
+      ++pairs;
+    }
   if (pairs != 2)
     throw std::invalid_argument(
         "wall '" + wall.name +

@@ -90,9 +90,10 @@ void collide(const Wall& wall, const Vec3& centre, double reach, std::vector<Sur
 void place(const Wall& first, const Pose& pose, Wall& wall);
 
 /// Area of the face of wall `index` [m^2]: its own `area` if positive, else the product of the distances
-/// between the two pairs of opposite walls whose normals are orthogonal to it. Throws std::invalid_argument
-/// naming the wall when there are no such pairs.
-double face_area(const std::vector<Wall>& walls, std::size_t index);
+/// between the two pairs of opposite walls whose normals are orthogonal to it; an axis along which space
+/// repeats itself, after `period` [m] > 0, is as good as a pair. Throws std::invalid_argument naming the wall
+/// when there are no such pairs.
+double face_area(const std::vector<Wall>& walls, std::size_t index, const Vec3& period = Vec3::Zero());
 
 /// Volume between the three pairs of opposite axis-aligned walls [m^3]; 0 when the walls do not close a box,
 /// or when a wall that is no plane takes room in it.

@@ -65,10 +65,11 @@ std::array<double, 4> orientation_of(const BodyRecord& record) {
 
 /// Points to balance: the candidates there are; in the beginning, the bodies.
 PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& bodies,
-                              const Candidates& candidates, std::int64_t all_candidates) {
+                              const Candidates& candidates, std::int64_t all_candidates,
+                              const Domain& domain) {
   PartitionPoints points;
   if (all_candidates > 0) {
-    points = candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs);
+    points = candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs, domain);
     // A weight counts in 64ths of the mean, or coarser: all together stay below 2^31.
     const double unit =
         std::clamp(std::floor(std::ldexp(1.0, 30) / static_cast<double>(all_candidates)), 1.0, 64.0);
@@ -90,7 +91,7 @@ struct Gathered {
 };
 
 Gathered exchange_surroundings(const Decomposition& decomposition, const graph::Communicator& ranks,
-                               const Bodies& bodies, std::span<const double> reach) {
+                               const Bodies& bodies, std::span<const double> reach, const Domain& domain) {
   Gathered gathered;
   gathered.own.reserve(bodies.size());
   double largest[1] = {0};
@@ -105,16 +106,17 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
       gathered.own.push_back(static_cast<Slot>(s));
       continue;
     }
-    for (const SubdomainId subdomain :
-         subdomains_within(decomposition.partition, bodies.x[s], 3 * largest[0])) {
-      const std::size_t rank = at(decomposition.rank_of[subdomain]);
-      if (sent[rank] == s) continue;
-      sent[rank] = s;
-      if (rank == here)
-        gathered.own.push_back(static_cast<Slot>(s));
-      else
-        to[rank].push_back(record_of(decomposition, bodies, reach, s));
-    }
+    domain.each_image(bodies.x[s], 3 * largest[0], [&](const Vec3&, const Vec3& image) {
+      for (const SubdomainId subdomain : subdomains_within(decomposition.partition, image, 3 * largest[0])) {
+        const std::size_t rank = at(decomposition.rank_of[subdomain]);
+        if (sent[rank] == s) continue;
+        sent[rank] = s;
+        if (rank == here)
+          gathered.own.push_back(static_cast<Slot>(s));
+        else
+          to[rank].push_back(record_of(decomposition, bodies, reach, s));
+      }
+    });
   }
   for (auto& part : ranks.exchange_records(std::move(to))) {
     gathered.come.insert(gathered.come.end(), part.begin(), part.end());
@@ -206,7 +208,8 @@ namespace {
 
 /// Collective. Makes the partition anew, near the one before.
 void cut_space(Decomposition& decomposition, const DecompositionSettings& settings,
-               const graph::Communicator& ranks, const Bodies& bodies, const Candidates& candidates) {
+               const graph::Communicator& ranks, const RankSample& sample, const Domain& domain) {
+  const auto& [bodies, candidates] = sample;
   std::int64_t all[1] = {static_cast<std::int64_t>(candidates.size())};
   ranks.sum(all);
   decomposition.blind = all[0] == 0;
@@ -214,8 +217,8 @@ void cut_space(Decomposition& decomposition, const DecompositionSettings& settin
   const bool first = before.tree.cuts.empty() && before.table.subdomain.empty();
   PartitionOptions options = partition_options(settings, before.subdomains);
   options.previous = first ? nullptr : &before;
-  decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0]), options,
-                                           reduction_over(ranks));
+  decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0], domain),
+                                           options, reduction_over(ranks));
 }
 
 /// Fills `by_id`, and `of_slot` of the bodies that others sent here.
@@ -233,10 +236,10 @@ void index_by_id(Surroundings& around, std::span<const BodyId> id_of_slot) {
 
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
                                   const graph::Communicator& ranks, const RankSample& sample,
-                                  std::span<const double> reach, bool partition_anew) {
+                                  std::span<const double> reach, bool partition_anew, const Domain& domain) {
   Bodies& bodies = sample.bodies;
-  if (partition_anew) cut_space(decomposition, settings, ranks, bodies, sample.candidates);
-  Gathered gathered = exchange_surroundings(decomposition, ranks, bodies, reach);
+  if (partition_anew) cut_space(decomposition, settings, ranks, sample, domain);
+  Gathered gathered = exchange_surroundings(decomposition, ranks, bodies, reach, domain);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
   /// `source`: into the own slots, then into what came.
   struct Place {

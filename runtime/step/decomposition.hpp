@@ -12,6 +12,7 @@
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/bodies/motion.hpp"
 #include "kernels/detection/chunks.hpp"
+#include "kernels/detection/domain.hpp"
 #include "partition/interface.hpp"
 #include "partition/partitioner.hpp"
 #include "runtime/graph/communicator.hpp"
@@ -101,12 +102,13 @@ struct RankSample {
 
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of
 /// the largest reaches of this rank's regions, so that each candidate whose midpoint is here, and each other
-/// candidate of its bodies, is found here without further messages. `reach` [m]: of the slots of the sample.
+/// candidate of its bodies, is found here without further messages; in a periodic domain their images count,
+/// too, and centres are wrapped. `reach` [m]: of the slots of the sample.
 /// The state of the bodies goes over to the surroundings: ids and centres stay in the sample for
 /// `distribute`.
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
                                   const graph::Communicator& ranks, const RankSample& sample,
-                                  std::span<const double> reach, bool partition_anew);
+                                  std::span<const double> reach, bool partition_anew, const Domain& domain);
 
 /// Candidates found among the surroundings.
 struct FoundCandidates {
@@ -115,6 +117,7 @@ struct FoundCandidates {
   /// Candidates between places in the surroundings whose impulses those found begin from, in the place of
   /// those of the sample; null: the sample's.
   const Candidates* begun_from = nullptr;
+  Domain domain = {};
 };
 
 /// Collective. From the candidates found to the copies, candidates with the impulses of those in `sample`,

@@ -25,17 +25,19 @@ struct ImpulseRecord {
 };
 
 /// The midpoint decides; at a wall the centre.
-Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3> x) {
+Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3> x, const Domain& domain) {
   const std::size_t grains = candidates.grain_pairs.size();
   if (k >= grains) return x[at(candidates.wall_pairs[k - grains].body)];
   const GrainPair& pair = candidates.grain_pairs[k];
-  return Domain{}.midpoint(x[at(pair.first)], x[at(pair.second)]);
+  return domain.midpoint(x[at(pair.first)], x[at(pair.second)]);
 }
 
 /// The impulses of the last step, with slots of the surroundings. Those whose point of contact now lies in a
 /// subdomain of another rank are sent there; `candidates` are freed.
 Candidates collect_impulses(const Decomposition& decomposition, const graph::Communicator& ranks,
-                            const Surroundings& around, const Bodies& bodies, Candidates candidates) {
+                            const Surroundings& around, const RankSample& sample, const Domain& domain) {
+  const Bodies& bodies = sample.bodies;
+  Candidates candidates = std::move(sample.candidates);
   const std::size_t grains = candidates.grain_pairs.size();
   Candidates old;
   old.grain_pairs.reserve(grains);
@@ -53,7 +55,8 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     const std::int32_t rank =
         ranks.ranks() == 1
             ? 0
-            : decomposition.rank_of[decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x))];
+            : decomposition
+                  .rank_of[decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x, domain))];
     if (rank == ranks.rank()) {
       if (wall)
         old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)], at_wall.feature});
@@ -255,8 +258,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
                                        FoundCandidates among, const RankSample& sample) {
   const Partition& partition = decomposition.partition;
   Candidates& found = among.candidates;
-  const Candidates old =
-      collect_impulses(decomposition, ranks, around, sample.bodies, std::move(sample.candidates));
+  const Candidates old = collect_impulses(decomposition, ranks, around, sample, among.domain);
   match_impulses(among.begun_from ? *among.begun_from : old, found);
   sample.candidates = {};
   release(sample.bodies.x);
@@ -268,7 +270,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   {
     std::vector<SubdomainId> subdomain(found.size()), home;
     for (std::size_t k = 0; k < found.size(); ++k)
-      subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x));
+      subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x, among.domain));
     for (const Vec3& x : around.bodies.x) home.push_back(partition.subdomain_of(x));
     const auto stand = [&] {
       return grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);

@@ -39,7 +39,7 @@ BodyRow body_row(const StepState& state, std::size_t s) {
   const Bodies& bodies = state.bodies;
   BodyRow row{};
   row.id = static_cast<std::int64_t>(bodies.id[s]);
-  copy3(bodies.x[s], row.x);
+  copy3(state.domain.wrap(bodies.x[s]), row.x);
   row.radius = bodies.radius[s];
   std::copy_n(bodies.velocity[s].u, 3, row.u);
   for (std::size_t k = 0; k < 3; ++k) row.omega[k] = bodies.velocity[s].w[k] / bodies.radius[s];
@@ -75,14 +75,14 @@ ContactRow contact_row(const StepState& state, const Active& active, double impu
   const Slot second = state.contacts.second[k];
   const auto j = static_cast<std::size_t>(std::max(second, 0));
   const std::int32_t wall = state.chunks.wall[static_cast<std::size_t>(active.chunk)];
-  const Touch touch = touch_of({bodies.x, bodies.radius, state.walls, clumps_of(state)}, state.contacts, k,
+  const Touch touch = touch_of(poses_of(state), state.contacts, k,
                                wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)]);
   ContactRow row;
   row.bodies[0] = static_cast<std::int64_t>(bodies.id[i]);
   row.bodies[1] =
       second >= 0 ? static_cast<std::int64_t>(bodies.id[j]) : -1 - static_cast<std::int64_t>(wall);
   copy3(normal, row.normal);
-  copy3(touch.ball.centre - (touch.ball.radius + 0.5 * touch.gap) * normal, row.point);
+  copy3(state.domain.wrap(touch.ball.centre - (touch.ball.radius + 0.5 * touch.gap) * normal), row.point);
   row.gap = touch.gap;
   copy3(impulse / impulse_time, row.force);
   return row;
@@ -142,6 +142,7 @@ std::vector<Slot> ascending(std::span<const Key> keys) {
 
 void fill_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
                 double impulse_time, Frame& frame) {
+  frame.domain = state.domain;
   std::vector<std::size_t> counted;
   std::vector<std::int64_t> ids;
   for (std::size_t s = 0; s < state.bodies.size(); ++s) {

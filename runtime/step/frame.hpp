@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/detection/domain.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/overlap.hpp"
 #include "runtime/step/worst_errors.hpp"
@@ -147,6 +148,7 @@ struct Frame {
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
+  Domain domain = {};  ///< that they stand in; x and contact_point are wrapped
   bool with_contacts = true;  ///< false: its contacts, of which there may be some, are left out
 };
 

@@ -27,7 +27,7 @@ BodyPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
 /// Calls visit(k, wall index or -1, touch) for each contact of this rank, with the present poses.
 template <class Visit>
 void for_each_touch(const StepState& state, const Visit& visit) {
-  const Poses poses{state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)};
+  const Poses poses = poses_of(state);
   for (std::size_t c = 0; c < state.chunks.size(); ++c) {
     const std::int32_t wall = state.chunks.wall[c];
     const Wall* const surface = wall < 0 ? nullptr : &state.walls[static_cast<std::size_t>(wall)];

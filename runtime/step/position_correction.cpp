@@ -19,8 +19,7 @@ void PositionCorrection::run(std::size_t chunk, int epoch) {
   SingleState& single = state_.single;
   WallCopy* const copy = chunks.wall[chunk] >= 0 ? &state_.copies[chunk] : nullptr;
   if (epoch == 0) {
-    find_overlaps(state_.contacts, chunks, chunk,
-                  {state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)}, part, single);
+    find_overlaps(state_.contacts, chunks, chunk, poses_of(state_), part, single);
     for (std::size_t k = range.begin; k < range.end; ++k) acceleration_.steps.n[k] = 0;
     return first_pushes(state_.contacts, range, pushes_, part, single, copy);
   }

@@ -37,14 +37,14 @@ void check_walls_apart(const std::vector<Wall>& walls, const StepName& step) {
 
 }  // namespace
 
-double pressed_area(const std::vector<Wall>& walls, std::size_t w, const StepName& step) {
+double pressed_area(const StepState& state, std::size_t w, const StepName& step) {
   try {
-    return face_area(walls, w);
+    return face_area(state.walls, w, state.domain.edges());
   } catch (const std::invalid_argument&) {
     throw RunawayError(fmt::format(
         "{}: the walls beside wall '{}' have passed each other, so its "
         "pressure acts on nothing. Are there grains between them? Reduce the time step or the pressure",
-        step.text(), walls[w].name));
+        step.text(), state.walls[w].name));
   }
 }
 

@@ -19,7 +19,7 @@ class RunawayError : public std::runtime_error {
 
 /// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws RunawayError
 /// when there is no such area any more, because walls have run through one another.
-double pressed_area(const std::vector<Wall>& walls, std::size_t w, const StepName& step);
+double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
 /// or the kinetic energy is far above what was supplied. `wall_energy_free`: of the walls with their free

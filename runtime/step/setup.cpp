@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "kernels/bodies/bodies.hpp"
+#include "runtime/step/cell.hpp"
 
 namespace talus {
 
@@ -197,6 +198,7 @@ void validate(const Setup& setup) {
       "Take \"auto\", or another decomposition.coupling");
   if (rolls(setup)) demand_plain_sweeps(setup, "moments of rolling resistance");
   if (!setup.clumps.empty()) validate_clumps(setup);
+  validate_cell(setup);
   require(setup.solver.check_every >= 2, "solver.check_every must be >= 2");
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,

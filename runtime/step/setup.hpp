@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/detection/domain.hpp"
 #include "kernels/law/pair_table.hpp"
 #include "kernels/law/restitution_law.hpp"
 #include "kernels/registry.hpp"
@@ -59,6 +60,14 @@ struct DetectionSettings {
   double alert = 0;  ///< [m] a pair with a smaller gap is a contact of the step; 0: 0.1 x smallest radius
   double skin = -1;  ///< [m] margin of the candidates beyond alert; < 0: 0.2 x smallest radius
 };
+
+/// The distances meant, where the smallest grain has this radius [m].
+inline double alert_distance(const DetectionSettings& detection, double smallest) {
+  return detection.alert > 0 ? detection.alert : 0.1 * smallest;
+}
+inline double skin_distance(const DetectionSettings& detection, double smallest) {
+  return detection.skin >= 0 ? detection.skin : 0.2 * smallest;
+}
 
 /// What makes of sweeps a solver, known by its name in the registry: runtime/step/methods/ has a file for
 /// each. The constants are those that code asks for.
@@ -177,6 +186,7 @@ struct Setup {
   std::vector<InsertRule> inserts;
   std::vector<RemoveRule> removes;
   std::vector<std::string> material_names;  ///< by number; empty where the scene names none
+  Domain domain;                            ///< that the grains stand in
   std::vector<Wall> walls;
   std::vector<WallGroup> groups = {};  ///< that walls name
   std::vector<Clump> clumps;           ///< shapes of bodies that are no spheres (Bodies::shape)

@@ -12,7 +12,7 @@ void take_loads(const Stage& stage, std::span<Wall> walls) {
       if (wall.name == name) wall.load = load;
 }
 
-void put_load(Wall& wall, const std::vector<Wall>& walls) {
+void put_load(Wall& wall, const std::vector<Wall>& walls, const Domain& domain) {
   if (wall.load.drive == WallDrive::fixed) wall.velocity.setZero();
   if (wall.load.drive == WallDrive::velocity) wall.velocity = wall.load.velocity;
   if (wall.load.pushed()) {
@@ -20,17 +20,17 @@ void put_load(Wall& wall, const std::vector<Wall>& walls) {
     if (wall.load.velocity != Vec3::Zero()) wall.velocity += wall.load.velocity;
   }
   if (wall.load.drive == WallDrive::pressure)
-    face_area(walls, static_cast<std::size_t>(&wall - walls.data()));
+    face_area(walls, static_cast<std::size_t>(&wall - walls.data()), domain.edges());
 }
 
 namespace {
 
 /// What wall w is pushed with, along its normal [N].
-double push_on(const std::vector<Wall>& walls, std::size_t w, const Vec3& gravity, const StepName& step) {
-  const Wall& wall = walls[w];
+double push_on(const StepState& state, std::size_t w, const Vec3& gravity, const StepName& step) {
+  const Wall& wall = state.walls[w];
   if (wall.absent || !wall.load.pushed()) return 0;
   const double push = wall.load.drive == WallDrive::pressure
-                          ? wall.load.pressure * pressed_area(walls, w, step)
+                          ? wall.load.pressure * pressed_area(state, w, step)
                           : wall.load.force;
   return wall.load.weight ? push + wall.load.mass * gravity.dot(wall.normal) : push;
 }
@@ -41,7 +41,7 @@ void apply_loads(const StepParameters& parameters, const StepName& step, StepSta
   for (std::size_t w = 0; w < state.walls.size(); ++w) {
     Wall& wall = state.walls[w];
     WallState& wall_state = state.wall_states[w];
-    wall_state.applied = push_on(state.walls, w, parameters.gravity, step);
+    wall_state.applied = push_on(state, w, parameters.gravity, step);
     if (wall.absent && wall.load.pushed()) wall.velocity.setZero();
     wall.gain = parameters.time_step * wall_state.applied * wall.inv_mass() * wall.normal;
     wall_state.free_velocity = wall.velocity + wall.gain / (1 + parameters.reflection);

@@ -17,7 +17,7 @@ void take_loads(const Stage& stage, std::span<Wall> walls);
 
 /// The velocity that a wall has when its load comes into force. `wall` is one of `walls`. Throws
 /// std::invalid_argument when it is pushed with a pressure and has no face.
-void put_load(Wall& wall, const std::vector<Wall>& walls);
+void put_load(Wall& wall, const std::vector<Wall>& walls, const Domain& domain);
 
 /// Applied forces, gains and free velocities of the walls for a step. Throws RunawayError, in which the step
 /// is named, when a pressure has lost its face.

@@ -64,6 +64,7 @@ struct WallState {
 struct StepState {
   Bodies bodies;              ///< n
   std::vector<Clump> clumps;  ///< of the setup
+  Domain domain;              ///< now
   std::vector<Wall> walls;
   std::vector<WallState> wall_states;  ///< like walls
   FreeVelocity free;                   ///< n, or empty parts
@@ -92,6 +93,11 @@ inline ClumpView clumps_of(const StepState& state, const Bodies& bodies) {
 }
 inline ClumpView clumps_of(const StepState& state) {
   return clumps_of(state, state.bodies);
+}
+
+/// Where bodies and walls are.
+inline Poses poses_of(const StepState& state) {
+  return {state.bodies.x, state.bodies.radius, state.walls, clumps_of(state), state.domain};
 }
 
 std::size_t memory_used(const StepState& state);

@@ -6,6 +6,7 @@
 
 #include "kernels/bodies/release.hpp"
 #include "kernels/detection/ball_pairs.hpp"
+#include "kernels/detection/images.hpp"
 #include "kernels/detection/materials.hpp"
 #include "kernels/detection/narrow_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
@@ -92,7 +93,7 @@ bool StepGraph::candidates_hold() const {
   std::vector<Encounter> needed, known;
   compare_skin_escapes(skin_escapes, state_.bodies, state_.candidates,
                        {state_.x_then, state_.reach_then, parameters_.time_step, parameters_.alert,
-                        parameters_.gravity, state_.walls},
+                        parameters_.gravity, state_.walls, state_.domain},
                        needed, known);
   return all_known(ranks_.gather_records(std::span<const Encounter>(needed)),
                    ranks_.gather_records(std::span<const Encounter>(known)));
@@ -113,6 +114,8 @@ void StepGraph::make_cells() {
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   Bodies& bodies = state_.bodies;
+  if (state_.domain.repeats)
+    for (Vec3& x : bodies.x) x = state_.domain.wrap(x);
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   // Grains that fly between others use up half a skin at once: they get one more, or their way
@@ -146,16 +149,26 @@ void StepGraph::make_cells() {
     const double began = graph::seconds_now();
     trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, {bodies, state_.candidates},
-                                   reach, anew);
+                                   reach, anew, state_.domain);
     span.end();
     sums_.times.dealing = graph::seconds_now() - began;
-    cells_ = build_cells(around_.bodies.x, around_.reach);
+    sort_into_cells(around_.bodies.x, around_.reach);
     return;
   }
   make_room();
   state_.x_then = bodies.x;
   state_.reach_then = std::move(reach);
-  cells_ = build_cells(state_.x_then, state_.reach_then);
+  sort_into_cells(state_.x_then, state_.reach_then);
+}
+
+void StepGraph::sort_into_cells(std::span<const Vec3> x, std::span<const double> reach) {
+  if (!state_.domain.repeats) {
+    cells_ = build_cells(x, reach);
+    return;
+  }
+  ImagedBodies imaged = with_images(state_.domain, x, reach);
+  cells_ = build_cells(imaged.x, imaged.reach);
+  images_ = std::move(imaged.original);
 }
 
 void StepGraph::find_pairs_of_share(std::uint32_t share) {
@@ -163,18 +176,22 @@ void StepGraph::find_pairs_of_share(std::uint32_t share) {
   pairs_[share].clear();
   const SlotRange range = range_of_share(cells_.cells.size(), share);
   find_pairs(cells_, range.begin, range.end, pairs_[share]);
+  if (state_.domain.repeats) fold_images(cells_.slots.size() - images_.size(), images_, pairs_[share]);
 }
 
 void StepGraph::make_chunks() {
   if (!sums_.broad_phase) return;
   cells_ = {};
+  images_ = {};
   const bool several = state_.decomposition.several();
   Candidates fresh;
   fresh.impulse = KeptImpulses(parameters_.impulses());
   fresh.grain_pairs = sort_pairs(pairs_, several ? around_.bodies.size() : state_.bodies.size());
+  if (state_.domain.repeats) drop_repeated(fresh.grain_pairs);
   for (auto& part : pairs_) release(part);
-  fresh.wall_pairs = find_wall_pairs(several ? around_.bodies.x : state_.bodies.x,
-                                     several ? around_.reach : state_.reach_then, state_.walls, wall_margin_);
+  fresh.wall_pairs =
+      find_wall_pairs(several ? around_.bodies.x : state_.bodies.x,
+                      several ? around_.reach : state_.reach_then, state_.walls, wall_margin_, state_.domain);
   split_into_balls(clumps_of(state_, several ? around_.bodies : state_.bodies), fresh);
   std::vector<char> glued;
   for (const Wall& wall : state_.walls) glued.push_back(wall.inv_mass() > 0 ? 1 : 0);
@@ -185,9 +202,9 @@ void StepGraph::make_chunks() {
   const double began = graph::seconds_now();
   if (several) {
     const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
-    groups =
-        distribute(state_.decomposition, decomposition_, ranks_, around_,
-                   {std::move(fresh), glued, begins ? &given : nullptr}, {state_.bodies, state_.candidates});
+    groups = distribute(state_.decomposition, decomposition_, ranks_, around_,
+                        {std::move(fresh), glued, begins ? &given : nullptr, state_.domain},
+                        {state_.bodies, state_.candidates});
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
     sums_.times.dealing += graph::seconds_now() - began;
@@ -262,9 +279,9 @@ void StepGraph::narrow_share(std::uint32_t share) {
     std::ranges::fill(state_.candidates.impulse.values(begin, end), 0.0);
   }
   const NarrowPhase in{
-      bodies.x,          bodies.radius,    bodies.velocity,     state_.walls,        parameters_.time_step,
-      parameters_.alert, parameters_.laws, parameters_.gravity, parameters_.turning, parameters_.reflection,
-      bodies.material,   clumps_of(state_)};
+      bodies.x,          bodies.radius,     bodies.velocity,     state_.walls,        parameters_.time_step,
+      parameters_.alert, parameters_.laws,  parameters_.gravity, parameters_.turning, parameters_.reflection,
+      bodies.material,   clumps_of(state_), state_.domain};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);

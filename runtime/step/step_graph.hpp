@@ -83,6 +83,7 @@ class StepGraph {
   bool needs_broad_phase();
   bool candidates_hold() const;
   void make_cells();
+  void sort_into_cells(std::span<const Vec3> x, std::span<const double> reach);
   void find_pairs_of_share(std::uint32_t share);
   void make_chunks();
   Candidates take_given_forces();
@@ -132,6 +133,7 @@ class StepGraph {
   std::int64_t contacts_before_ = 0;          ///< of all ranks, in the last step
   double imbalance_before_ = 0;               ///< SolverLoop::imbalance of the last step
   CellGrid cells_;
+  std::vector<Slot> images_;               ///< ImagedBodies::original; empty between walls
   std::vector<double> wall_margin_;        ///< at the last broad phase [m]
   std::vector<std::vector<Escape>> left_;  ///< per share: grains that have used up their margins
   std::vector<std::vector<GrainPair>> pairs_;

@@ -9,7 +9,6 @@
 #include <unordered_map>
 
 #include "kernels/bodies/larger.hpp"
-#include "kernels/detection/domain.hpp"
 
 namespace talus {
 
@@ -89,7 +88,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   report.overlapping = overlap.named ? std::optional(overlap.pair) : std::nullopt;
   report.kinetic_translation = sums.motion.energy.translation;
   report.kinetic_rotation = sums.motion.energy.rotation;
-  const double box = Domain{}.volume(state.walls);
+  const double box = state.domain.volume(state.walls);
   report.solid_fraction = box > 0 ? sample.volume / box : 0;
   report.equilibrium = distance_from_equilibrium(outcome);
   report.wall_s = elapsed;
@@ -161,7 +160,7 @@ double coordination(const StepState& state, const graph::Communicator& ranks, st
 std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const StepReport& report,
                                               const Stage& stage, const Vec3& strain,
                                               const graph::Communicator& ranks) {
-  const double box = Domain{}.volume(outcome.state.walls);
+  const double box = outcome.state.domain.volume(outcome.state.walls);
   if (!(box > 0)) return std::nullopt;
   TriaxialReport out;
   out.step = report.step;

@@ -171,7 +171,7 @@ void StepGraph::measure_share(std::uint32_t share) {
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     store_impulses(state_.contacts, state_.chunks, c, state_.candidates);
-    const Poses poses{state_.bodies.x, state_.bodies.radius, state_.walls, clumps_of(state_)};
+    const Poses poses = poses_of(state_);
     contact_sums_[c] = measure_contacts(state_.contacts, state_.chunks, c, poses);
     wall_sums_[c] = {};
     if (const std::int32_t w = state_.chunks.wall[c]; w >= 0)

@@ -66,11 +66,8 @@ double longest_time_step(const StepState& state, const Setup& setup, const StepP
   const bool elastic = parameters.laws.largest(&PairLaw::restitution) >= 1;
   const double near = unseen + (elastic ? 0 : 0.5 * parameters.alert);
   const bool blind = !state.given_overlaps;  // before the first step any two may approach
-  double rates[2] = {
-      blind ? 0
-            : closing_rate(state.candidates, state.bodies,
-                           {state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)}, near),
-      fastest(state)};
+  double rates[2] = {blind ? 0 : closing_rate(state.candidates, state.bodies, poses_of(state), near),
+                     fastest(state)};
   ranks.max(rates);
   if (blind) rates[0] = 2 * rates[1] / near;
   const auto inverse = [](double rate) {

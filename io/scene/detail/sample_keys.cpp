@@ -26,12 +26,14 @@ auto is_drawn(std::initializer_list<RadiusKind> kinds) {
 std::vector<Key<SampleSpec>> making_keys() {
   using S = SampleSpec;
   const auto made = is_kind({SampleKind::deposition, SampleKind::lattice});
+  const auto counted = is_kind({SampleKind::deposition, SampleKind::lattice, SampleKind::random});
   const auto lattice = is_kind({SampleKind::lattice});
-  const std::string kinds = "kind is deposition or lattice";
+  const std::string kinds = "kind is deposition or lattice",
+                    counted_kinds = "kind is deposition, lattice or random";
   return {
       key<S>("count", "", countable,
              "Number of grains. A lattice may give `cells` instead, or fill its `region`.", &S::count)
-          .only(kinds, made)
+          .only(counted_kinds, counted)
           .blank_when_zero()
           .or_else("none"),
       key<S>("base", "m", positive,
@@ -50,7 +52,11 @@ std::vector<Key<SampleSpec>> making_keys() {
           .or_else("none"),
       key<S>("spacing", "", at_least_one, "Distance of the centres over the largest diameter.", &S::spacing)
           .only("kind = lattice", lattice),
-      choice<S>("shape", body_shapes(), &S::shape).only(kinds, made)};
+      key<S>("noise", "", zero_to_one,
+             "Each grain is displaced at random, at most by this part of half the gap between two sites.",
+             &S::noise)
+          .only("kind = lattice", lattice),
+      choice<S>("shape", body_shapes(), &S::shape).only(counted_kinds, counted)};
 }
 
 }  // namespace
@@ -120,7 +126,7 @@ Section<Region> region_keys() {
   using K = Region::Kind;
   return {
       "[sample.region]",
-      "A part of space: the one that a lattice fills, and likewise `[insert.region]`, where grains are put "
+      "A part of space: the one that a lattice fills or random grains stand in (box), and likewise `[insert.region]`, where grains are put "
       "(box, cylinder, disc), and `[remove.region]`, where they are taken away (box, cylinder, beyond).",
       {choice<R>("shape", {"box", "cylinder", "disc", "beyond"},
                  "`box`: between two corners; `cylinder`: solid; `disc`: round, flat, centres lie on it; "
@@ -153,13 +159,13 @@ Section<Region> region_keys() {
 Section<SampleSpec> sample_keys() {
   using S = SampleSpec;
   const auto made = [](const S& s) { return !s.from_file(); };
-  const auto distributed = is_kind({SampleKind::deposition, SampleKind::lattice});
+  const auto distributed = is_kind({SampleKind::deposition, SampleKind::lattice, SampleKind::random});
   auto material = bound<std::string, S>(
       "material", "", any, "Name of the grains' material.",
       [](S& sample, const std::string& name) { sample.material = name; },
       [](const S& s) { return s.material.empty() ? Value{} : Value{s.material}; });
   std::vector<Key<S>> keys = {
-      choice<S>("kind", {"deposition", "lattice", "bodies", "state", "body"}, "Way of making the sample.",
+      choice<S>("kind", {"deposition", "lattice", "bodies", "state", "body", "random"}, "Way of making the sample.",
                 &S::kind)
           .need(),
       bound<std::string, S>(
@@ -175,7 +181,7 @@ Section<SampleSpec> sample_keys() {
     drawn.applies = [applies, single, made, distributed](const S& s) {
       return (single ? made(s) : distributed(s)) && (!applies || applies(s));
     };
-    if (drawn.when.empty()) drawn.when = "kind is deposition or lattice";
+    if (drawn.when.empty()) drawn.when = "kind is deposition, lattice or random";
     keys.push_back(std::move(drawn));
   }
   keys.push_back(key<S>("position", "m", any, "Centre of the body.", &S::position)
@@ -209,7 +215,9 @@ Section<SampleSpec> sample_keys() {
       "file with the columns `id,x,y,z,radius`, then perhaps `vx,vy,vz`, then perhaps `wx,wy,wz` (m, m/s, "
       "rad/s), then perhaps `material`; `state` begins where a run was: spheres with their velocities, "
       "forces where contacts are, and walls of the same names that have no place of their own; `body` is "
-      "one sphere. A scene with an `[[insert]]` may do without any.",
+      "one sphere; `random` puts `count` grains at random places of a box or of the periodic cell, each where "
+      "it overlaps none (up to a solid fraction of about 0.35). A scene with an `[[insert]]` may do without "
+      "any.",
       std::move(keys)};
 }
 

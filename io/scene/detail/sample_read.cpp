@@ -28,6 +28,20 @@ void check_lattice(const toml::table& table, const std::string& path, const Samp
             fmt::format("makes {:.3g} grains, more than {:.0f}", grains, countable.high));
 }
 
+void check_random(const toml::table& table, const std::string& path, const SampleSpec& sample,
+                  const Domain& domain) {
+  if (sample.count == 0) fail_at(table, path + ".count", "missing; random grains are counted");
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    const double edge = domain.edges()[axis];
+    if (!sample.region && edge == 0)
+      fail_at(table, path + ".region",
+              fmt::format("missing; random grains need a box, since nothing repeats along {}", "xyz"[axis]));
+    if (sample.region && edge > 0 && sample.region->high[axis] - sample.region->low[axis] > edge)
+      fail_at(*table.get("region"), path + ".region",
+              fmt::format("is longer along {} than the cell, {} m", "xyz"[axis], edge));
+  }
+}
+
 void check_room(const toml::table& table, const std::string& path, const SampleSpec& sample) {
   const double largest = largest_radius(sample.radii);
   if (sample.count > 0)
@@ -71,9 +85,15 @@ void read_sample(const toml::table& table, const std::string& path, const std::f
   read_material(table, path, scene, material_of_grains);
   if (!sample.name.empty() || table.get("name")) check_name(table, path, sample.name);
   check_among(table, path, sample, scene);
-  if (const toml::node* region = table.get("region"); region && sample.kind != SampleKind::lattice)
-    fail_at(*region, path + ".region", "has a meaning only with: kind = lattice");
-  sample.region = read_region(table, path, {Region::Kind::box, Region::Kind::cylinder});
+  const bool random = sample.kind == SampleKind::random;
+  if (const toml::node* region = table.get("region");
+      region && sample.kind != SampleKind::lattice && !random)
+    fail_at(*region, path + ".region", "has a meaning only with: kind = lattice or random");
+  sample.region = random ? read_region(table, path, {Region::Kind::box})
+                         : read_region(table, path, {Region::Kind::box, Region::Kind::cylinder});
+  if (random) check_random(table, path, sample, scene.setup.domain);
+  if (sample.noise > 0 && sample.region)
+    fail_at(*table.get("noise"), path + ".noise", "a lattice that fills a region has none");
   if (sample.kind == SampleKind::deposition && !(sample.count > 0 && sample.base[0] > 0))
     fail_at(table, path, "a deposition needs count and base");
   if (sample.kind == SampleKind::lattice) check_lattice(table, path, sample);

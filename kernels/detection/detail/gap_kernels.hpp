@@ -2,7 +2,7 @@
 
 /// How the kernels of the narrow phase are called: plain pointers, and no functions, so that the translation
 /// units of instruction sets include nothing that could be kept in a version for the wrong processor.
-/// (`WalledSpace` is inlined always.)
+/// (Spaces are inlined always.)
 
 #include <cstddef>
 #include <cstdint>
@@ -21,7 +21,7 @@ struct PairView {
   const std::int32_t *first, *second;   ///< per pair: slots of its bodies
   std::size_t count;                    ///< of pairs
   const double* restitution = nullptr;  ///< per pair; null: all have that of the rule
-  [[no_unique_address]] WalledSpace domain = {};
+  const PeriodicSpace* cell = nullptr;  ///< null: between walls
 };
 
 /// What is found, per pair.

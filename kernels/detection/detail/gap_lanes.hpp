@@ -24,8 +24,7 @@ struct Pairing {
 /// x_i - x_j in the first three lanes; no number behind the three of a centre is read.
 template <std::same_as<Quad> V>
 [[gnu::always_inline]] inline V apart(const PairView& pairs, std::size_t i, std::size_t j) {
-  return pairs.domain.separation(load<V>(pairs.x + 3 * i, 0, FirstLanes{3}),
-                                 load<V>(pairs.x + 3 * j, 0, FirstLanes{3}));
+  return load<V>(pairs.x + 3 * i, 0, FirstLanes{3}) - load<V>(pairs.x + 3 * j, 0, FirstLanes{3});
 }
 [[gnu::always_inline]] inline Quad relative(const PairView& pairs, std::size_t i, std::size_t j) {
   return load<Quad>(pairs.velocity + 8 * i) - load<Quad>(pairs.velocity + 8 * j);
@@ -85,10 +84,12 @@ struct LaneSlots {
 };
 
 /// W pairs from `at` of `out` on; returns the lanes that came far.
-template <class V, class E>
-[[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, LaneSlots slots, const GapRule& rule,
-                                                  E restitution, const GapTarget& out, std::size_t at) {
-  const Pairing<V> pair = meet(pairs, slots.i, slots.j, V{});
+template <class V, class S, class E>
+[[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const S& space, LaneSlots slots,
+                                                  const GapRule& rule, E restitution, const GapTarget& out,
+                                                  std::size_t at) {
+  Pairing<V> pair = meet(pairs, slots.i, slots.j, V{});
+  space.shorten(pair.d.x, pair.d.y, pair.d.z);
   const V distance = root(dot(pair.d, pair.d));
   const BitsOf<V> off = distance > 0;
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
@@ -106,9 +107,9 @@ template <class V, class E>
   return ~(dot(way, way) < 0.25 * small * small);
 }
 
-template <int W, class E>
-[[gnu::always_inline]] inline bool find_gaps_with(const PairView& view, const GapRule& rule, E restitution,
-                                                  const GapTarget& target) {
+template <int W, class S, class E>
+[[gnu::always_inline]] inline bool find_gaps_with(const PairView& view, const S& space, const GapRule& rule,
+                                                  E restitution, const GapTarget& target) {
   using V = Lanes<W>;
   const PairView pairs = view;  // local ones, so that no store can change them
   const GapTarget out = target;
@@ -137,13 +138,13 @@ template <int W, class E>
         ask(pairs.second[next]);
       }
     }
-    far |= gap_block<V>(pairs, {i, j}, rule, restitution.template of<V>(k, AllLanes{}), out, k);
+    far |= gap_block<V>(pairs, space, {i, j}, rule, restitution.template of<V>(k, AllLanes{}), out, k);
   }
   if (const std::size_t rest = pairs.count - k; rest > 0) {  // the last pair fills the lanes behind it
     for (std::size_t l = 0; l < W; ++l) slots(k + (l < rest ? l : rest - 1), l);
     double nx[W], ny[W], nz[W], bias[W];
     std::int64_t contact[W];
-    far |= gap_block<V>(pairs, {i, j}, rule, restitution.template of<V>(k, FirstLanes{rest}),
+    far |= gap_block<V>(pairs, space, {i, j}, rule, restitution.template of<V>(k, FirstLanes{rest}),
                         {nx, ny, nz, bias, contact}, 0);
     for (std::size_t l = 0; l < rest; ++l) {
       out.nx[k + l] = nx[l];
@@ -160,8 +161,11 @@ template <int W, class E>
 
 template <int W>
 bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& target) {
-  if (view.restitution) return find_gaps_with<W>(view, rule, OwnRestitution{view.restitution}, target);
-  return find_gaps_with<W>(view, rule, OneRestitution{rule.restitution}, target);
+  const auto with = [&](const auto& restitution) {
+    if (view.cell) return find_gaps_with<W>(view, PeriodicSpace(*view.cell), rule, restitution, target);
+    return find_gaps_with<W>(view, WalledSpace{}, rule, restitution, target);
+  };
+  return view.restitution ? with(OwnRestitution{view.restitution}) : with(OneRestitution{rule.restitution});
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 #include "kernels/detection/domain.hpp"
+#include "runtime/step/cell.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
 #include "runtime/step/named_bodies.hpp"
@@ -100,7 +101,7 @@ struct Simulation::Implementation {
       if (std::equal(load.begin(), load.end(),
                      head.wall_loads.begin() + static_cast<std::ptrdiff_t>(load.size() * w)))
         continue;
-      put_load(state.walls[w], state.walls);
+      put_load(state.walls[w], state.walls, state.domain);
       state.candidates_valid = false;  // a wall that is free now has chunks of another kind
     }
     resolve_stages(setup, stage_index, stage_begins, state.walls);
@@ -134,9 +135,14 @@ struct Simulation::Implementation {
   void choose_distances() {
     constexpr double farthest_turning = 0.5;
     const double unit = smallest_radius();
-    parameters.alert = setup.detection.alert > 0 ? setup.detection.alert : 0.1 * unit;
+    parameters.alert = alert_distance(setup.detection, unit);
     parameters.turning = farthest_turning * unit;
-    parameters.skin = setup.detection.skin >= 0 ? setup.detection.skin : 0.2 * unit;
+    parameters.skin = skin_distance(setup.detection, unit);
+    if (!setup.domain.repeats) return;
+    double largest[1] = {0};
+    for (const double radius : state.bodies.radius) largest[0] = std::max(largest[0], radius);
+    ranks.max(largest);
+    check_cell(setup.domain, largest[0], parameters.alert + parameters.skin);
   }
 
   const Stage& stage() const { return setup.stages[stage_index]; }
@@ -171,7 +177,7 @@ struct Simulation::Implementation {
     if (stage_begins.size() == stage_index) stage_begins.push_back(report.time);
     resolve_stages(setup, stage_index, stage_begins, state.walls);
     take_loads(stage(), state.walls);
-    for (Wall& wall : state.walls) put_load(wall, state.walls);
+    for (Wall& wall : state.walls) put_load(wall, state.walls, state.domain);
     wind_clock();
     const double last_reflection = parameters.reflection;
     prescribe();
@@ -189,12 +195,12 @@ struct Simulation::Implementation {
       // Forces outlive the change of law.
       for (double& value : state.candidates.impulse.values())
         value *= (1 + last_reflection) / (1 + parameters.reflection);
-      convert_impulses(state.candidates, parameters.impulses(), state.bodies.x, state.walls);
+      convert_impulses(state.candidates, parameters.impulses(), state.bodies.x, state.walls, state.domain);
       state.candidates_valid = false;
     }
     stage_steps = 0;
     held = 0;
-    lengths_at_start = Domain{}.lengths(state.walls);
+    lengths_at_start = state.domain.lengths(state.walls);
   }
 
   StepName next_step() const { return {report.step + 1, setup.stages[stage_index].name}; }
@@ -261,7 +267,7 @@ struct Simulation::Implementation {
   }
 
   double strain(int axis) const {
-    return Domain{}.strain(Domain{}.lengths(state.walls)[axis], lengths_at_start[axis]);
+    return Domain::strain(state.domain.lengths(state.walls)[axis], lengths_at_start[axis]);
   }
 
   StageDone done() const {

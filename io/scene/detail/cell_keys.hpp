@@ -1,0 +1,10 @@
+#pragma once
+
+#include "io/scene/detail/scene_key.hpp"
+#include "io/scene/scene.hpp"
+
+namespace talus::io::detail {
+
+Section<CellSpec> cell_keys();
+
+}  // namespace talus::io::detail

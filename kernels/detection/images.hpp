@@ -1,0 +1,40 @@
+#pragma once
+
+/// Bodies of a periodic cell with those of their images that stand beside its faces: a broad phase that knows
+/// nothing of cells finds the pairs across a face among them.
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "kernels/detection/broad_phase.hpp"
+#include "kernels/detection/domain.hpp"
+
+namespace talus {
+
+/// The bodies in their order, then images of some of them. Of each pair across a face one body, not both, has
+/// the image that is near the other: images are those by k > 0, compared along z, then y, then x.
+struct ImagedBodies {
+  std::vector<Vec3> x;         ///< [m]
+  std::vector<double> reach;   ///< [m]
+  std::vector<Slot> original;  ///< of image `bodies + k`
+};
+
+/// `x` [m] in the brick of the domain; sizes as in build_cells.
+ImagedBodies with_images(const Domain& domain, std::span<const Vec3> x, std::span<const double> reach);
+
+/// Turns the pairs that were found among them into pairs of bodies. Pairs of two images are pairs of bodies
+/// elsewhere, and dropped; so are bodies within reach of an image of
+/// themselves, which no cell that is large enough brings in touch (check_cell of runtime/step).
+void fold_images(std::size_t bodies, std::span<const Slot> original, std::vector<GrainPair>& pairs);
+
+/// Two bodies within reach of two images of one another, as fast ones may be, are one candidate: leaves each
+/// pair once. `pairs` in order (sort_pairs).
+void drop_repeated(std::vector<GrainPair>& pairs);
+
+/// The pairs nearer than the sum of their reaches in the domain, each once, in no promised order. Sizes as in
+/// build_cells; x [m] may lie anywhere.
+std::vector<GrainPair> near_pairs(const Domain& domain, std::span<const Vec3> x,
+                                  std::span<const double> reach);
+
+}  // namespace talus

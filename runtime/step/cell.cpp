@@ -1,0 +1,47 @@
+#include "runtime/step/cell.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace talus {
+
+void validate_cell(const Setup& setup) {
+  if (!setup.domain.repeats) return;
+  const auto refuse = [](const std::string& what) { throw std::invalid_argument("cell: " + what); };
+  for (const Wall& wall : setup.walls) {
+    if (wall.surface() != nullptr)
+      refuse(fmt::format("wall '{}' is no plane; a periodic cell has planes along its walled axes only",
+                         wall.name));
+    for (const Eigen::Index axis : {0, 1, 2})
+      if (setup.domain.edges()[axis] > 0 && wall.normal[axis] != 0)
+        refuse(
+            fmt::format("wall '{}' bounds the sample along {}, where the cell is periodic; remove the "
+                        "wall, or set cell.lengths[{}] to 0",
+                        wall.name, "xyz"[axis], axis));
+    if (std::ranges::any_of(wall.motion, &MotionPart::turns))
+      refuse(fmt::format("wall '{}' turns; walls of a periodic cell keep their normals", wall.name));
+  }
+  if (!setup.inserts.empty() || !setup.removes.empty())
+    refuse("grains cannot come or go in a periodic cell; remove [[insert]] and [[remove]]");
+}
+
+double candidate_margin(const DetectionSettings& detection, double smallest) {
+  return alert_distance(detection, smallest) + skin_distance(detection, smallest);
+}
+
+void check_cell(const Domain& domain, double largest, double margin) {
+  const double least = 2 * (2 * largest + margin);
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    const double edge = domain.edges()[axis];
+    if (edge > 0 && edge < least)
+      throw std::invalid_argument(fmt::format(
+          "cell: {} m along {} is less than {} m, twice the largest diameter and the distance at which "
+          "contacts are looked for: a grain would touch two images of another. Make the cell larger, or the "
+          "grains smaller",
+          edge, "xyz"[axis], least));
+  }
+}
+
+}  // namespace talus

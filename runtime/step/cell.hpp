@@ -1,0 +1,22 @@
+#pragma once
+
+/// What a periodic cell asks of the rest of a setup.
+
+#include "kernels/detection/domain.hpp"
+#include "runtime/step/setup.hpp"
+
+namespace talus {
+
+/// Throws std::invalid_argument, naming it, for whatever a cell has no room for: walls across an axis that
+/// repeats, walls that are no planes or that turn, and grains that come or go.
+void validate_cell(const Setup& setup);
+
+/// Distance of two grains at rest within which they are candidates [m], where the smallest has this radius.
+double candidate_margin(const DetectionSettings& detection, double smallest);
+
+/// Throws std::invalid_argument where a body of the largest radius [m] could touch two images of another, or
+/// its own: where an edge is shorter than twice the largest diameter and `margin` [m], the distance at which
+/// candidates are looked for.
+void check_cell(const Domain& domain, double largest, double margin);
+
+}  // namespace talus

@@ -1,0 +1,83 @@
+/// A periodic cell on several ranks: same bits as on one.
+
+#include "tests/mpi/launcher.hpp"
+
+namespace talus::test {
+namespace {
+
+/// Grains that are pressed by a lid, between faces along x and y.
+const std::string pressed_cell = R"(name = "cell"
+time_step = 5e-4
+allow_unconverged = true
+[material]
+density = 2600
+friction = 0.4
+[cell]
+lengths = [0.12, 0.1, 0.0]
+origin = [-0.03, 0, 0]
+[sample]
+kind = "random"
+count = 300
+radius_distribution = "uniform"
+radius_min = 0.006
+radius_max = 0.009
+velocity = [0.4, 0.2, -0.3]
+[sample.region]
+shape = "box"
+low = [-0.03, 0, 0]
+high = [0.09, 0.1, 0.25]
+[[wall]]
+name = "z-"
+side = "z-"
+[[wall]]
+name = "z+"
+side = "z+"
+drive = "pressure"
+pressure = 2e3
+[[stage]]
+end = { steps = 150 }
+[solver]
+max_iterations = 60
+[decomposition]
+repartition_every = 5
+[output]
+every_steps = 100
+pictures = false
+)";
+
+class CellsOnRanks : public OnRanks {
+ protected:
+  void SetUp() override { write(at("scene.toml"), pressed_cell); }
+};
+
+TEST_F(CellsOnRanks, ChangeNoBitWithRanksAndThreads) {
+  for (const int subdomains : {1, 2, 8}) {
+    const std::string one = fmt::format("one{}", subdomains);
+    expect_same_bits(subdomains, {{1, 2}, {2, 1}}, one, [&](const std::string& out) {
+      const Frame a = last_frame(one), b = last_frame(out);
+      EXPECT_EQ(a.x, b.x) << out;
+      EXPECT_EQ(a.contact_bodies, b.contact_bodies) << out;
+      EXPECT_EQ(a.contact_force, b.contact_force) << out;
+    });
+    const Frame frame = last_frame(one);
+    ASSERT_EQ(frame.id.size(), 300u);
+    for (const Vec3& x : frame.x) {
+      EXPECT_GE(x[0], -0.03 - 1e-12);
+      EXPECT_LE(x[0], 0.09 + 1e-12);
+    }
+  }
+}
+
+TEST_F(CellsOnRanks, GoOnFromACheckpointToTheSameBits) {
+  const std::string command = "run scene.toml --set decomposition.subdomains=4 --threads 1";
+  const Outcome whole = run(1, command + " --out whole");
+  ASSERT_EQ(whole.code, 0) << whole.messages;
+  const Outcome first = run(2, command + " --out parts --set checkpoint.every_steps=10 --steps 60");
+  ASSERT_EQ(first.code, 0) << first.messages;
+  const Outcome rest = run(1, command + " --out parts --set checkpoint.every_steps=10 --resume");
+  ASSERT_EQ(rest.code, 0) << rest.messages;
+  EXPECT_EQ(digest_of("parts"), digest_of("whole"));
+}
+
+}  // namespace
+}  // namespace talus::test

@@ -1,0 +1,133 @@
+/// [cell], and the samples made for it.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "apps/shared/sample_builder.hpp"
+#include "tests/unit/io/scene/scene_text.hpp"
+
+namespace talus::io::cell_test {
+namespace {
+
+using scene_test::replaced;
+
+const std::string cube = R"(time_step = 1e-4
+[material]
+density = 2600
+[cell]
+lengths = [0.1, 0.1, 0.1]
+[sample]
+kind = "random"
+count = 100
+radius = 0.005
+[[stage]]
+end = { steps = 5 }
+)";
+
+Scene parsed(const std::string& text) {
+  return parse_scene(text, "test.toml");
+}
+
+void refuse(const std::string& text, const std::string& key, const std::string& message) {
+  try {
+    Scene scene = parsed(text);
+    place_walls(scene, build_sample(scene));
+    FAIL() << "accepted: " << text;
+  } catch (const SceneError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find(key), std::string::npos) << what;
+    EXPECT_NE(what.find(message), std::string::npos) << what;
+  }
+}
+
+TEST(CellScene, ReadsEdgesOriginAndShears) {
+  const Scene scene = parsed(replaced(
+      cube, "lengths = [0.1, 0.1, 0.1]", "lengths = [0.1, 0.2, 0.3]\norigin = [1, 2, 3]\nshears = [0, 0.02, 0]"));
+  EXPECT_EQ(scene.setup.domain.edges(), Vec3(0.1, 0.2, 0.3));
+  EXPECT_EQ(scene.setup.domain.low, Vec3(1, 2, 3));
+  EXPECT_EQ(scene.setup.domain.cell.xz, 0.02);
+  const Scene again = parse_scene(resolved_scene(scene), "resolved.toml");
+  EXPECT_EQ(again.setup.domain.edges(), scene.setup.domain.edges());
+  EXPECT_EQ(again.setup.domain.cell.xz, 0.02);
+  EXPECT_FALSE(parsed(scene_test::scene_with()).setup.domain.repeats);
+}
+
+TEST(CellScene, RandomGrainsStandInTheCell) {
+  const Scene scene = parsed(cube);
+  const Sample sample = build_sample(scene);
+  ASSERT_EQ(sample.size(), 100u);
+  for (const Vec3& x : sample.x) {
+    EXPECT_GE(x.minCoeff(), 0);
+    EXPECT_LE(x.maxCoeff(), 0.1);
+  }
+  EXPECT_TRUE(std::ranges::any_of(sample.x, [](const Vec3& x) { return x[2] < 0.005; }));
+}
+
+TEST(CellScene, NoiseOfALatticeMovesGrainsAndLeavesThemApart) {
+  const std::string text = R"([sample]
+kind = "lattice"
+cells = [4, 4, 4]
+spacing = 1.5
+radius = 0.005
+)";
+  const auto sample_of = [&](const std::string& noise) {
+    std::string scene = cube;
+    const std::size_t from = scene.find("[sample]"), to = scene.find("[[stage]]");
+    return build_sample(parsed(scene.replace(from, to - from, text + noise)));
+  };
+  const Sample still = sample_of(""), moved = sample_of("noise = 1.0\n");
+  double farthest = 0, nearest = 1;
+  for (std::size_t a = 0; a < moved.size(); ++a) {
+    farthest = std::max(farthest, (moved.x[a] - still.x[a] - (moved.x[0] - still.x[0])).norm());
+    for (std::size_t b = 0; b < a; ++b) nearest = std::min(nearest, (moved.x[a] - moved.x[b]).norm());
+  }
+  EXPECT_GT(farthest, 0.001);
+  EXPECT_GE(nearest, 0.01);
+}
+
+TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
+  refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.02, 0.1, 0.1]"), "cell.lengths", "along x is less than");
+  refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0, 0, 0]"), "cell", "one of the lengths must be > 0");
+  refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[-0.1, 0.1, 0.1]"), "cell.lengths", "must be >= 0");
+  refuse(replaced(cube, "time_step", "box = true\ntime_step"), "cell",
+         "wall 'x-' bounds the sample along x, where the cell is periodic");
+  refuse(replaced(cube, "[[stage]]", "[[wall]]\nname = \"tilted\"\nnormal = [0, 1, 1]\npoint = [0, 0, 0]\n[[stage]]"),
+         "cell", "wall 'tilted' bounds the sample along y");
+  refuse(replaced(cube, "[[stage]]",
+                  "[[wall]]\nname = \"pipe\"\nshape = \"cylinder\"\nstart = [0, 0, 0]\nend = [0, 0, 1]\nradius = "
+                  "0.05\n[[stage]]"),
+         "cell", "wall 'pipe' is no plane");
+  refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]"), "sample.region", "nothing repeats along z");
+  refuse(replaced(cube, "count = 100", "count = 4000"), "sample[0].count", "no room for a grain");
+  refuse(replaced(cube, "lengths", "shears = [0.01, 0, 0]\nlength"), "cell.length", "did you mean 'lengths'?");
+}
+
+TEST(CellScene, RandomGrainsBetweenWallsNeedABox) {
+  std::string text = replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]");
+  text = replaced(text, "[[stage]]", R"([sample.region]
+shape = "box"
+low = [0, 0, 0]
+high = [0.1, 0.1, 0.2]
+[[wall]]
+name = "z-"
+side = "z-"
+[[wall]]
+name = "z+"
+side = "z+"
+drive = "pressure"
+pressure = 1e3
+[[stage]])");
+  Scene scene = parsed(text);
+  const Sample sample = build_sample(scene);
+  place_walls(scene, sample);
+  for (const Vec3& x : sample.x) {
+    EXPECT_GE(x[2], 0.005);
+    EXPECT_LE(x[2], 0.195);
+  }
+  EXPECT_EQ(scene.setup.domain.edges(), Vec3(0.1, 0.1, 0));
+}
+
+}  // namespace
+}  // namespace talus::io::cell_test

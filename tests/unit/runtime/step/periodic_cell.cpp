@@ -1,0 +1,168 @@
+/// Whole simulations in a periodic cell: the same forces wherever its faces lie, and the same bits on any
+/// ranks and threads.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+
+#include "runtime/graph/one_rank.hpp"
+#include "runtime/graph/pretend_ranks.hpp"
+#include "runtime/step/dealing.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/runtime/step/cut_boxes.hpp"
+#include "tests/unit/runtime/step/loose_scenes.hpp"
+
+namespace talus::periodic_cell_test {
+namespace {
+
+using simulation_test::density;
+using simulation_test::loose_sample;
+using simulation_test::radius;
+using simulation_test::stage;
+
+constexpr double edge = 6 * 2.1 * radius;
+
+/// 216 grains that fly about in a cube and hit one another, with friction.
+Setup colliding(std::int64_t steps) {
+  talus::Setup setup;
+  setup.domain = periodic_domain(Vec3::Constant(edge));
+  setup.stages = {stage("fly", steps)};
+  setup.stages[0].laws = laws_of_one_material(0.4, 0.4, 0);
+  setup.solver.tolerance = 1e-10;
+  setup.solver.max_iterations = 20000;
+  setup.solver.overlap_tolerance = 1;
+  setup.decomposition.subdomains = 1;
+  return setup;
+}
+
+Sample flying(const Vec3& shift = Vec3::Zero()) {
+  const Bodies bodies = loose_sample(6, 6, 6, 11);
+  test::Random random(12);
+  Sample sample;
+  sample.density = density;
+  for (std::size_t k = 0; k < bodies.size(); ++k) {
+    sample.x.push_back(bodies.x[k] + shift);
+    sample.radius.push_back(bodies.radius[k]);
+    const Vec3 u = test::uniform_vector(random, -0.5, 0.5);
+    sample.velocity.push_back({u[0], u[1], u[2], 0, 0, 0});
+  }
+  return sample;
+}
+
+/// State of each grain at the end, by its number, and what the steps said.
+struct Outcome {
+  std::map<BodyId, std::pair<Vec3, Velocity>> grains;
+  std::int64_t contacts = 0, migrants = 0;
+  std::uint64_t digest = 0;
+  bool converged = true;
+};
+Outcome simulate(const talus::Setup& setup, Sample sample,
+                 const graph::Communicator& ranks = graph::one_rank(), int threads = 1) {
+  graph::Executor executor({.threads = threads});
+  Simulation simulation(setup, deal_out(std::move(sample), setup.decomposition, ranks), executor, ranks);
+  Outcome outcome;
+  for (; !simulation.finished(); simulation.begin_next_stage()) {
+    const StepReport& report = simulation.step();
+    outcome.contacts += report.active;
+    outcome.migrants += report.migrants;
+    outcome.converged = outcome.converged && report.converged;
+  }
+  outcome.digest = simulation.digest();
+  const Bodies& bodies = simulation.state().bodies;
+  for (std::size_t s = 0; s < bodies.size(); ++s)
+    outcome.grains.insert({bodies.id[s], {bodies.x[s], bodies.velocity[s]}});
+  return outcome;
+}
+
+Vec3 momentum(const Outcome& outcome) {
+  Vec3 sum = Vec3::Zero();
+  for (const auto& [id, grain] : outcome.grains)
+    sum += Eigen::Map<const Vec3>(grain.second.u) / grain.second.inv_mass;
+  return sum;
+}
+
+TEST(PeriodicRun, ForcesDoNotDependOnWhereTheFacesLie) {
+  const talus::Setup setup = colliding(60);
+  const Outcome one = simulate(setup, flying());
+  ASSERT_GT(one.contacts, 1000);
+  EXPECT_TRUE(one.converged);
+  for (const Vec3& shift : {Vec3(0.3 * edge, 0, 0), Vec3(0.7, -0.9, 0.41), Vec3(0, 0, -7 * edge)}) {
+    const Outcome other = simulate(setup, flying(shift));
+    double worst_place = 0, worst_speed = 0;
+    for (const auto& [id, grain] : one.grains) {
+      const auto& [x, velocity] = other.grains.at(id);
+      worst_place = std::max(worst_place, setup.domain.separation(x - shift, grain.first).norm());
+      worst_speed = std::max(
+          worst_speed, (Eigen::Map<const Vec3>(velocity.u) - Eigen::Map<const Vec3>(grain.second.u)).norm());
+    }
+    EXPECT_LT(worst_place, 1e-6 * radius);
+    EXPECT_LT(worst_speed, 1e-5 * 0.5);
+  }
+}
+
+TEST(PeriodicRun, MomentumOfTheWholeIsKept) {
+  const talus::Setup setup = colliding(1);
+  const Vec3 before = momentum(simulate(setup, flying()));
+  talus::Setup longer = colliding(60);
+  const Outcome outcome = simulate(longer, flying());
+  double scale = 0;
+  for (const auto& [id, grain] : outcome.grains)
+    scale += Eigen::Map<const Vec3>(grain.second.u).norm() / grain.second.inv_mass;
+  EXPECT_LT((momentum(outcome) - before).norm(), 1e-12 * scale);
+}
+
+TEST(PeriodicRun, GrainsAreStoredInTheCellWhereverTheyFly) {
+  talus::Setup setup = colliding(400);
+  setup.solver.tolerance = 1e-3;
+  const Outcome outcome = simulate(setup, flying());
+  for (const auto& [id, grain] : outcome.grains) {
+    EXPECT_GT(grain.first.minCoeff(), -radius) << "at most a skin outside";
+    EXPECT_LT(grain.first.maxCoeff(), edge + radius);
+  }
+}
+
+TEST(PeriodicRun, HasTheSameBitsOnAnyRanksAndThreads) {
+  for (const auto& variant : decomposition_test::variants)
+    for (const int subdomains : {2, 8}) {
+      talus::Setup setup = colliding(20);
+      setup.solver.max_iterations = 40;
+      decomposition_test::choose(setup, variant, subdomains);
+      setup.decomposition.repartition_every = 3;
+      const Outcome one = simulate(setup, flying());
+      EXPECT_EQ(simulate(setup, flying(), graph::one_rank(), 2).digest, one.digest) << variant.name;
+      EXPECT_GT(one.migrants, 0) << variant.name;
+      for (const int count : {2, 3}) {
+        if (count > subdomains) continue;
+        std::map<BodyId, std::pair<Vec3, Velocity>> all;
+        std::mutex adding;
+        graph::on_pretend_ranks(count, [&](const graph::Communicator& ranks) {
+          const Outcome own = simulate(setup, ranks.rank() == 0 ? flying() : Sample{}, ranks);
+          const std::lock_guard lock(adding);
+          for (const auto& [id, grain] : own.grains) all.insert({id, grain});
+        });
+        ASSERT_EQ(all.size(), one.grains.size()) << variant.name;
+        for (const auto& [id, grain] : one.grains) {
+          const auto& [x, velocity] = all.at(id);
+          EXPECT_EQ(x, grain.first) << variant.name << ", " << count << " ranks";
+          EXPECT_TRUE(std::equal(velocity.u, velocity.u + 3, grain.second.u)) << variant.name;
+        }
+      }
+    }
+}
+
+TEST(PeriodicRun, EverySubdomainCountFindsTheSameMotion) {
+  const Outcome one = simulate(colliding(30), flying());
+  for (const int subdomains : {2, 5, 8}) {
+    talus::Setup setup = colliding(30);
+    setup.decomposition.subdomains = subdomains;
+    const Outcome other = simulate(setup, flying());
+    EXPECT_EQ(other.contacts, one.contacts) << subdomains;
+    for (const auto& [id, grain] : one.grains)
+      EXPECT_LT(setup.domain.separation(other.grains.at(id).first, grain.first).norm(), 1e-5 * radius);
+  }
+}
+
+}  // namespace
+}  // namespace talus::periodic_cell_test

@@ -1,0 +1,117 @@
+/// Periodic cells: contacts across a face, and the stress of lattices.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation::closed_form_cells_test {
+namespace {
+
+constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
+
+TEST(CollisionAcrossAFace, IsThatOfTheSameGrainsWithoutAFace) {
+  // Grain 1 flies out of the cell, and into grain 0 on the other side; without the cell it stands one edge
+  // further back.
+  const double edge = 1;
+  const Vec3 u(2, 0.3, -0.2);
+  const auto made = [&](bool periodic) {
+    Scene scene(h);
+    scene.friction(0.3);
+    scene.stage().laws.set_all(&PairLaw::restitution, 0.5);
+    if (periodic) scene.setup.domain = periodic_domain(Vec3::Constant(edge));
+    scene.sphere({0.08, 0.5, 0.5}, radius, mass);
+    scene.sphere({0.8 - (periodic ? 0 : edge), 0.49, 0.52}, radius, 2 * mass, u);
+    return Experiment(std::move(scene));
+  };
+  Experiment periodic = made(true), open = made(false);
+  for (int k = 0; k < 400; ++k) {
+    periodic.step();
+    open.step();
+    for (const int id : {0, 1}) {
+      ASSERT_LT((periodic.u(id) - open.u(id)).norm(), 1e-11) << "step " << k;
+      ASSERT_LT((periodic.w(id) - open.w(id)).norm(), 1e-11) << "step " << k;
+      const Vec3 way = periodic.x(id) - open.x(id);
+      ASSERT_LT((way - edge * (way / edge).array().round().matrix()).norm(), 1e-11) << "step " << k;
+    }
+  }
+  EXPECT_GT((open.u(1) - u).norm(), 0.1) << "they met";
+}
+
+/// Three grains in a row along x, and one in the hollow between the last and the image of the first.
+TEST(GrainInAHollowAcrossAFace, IsHeldByBothGrainsAndPressesTheRow) {
+  const double opening = 0.4 * radius, edge = 6 * radius + opening;
+  Scene scene(h);
+  scene.stage().gravity = {0, 0, -g_earth};
+  scene.setup.domain = periodic_domain({edge, 0, 0});
+  scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+  scene.wall("back", Vec3::Zero(), Vec3::UnitY());
+  scene.wall("front", {0, 2 * radius, 0}, -Vec3::UnitY());
+  for (const double x : {1.0, 3.0, 5.0}) scene.sphere({x * radius + opening / 2, radius, radius}, radius, mass);
+  const double half = radius + opening / 2, height = std::sqrt(4 * radius * radius - half * half);
+  scene.sphere({0, radius, radius + height}, radius, mass);
+  Experiment run(std::move(scene));
+  for (int k = 0; k < 50; ++k) ASSERT_TRUE(run.step().converged) << "step " << k;
+  const double weight = mass * g_earth, push = weight * radius / height;
+  EXPECT_NEAR(run.wall_force(0)[2], 4 * weight, 1e-7 * weight);
+  const Frame frame = run.simulation().frame();
+  int held = 0, pressed = 0;
+  for (std::size_t k = 0; k < frame.contact_force.size(); ++k) {
+    const auto [first, second] = frame.contact_bodies[k];
+    if (second < 0) continue;
+    if (first == 3 || second == 3) {
+      ++held;
+      EXPECT_NEAR(frame.contact_force[k].norm(), push, 1e-6 * weight);
+    } else {
+      ++pressed;
+      EXPECT_NEAR(frame.contact_force[k].norm(), push * half / (2 * radius), 1e-6 * weight);
+    }
+  }
+  EXPECT_EQ(held, 2);
+  EXPECT_EQ(pressed, 2);
+}
+
+/// A cubic lattice between two plates, periodic along x and y: columns of touching grains.
+TEST(CubicLatticeBetweenPlates, HasTheStressOfThePlatesExactly) {
+  const double pressure = 1e3;
+  const int n = 4;
+  Scene scene(h);
+  const double side = n * 2.2 * radius;
+  scene.setup.domain = periodic_domain({side, side, 0});
+  scene.wall("z-", Vec3::Zero(), Vec3::UnitZ());
+  Wall& lid = scene.wall("z+", {0, 0, n * 2 * radius}, -Vec3::UnitZ());
+  lid.load.drive = WallDrive::pressure;
+  lid.load.pressure = pressure;
+  lid.load.mass = 1;
+  for (int k = 0; k < n * n * n; ++k)
+    scene.sphere({2.2 * radius * (k % n), 2.2 * radius * (k / n % n), radius * (2 * (k / n / n) + 1)}, radius,
+                 mass);
+  Experiment run(std::move(scene));
+  for (int k = 0; k < 5; ++k) ASSERT_TRUE(run.step().converged) << "step " << k;
+  EXPECT_NEAR(run.wall_force(0)[2], pressure * side * side, 1e-8 * pressure * side * side);
+  const auto triaxial = run.simulation().triaxial();
+  ASSERT_TRUE(triaxial);
+  EXPECT_NEAR(triaxial->stress[2], pressure, 1e-8 * pressure);
+  EXPECT_NEAR(triaxial->stress[0], 0, 1e-8 * pressure);
+  EXPECT_NEAR(triaxial->solid_fraction, pi / 6 / (1.1 * 1.1), 1e-9);
+}
+
+/// In free flight nothing happens at a face.
+TEST(GrainThatFallsThroughTheCell, PassesItsFacesAsIfThereWereNone) {
+  Scene scene(h);
+  scene.stage().gravity = {0.5, 0, -g_earth};
+  scene.setup.domain = periodic_domain(Vec3::Constant(0.5));
+  scene.sphere({0.25, 0.25, 0.25}, radius, mass, {1, 2, 3});
+  Experiment run(std::move(scene));
+  run.steps(1000);
+  const Vec3 g(0.5, 0, -g_earth), u = Vec3(1, 2, 3) + g;
+  EXPECT_LT((run.u() - u).norm(), 1e-11);
+  const Vec3 way = Vec3(1, 2, 3) + 0.5 * g, x = Vec3::Constant(0.25) + way;
+  const Vec3 off = run.x() - x;
+  EXPECT_LT((off - 0.5 * (off / 0.5).array().round().matrix()).norm(), 1e-10);
+  EXPECT_LT(run.x().cwiseAbs().maxCoeff(), 0.6);
+}
+
+}  // namespace
+}  // namespace talus::validation::closed_form_cells_test
