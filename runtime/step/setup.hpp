@@ -19,6 +19,7 @@
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
 #include "runtime/step/grain_rules.hpp"
+#include "runtime/step/probe_rules.hpp"
 
 namespace talus {
 
@@ -176,6 +177,8 @@ struct Setup {
   std::vector<NamedBody> named;
   std::vector<InsertRule> inserts;
   std::vector<RemoveRule> removes;
+  std::vector<ProbeRule> probes;
+  std::vector<FieldRule> fields;
   std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   std::vector<Wall> walls;
   std::vector<WallGroup> groups = {};  ///< that walls name

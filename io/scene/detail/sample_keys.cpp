@@ -121,10 +121,11 @@ Section<Region> region_keys() {
   return {
       "[sample.region]",
       "A part of space: the one that a lattice fills, and likewise `[insert.region]`, where grains are put "
-      "(box, cylinder, disc), and `[remove.region]`, where they are taken away (box, cylinder, beyond).",
-      {choice<R>("shape", {"box", "cylinder", "disc", "beyond"},
+      "(box, cylinder, disc), `[remove.region]`, where they are taken away (box, cylinder, beyond), and "
+      "`[probe.region]`, where they are looked at.",
+      {choice<R>("shape", {"box", "cylinder", "disc", "beyond", "plane"},
                  "`box`: between two corners; `cylinder`: solid; `disc`: round, flat, centres lie on it; "
-                 "`beyond`: all that lies behind a plane.",
+                 "`beyond`: all that lies behind a plane; `plane`: the plane.",
                  &R::kind)
            .need(),
        key<R>("low", "m", any, "Lower corner.", &R::low).only("shape = box", is({K::box})).need(),
@@ -142,11 +143,11 @@ Section<Region> region_keys() {
            .only("shape = cylinder or disc", is({K::cylinder, K::disc}))
            .need(),
        key<R>("point", "m", any, "A point of the plane.", &R::point)
-           .only("shape = beyond", is({K::beyond}))
+           .only("shape = beyond or plane", is({K::beyond, K::plane}))
            .need(),
-       key<R>("normal", "", any, "Direction out of the plane, of any length: there grains are removed.",
+       key<R>("normal", "", any, "Direction out of the plane, of any length, to what lies beyond it.",
               &R::normal)
-           .only("shape = beyond", is({K::beyond}))
+           .only("shape = beyond or plane", is({K::beyond, K::plane}))
            .need()}};
 }
 
