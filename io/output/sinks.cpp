@@ -17,7 +17,7 @@ constexpr SinkRegistry::Item sinks[] = {
     named("frames", "results.h5: the state at every output time, in full precision", &frame_sink),
     named("grids", "fields/field_NAME_*.vti: coarse-grained fields of every frame", &grid_sink),
     named("fields", "write frames as .vtp files for ParaView", &field_sink),
-    named("pictures", "draw curves and the force network", &picture_sink),
+    named("pictures", "draw curves, the force network, velocities and materials", &picture_sink),
     named("xyz", "write the grains of frames as frames.xyz, for OVITO, VMD and ASE", &xyz_sink),
 };
 

@@ -45,22 +45,42 @@ double common_area(double distance, double r, double s) {
   return segment(r, to_r) + segment(s, to_s);
 }
 
-/// Integral of `area`(radius of the slice) over the slices of a unit sphere from z = low to high: Gauss's
-/// rule with five points in each panel, in the angle, so that the slices' radii are smooth.
-template <class Area>
-double over_slices(double low, double high, const Area& area) {
-  constexpr int panels = 16;
+/// Integral of f over the angles from `low` to `high`: Gauss's rule with five points in each panel.
+template <class F>
+double over_angles(double low, double high, const F& f) {
+  constexpr int panels = 6;
   constexpr std::array<double, 5> place{-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
                                         0.9061798459386640};
   constexpr std::array<double, 5> weight{0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
                                          0.4786286704993665, 0.2369268850561891};
-  const double first = std::asin(low), half = 0.5 * (std::asin(high) - first) / panels;
+  const double half = 0.5 * (high - low) / panels;
   double sum = 0;
   for (int p = 0; p < panels; ++p)
-    for (std::size_t k = 0; k < place.size(); ++k) {
-      const double radius = std::cos(first + half * (2 * p + 1 + place[k]));
-      sum += weight[k] * half * radius * area(radius);
-    }
+    for (std::size_t k = 0; k < place.size(); ++k)
+      sum += weight[k] * half * f(low + half * (2 * p + 1 + place[k]));
+  return sum;
+}
+
+/// Integral of `area`(radius of the slice) over the slices of a unit sphere from z = low to high, in the
+/// angle, so that the slices' radii are smooth. `kinks`: radii at which the area is not; it is integrated up
+/// to them.
+template <std::size_t n, class Area>
+double over_slices(double low, double high, const std::array<double, n>& kinks, const Area& area) {
+  std::array<double, 2 * n + 2> ends{};
+  const double first = std::asin(low), last = std::asin(high);
+  for (std::size_t k = 0; k < n; ++k) {
+    const double angle = kinks[k] < 1 ? std::acos(std::max(0.0, kinks[k])) : 0;
+    ends[2 * k] = std::clamp(angle, first, last);
+    ends[2 * k + 1] = std::clamp(-angle, first, last);
+  }
+  ends[2 * n] = first;
+  ends[2 * n + 1] = last;
+  std::ranges::sort(ends);
+  double sum = 0;
+  for (std::size_t k = 1; k < ends.size(); ++k)
+    if (ends[k] > ends[k - 1])
+      sum += over_angles(ends[k - 1], ends[k],
+                         [&](double angle) { return std::cos(angle) * area(std::cos(angle)); });
   return sum;
 }
 
@@ -73,7 +93,15 @@ double unit_sphere_in_box(const Vec3& low, const Vec3& high) {
     if (from[k] > -1 || to[k] < 1) cut = k, ++cuts;
   if (cuts <= 1) return between_planes(from[cut], to[cut]);
   const Eigen::Index a = (cut + 1) % 3, b = (cut + 2) % 3;
-  return over_slices(from[cut], to[cut], [&](double radius) {
+  const std::array<double, 8> kinks{std::abs(from[a]),
+                                    std::abs(to[a]),
+                                    std::abs(from[b]),
+                                    std::abs(to[b]),
+                                    std::hypot(from[a], from[b]),
+                                    std::hypot(from[a], to[b]),
+                                    std::hypot(to[a], from[b]),
+                                    std::hypot(to[a], to[b])};
+  return over_slices(from[cut], to[cut], kinks, [&](double radius) {
     return area_to(to[a], to[b], radius) - area_to(from[a], to[b], radius) - area_to(to[a], from[b], radius) +
            area_to(from[a], from[b], radius);
   });
@@ -84,7 +112,8 @@ double unit_sphere_in_cylinder(double low, double high, double distance, double 
   const double from = std::max(low, -1.0), to = std::min(high, 1.0);
   if (to <= from || distance >= radius + 1) return 0;
   if (distance + 1 <= radius) return between_planes(from, to);
-  return over_slices(from, to, [&](double slice) { return common_area(distance, radius, slice); });
+  const std::array<double, 2> kinks{std::abs(radius - distance), radius + distance};
+  return over_slices(from, to, kinks, [&](double slice) { return common_area(distance, radius, slice); });
 }
 
 /// Where a point is, seen from a cylinder: along its axis from the first end, and across it.

@@ -12,7 +12,6 @@ namespace talus::io::probe_scene_test {
 namespace {
 
 using scene_test::expect_refused;
-using scene_test::parse_scene;
 using scene_test::scene_with;
 
 const std::string gate = R"([[probe]]

@@ -102,7 +102,7 @@ TEST(Probes, ADiscCountsWhatPassesWithinIt) {
   disc.kind = Region::Kind::disc;
   disc.centre = {0, 0, -0.005};
   disc.axis = {0, 0, -1};
-  disc.radius = 0.05;
+  disc.radius = 0.045;
   setup.probes = {probe("disc", disc)};
   Bodies bodies;
   for (int k = 0; k < 10; ++k) add_sphere(bodies, BodyId{k}, {0.03 * k - 0.1, 0, 0}, 0.01, density);
@@ -114,7 +114,8 @@ TEST(Probes, ADiscCountsWhatPassesWithinIt) {
 }
 
 /// 3 x 3 x 3 equal spheres that touch, between a floor and a lid that is pushed with a force, without
-/// friction or gravity: nine columns, each with a ninth of it.
+/// friction or gravity: nine columns that carry it together; which one how much, a lid that does not tilt
+/// leaves open.
 TEST(Probes, APressedLatticeHasTheStressOfItsLidAndItsOwnSolidFraction) {
   const double r = 0.01, d = 2 * r, force = 90;
   talus::Setup setup = free_setup(5);
@@ -130,7 +131,7 @@ TEST(Probes, APressedLatticeHasTheStressOfItsLidAndItsOwnSolidFraction) {
   round.end = {1.5 * d, 1.5 * d, 2.25 * d};
   round.radius = 0.4 * d;  // cuts the middle column
   setup.probes = {probe("all", box(Vec3::Zero(), Vec3::Constant(3 * d))),
-                  probe("part", box({d, 0, 0.7 * d}, {2 * d, 3 * d, 2.2 * d})),
+                  probe("part", box({0, 0, 0.7 * d}, {3 * d, 3 * d, 2.2 * d})),
                   probe("middle", box(Vec3::Constant(d), Vec3::Constant(2 * d))), probe("round", round)};
   Bodies bodies;
   for (int k = 0; k < 27; ++k)
@@ -141,17 +142,21 @@ TEST(Probes, APressedLatticeHasTheStressOfItsLidAndItsOwnSolidFraction) {
     const auto& reports = simulation.probes();
     const double stress = force / (9 * d * d), close = 1e-6 * stress;
     for (std::size_t p = 0; p < 3; ++p) {
-      EXPECT_NEAR(reports[p].contact_stress(2, 2), stress, close) << reports[p].name;
+      if (p < 2) {
+        EXPECT_NEAR(reports[p].contact_stress(2, 2), stress, close) << reports[p].name;
+      }
       EXPECT_NEAR(reports[p].contact_stress(0, 0), 0, close);
       EXPECT_NEAR(reports[p].contact_stress(0, 2), 0, close);
-      EXPECT_NEAR(reports[p].coordination, 2, 0);  // the one above, the one below
+      EXPECT_EQ(reports[p].coordination, 2);  // the one above, the one below
       EXPECT_LT(reports[p].kinetic_stress.norm(), 1e-9 * stress);
     }
-    EXPECT_NEAR(reports[3].contact_stress(2, 2), force / 9 / (std::numbers::pi * 0.16 * d * d),
-                1e-5 * stress);
+    // The force of the middle column, over the section of the box and over that of the cylinder.
+    EXPECT_NEAR(reports[3].contact_stress(2, 2) * std::numbers::pi * 0.16, reports[2].contact_stress(2, 2),
+                close);
+    EXPECT_NEAR(reports[2].contact_stress(2, 2), stress, 0.1 * stress);
     EXPECT_EQ(reports[0].count, 27);
     EXPECT_EQ(reports[2].count, 1);
-    EXPECT_EQ(reports[1].count, 3);  // centres at 0.5 d and 2.5 d are outside
+    EXPECT_EQ(reports[1].count, 9);  // centres at 0.5 d and 2.5 d are outside
     EXPECT_NEAR(reports[0].mass, 27 * density * ball(r), 1e-9);
     EXPECT_NEAR(reports[0].solid_fraction, std::numbers::pi / 6, 1e-6);
     EXPECT_NEAR(reports[2].solid_fraction, std::numbers::pi / 6, 1e-6);
