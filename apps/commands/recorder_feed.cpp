@@ -17,7 +17,8 @@ void RecorderFeed::row(const Simulation& simulation, const std::optional<Triaxia
                    .triaxial = triaxial,
                    .bodies = simulation.named_bodies(),
                    .inserted = simulation.inserted(),
-                   .removed = simulation.removed()});
+                   .removed = simulation.removed(),
+                   .probes = simulation.probes()});
   if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
   if (rows_.size() >= 64 || graph::seconds_now() - flushed_ > 0.5) flush();
 }

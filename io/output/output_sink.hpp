@@ -41,6 +41,8 @@ struct OutputContext {
   FrameFormat format = {};                        ///< of results.h5
   std::int64_t tables_every = 1;                  ///< steps from line to line of walls.csv and triaxial.csv
   std::vector<Wall> walls = {};                   ///< in the order of Frame::walls
+  std::vector<std::string> material_names = {};   ///< of the setup
+  std::vector<std::string> grids = {};            ///< names of the fields of the setup
   std::map<std::string, int> axis_of_stage = {};  ///< 0, 1, 2: along which the strain of a stage is measured
   Provenance provenance = {};
   const graph::Communicator& ranks;  ///< outlives the sinks
@@ -58,6 +60,7 @@ struct StepRecord {
   std::vector<BodyReport> bodies = {};          ///< that the scene names
   std::vector<InsertReport> inserted = {};      ///< of each insertion
   std::vector<RemoveReport> removed = {};       ///< of each removal and material
+  std::vector<ProbeReport> probes = {};         ///< that were due
 };
 
 /// How far the files of a run are: a checkpoint keeps it.

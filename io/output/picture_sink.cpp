@@ -1,4 +1,5 @@
-/// forces.svg of the newest frame, and triaxial.svg of the newest stage that has such reports.
+/// forces.svg, velocities.svg and materials.svg of the newest frame, and triaxial.svg of the newest stage
+/// that has such reports.
 
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
@@ -23,23 +24,23 @@ class PictureSink : public OutputSink {
     if (record.triaxial && context_.has_table_line(record.step.step)) curve_.add(*record.triaxial);
   }
   void frame(const Frame& part) override {
-    if (part.with_contacts) draw_force_picture(part);
+    if (context_.ranks.ranks() == 1) {
+      draw_grain_pictures(part);
+    } else {
+      const Frame all = gather_for_picture(part, context_.ranks, {});
+      if (context_.ranks.rank() == 0) draw_grain_pictures(all);
+    }
     draw_triaxial_picture();
   }
   void close() override { draw_triaxial_picture(); }
 
  private:
-  void draw_force_picture(const Frame& part) const {
-    const ForcePicture options;
-    const auto write = [&](const Frame& all) {
-      write_whole(context_.directory / "forces.svg", draw_forces(all, context_.walls, options));
-    };
-    if (context_.ranks.ranks() == 1) {
-      write(part);
-      return;
-    }
-    const Frame all = gather_for_picture(part, context_.ranks, options);
-    if (context_.ranks.rank() == 0) write(all);
+  void draw_grain_pictures(const Frame& all) const {
+    if (all.with_contacts)
+      write_whole(context_.directory / "forces.svg", draw_forces(all, context_.walls, {}));
+    write_whole(context_.directory / "velocities.svg", draw_velocities(all, {}));
+    if (!all.material.empty())
+      write_whole(context_.directory / "materials.svg", draw_materials(all, context_.material_names, {}));
   }
 
   void draw_triaxial_picture() const {
@@ -58,11 +59,13 @@ class PictureSink : public OutputSink {
 
 }  // namespace
 
-const SinkKind picture_sink{
-    SinkUse::by_default,
-    [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
-      return std::make_unique<PictureSink>(context);
-    },
-    [](const std::string& name) { return name == "forces.svg" || name == "triaxial.svg"; }};
+const SinkKind picture_sink{SinkUse::by_default,
+                            [](const OutputContext& context) -> std::unique_ptr<OutputSink> {
+                              return std::make_unique<PictureSink>(context);
+                            },
+                            [](const std::string& name) {
+                              return name == "forces.svg" || name == "velocities.svg" ||
+                                     name == "materials.svg" || name == "triaxial.svg";
+                            }};
 
 }  // namespace talus::io

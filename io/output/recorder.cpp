@@ -21,7 +21,9 @@ void drop_contacts(Frame& frame) {
 
 OutputContext output_context(const std::filesystem::path& directory, const Setup& setup,
                              const graph::Communicator& ranks) {
-  OutputContext context{.directory = directory, .walls = setup.walls, .ranks = ranks};
+  OutputContext context{
+      .directory = directory, .walls = setup.walls, .material_names = setup.material_names, .ranks = ranks};
+  for (const FieldRule& field : setup.fields) context.grids.push_back(field.name);
   for (const Stage& stage : setup.stages) context.axis_of_stage.emplace(stage.name, stage.end.strain_axis);
   return context;
 }

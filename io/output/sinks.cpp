@@ -12,10 +12,12 @@ constexpr SinkRegistry::Item sinks[] = {
     named("tables",
           "steps.csv, walls.csv, bodies.csv, inserted.csv, removed.csv, triaxial.csv and error_history.csv",
           &table_sink),
+    named("probes", "probes.csv: what the probes of a scene report", &probe_sink),
     named("run", "run.json: where the numbers come from, and what came of the run", &run_json_sink),
     named("frames", "results.h5: the state at every output time, in full precision", &frame_sink),
+    named("grids", "fields/field_NAME_*.vti: coarse-grained fields of every frame", &grid_sink),
     named("fields", "write frames as .vtp files for ParaView", &field_sink),
-    named("pictures", "draw curves and the force network", &picture_sink),
+    named("pictures", "draw curves, the force network, velocities and materials", &picture_sink),
     named("xyz", "write the grains of frames as frames.xyz, for OVITO, VMD and ASE", &xyz_sink),
 };
 

@@ -18,6 +18,8 @@ extern const SinkKind run_json_sink;
 extern const SinkKind field_sink;
 extern const SinkKind picture_sink;
 extern const SinkKind xyz_sink;
+extern const SinkKind probe_sink;
+extern const SinkKind grid_sink;
 
 /// By name: no code asks for one of them.
 using SinkRegistry = Registry<std::string_view, const SinkKind*>;

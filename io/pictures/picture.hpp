@@ -38,6 +38,18 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
 /// the contacts only those about the slab. Empty on others; rows travel in bounded pieces.
 Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, const ForcePicture& options);
 
+struct GrainPicture {
+  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+};
+
+/// Grains of such a slab coloured by their speed, from 0 to the one that nineteen of twenty of them do not
+/// exceed, each with a line along its velocity, as long as its diameter at that speed.
+std::string draw_velocities(const Frame& frame, const GrainPicture& options);
+
+/// The same grains coloured by material; `names` by number, for the legend.
+std::string draw_materials(const Frame& frame, std::span<const std::string> names,
+                           const GrainPicture& options);
+
 struct PartitionPicture {
   std::string title;
   std::int32_t subdomains = 1;

@@ -48,10 +48,12 @@ Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, co
   all.stage = part.stage;
   all.domain = part.domain;
   all.walls = part.walls;
+  all.with_contacts = part.with_contacts;
   append_parts(part.id, ranks, all.id);
   append_parts(part.x, ranks, all.x);
   append_parts(part.radius, ranks, all.radius);
   append_parts(part.u, ranks, all.u);
+  append_parts(part.material, ranks, all.material);
   const detail::Slab slab = detail::cut_slab(all, options.thickness);
   double largest[1] = {0};
   for (double r : part.radius) largest[0] = std::max(largest[0], r);

@@ -12,6 +12,7 @@
 #include "io/scene/detail/grain_read.hpp"
 #include "io/scene/detail/material_read.hpp"
 #include "io/scene/detail/motion_read.hpp"
+#include "io/scene/detail/probe_read.hpp"
 #include "io/scene/detail/sample_read.hpp"
 #include "io/scene/detail/scene_read.hpp"
 #include "io/scene/detail/shape_keys.hpp"
@@ -37,8 +38,8 @@ class SceneReader {
 
   Scene read() && {
     read_table(root_, "", keys_.top,
-               {"material", "pair", "cell", "sample", "insert", "remove", "wall", "group", "stage",
-                "detection", "solver", "decomposition", "output", "checkpoint"},
+               {"material", "pair", "cell", "sample", "insert", "remove", "probe", "field", "wall", "group",
+                "stage", "detection", "solver", "decomposition", "output", "checkpoint"},
                scene_);
     if (root_.get("name")) check_name(root_, "", scene_.name);
     read_materials(root_, scene_);
@@ -54,6 +55,7 @@ class SceneReader {
     read_table(table_at(root_, "solver"), "solver", keys_.solver, {}, scene_.setup.solver);
     read_decomposition();
     read_table(table_at(root_, "output"), "output", keys_.output, {}, scene_.output);
+    read_probes(root_, scene_);
     read_table(table_at(root_, "checkpoint"), "checkpoint", keys_.checkpoint, {}, scene_.checkpoint);
     if (scene_.output.directory.empty()) scene_.output.directory = "out/" + scene_.name;
     return std::move(scene_);

@@ -64,6 +64,7 @@ bool may_change(const std::string& key) {
     if (key.starts_with(front)) return true;
   if (key.starts_with("stage."))
     return key.find(".end.") != std::string::npos || key.find(".load.") != std::string::npos;
+  if (key.starts_with("probe.")) return key.ends_with(".every") || key.ends_with(".every_steps");
   constexpr std::array<std::string_view, 7> loads{"drive",  "pressure",           "force", "velocity", "mass",
                                                   "weight", "tangential_velocity"};
   const std::string_view last = std::string_view(key).substr(key.rfind('.') + 1);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "io/scene/detail/probe_read.hpp"
 #include "io/scene/detail/scene_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
 #include "io/scene/scene.hpp"
@@ -125,6 +126,9 @@ void place_walls(Scene& scene, const Sample& grains) {
 
   for (std::size_t k = 0; k < walls.size(); ++k)
     if (const std::string fault = detail::wall_conflict(walls, k); !fault.empty()) refuse(fault);
+  for (const ProbeRule& probe : scene.setup.probes)
+    if (const std::string fault = detail::probe_fault(probe, walls); !fault.empty())
+      throw SceneError(scene.source_file, 0, "probe", fault);
   for (const Wall& wall : walls)
     for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < grains.size(); ++k)
       if (const double depth = depth_behind(wall, grains.x[k]); depth > 0)

@@ -58,6 +58,15 @@ void write_grain_rules(std::string& out, const Scene& scene) {
   }
 }
 
+void write_probes(std::string& out, const Scene& scene) {
+  const SceneKeys& keys = scene_keys();
+  for (const ProbeRule& rule : scene.setup.probes) {
+    write_section(out, keys.probe, rule);
+    write_section(out, keys.region, rule.region, {}, "[probe.region]");
+  }
+  for (const FieldRule& rule : scene.setup.fields) write_section(out, keys.field, rule);
+}
+
 }  // namespace
 
 std::string resolved_scene(const Scene& scene) {
@@ -68,6 +77,7 @@ std::string resolved_scene(const Scene& scene) {
   if (scene.setup.domain.repeats) write_section(out, keys.cell, scene.cell);
   write_samples(out, scene);
   write_grain_rules(out, scene);
+  write_probes(out, scene);
   write_section(out, keys.detection, scene.setup.detection);
   write_section(out, keys.solver, scene.setup.solver);
   write_section(out, keys.decomposition, scene.setup.decomposition);

@@ -48,4 +48,12 @@ Touch touch_of(const Poses& poses, const Contacts& contacts, std::size_t k, cons
   return touch_bodies(poses, contacts.first[k], contacts.second[k], numbers);
 }
 
+Vec3 branch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall) {
+  const auto i = static_cast<std::size_t>(contacts.first[k]);
+  if (wall == nullptr)
+    return poses.domain.separation(poses.x[i], poses.x[static_cast<std::size_t>(contacts.second[k])]);
+  const Touch touch = touch_of(poses, contacts, k, wall);
+  return poses.clumps.is_clump(i) ? poses.domain.separation(poses.x[i], touch.point) : touch.separation;
+}
+
 }  // namespace talus

@@ -35,4 +35,8 @@ Touch touch_wall(const Poses& poses, const Wall& wall, Slot body, std::int32_t f
 /// Contact k, of spheres or blocks, at `wall`, or between bodies where that is null.
 Touch touch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall);
 
+/// Branch vector of the same contact [m]: to the centre of the first body from that of the second, at a wall
+/// from the point of contact; of a sphere from the nearest point of the wall.
+Vec3 branch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall);
+
 }  // namespace talus

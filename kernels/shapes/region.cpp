@@ -1,6 +1,7 @@
 #include "kernels/shapes/region.hpp"
 
 #include <cmath>
+#include <limits>
 
 namespace talus {
 
@@ -26,10 +27,6 @@ Vec3 beside(const Vec3& axis) {
   return across / across.norm();
 }
 
-bool is_round(const Region& region) {
-  return region.kind == Region::Kind::cylinder || region.kind == Region::Kind::disc;
-}
-
 }  // namespace
 
 const char* fault_of(const Region& region) {
@@ -42,6 +39,7 @@ const char* fault_of(const Region& region) {
     case Region::Kind::disc:
       return region.axis.norm() > 0 ? "" : "`axis` must not be zero";
     case Region::Kind::beyond:
+    case Region::Kind::plane:
       return region.normal.norm() > 0 ? "" : "`normal` must not be zero";
   }
   return "";
@@ -54,6 +52,7 @@ bool contains(const Region& region, const Vec3& x) {
     case Region::Kind::cylinder:
       return holds(region, x, 0);
     case Region::Kind::disc:
+    case Region::Kind::plane:
       return false;
     case Region::Kind::beyond:
       return (x - region.point).dot(region.normal) > 0;
@@ -64,6 +63,7 @@ bool contains(const Region& region, const Vec3& x) {
 bool holds(const Region& region, const Vec3& x, double radius) {
   if (region.kind == Region::Kind::beyond)
     return (x - region.point).dot(region.normal) >= radius * region.normal.norm();
+  if (region.kind == Region::Kind::plane) return false;
   if (region.kind == Region::Kind::box)
     return (x.array() - radius >= region.low.array()).all() &&
            (x.array() + radius <= region.high.array()).all();
@@ -84,12 +84,16 @@ bool has_room(const Region& region, double radius) {
       return region.radius >= radius;
     case Region::Kind::beyond:
       return true;
+    case Region::Kind::plane:
+      return false;
   }
   return false;
 }
 
 Bounds bounds_of(const Region& region) {
-  if (!is_round(region)) return {region.low, region.high};
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  if (region.kind == Region::Kind::box) return {region.low, region.high};
+  if (!region.is_round()) return {Vec3::Constant(-infinity), Vec3::Constant(infinity)};
   const Round round = round_of(region);
   const Vec3 other_end = round.foot + round.length * round.axis;
   const Vec3 across = region.radius * (1 - round.axis.array().square()).max(0).sqrt();

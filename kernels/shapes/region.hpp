@@ -7,14 +7,15 @@
 
 namespace talus {
 
-/// A part of space that a scene names: where grains are put, or taken away. Fields that the kind does not use
-/// keep their defaults.
+/// A part of space that a scene names: where grains are put, taken away, or looked at. Fields that the kind
+/// does not use keep their defaults.
 struct Region {
   enum class Kind {
     box,       ///< between the corners `low` and `high`
     cylinder,  ///< about the line from `start` to `end`
     disc,      ///< round and flat, about `centre`, at right angles to `axis`
     beyond,    ///< the half space behind a plane: (x - point) . normal > 0
+    plane,     ///< the plane itself
   };
   Kind kind = Kind::box;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();   ///< [m] box
@@ -22,23 +23,27 @@ struct Region {
   Vec3 centre = Vec3::Zero();                     ///< [m] disc
   Vec3 axis = Vec3::UnitZ();                      ///< disc: of any length
   double radius = 0;                              ///< [m] cylinder, disc
-  Vec3 point = Vec3::Zero();                      ///< [m] beyond
-  Vec3 normal = Vec3::Zero();                     ///< beyond: of any length
+  Vec3 point = Vec3::Zero();                      ///< [m] beyond, plane
+  Vec3 normal = Vec3::Zero();                     ///< beyond, plane: of any length
+
+  bool is_round() const { return kind == Kind::cylinder || kind == Kind::disc; }
+  bool is_surface() const { return kind == Kind::disc || kind == Kind::plane; }
 };
 
 /// "" or what makes no sense: a box without volume, an axis of no length, ...
 const char* fault_of(const Region& region);
 
-/// Whether a point [m] lies in the region. A disc holds none.
+/// Whether a point [m] lies in the region. A disc and a plane hold none.
 bool contains(const Region& region, const Vec3& x);
 
-/// Whether a sphere lies in the region as a whole: in a disc, its centre on it and its great circle within.
+/// Whether a sphere lies in the region as a whole: in a disc, its centre on it and its great circle within. A
+/// plane holds none.
 bool holds(const Region& region, const Vec3& x, double radius);
 
 /// Whether there is a place for a sphere of this radius [m].
 bool has_room(const Region& region, double radius);
 
-/// The smallest box about a box, cylinder or disc.
+/// The smallest box about a box, cylinder or disc; without limits about the others.
 Bounds bounds_of(const Region& region);
 
 /// The centre that three numbers in [0, 1) give to a sphere, which then lies in the region as a whole: evenly

@@ -14,6 +14,7 @@
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/population.hpp"
+#include "runtime/step/probes.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/stiffness_memory.hpp"
@@ -109,6 +110,7 @@ struct CheckpointHead {
   SampleSize size;
   std::int64_t shares = 0;  ///< of each subdomain in the step's graph
   PopulationState population;
+  ProbeState probes;
 
   // Walls, in the order of the setup.
   std::vector<double> wall_points, wall_velocities, wall_then;  ///< 3 each
@@ -172,6 +174,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("size_materials", head.size.materials);
   visit("shares", head.shares);
   head.population.each_number(visit);
+  head.probes.each_number(visit);
   visit("wall_points", head.wall_points);
   visit("wall_velocities", head.wall_velocities);
   visit("wall_then", head.wall_then);

@@ -11,6 +11,7 @@
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/domain.hpp"
 #include "runtime/graph/communicator.hpp"
+#include "runtime/step/field_grids.hpp"
 #include "runtime/step/overlap.hpp"
 #include "runtime/step/worst_errors.hpp"
 
@@ -112,6 +113,30 @@ struct RemoveReport {
   double mass = 0;  ///< [kg]
 };
 
+/// One row of probes.csv. What a probe of its kind does not have is 0: the contents where it is a disc or a
+/// plane, the passages elsewhere, what needs a volume beyond a plane.
+struct ProbeReport {
+  /// Grains of one material.
+  struct OfMaterial {
+    std::int64_t count = 0, passed_count = 0;
+    double mass = 0, passed_mass = 0;  ///< [kg]
+  };
+  std::string name;
+  std::int64_t count = 0;  ///< grains whose centre is in the region; means are over these
+  double mass = 0;         ///< [kg]
+  double solid_fraction = 0;
+  Vec3 velocity = Vec3::Zero();        ///< of their centre of mass [m/s]
+  double temperature = 0;              ///< a third of the mean square of what is left of it [m^2/s^2]
+  double coordination = 0;             ///< active contacts of a grain, those with walls among them
+  Mat3 contact_stress = Mat3::Zero();  ///< [Pa], positive in compression: force, then branch
+  Mat3 kinetic_stress = Mat3::Zero();  ///< [Pa]
+  std::int64_t passed_count = 0;       ///< along the normal less against it, since the run began
+  double passed_mass = 0;              ///< [kg]
+  double count_rate = 0;               ///< [1/s] of them, mean since the last report
+  double mass_rate = 0;                ///< [kg/s]
+  std::vector<OfMaterial> materials;   ///< by number
+};
+
 /// One row of triaxial.csv; compression is positive for stresses, strains (28)-(30) are negative in
 /// compression as in the paper.
 struct TriaxialReport {
@@ -148,8 +173,9 @@ struct Frame {
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
-  Domain domain = {};  ///< that they stand in; x and contact_point are wrapped
-  bool with_contacts = true;  ///< false: its contacts, of which there may be some, are left out
+  Domain domain = {};            ///< that they stand in; x and contact_point are wrapped
+  std::vector<FieldGrid> grids;  ///< that the scene asks for
+  bool with_contacts = true;     ///< false: its contacts, of which there may be some, are left out
 };
 
 struct StepState;

@@ -153,6 +153,19 @@ void validate_grains(const Setup& setup) {
   }
 }
 
+void validate_probes(const Setup& setup) {
+  for (const ProbeRule& rule : setup.probes) {
+    const std::string where = fmt::format("probe '{}'", rule.name), region = fault_of(rule.region);
+    require(region.empty(), fmt::format("{}: {}", where, region));
+    require(rule.every_steps.value_or(1) > 0 && rule.every.value_or(1) > 0,
+            where + ": every and every_steps must exceed 0");
+  }
+  for (const FieldRule& rule : setup.fields) {
+    const std::string where = fmt::format("field '{}'", rule.name), fault = fault_of(rule);
+    require(fault.empty(), fmt::format("{}: {}", where, fault));
+  }
+}
+
 }  // namespace
 
 void validate(const Setup& setup) {
@@ -166,6 +179,7 @@ void validate(const Setup& setup) {
   }
   require(!setup.stages.empty(), "at least one stage is needed");
   validate_grains(setup);
+  validate_probes(setup);
   for (const Stage& stage : setup.stages) {
     validate_time_step(stage);
     require(stage.gravity.allFinite(), fmt::format("stage '{}': gravity must be finite [m/s^2]", stage.name));

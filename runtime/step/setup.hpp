@@ -20,6 +20,7 @@
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "partition/partitioner.hpp"
 #include "runtime/step/grain_rules.hpp"
+#include "runtime/step/probe_rules.hpp"
 
 namespace talus {
 
@@ -185,6 +186,8 @@ struct Setup {
   std::vector<NamedBody> named;
   std::vector<InsertRule> inserts;
   std::vector<RemoveRule> removes;
+  std::vector<ProbeRule> probes;
+  std::vector<FieldRule> fields;
   std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   Domain domain;                            ///< that the grains stand in
   std::vector<Wall> walls;

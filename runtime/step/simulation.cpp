@@ -62,6 +62,7 @@ const StepReport& Simulation::step() {
   impl_->load_walls();
   const std::vector<NamedBody> named = impl_->named_now();
   impl_->named.begin_step(named, impl_->state, impl_->ranks);
+  impl_->probes.begin_step(impl_->state);
   const double wall_energy_free = free_energy_of(impl_->state.walls);
   impl_->graph.run();
   const StepOutcome outcome = impl_->outcome();
@@ -71,6 +72,7 @@ const StepReport& Simulation::step() {
   add_step(impl_->report, outcome, overlap, graph::seconds_now() - start);
   impl_->named_reports = impl_->named.end_step(named, impl_->state, impl_->parameters, impl_->ranks);
   impl_->count_step();
+  impl_->probe();
   return impl_->report;
 }
 
@@ -143,6 +145,10 @@ std::vector<RemoveReport> Simulation::removed() const {
   return impl_->population.removed();
 }
 
+const std::vector<ProbeReport>& Simulation::probes() const {
+  return impl_->probes.reports();
+}
+
 std::optional<TriaxialReport> Simulation::triaxial() const {
   Vec3 strain;
   for (int axis = 0; axis < 3; ++axis) strain[axis] = impl_->strain(axis);
@@ -175,6 +181,9 @@ Frame Simulation::frame(bool contacts) const {
              impl_->parameters.impulse_time(), frame);
   frame.walls = walls();
   frame.with_contacts = contacts;
+  if (!impl_->setup.fields.empty())
+    frame.grids = coarse_fields(impl_->setup.fields, impl_->state,
+                                frame.step > 0 ? impl_->parameters.impulse_time() : 0, impl_->ranks);
   return frame;
 }
 

@@ -119,6 +119,8 @@ class Simulation {
   /// What insertions and removals have done so far; empty without any.
   std::vector<InsertReport> inserted() const;
   std::vector<RemoveReport> removed() const;
+  /// Probes that were due behind the last step; empty without any.
+  const std::vector<ProbeReport>& probes() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them

@@ -39,6 +39,7 @@ const std::vector<Room>& rooms() {
       {"kernels/delassus", {"kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
       {"kernels/clusters", {"kernels/bodies", "kernels/law", "kernels/global", "kernels/delassus"}},
       {"kernels/samples", {"kernels/bodies", "kernels/shapes"}},
+      {"kernels/fields", {"kernels/bodies"}},
       {"io/files", {}},
       {"io/fclib", {"io/files"}},
       {"io/results", {"io/files"}},

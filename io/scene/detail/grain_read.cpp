@@ -11,19 +11,6 @@ namespace talus::io::detail {
 
 namespace {
 
-/// A name of its own, or the one that its number gives.
-template <class Rule>
-void settle_name(const toml::table& table, const std::string& path, const char* kind,
-                 const std::vector<Rule>& earlier, Rule& rule) {
-  if (!table.get("name"))
-    rule.name = fmt::format("{}-{}", kind, earlier.size() + 1);
-  else
-    check_name(table, path, rule.name);
-  if (std::ranges::find(earlier, rule.name, &Rule::name) == earlier.end()) return;
-  const toml::node* at = table.get("name");
-  fail_at(at ? *at : table, path + ".name", fmt::format("another {} is named '{}' already", kind, rule.name));
-}
-
 void check_times(const toml::table& table, const std::string& path, const RuleTimes& times,
                  const Scene& scene) {
   if (times.until <= times.from)
@@ -35,16 +22,6 @@ void check_times(const toml::table& table, const std::string& path, const RuleTi
   if (std::ranges::find(names, times.stage) == names.end())
     fail_at(*table.get("stage"), path + ".stage",
             fmt::format("no stage is named '{}'{}", times.stage, hint(times.stage, names)));
-}
-
-Region needed_region(const toml::table& table, const std::string& path,
-                     std::initializer_list<Region::Kind> shapes) {
-  const auto region = read_region(table, path, shapes);
-  if (!region)
-    fail_at(
-        table, path + ".region",
-        "missing; expected a table, e.g. region = { shape = \"box\", low = [0, 0, 0], high = [1, 1, 1] }");
-  return *region;
 }
 
 void check_amount(const toml::table& table, const std::string& path, const InsertRule& rule) {
@@ -93,6 +70,16 @@ void read_remove(const toml::table& table, const std::string& path, Scene& scene
 }
 
 }  // namespace
+
+Region needed_region(const toml::table& table, const std::string& path,
+                     std::initializer_list<Region::Kind> shapes) {
+  const auto region = read_region(table, path, shapes);
+  if (!region)
+    fail_at(
+        table, path + ".region",
+        "missing; expected a table, e.g. region = { shape = \"box\", low = [0, 0, 0], high = [1, 1, 1] }");
+  return *region;
+}
 
 void read_grain_rules(const toml::table& root, Scene& scene) {
   for (const MaterialSpec& material : scene.materials) scene.setup.material_names.push_back(material.name);

@@ -9,6 +9,7 @@
 #include "io/scene/detail/grain_keys.hpp"
 #include "io/scene/detail/loading_keys.hpp"
 #include "io/scene/detail/material_keys.hpp"
+#include "io/scene/detail/probe_keys.hpp"
 #include "io/scene/detail/sample_keys.hpp"
 #include "io/scene/detail/solver_keys.hpp"
 
@@ -127,9 +128,11 @@ Section<OutputSpec> output_keys() {
                       "Contacts in each of so many frames only, from the first on.",
                       &OutputSpec::contacts_every)
           .only("contacts", [](const OutputSpec& o) { return o.contacts; }),
-      key<OutputSpec>("tables_every", "", countable,
-                      "Steps from line to line of walls.csv and triaxial.csv; steps.csv has all of them.",
-                      &OutputSpec::tables_every)};
+      key<OutputSpec>(
+          "tables_every", "", countable,
+          "Steps from line to line of walls.csv and triaxial.csv, and of probes.csv where a probe says no "
+          "more; steps.csv has all of them.",
+          &OutputSpec::tables_every)};
   for (auto& format_key : within(format_keys(), &OutputSpec::format)) keys.push_back(std::move(format_key));
   for (auto& sink_key : sink_keys()) keys.push_back(std::move(sink_key));
   return {"[output]", "What is written, and when. Frames come at the first of `every` and `every_steps`.",
@@ -155,11 +158,11 @@ Section<CheckpointSpec> checkpoint_keys() {
 
 const SceneKeys& scene_keys() {
   static const SceneKeys keys = {
-      top_keys(),         material_keys(),   named_material_keys(), pair_keys(),   cell_keys(),
-      sample_keys(),      region_keys(),     insert_keys(),         remove_keys(), wall_keys(),
-      wall_motion_keys(), group_keys(),      group_motion_keys(),   stage_keys(),  stage_end_keys(),
-      stage_load_keys(),  stage_pair_keys(), detection_keys(),      solver_keys(), decomposition_keys(),
-      output_keys(),      checkpoint_keys()};
+      top_keys(),    material_keys(),      named_material_keys(), pair_keys(),       cell_keys(),
+      sample_keys(), region_keys(),        insert_keys(),         remove_keys(),     probe_keys(),
+      field_keys(),  wall_keys(),          wall_motion_keys(),    group_keys(),      group_motion_keys(),
+      stage_keys(),  stage_end_keys(),     stage_load_keys(),     stage_pair_keys(), detection_keys(),
+      solver_keys(), decomposition_keys(), output_keys(),         checkpoint_keys()};
   return keys;
 }
 

@@ -17,6 +17,8 @@ struct SceneKeys {
   Section<Region> region;
   Section<InsertRule> insert;
   Section<RemoveRule> remove;
+  Section<ProbeRule> probe;
+  Section<FieldRule> field;
   Section<Wall> wall;
   Section<MotionPart> wall_motion;
   Section<WallGroup> group;
@@ -36,15 +38,16 @@ struct SceneKeys {
 template <class Keys, class F>
 void for_each_section(Keys&& keys, F&& f) {
   f(keys.top), f(keys.material), f(keys.named_material), f(keys.pair), f(keys.cell), f(keys.sample);
-  f(keys.region), f(keys.insert), f(keys.remove), f(keys.wall);
+  f(keys.region), f(keys.insert), f(keys.remove), f(keys.probe), f(keys.field), f(keys.wall);
   f(keys.wall_motion), f(keys.group), f(keys.group_motion);
   f(keys.stage), f(keys.stage_end), f(keys.stage_load), f(keys.stage_pair);
   f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output), f(keys.checkpoint);
 }
 
 /// Top, output and checkpoint from scene_keys.cpp, the cell from cell_keys.cpp, samples and regions from
-/// sample_keys.cpp, insertions and removals from grain_keys.cpp, materials from material_keys.cpp, walls and
-/// stages from loading_keys.cpp, detection, solver and decomposition from solver_keys.cpp.
+/// sample_keys.cpp, insertions and removals from grain_keys.cpp, probes and fields from probe_keys.cpp,
+/// materials from material_keys.cpp, walls and stages from loading_keys.cpp, detection, solver and
+/// decomposition from solver_keys.cpp.
 const SceneKeys& scene_keys();
 
 }  // namespace talus::io::detail

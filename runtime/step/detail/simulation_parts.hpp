@@ -10,6 +10,7 @@
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
 #include "runtime/step/named_bodies.hpp"
+#include "runtime/step/probes.hpp"
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/simulation.hpp"
 #include "runtime/step/stage_end.hpp"
@@ -45,6 +46,7 @@ struct Simulation::Implementation {
         state(first_state(setup, std::move(bodies), ranks_)),
         size(first_size(setup, measure_sample(state.bodies, ranks_, setup.clumps))),
         population(setup, state.bodies, ranks_),
+        probes(setup),
         graph(state, parameters, setup,
               StepGraph::shares_for(size.bodies + expected_grains(setup),
                                     state.decomposition.partition.subdomains),
@@ -83,10 +85,12 @@ struct Simulation::Implementation {
         state(restored_state(setup, from, ranks_)),
         size(from.head.size),
         population(setup, from.head.population),
+        probes(setup),
         report(from.head.report),
         graph(state, parameters, setup, static_cast<std::uint32_t>(from.head.shares), executor, ranks_) {
     choose_distances();
     const CheckpointHead& head = from.head;
+    probes.go_on_from(head.probes);
     stage_index = static_cast<std::size_t>(head.stage_index);
     stage_begins = head.stage_begins;
     prescribe();
@@ -117,6 +121,7 @@ struct Simulation::Implementation {
     head.size = size;
     head.shares = graph.shares_of_subdomain();
     head.population = population.state();
+    head.probes = probes.state();
     head.stage_index = static_cast<std::int64_t>(stage_index);
     head.stage_steps = stage_steps;
     head.stage_begins = stage_begins;
@@ -258,6 +263,11 @@ struct Simulation::Implementation {
     if (held > 0 && population.expects_grains(last)) held = 0;
   }
 
+  void probe() {
+    const bool dealt = graph.sums().broad_phase && state.decomposition.several();
+    probes.end_step({report.step, report.time, parameters.impulse_time(), dealt}, state, ranks);
+  }
+
   /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
     state.time = report.time;
@@ -292,6 +302,7 @@ struct Simulation::Implementation {
   StepState state;
   SampleSize size;
   Population population;
+  Probes probes;
   StepParameters parameters;
   StepReport report;
   StepGraph graph;

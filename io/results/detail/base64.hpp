@@ -1,0 +1,57 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "io/files/write_text.hpp"
+
+namespace talus::io::detail {
+
+static_assert(std::endian::native == std::endian::little, "the files say that they are little endian");
+
+/// Bytes that come in pieces as base64 text.
+class Base64 {
+ public:
+  explicit Base64(const WriteText& out) : out_(out) {}
+  void add(std::span<const std::byte> bytes) {
+    text_.reserve((bytes.size() + 2) / 3 * 4);
+    for (const std::byte byte : bytes) {
+      group_ = group_ << 8 | std::to_integer<std::uint32_t>(byte);
+      if (++count_ == 3) put();
+    }
+    flush();
+  }
+  void finish() {
+    if (count_ > 0) {
+      const int count = count_;
+      group_ <<= 8 * (3 - count);
+      put();
+      for (int k = count; k < 3; ++k) text_[text_.size() - static_cast<std::size_t>(3 - k)] = '=';
+    }
+    flush();
+  }
+
+ private:
+  void put() {
+    static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const char four[] = {digits[group_ >> 18], digits[group_ >> 12 & 63], digits[group_ >> 6 & 63],
+                         digits[group_ & 63]};
+    text_.append(four, sizeof four);  // at once: digit by digit was a percent of a small run
+    group_ = 0;
+    count_ = 0;
+  }
+  void flush() {
+    out_(text_);
+    text_.clear();
+  }
+
+  const WriteText& out_;
+  std::string text_;
+  std::uint32_t group_ = 0;
+  int count_ = 0;
+};
+
+}  // namespace talus::io::detail

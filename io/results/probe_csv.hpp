@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "runtime/step/frame.hpp"
+
+namespace talus::io {
+
+/// Header line of probes.csv (docs/formats.md), with line end: columns of their own for each material that
+/// has a name.
+std::string probes_csv_header(std::span<const std::string> materials);
+
+/// Appends one line, with line end. The report has one entry per name, or one where materials have none.
+void append_probes_row(std::string& text, const StepReport& step, const ProbeReport& report,
+                       std::span<const std::string> materials);
+
+}  // namespace talus::io

@@ -1,0 +1,32 @@
+#pragma once
+
+/// Coarse-grained fields of a simulation (kernels/fields), for frames.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kernels/fields/coarse_grid.hpp"
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/probe_rules.hpp"
+
+namespace talus {
+
+struct StepState;
+
+/// "" or what makes no sense.
+std::string fault_of(const FieldRule& rule);
+
+struct FieldGrid {
+  std::string name;
+  Grid grid;
+  GridSums sums;  ///< on rank 0; empty on others
+};
+
+/// The fields of `rules` with the poses and velocities of the end of the step; forces are impulses over
+/// `impulse_time` [s], and are left out where that is 0. Subdomain after subdomain: the same bits on any
+/// ranks and threads. Each rank holds one grid at a time. Collective.
+std::vector<FieldGrid> coarse_fields(std::span<const FieldRule> rules, const StepState& state,
+                                     double impulse_time, const graph::Communicator& ranks);
+
+}  // namespace talus
