@@ -148,7 +148,7 @@ struct Frame {
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
-  Domain domain = {};  ///< that they stand in; x and contact_point are wrapped
+  Domain domain = {};         ///< that they stand in; x and contact_point are wrapped
   bool with_contacts = true;  ///< false: its contacts, of which there may be some, are left out
 };
 

@@ -124,36 +124,36 @@ Section<Region> region_keys() {
   };
   using R = Region;
   using K = Region::Kind;
-  return {
-      "[sample.region]",
-      "A part of space: the one that a lattice fills or random grains stand in (box), and likewise `[insert.region]`, where grains are put "
-      "(box, cylinder, disc), and `[remove.region]`, where they are taken away (box, cylinder, beyond).",
-      {choice<R>("shape", {"box", "cylinder", "disc", "beyond"},
-                 "`box`: between two corners; `cylinder`: solid; `disc`: round, flat, centres lie on it; "
-                 "`beyond`: all that lies behind a plane.",
-                 &R::kind)
-           .need(),
-       key<R>("low", "m", any, "Lower corner.", &R::low).only("shape = box", is({K::box})).need(),
-       key<R>("high", "m", any, "Upper corner.", &R::high).only("shape = box", is({K::box})).need(),
-       key<R>("start", "m", any, "Centre of the first end.", &R::start)
-           .only("shape = cylinder", is({K::cylinder}))
-           .need(),
-       key<R>("end", "m", any, "Centre of the other end.", &R::end)
-           .only("shape = cylinder", is({K::cylinder}))
-           .need(),
-       key<R>("centre", "m", any, "Centre.", &R::centre).only("shape = disc", is({K::disc})).need(),
-       key<R>("axis", "", any, "Direction at right angles to the disc, of any length.", &R::axis)
-           .only("shape = disc", is({K::disc})),
-       key<R>("radius", "m", positive, "Radius.", &R::radius)
-           .only("shape = cylinder or disc", is({K::cylinder, K::disc}))
-           .need(),
-       key<R>("point", "m", any, "A point of the plane.", &R::point)
-           .only("shape = beyond", is({K::beyond}))
-           .need(),
-       key<R>("normal", "", any, "Direction out of the plane, of any length: there grains are removed.",
-              &R::normal)
-           .only("shape = beyond", is({K::beyond}))
-           .need()}};
+  return {"[sample.region]",
+          "A part of space: the one that a lattice fills or random grains stand in (box), and likewise "
+          "`[insert.region]`, where grains are put "
+          "(box, cylinder, disc), and `[remove.region]`, where they are taken away (box, cylinder, beyond).",
+          {choice<R>("shape", {"box", "cylinder", "disc", "beyond"},
+                     "`box`: between two corners; `cylinder`: solid; `disc`: round, flat, centres lie on it; "
+                     "`beyond`: all that lies behind a plane.",
+                     &R::kind)
+               .need(),
+           key<R>("low", "m", any, "Lower corner.", &R::low).only("shape = box", is({K::box})).need(),
+           key<R>("high", "m", any, "Upper corner.", &R::high).only("shape = box", is({K::box})).need(),
+           key<R>("start", "m", any, "Centre of the first end.", &R::start)
+               .only("shape = cylinder", is({K::cylinder}))
+               .need(),
+           key<R>("end", "m", any, "Centre of the other end.", &R::end)
+               .only("shape = cylinder", is({K::cylinder}))
+               .need(),
+           key<R>("centre", "m", any, "Centre.", &R::centre).only("shape = disc", is({K::disc})).need(),
+           key<R>("axis", "", any, "Direction at right angles to the disc, of any length.", &R::axis)
+               .only("shape = disc", is({K::disc})),
+           key<R>("radius", "m", positive, "Radius.", &R::radius)
+               .only("shape = cylinder or disc", is({K::cylinder, K::disc}))
+               .need(),
+           key<R>("point", "m", any, "A point of the plane.", &R::point)
+               .only("shape = beyond", is({K::beyond}))
+               .need(),
+           key<R>("normal", "", any, "Direction out of the plane, of any length: there grains are removed.",
+                  &R::normal)
+               .only("shape = beyond", is({K::beyond}))
+               .need()}};
 }
 
 Section<SampleSpec> sample_keys() {
@@ -165,8 +165,8 @@ Section<SampleSpec> sample_keys() {
       [](S& sample, const std::string& name) { sample.material = name; },
       [](const S& s) { return s.material.empty() ? Value{} : Value{s.material}; });
   std::vector<Key<S>> keys = {
-      choice<S>("kind", {"deposition", "lattice", "bodies", "state", "body", "random"}, "Way of making the sample.",
-                &S::kind)
+      choice<S>("kind", {"deposition", "lattice", "bodies", "state", "body", "random"},
+                "Way of making the sample.", &S::kind)
           .need(),
       bound<std::string, S>(
           "name", "", any,
@@ -215,7 +215,8 @@ Section<SampleSpec> sample_keys() {
       "file with the columns `id,x,y,z,radius`, then perhaps `vx,vy,vz`, then perhaps `wx,wy,wz` (m, m/s, "
       "rad/s), then perhaps `material`; `state` begins where a run was: spheres with their velocities, "
       "forces where contacts are, and walls of the same names that have no place of their own; `body` is "
-      "one sphere; `random` puts `count` grains at random places of a box or of the periodic cell, each where "
+      "one sphere; `random` puts `count` grains at random places of a box or of the periodic cell, each "
+      "where "
       "it overlaps none (up to a solid fraction of about 0.35). A scene with an `[[insert]]` may do without "
       "any.",
       std::move(keys)};

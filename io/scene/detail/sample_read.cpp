@@ -86,8 +86,7 @@ void read_sample(const toml::table& table, const std::string& path, const std::f
   if (!sample.name.empty() || table.get("name")) check_name(table, path, sample.name);
   check_among(table, path, sample, scene);
   const bool random = sample.kind == SampleKind::random;
-  if (const toml::node* region = table.get("region");
-      region && sample.kind != SampleKind::lattice && !random)
+  if (const toml::node* region = table.get("region"); region && sample.kind != SampleKind::lattice && !random)
     fail_at(*region, path + ".region", "has a meaning only with: kind = lattice or random");
   sample.region = random ? read_region(table, path, {Region::Kind::box})
                          : read_region(table, path, {Region::Kind::box, Region::Kind::cylinder});

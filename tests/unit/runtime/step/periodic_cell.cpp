@@ -126,7 +126,8 @@ TEST(PeriodicRun, GrainsAreStoredInTheCellWhereverTheyFly) {
 TEST(PeriodicRun, HasTheSameBitsOnAnyRanksAndThreads) {
   for (const auto& variant : decomposition_test::variants)
     for (const int subdomains : {2, 8}) {
-      talus::Setup setup = colliding(20);
+      if (subdomains == 2 && &variant != &decomposition_test::variants[3]) continue;
+      talus::Setup setup = colliding(12);
       setup.solver.max_iterations = 40;
       decomposition_test::choose(setup, variant, subdomains);
       setup.decomposition.repartition_every = 3;
