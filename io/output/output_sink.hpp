@@ -39,13 +39,13 @@ struct OutputContext {
   std::filesystem::path directory;                ///< prepared (prepare_output_directory)
   bool contacts = true;                           ///< false: frames hold no contacts
   FrameFormat format = {};                        ///< of results.h5
-  std::int64_t tables_every = 1;                  ///< steps from line to line of walls.csv and triaxial.csv
+  std::int64_t tables_every = 1;                  ///< steps between lines of walls, triaxial and cell.csv
   std::vector<Wall> walls = {};                   ///< in the order of Frame::walls
   std::map<std::string, int> axis_of_stage = {};  ///< 0, 1, 2: along which the strain of a stage is measured
   Provenance provenance = {};
   const graph::Communicator& ranks;  ///< outlives the sinks
 
-  /// Whether walls.csv and triaxial.csv, and what is drawn from them, have a line for that step.
+  /// Whether walls.csv, triaxial.csv and cell.csv, and what is drawn from them, have a line for that step.
   bool has_table_line(std::int64_t step) const { return step % tables_every == 0; }
 };
 
@@ -58,6 +58,7 @@ struct StepRecord {
   std::vector<BodyReport> bodies = {};          ///< that the scene names
   std::vector<InsertReport> inserted = {};      ///< of each insertion
   std::vector<RemoveReport> removed = {};       ///< of each removal and material
+  std::optional<CellReport> cell = {};          ///< of a periodic cell
 };
 
 /// How far the files of a run are: a checkpoint keeps it.

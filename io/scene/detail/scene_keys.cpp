@@ -127,9 +127,10 @@ Section<OutputSpec> output_keys() {
                       "Contacts in each of so many frames only, from the first on.",
                       &OutputSpec::contacts_every)
           .only("contacts", [](const OutputSpec& o) { return o.contacts; }),
-      key<OutputSpec>("tables_every", "", countable,
-                      "Steps from line to line of walls.csv and triaxial.csv; steps.csv has all of them.",
-                      &OutputSpec::tables_every)};
+      key<OutputSpec>(
+          "tables_every", "", countable,
+          "Steps from line to line of walls.csv, triaxial.csv and cell.csv; steps.csv has all of them.",
+          &OutputSpec::tables_every)};
   for (auto& format_key : within(format_keys(), &OutputSpec::format)) keys.push_back(std::move(format_key));
   for (auto& sink_key : sink_keys()) keys.push_back(std::move(sink_key));
   return {"[output]", "What is written, and when. Frames come at the first of `every` and `every_steps`.",
