@@ -8,7 +8,9 @@ RecorderFeed::RecorderFeed(graph::Executor& executor, io::Recorder& recorder,
                            const graph::Communicator& ranks, StepList error_steps)
     : executor_(executor), recorder_(recorder), ranks_(ranks), error_steps_(std::move(error_steps)) {}
 
-void RecorderFeed::row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial) {
+void RecorderFeed::row(const Simulation& simulation) {
+  const std::optional<TriaxialReport> triaxial = simulation.triaxial();
+  const std::optional<CellReport> cell = simulation.cell();
   if (ranks_.rank() != 0) return;
   std::vector<WallReport> walls = simulation.walls();
   for (WallReport& group : simulation.groups()) walls.push_back(std::move(group));
@@ -18,7 +20,8 @@ void RecorderFeed::row(const Simulation& simulation, const std::optional<Triaxia
                    .bodies = simulation.named_bodies(),
                    .inserted = simulation.inserted(),
                    .removed = simulation.removed(),
-                   .probes = simulation.probes()});
+                   .probes = simulation.probes(),
+                   .cell = cell});
   if (error_steps_.contains(simulation.report().step)) rows_.back().errors = simulation.error_history();
   if (rows_.size() >= 64 || graph::seconds_now() - flushed_ > 0.5) flush();
 }

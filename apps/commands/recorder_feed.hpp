@@ -24,7 +24,7 @@ class RecorderFeed {
                StepList error_steps);
 
   /// Rank 0 alone has rows.
-  void row(const Simulation& simulation, const std::optional<TriaxialReport>& triaxial);
+  void row(const Simulation& simulation);
 
   /// Collective.
   void frame(Frame&& frame);

@@ -117,7 +117,7 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   const double before = graph::seconds_now();
   const StepReport& report = simulation.step();
   all.memory.tally.add(simulation);
-  feed.row(simulation, simulation.triaxial());
+  feed.row(simulation);
   if (std::count(options.dump_fclib.begin(), options.dump_fclib.end(), report.step) > 0)
     feed.later("dump of a contact problem", fclib_dump(simulation, run.directory));
   const double now = graph::seconds_now();

@@ -88,8 +88,7 @@ std::vector<Vec3> sites_in_region(const io::Scene& scene, const io::SampleSpec& 
 std::vector<Vec3> random_places(const io::Scene& scene, std::size_t k, const std::vector<double>& radii) {
   const io::SampleSpec& spec = scene.samples[k];
   const Domain& domain = scene.setup.domain;
-  const Bounds box =
-      spec.region ? bounds_of(*spec.region) : Bounds{domain.low, domain.low + domain.edges()};
+  const Bounds box = spec.region ? bounds_of(*spec.region) : Bounds{domain.low, domain.low + domain.edges()};
   try {
     return scatter(radii, {box.low, box.high, domain, scene.setup.seed, static_cast<std::uint32_t>(k)});
   } catch (const std::invalid_argument& error) {

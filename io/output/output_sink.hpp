@@ -39,7 +39,7 @@ struct OutputContext {
   std::filesystem::path directory;                ///< prepared (prepare_output_directory)
   bool contacts = true;                           ///< false: frames hold no contacts
   FrameFormat format = {};                        ///< of results.h5
-  std::int64_t tables_every = 1;                  ///< steps from line to line of walls.csv and triaxial.csv
+  std::int64_t tables_every = 1;                  ///< steps between lines of walls, triaxial and cell.csv
   std::vector<Wall> walls = {};                   ///< in the order of Frame::walls
   std::vector<std::string> material_names = {};   ///< of the setup
   std::vector<std::string> grids = {};            ///< names of the fields of the setup
@@ -47,7 +47,7 @@ struct OutputContext {
   Provenance provenance = {};
   const graph::Communicator& ranks;  ///< outlives the sinks
 
-  /// Whether walls.csv and triaxial.csv, and what is drawn from them, have a line for that step.
+  /// Whether walls.csv, triaxial.csv and cell.csv, and what is drawn from them, have a line for that step.
   bool has_table_line(std::int64_t step) const { return step % tables_every == 0; }
 };
 
@@ -61,6 +61,7 @@ struct StepRecord {
   std::vector<InsertReport> inserted = {};      ///< of each insertion
   std::vector<RemoveReport> removed = {};       ///< of each removal and material
   std::vector<ProbeReport> probes = {};         ///< that were due
+  std::optional<CellReport> cell = {};          ///< of a periodic cell
 };
 
 /// How far the files of a run are: a checkpoint keeps it.

@@ -10,7 +10,8 @@ namespace {
 /// In the order in which they are driven.
 constexpr SinkRegistry::Item sinks[] = {
     named("tables",
-          "steps.csv, walls.csv, bodies.csv, inserted.csv, removed.csv, triaxial.csv and error_history.csv",
+          "steps.csv, walls.csv, bodies.csv, inserted.csv, removed.csv, triaxial.csv, cell.csv and "
+          "error_history.csv",
           &table_sink),
     named("probes", "probes.csv: what the probes of a scene report", &probe_sink),
     named("run", "run.json: where the numbers come from, and what came of the run", &run_json_sink),

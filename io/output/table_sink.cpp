@@ -1,5 +1,5 @@
-/// The tables of a run as CSV: a line for each step, wall, named body, insertion, removal, triaxial report
-/// and check of the error; and columns.json, which says what their columns mean.
+/// The tables of a run as CSV: a line for each step, wall, named body, insertion, removal, triaxial report,
+/// cell and check of the error; and columns.json, which says what their columns mean.
 
 #include <algorithm>
 #include <array>
@@ -12,13 +12,13 @@
 namespace talus::io {
 namespace {
 
-enum Table : std::size_t { steps, walls, triaxial, errors, bodies, inserted, removed, tables };
+enum Table : std::size_t { steps, walls, triaxial, errors, bodies, inserted, removed, cell, tables };
 constexpr std::array<std::string_view, tables> names{"steps.csv",         "walls.csv",  "triaxial.csv",
                                                      "error_history.csv", "bodies.csv", "inserted.csv",
-                                                     "removed.csv"};
+                                                     "removed.csv",       "cell.csv"};
 constexpr std::array<std::string (*)(), tables> headers{
     steps_csv_header,  walls_csv_header,    triaxial_csv_header, error_history_csv_header,
-    bodies_csv_header, inserted_csv_header, removed_csv_header};
+    bodies_csv_header, inserted_csv_header, removed_csv_header,  cell_csv_header};
 
 class TableSink : public OutputSink {
  public:
@@ -60,6 +60,7 @@ class TableSink : public OutputSink {
     for (const RemoveReport& remove : record.removed)
       append_removed_row(lines_of(removed), record.step, remove);
     if (record.triaxial && line) append_triaxial_row(lines_of(triaxial), *record.triaxial);
+    if (record.cell && line) append_cell_row(lines_of(cell), *record.cell);
     for (const ErrorCheck& check : record.errors)
       append_error_history_row(lines_of(errors), record.step.step, check);
   }

@@ -154,6 +154,38 @@ constexpr Column<TriaxialReport> triaxial_columns[] = {
     {"converged", [](std::string& t, const TriaxialReport& r) { put(t, r.converged); }},
 };
 
+constexpr Column<CellReport> cell_columns[] = {
+    {"step", [](std::string& t, const CellReport& r) { put(t, r.step); }},
+    {"time", [](std::string& t, const CellReport& r) { put(t, r.time); }},
+    {"stage", [](std::string& t, const CellReport& r) { put(t, r.stage); }},
+    {"edge_xx", [](std::string& t, const CellReport& r) { put(t, r.edges[0]); }},
+    {"edge_yy", [](std::string& t, const CellReport& r) { put(t, r.edges[1]); }},
+    {"edge_zz", [](std::string& t, const CellReport& r) { put(t, r.edges[2]); }},
+    {"edge_xy", [](std::string& t, const CellReport& r) { put(t, r.edges[3]); }},
+    {"edge_xz", [](std::string& t, const CellReport& r) { put(t, r.edges[4]); }},
+    {"edge_yz", [](std::string& t, const CellReport& r) { put(t, r.edges[5]); }},
+    {"stress_xx", [](std::string& t, const CellReport& r) { put(t, r.stress[0]); }},
+    {"stress_yy", [](std::string& t, const CellReport& r) { put(t, r.stress[1]); }},
+    {"stress_zz", [](std::string& t, const CellReport& r) { put(t, r.stress[2]); }},
+    {"stress_xy", [](std::string& t, const CellReport& r) { put(t, r.stress[3]); }},
+    {"stress_xz", [](std::string& t, const CellReport& r) { put(t, r.stress[4]); }},
+    {"stress_yz", [](std::string& t, const CellReport& r) { put(t, r.stress[5]); }},
+    {"kinetic_xx", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[0]); }},
+    {"kinetic_yy", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[1]); }},
+    {"kinetic_zz", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[2]); }},
+    {"kinetic_xy", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[3]); }},
+    {"kinetic_xz", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[4]); }},
+    {"kinetic_yz", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[5]); }},
+    {"p", [](std::string& t, const CellReport& r) { put(t, r.p); }},
+    {"q", [](std::string& t, const CellReport& r) { put(t, r.q); }},
+    {"q_over_p", [](std::string& t, const CellReport& r) { put(t, r.q_over_p); }},
+    {"solid_fraction", [](std::string& t, const CellReport& r) { put(t, r.solid_fraction); }},
+    {"contacts_a_grain", [](std::string& t, const CellReport& r) { put(t, r.contacts_a_grain); }},
+    {"coordination", [](std::string& t, const CellReport& r) { put(t, r.coordination); }},
+    {"inertial_number", [](std::string& t, const CellReport& r) { put(t, r.inertial_number); }},
+    {"converged", [](std::string& t, const CellReport& r) { put(t, r.converged); }},
+};
+
 constexpr Column<ErrorRow> error_history_columns[] = {
     {"step", [](std::string& t, const ErrorRow& r) { put(t, r.step); }},
     {"iterations", [](std::string& t, const ErrorRow& r) { put(t, r.check.iterations); }},
@@ -200,6 +232,9 @@ std::string removed_csv_header() {
 std::string triaxial_csv_header() {
   return header_line<TriaxialReport>(triaxial_columns);
 }
+std::string cell_csv_header() {
+  return header_line<CellReport>(cell_columns);
+}
 std::string error_history_csv_header() {
   return header_line<ErrorRow>(error_history_columns);
 }
@@ -226,6 +261,10 @@ void append_removed_row(std::string& text, const StepReport& report, const Remov
 
 void append_triaxial_row(std::string& text, const TriaxialReport& report) {
   append_line<TriaxialReport>(text, triaxial_columns, report);
+}
+
+void append_cell_row(std::string& text, const CellReport& report) {
+  append_line<CellReport>(text, cell_columns, report);
 }
 
 void append_error_history_row(std::string& text, std::int64_t step, const ErrorCheck& check) {

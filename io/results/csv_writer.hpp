@@ -1,6 +1,6 @@
 #pragma once
 
-/// The tables of a run: steps.csv, walls.csv, bodies.csv, inserted.csv, removed.csv, triaxial.csv,
+/// The tables of a run: steps.csv, walls.csv, bodies.csv, inserted.csv, removed.csv, triaxial.csv, cell.csv,
 /// error_history.csv (columns and units: docs/formats.md).
 
 #include <cstdint>
@@ -21,6 +21,7 @@ std::string bodies_csv_header();
 std::string inserted_csv_header();
 std::string removed_csv_header();
 std::string triaxial_csv_header();
+std::string cell_csv_header();
 std::string error_history_csv_header();
 
 /// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true
@@ -31,6 +32,7 @@ void append_bodies_row(std::string& text, const StepReport& report, const BodyRe
 void append_inserted_row(std::string& text, const StepReport& report, const InsertReport& insert);
 void append_removed_row(std::string& text, const StepReport& report, const RemoveReport& remove);
 void append_triaxial_row(std::string& text, const TriaxialReport& report);
+void append_cell_row(std::string& text, const CellReport& report);
 void append_error_history_row(std::string& text, std::int64_t step, const ErrorCheck& check);
 
 /// A file that grows by whole lines: what a killed run leaves lacks those that were not flushed (a kill in

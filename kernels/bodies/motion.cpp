@@ -26,6 +26,13 @@ void free_velocities(SlotRange range, std::span<const Velocity> velocity, double
     }
 }
 
+void add_gain(SlotRange range, std::span<const Vec3> x, const AffineGain& gain, FreeVelocity& free) {
+  for (std::size_t s = range.begin; s < range.end; ++s) {
+    const Vec3 more = gain.at(x[s]);
+    for (std::size_t c = 0; c < 3; ++c) free.u[s][c] += more[static_cast<Eigen::Index>(c)];
+  }
+}
+
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity) {
   for (Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);
@@ -49,9 +56,9 @@ void MotionSums::add(const MotionSums& other) {
 namespace {
 
 /// V = Vbar + E (Vbar - V-) of body s: written so, a body that meets nothing keeps its velocity to the bit.
-void reflect(Velocity& v, const FreeVelocity& free, std::size_t s, const StepFinish& end) {
+void reflect(Velocity& v, const FreeVelocity& free, std::size_t s, const Vec3& gain, const StepFinish& end) {
   for (std::size_t c = 0; c < 3; ++c) {
-    const double before = free.u[s][c] - end.gain[static_cast<Eigen::Index>(c)];
+    const double before = free.u[s][c] - gain[static_cast<Eigen::Index>(c)];
     v.u[c] += end.reflection * (v.u[c] - before);
     if (!free.w.empty()) v.w[c] += end.reflection * (v.w[c] - free.w[s][c]);
   }
@@ -68,9 +75,10 @@ MotionSums finish_with(SlotRange range, std::span<Vec3> x, std::span<Velocity> v
     Vec3 u_free(free.u[s][0], free.u[s][1], free.u[s][2]);
     const Vec3 change = u - u_free;
     if constexpr (Reflects) {
-      reflect(v, free, s, end);
+      const Vec3 gain = end.cell ? Vec3(end.gain + end.cell->at(x[s])) : end.gain;
+      reflect(v, free, s, gain, end);
       u = {v.u[0], v.u[1], v.u[2]};
-      u_free += end.reflection * end.gain;  // the loads' whole share
+      u_free += end.reflection * gain;  // the loads' whole share
     }
     x[s] += 0.5 * end.time_step * u;
     const double share =

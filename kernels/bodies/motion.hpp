@@ -48,13 +48,24 @@ struct CopyShares {
   Multiplicities multiplicity = {}, parts = {};
 };
 
+/// A velocity that each body gains by where it is: that of a cell whose faces are sped up.
+struct AffineGain {
+  Mat3 gradient = Mat3::Zero();  ///< [1/s]
+  Vec3 resting = Vec3::Zero();   ///< [m] where nothing is gained
+  Vec3 at(const Vec3& x) const { return gradient * (x - resting); }
+};
+
+/// Adds the gain to the free velocities.
+void add_gain(SlotRange range, std::span<const Vec3> x, const AffineGain& gain, FreeVelocity& free);
+
 /// How a step ends.
 struct StepFinish {
   double time_step;  ///< h [s]
   CopyShares copies = {};
   double reflection =
       0;  ///< E: with Moreau's restitution V = (1 + E) Vbar - E V-, of the Vbar that was found
-  Vec3 gain = Vec3::Zero();  ///< of the free velocity from V- [m/s]; asked for where E > 0
+  Vec3 gain = Vec3::Zero();          ///< of the free velocity from V- [m/s]; asked for where E > 0
+  const AffineGain* cell = nullptr;  ///< what x, of mid-step, adds to that; null: nothing
 };
 
 /// Second half: V of the end of the step where Vbar stood, x += h/2 u, and the sums. Impulses are those that

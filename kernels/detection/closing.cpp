@@ -31,7 +31,9 @@ double closing_rate(const Candidates& candidates, const Bodies& bodies, const Po
     const auto [first, second] = candidates.grain_pairs[k];
     const BallNumbers balls = candidates.balls.empty() ? BallNumbers{0} : candidates.balls[k];
     const Touch touch = touch_bodies(poses, first, second, balls);
-    const double approach = -touch.normal.dot(velocity_of(bodies, first) - velocity_of(bodies, second));
+    const Vec3 image = poses.domain.image_velocity(bodies.x[index(first)], bodies.x[index(second)]);
+    const double approach =
+        -touch.normal.dot(velocity_of(bodies, first) - velocity_of(bodies, second) - image);
     consider(approach + spin_of(bodies, first) + spin_of(bodies, second), touch.gap);
   }
   for (const WallPair& pair : candidates.wall_pairs) {

@@ -41,8 +41,10 @@ struct Contacts {
   std::vector<Vec3> spin;          ///< at walls that turn, where something resists rolling: of the wall's
                                    ///< material [rad/s]; else empty
   std::vector<double> vx, vy, vz;  ///< at walls: velocity of the wall's material at the contact beyond that
-                                   ///< of the wall [m/s], void between bodies; empty where no wall turns or
-                                   ///< has a surface that moves alone
+                                   ///< of the wall [m/s]; empty where no wall turns or has a surface that
+                                   ///< moves alone, and no cell flows
+  bool drifts_between = false;     ///< between bodies: of the second's image beyond that of the second; void
+                                   ///< where false
   std::vector<double> mu;      ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Levers> levers;  ///< of contacts in chunks of blocks; empty where no body is a clump
   std::vector<std::uint16_t> balls;  ///< likewise: Candidates::balls
@@ -67,7 +69,7 @@ struct SingleContacts {
   std::vector<float> vx, vy, vz;  ///< likewise
 };
 
-/// Drift of a wall's material at contact k; 0 where contacts have none.
+/// Drift at contact k, at a wall or where drifts_between; 0 where contacts have none.
 inline Vec3 drift_of(const Contacts& contacts, std::size_t k) {
   if (contacts.vx.empty()) return Vec3::Zero();
   return {contacts.vx[k], contacts.vy[k], contacts.vz[k]};

@@ -6,31 +6,38 @@
 
 namespace talus {
 
+Vec3 Domain::edges_between(const Vec3& a, const Vec3& b) const {
+  const Vec3 d = a - b;
+  const double c = nearest_integer(cell.per_zz * d[2]);
+  const double y = d[1] - cell.yz * c, beside = nearest_integer(cell.per_yy * y);
+  const double x = d[0] - cell.xz * c - cell.xy * beside;
+  return {nearest_integer(cell.per_xx * x), beside, c};
+}
+
 Vec3 Domain::midpoint(const Vec3& a, const Vec3& b) const {
   Vec3 middle = 0.5 * (a + b);
   if (!repeats) return middle;
   // Halfway to another image of b is half its shift farther. Shifts of (a, b) and (b, a) are opposite: adding
   // half an edge for an odd number, whatever its sign, is the same point but for whole edges.
-  const Vec3 d = a - b;
   const auto odd = [](double k) { return std::fmod(k, 2.0) != 0 ? 0.5 : 0.0; };
-  const double c = nearest_integer(cell.per_zz * d[2]);
-  const double y = d[1] - cell.yz * c, b_ = nearest_integer(cell.per_yy * y);
-  const double x = d[0] - cell.xz * c - cell.xy * b_, a_ = nearest_integer(cell.per_xx * x);
-  middle += odd(c) * Vec3(cell.xz, cell.yz, cell.zz) + odd(b_) * Vec3(cell.xy, cell.yy, 0) +
-            odd(a_) * Vec3(cell.xx, 0, 0);
+  const Vec3 k = edges_between(a, b);
+  middle += odd(k[2]) * Vec3(cell.xz, cell.yz, cell.zz) + odd(k[1]) * Vec3(cell.xy, cell.yy, 0) +
+            odd(k[0]) * Vec3(cell.xx, 0, 0);
   return wrap(middle);
+}
+
+Vec3 Domain::edges_beyond(const Vec3& x) const {
+  const double c = std::floor(cell.per_zz * (x[2] - low[2]));
+  const double b = std::floor(cell.per_yy * (x[1] - low[1] - cell.yz * c));
+  return {std::floor(cell.per_xx * (x[0] - low[0] - cell.xz * c - cell.xy * b)), b, c};
 }
 
 Vec3 Domain::wrap(const Vec3& x) const {
   if (!repeats) return x;
-  Vec3 inside = x;
-  const double c = std::floor(cell.per_zz * (x[2] - low[2]));
-  if (c != 0) inside -= c * Vec3(cell.xz, cell.yz, cell.zz);
-  const double b = std::floor(cell.per_yy * (inside[1] - low[1]));
-  if (b != 0) inside -= b * Vec3(cell.xy, cell.yy, 0);
-  const double a = std::floor(cell.per_xx * (inside[0] - low[0]));
-  if (a != 0) inside -= a * Vec3(cell.xx, 0, 0);
-  return inside;
+  const Vec3 k = edges_beyond(x);
+  if (k == Vec3::Zero()) return x;
+  return x - k[2] * Vec3(cell.xz, cell.yz, cell.zz) - k[1] * Vec3(cell.xy, cell.yy, 0) -
+         k[0] * Vec3(cell.xx, 0, 0);
 }
 
 Vec3 Domain::lengths(const std::vector<Wall>& walls) const {

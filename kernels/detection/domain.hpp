@@ -21,6 +21,9 @@ struct Domain {
   PeriodicSpace cell;       ///< all 0 between walls
   Vec3 low = Vec3::Zero();  ///< lower corner of the brick [m]; 0 along an axis of walls
   bool repeats = false;     ///< along any axis
+  bool flows = false;       ///< the edges may change
+  EdgeRates rates;          ///< of the edges as the step begins [m/s]
+  EdgeRates drift_rates;    ///< with the velocities that the step is solved for [m/s]
 
   /// Edges of the brick [m]; 0 along an axis of walls.
   Vec3 edges() const { return {cell.xx, cell.yy, cell.zz}; }
@@ -41,11 +44,25 @@ struct Domain {
   /// The image of x that is nearest to `to` [m]; x itself, to the bit, between walls.
   Vec3 image_near(const Vec3& to, const Vec3& x) const { return repeats ? Vec3(to + separation(x, to)) : x; }
 
+  /// How many edges along x, y, z that image of b which is nearest to a stands away from b.
+  Vec3 edges_between(const Vec3& a, const Vec3& b) const;
+  /// Velocity of that image beyond that of b, as the step begins, and in its solution [m/s].
+  Vec3 image_velocity(const Vec3& a, const Vec3& b) const {
+    return flows ? times(rates, edges_between(a, b)) : Vec3(Vec3::Zero());
+  }
+  Vec3 image_drift(const Vec3& a, const Vec3& b) const { return times(drift_rates, edges_between(a, b)); }
+  static Vec3 times(const EdgeRates& r, const Vec3& k) {
+    return {r.xx * k[0] + r.xy * k[1] + r.xz * k[2], r.yy * k[1] + r.yz * k[2], r.zz * k[2]};
+  }
+
   /// Halfway along that way [m]: the same point for (a, b) and (b, a), bit for bit.
   Vec3 midpoint(const Vec3& a, const Vec3& b) const;
 
   /// The image of x that lies in the brick [m], but for rounding; x itself between walls.
   Vec3 wrap(const Vec3& x) const;
+
+  /// How many edges x lies beyond the brick: wrap(x) is x less so many edges.
+  Vec3 edges_beyond(const Vec3& x) const;
 
   /// Extent along x, y, z [m]; 0 along an axis that nothing bounds.
   Vec3 lengths(const std::vector<Wall>& walls) const;

@@ -23,8 +23,10 @@ struct Pairing {
 Pairing meet(const PairView& pairs, const Domain& domain, std::size_t k) {
   const std::size_t i = at(pairs.first[k]), j = at(pairs.second[k]);
   using Map = Eigen::Map<const Vec3>;
-  return {domain.separation(Vec3(Map(pairs.x + 3 * i)), Vec3(Map(pairs.x + 3 * j))),
-          Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j), pairs.radius[i], pairs.radius[j]};
+  const Vec3 x_i = Map(pairs.x + 3 * i), x_j = Map(pairs.x + 3 * j);
+  return {domain.separation(x_i, x_j),
+          Map(pairs.velocity + 8 * i) - Map(pairs.velocity + 8 * j) - domain.image_velocity(x_i, x_j),
+          pairs.radius[i], pairs.radius[j]};
 }
 
 std::int32_t count_passed(const PairView& pairs, const Domain& domain, double time_step) {
@@ -82,13 +84,17 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
                        second,
                        count,
                        restitution.empty() ? nullptr : restitution.data(),
-                       in.domain.repeats ? &in.domain.cell : nullptr};
+                       in.domain.repeats ? &in.domain.cell : nullptr,
+                       in.domain.flows ? &in.domain.rates : nullptr};
   const GapTarget target{contacts.nx.data() + begin, contacts.ny.data() + begin, contacts.nz.data() + begin,
                          contacts.bias.data() + begin, contact.data()};
   const bool far = kernel_of(set)(pairs, rule, target);
   contacts.passed[chunk] = far ? count_passed(pairs, in.domain, in.time_step) : 0;
   const detail::ChunkPlaces places{chunks, chunk, contacts, contact};
   if (!detail::repair_groups(places)) detail::deal_groups(places);
+  if (!in.domain.flows) return;
+  for (std::size_t k = begin; k < begin + at(contacts.count[chunk]); ++k)
+    set_drift(contacts, k, in.domain.image_drift(in.x[at(contacts.first[k])], in.x[at(contacts.second[k])]));
 }
 
 /// Restitution of a grain at a wall.

@@ -19,6 +19,15 @@ struct WalledSpace {
   /// The difference as it is.
   template <class T>
   [[gnu::always_inline]] static inline void shorten(T&, T&, T&) {}
+  template <class T>
+  [[gnu::always_inline]] static inline void meet(T&, T&, T&, T&, T&, T&) {}
+};
+
+/// What moves along an edge of a cell: of the edges themselves, how fast they change [m/s]. An image that
+/// stands (a, b, c) edges away from a body is faster by the product with these numbers.
+struct EdgeRates {
+  double xx = 0, yy = 0, zz = 0;
+  double xy = 0, xz = 0, yz = 0;
 };
 
 /// Space that repeats itself along the edges (xx, 0, 0), (xy, yy, 0) and (xz, yz, zz) of a cell [m]. Any cell
@@ -41,6 +50,34 @@ struct PeriodicSpace {
     x = x - xy * b;
     y = y - yy * b;
     x = x - xx * nearest_integer(per_xx * x);
+  }
+  /// Of differences of positions and of velocities: the images are as fast as the bodies.
+  template <class T>
+  [[gnu::always_inline]] inline void meet(T& x, T& y, T& z, T&, T&, T&) const {
+    shorten(x, y, z);
+  }
+};
+
+/// Periodic space whose edges change.
+struct FlowingSpace {
+  PeriodicSpace cell;
+  EdgeRates rates;
+
+  /// Likewise, where images have velocities of their own.
+  template <class T>
+  [[gnu::always_inline]] inline void meet(T& x, T& y, T& z, T& vx, T& vy, T& vz) const {
+    const T c = nearest_integer(cell.per_zz * z);
+    x = x - cell.xz * c;
+    y = y - cell.yz * c;
+    z = z - cell.zz * c;
+    const T b = nearest_integer(cell.per_yy * y);
+    x = x - cell.xy * b;
+    y = y - cell.yy * b;
+    const T a = nearest_integer(cell.per_xx * x);
+    x = x - cell.xx * a;
+    vx = vx - rates.xx * a - rates.xy * b - rates.xz * c;
+    vy = vy - rates.yy * b - rates.yz * c;
+    vz = vz - rates.zz * c;
   }
 };
 

@@ -139,6 +139,11 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
       if (contact.second < 0) contact.drive = drive.norm();
       contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
     }
+    if (w < 0 && contacts.drifts_between) {
+      const Vec3 drift = drift_of(contacts, k);
+      contact.drive = drift.norm();
+      contact.offset -= drift;
+    }
     contact.place = static_cast<std::int32_t>(k);
     contact.wall = w;
     if (source.chunks.kind[c] == ChunkKind::blocks) contact.levers = &contacts.levers[k];

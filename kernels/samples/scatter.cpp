@@ -20,8 +20,8 @@ class PlacedGrains {
     for (std::size_t axis = 0; axis < 3; ++axis)
       count_[axis] = static_cast<std::size_t>(
           std::clamp(extent[static_cast<Eigen::Index>(axis)] / reach_, 1.0, most_cells_an_axis));
-    size_ = extent.cwiseQuotient(Vec3(static_cast<double>(count_[0]), static_cast<double>(count_[1]),
-                                      static_cast<double>(count_[2])));
+    size_ = extent.cwiseQuotient(
+        Vec3(static_cast<double>(count_[0]), static_cast<double>(count_[1]), static_cast<double>(count_[2])));
     cells_.resize(count_[0] * count_[1] * count_[2]);
   }
 
@@ -102,7 +102,8 @@ std::vector<Vec3> scatter(std::span<const double> radii, const ScatterBox& box) 
       if (attempt == most_tries)
         throw std::invalid_argument("random sample: no room for a grain of radius " +
                                     std::to_string(radii[k]) + " m behind " + std::to_string(done) + " of " +
-                                    std::to_string(radii.size()) + "; make the space larger, or count smaller");
+                                    std::to_string(radii.size()) +
+                                    "; make the space larger, or count smaller");
       centres[k] = place_of(box, radii[k], k, attempt++);
     } while (placed.overlaps(centres[k], radii[k]));
     placed.add(centres[k], radii[k]);

@@ -17,7 +17,7 @@ struct ContactViewOf {
   const Number *rx, *ry, *rz;           ///< with friction
   const Number* rn;                     ///< without
   const Number* mu;                     ///< where each contact has friction of its own
-  const Number *vx, *vy, *vz;           ///< drifts at walls, or null
+  const Number *vx, *vy, *vz;           ///< drifts, or null
   const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;

@@ -24,7 +24,8 @@ Vec3 relative_velocity(const Contacts& contacts, std::size_t k, std::span<const 
   const Levers& levers = contacts.levers[k];
   const Vec3 v = surface_velocity(velocity[at(contacts.first[k])], levers.first);
   if (wall != nullptr) return v - (ConstMap(wall->velocity) + drift_of(contacts, k));
-  return v - surface_velocity(velocity[at(contacts.second[k])], levers.second);
+  const Vec3 between = v - surface_velocity(velocity[at(contacts.second[k])], levers.second);
+  return contacts.drifts_between ? Vec3(between - drift_of(contacts, k)) : between;
 }
 
 /// Adds what a body, of whose mass the record holds one of `parts`, gives to W.

@@ -31,12 +31,16 @@ ImpulseView impulses(Contacts& c) {
   return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
 }
 
+/// Of the contacts between grains, whose drifts may be void, or at a wall.
+enum class Between { grains, wall };
+
 /// `arrays` are Contacts or SingleContacts; `contacts` lends bodies and groups.
 template <class Number, class Arrays, class Record>
 ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, ContactRange range,
-                           std::span<Record> velocity) {
+                           std::span<Record> velocity, Between between) {
   constexpr std::size_t near = std::size_t{256} << 10;  // with fewer, asking costs more than it gains
-  const auto drift = [](const std::vector<Number>& v) { return v.empty() ? nullptr : v.data(); };
+  const bool drifts = between == Between::wall || contacts.drifts_between;
+  const auto drift = [&](const std::vector<Number>& v) { return v.empty() || !drifts ? nullptr : v.data(); };
   return {arrays.nx.data(),
           arrays.ny.data(),
           arrays.nz.data(),
@@ -56,12 +60,13 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, Conta
           range.end,
           velocity.size_bytes() > near};
 }
-ContactView view(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity) {
-  return view<double>(contacts, contacts, range, velocity);
+ContactView view(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                 Between between) {
+  return view<double>(contacts, contacts, range, velocity, between);
 }
 SingleContactView view(const Contacts& contacts, const SingleContacts& single, ContactRange range,
-                       std::span<const SingleVelocity> velocity) {
-  return view<float>(contacts, single, range, velocity);
+                       std::span<const SingleVelocity> velocity, Between between) {
+  return view<float>(contacts, single, range, velocity, between);
 }
 
 SingleImpulseView impulses(SingleContacts& c) {
@@ -118,68 +123,70 @@ SweepKernels::SweepKernels(InstructionSet set)
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 ChunkFriction friction) const {
-  lanes<Friction>(friction).sweep_grains(view(contacts, range, velocity), impulses(contacts),
+  lanes<Friction>(friction).sweep_grains(view(contacts, range, velocity, Between::grains), impulses(contacts),
                                          records(velocity), friction.mu);
 }
 
 template <bool Friction>
 void SweepKernels::sweep_grains(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                 ChunkFriction friction, const SweepMomentum& momentum) const {
-  lanes<Friction>(friction).momentum_grains(view(contacts, range, velocity), impulses(contacts),
-                                            records(velocity), friction.mu, view(momentum));
+  lanes<Friction>(friction).momentum_grains(view(contacts, range, velocity, Between::grains),
+                                            impulses(contacts), records(velocity), friction.mu,
+                                            view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                               ChunkFriction friction, WallCopy& wall) const {
-  lanes<Friction>(friction).sweep_wall(view(contacts, range, velocity), impulses(contacts), records(velocity),
-                                       friction.mu, view(wall));
+  lanes<Friction>(friction).sweep_wall(view(contacts, range, velocity, Between::wall), impulses(contacts),
+                                       records(velocity), friction.mu, view(wall));
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                               ChunkFriction friction, WallCopy& wall, const SweepMomentum& momentum) const {
-  lanes<Friction>(friction).momentum_wall(view(contacts, range, velocity), impulses(contacts),
+  lanes<Friction>(friction).momentum_wall(view(contacts, range, velocity, Between::wall), impulses(contacts),
                                           records(velocity), friction.mu, view(wall), view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::sweep_grains(const Contacts& contacts, SingleState& single, ContactRange range,
                                 ChunkFriction friction, const SweepMomentum& momentum) const {
-  lanes<Friction>(friction).single_grains(view(contacts, single.contacts, range, single.velocity),
-                                          impulses(single.contacts), records(single.velocity), friction.mu,
-                                          view(momentum));
+  lanes<Friction>(friction).single_grains(
+      view(contacts, single.contacts, range, single.velocity, Between::grains), impulses(single.contacts),
+      records(single.velocity), friction.mu, view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::sweep_wall(const Contacts& contacts, SingleState& single, ContactRange range,
                               ChunkFriction friction, WallCopy& wall, const SweepMomentum& momentum) const {
-  lanes<Friction>(friction).single_wall(view(contacts, single.contacts, range, single.velocity),
-                                        impulses(single.contacts), records(single.velocity), friction.mu,
-                                        {wall.velocity, wall.inv_mass * single.contacts.unit},
-                                        view(momentum));
+  lanes<Friction>(friction).single_wall(
+      view(contacts, single.contacts, range, single.velocity, Between::wall), impulses(single.contacts),
+      records(single.velocity), friction.mu, {wall.velocity, wall.inv_mass * single.contacts.unit},
+      view(momentum));
 }
 
 template <bool Friction>
 void SweepKernels::accumulate_grains(const Contacts& contacts, ContactRange range,
                                      std::span<Velocity> velocity) const {
-  lanes<Friction>(0).accumulate_grains(view(contacts, range, velocity), records(velocity));
+  lanes<Friction>(0).accumulate_grains(view(contacts, range, velocity, Between::grains), records(velocity));
 }
 
 template <bool Friction>
 void SweepKernels::accumulate_wall(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                                    WallCopy& wall) const {
-  lanes<Friction>(0).accumulate_wall(view(contacts, range, velocity), records(velocity), view(wall));
+  lanes<Friction>(0).accumulate_wall(view(contacts, range, velocity, Between::wall), records(velocity),
+                                     view(wall));
 }
 
 template <bool Friction>
 ErrorSums SweepKernels::error_grains(const Contacts& contacts, ContactRange range,
                                      std::span<const Velocity> velocity, ChunkFriction friction,
                                      Multiplicities parts) const {
-  return sums_of(
-      lanes<Friction>(friction).error_grains(view(contacts, range, velocity), records(velocity), friction.mu,
-                                             {.wall = nullptr, .wall_inv_mass = 0, .parts = parts.data()}),
-      range);
+  return sums_of(lanes<Friction>(friction).error_grains(
+                     view(contacts, range, velocity, Between::grains), records(velocity), friction.mu,
+                     {.wall = nullptr, .wall_inv_mass = 0, .parts = parts.data()}),
+                 range);
 }
 
 template <bool Friction>
@@ -187,8 +194,8 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
                                    std::span<const Velocity> velocity, ChunkFriction friction,
                                    const WallCopy& wall, Multiplicities parts) const {
   return sums_of(
-      lanes<Friction>(friction).error_wall(view(contacts, range, velocity), records(velocity), friction.mu,
-                                           {wall.velocity, wall.inv_mass, parts.data()}),
+      lanes<Friction>(friction).error_wall(view(contacts, range, velocity, Between::wall), records(velocity),
+                                           friction.mu, {wall.velocity, wall.inv_mass, parts.data()}),
       range);
 }
 

@@ -120,6 +120,10 @@ struct CheckpointHead {
   double time_then = 0;            ///< of the run, of the places that the last broad phase saw [s]
   std::vector<double> wall_loads;  ///< numbers_of(load) of each, in force
 
+  /// Of a cell that flows, else empty: xx, yy, zz, xy, xz, yz of its edges [m], of their rates [m/s], and of
+  /// the edges at the last broad phase [m].
+  std::vector<double> cell_edges, cell_rates, cell_edges_then;
+
   bool candidates_valid = false;
   std::int64_t impulse_kind = 3;
   bool overlaps_given = false;
@@ -185,6 +189,9 @@ void each_member(Head& head, const Visit& visit) {
   visit("time_then", head.time_then);
   visit("wall_margins", head.wall_margins);
   visit("wall_loads", head.wall_loads);
+  visit("cell_edges", head.cell_edges);
+  visit("cell_rates", head.cell_rates);
+  visit("cell_edges_then", head.cell_edges_then);
   visit("candidates_valid", head.candidates_valid);
   visit("impulse_kind", head.impulse_kind);
   visit("overlaps_given", head.overlaps_given);

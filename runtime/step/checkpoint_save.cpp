@@ -123,6 +123,16 @@ void save_chunk(const StepState& state, std::size_t c, Slot first_slot, Checkpoi
   for (std::int32_t sum = 0; sum < state.contacts.count[c]; sum += *group++) part.groups.push_back(*group);
 }
 
+void save_cell(const StepState& state, CheckpointHead& head) {
+  if (!state.domain.flows) return;
+  const auto numbers = [](const Mat3& m) {
+    return std::vector{m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)};
+  };
+  head.cell_edges = numbers(edges_of(state.domain));
+  head.cell_rates = numbers(matrix_of(state.domain.rates));
+  head.cell_edges_then = numbers(state.flow.edges_then);
+}
+
 }  // namespace
 
 std::vector<double> numbers_of(const WallLoad& load) {
@@ -141,6 +151,7 @@ void save_state(const StepState& state, Checkpoint& to) {
   const Decomposition& all = state.decomposition;
   save_partition(all, head);
   save_walls(state, head);
+  save_cell(state, head);
   head.candidates_valid = state.candidates_valid;
   head.impulse_kind = static_cast<std::int64_t>(state.candidates.impulse.kind());
   head.overlaps_given = state.given_overlaps.has_value();

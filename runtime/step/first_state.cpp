@@ -51,6 +51,7 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
   simplify_motions(state.walls);
   state.clumps = setup.clumps;
   state.domain = setup.domain;
+  state.domain.flows = std::ranges::any_of(setup.stages, &Stage::flows);
   state.wall_states.resize(state.walls.size());
   state.free.u.resize(state.bodies.size());
   return state;
@@ -60,7 +61,6 @@ StepState restored_state(const Setup& setup, const Checkpoint& from, const graph
   validate(setup);
   StepState state = restore_state(setup, from, ranks);
   simplify_motions(state.walls);
-  state.domain = setup.domain;
   demand_laws(setup, state.bodies);
   for (std::size_t k = 0; k <= static_cast<std::size_t>(from.head.stage_index); ++k)
     take_loads(setup.stages.at(k), state.walls);

@@ -37,11 +37,14 @@ constexpr std::size_t piece = 8192;
 
 BodyRow body_row(const StepState& state, std::size_t s) {
   const Bodies& bodies = state.bodies;
+  Vec3 x = bodies.x[s];
+  Velocity velocity = bodies.velocity[s];
+  if (state.domain.repeats) wrap_body(state.domain, x, velocity);
   BodyRow row{};
   row.id = static_cast<std::int64_t>(bodies.id[s]);
-  copy3(state.domain.wrap(bodies.x[s]), row.x);
+  copy3(x, row.x);
   row.radius = bodies.radius[s];
-  std::copy_n(bodies.velocity[s].u, 3, row.u);
+  std::copy_n(velocity.u, 3, row.u);
   for (std::size_t k = 0; k < 3; ++k) row.omega[k] = bodies.velocity[s].w[k] / bodies.radius[s];
   if (const ClumpView clumps = clumps_of(state); clumps.is_clump(s))
     copy3(turning_of(clumps, s, bodies.radius[s]) * vector_of(bodies.velocity[s].w), row.omega);

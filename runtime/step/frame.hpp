@@ -153,6 +153,23 @@ struct TriaxialReport {
   bool converged = true;    ///< of the step (StepReport)
 };
 
+/// One row of cell.csv: a periodic cell and what is in it at the end of a step. Tensors as xx, yy, zz, xy,
+/// xz, yz of their symmetric parts, compression positive.
+struct CellReport {
+  std::int64_t step = 0;
+  double time = 0;  ///< [s]
+  std::string stage;
+  std::array<double, 6> edges{};           ///< PeriodicSpace [m]
+  std::array<double, 6> stress{};          ///< of the contacts, mean over the step (Love-Weber) [Pa]
+  std::array<double, 6> kinetic_stress{};  ///< sum of m v (x) v over the volume, v against the flow [Pa]
+  double p = 0, q = 0, q_over_p = 0;  ///< of the contacts: mean stress, root of 3/2 s : s, s its deviator
+  double solid_fraction = 0;
+  double contacts_a_grain = 0;  ///< active contacts of a grain, of all grains
+  double coordination = 0;      ///< likewise, those of rattlers and with them left out
+  double inertial_number = 0;   ///< rate of shear x mean diameter x root of density over p; 0 without p
+  bool converged = true;        ///< of the step (StepReport)
+};
+
 /// State at an output time. Vectors named first are per body, those after `contact` per active contact; on
 /// several ranks each has a part: bodies in order of id, contacts in order of their ids, and the parts of the
 /// ranks, in order of rank, follow one another.

@@ -65,7 +65,9 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
   };
   std::vector<GivenOverlap> given;
   for_each_touch(state, [&](std::size_t k, std::int32_t wall, const Touch& touch) {
-    const Vec3 other = wall < 0 ? velocity(state.contacts.second[k])
+    const auto x = [&](Slot slot) -> const Vec3& { return state.bodies.x[static_cast<std::size_t>(slot)]; };
+    const Slot first = state.contacts.first[k], second = state.contacts.second[k];
+    const Vec3 other = wall < 0 ? Vec3(velocity(second) + state.domain.image_velocity(x(first), x(second)))
                                 : state.walls[static_cast<std::size_t>(wall)].velocity_at(touch.point);
     const Vec3 way = 0.5 * parameters.time_step * (velocity(state.contacts.first[k]) - other);
     // Where separation and normal are parallel, as in overlaps less deep than a centre.

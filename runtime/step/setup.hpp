@@ -47,12 +47,15 @@ struct StageEnd {
 /// One stage: a time interval with its own loads.
 struct Stage {
   std::string name;
-  double time_step = 0;            ///< h [s] > 0; 0 where each step's is chosen
-  bool chooses_time_step = false;  ///< each step's h is chosen (time_step.hpp), between:
-  double time_step_max = 0;        ///< [s]; 0: the time of a small fall, so there must be gravity
-  double time_step_min = 0;        ///< [s]; 0: a part of the longest
-  Vec3 gravity = Vec3::Zero();     ///< [m/s^2]
-  PairTable laws;                  ///< of the setup's materials
+  double time_step = 0;              ///< h [s] > 0; 0 where each step's is chosen
+  bool chooses_time_step = false;    ///< each step's h is chosen (time_step.hpp), between:
+  double time_step_max = 0;          ///< [s]; 0: the time of a small fall, so there must be gravity
+  double time_step_min = 0;          ///< [s]; 0: a part of the longest
+  Vec3 gravity = Vec3::Zero();       ///< [m/s^2]
+  Vec3 strain_rates = Vec3::Zero();  ///< of the periodic cell: dv_x/dx, dv_y/dy, dv_z/dz [1/s]
+  Vec3 shear_rates = Vec3::Zero();   ///< dv_x/dy, dv_x/dz, dv_y/dz [1/s]
+  bool flows() const { return !strain_rates.isZero(0) || !shear_rates.isZero(0); }
+  PairTable laws;                                       ///< of the setup's materials
   std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
   StageEnd end;
 };

@@ -5,6 +5,7 @@
 
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/one_rank.hpp"
+#include "runtime/step/cell_report.hpp"
 #include "runtime/step/detail/simulation_parts.hpp"
 
 namespace talus {
@@ -41,7 +42,8 @@ SavedState Simulation::save() const {
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
   return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
           impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
-          impl_->clock,        impl_->held,        impl_->stage_begins,     impl_->population.state()};
+          impl_->clock,        impl_->held,        impl_->stage_begins,     impl_->population.state(),
+          impl_->state.domain, impl_->state.flow};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {
@@ -153,6 +155,10 @@ std::optional<TriaxialReport> Simulation::triaxial() const {
   Vec3 strain;
   for (int axis = 0; axis < 3; ++axis) strain[axis] = impl_->strain(axis);
   return triaxial_report(impl_->outcome(), impl_->report, stage(), strain, impl_->ranks);
+}
+
+std::optional<CellReport> Simulation::cell() const {
+  return cell_report(impl_->outcome(), impl_->report, impl_->ranks);
 }
 
 std::uint64_t Simulation::digest() const {

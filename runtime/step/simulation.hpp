@@ -35,6 +35,8 @@ struct SavedState {
   double held = 0;                        ///< time for which the stage's bound on equilibrium has held [s]
   std::vector<double> stage_begins = {};  ///< times of the run at which this stage and those before began [s]
   PopulationState population = {};
+  Domain domain = {};
+  CellFlow flow = {};
 };
 
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time
@@ -123,6 +125,8 @@ class Simulation {
   const std::vector<ProbeReport>& probes() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
+  /// Of a periodic cell. Collective.
+  std::optional<CellReport> cell() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them
   /// out. Collective; each rank gets its part (frame.hpp).
   Frame frame(bool contacts = true) const;

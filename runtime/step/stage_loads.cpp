@@ -50,6 +50,10 @@ void apply_loads(const StepParameters& parameters, const StepName& step, StepSta
 
 StepParameters parameters_of(const Setup& setup, const Stage& stage, StepParameters now) {
   now.gravity = stage.gravity;
+  now.velocity_gradient = Mat3(stage.strain_rates.asDiagonal());
+  now.velocity_gradient(0, 1) = stage.shear_rates[0];
+  now.velocity_gradient(0, 2) = stage.shear_rates[1];
+  now.velocity_gradient(1, 2) = stage.shear_rates[2];
   now.laws = stage.laws;
   now.reflection = reflection_of(setup.solver.restitution_law, now.laws);
   now.clumps = !setup.clumps.empty();

@@ -12,6 +12,7 @@
 #include "kernels/shapes/walls.hpp"
 #include "kernels/sweeps/single_precision.hpp"
 #include "kernels/sweeps/sweep.hpp"
+#include "runtime/step/cell_flow.hpp"
 #include "runtime/step/decomposition.hpp"
 #include "runtime/step/given_forces.hpp"
 #include "runtime/step/overlap.hpp"
@@ -23,6 +24,7 @@ namespace talus {
 struct StepParameters {
   double time_step = 0;  ///< h [s]
   Vec3 gravity = Vec3::Zero();
+  Mat3 velocity_gradient = Mat3::Zero();  ///< of the periodic cell [1/s]
   PairTable laws;
   /// Any friction coefficient > 0, or clumps: impulses have three components and bodies may turn.
   bool friction = false;
@@ -65,6 +67,7 @@ struct StepState {
   Bodies bodies;              ///< n
   std::vector<Clump> clumps;  ///< of the setup
   Domain domain;              ///< now
+  CellFlow flow;              ///< of its edges
   std::vector<Wall> walls;
   std::vector<WallState> wall_states;  ///< like walls
   FreeVelocity free;                   ///< n, or empty parts

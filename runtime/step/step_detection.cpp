@@ -36,10 +36,63 @@ void StepGraph::predict_share(std::uint32_t share) {
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * h);
   // What clumps spin with belongs to their axes, so that these come before the free velocity.
   turn_clumps(range, bodies, state_.clumps, 0.5 * h);
-  free_velocities(range, bodies.velocity, parameters_.impulse_time(), parameters_.gravity, state_.free);
+  find_free_velocities(range);
   left_[share].clear();
-  if (state_.candidates_valid)
+  if (!state_.candidates_valid) return;
+  if (state_.domain.flows)
+    find_flow_escape(range, share);
+  else
     find_skin_escapes(range, bodies, {state_.x_then, state_.reach_then, h, parameters_.alert}, left_[share]);
+}
+
+/// V of the step without contacts.
+void StepGraph::find_free_velocities(SlotRange range) {
+  free_velocities(range, state_.bodies.velocity, parameters_.impulse_time(), parameters_.gravity,
+                  state_.free);
+  if (state_.domain.flows) add_gain(range, state_.bodies.x, state_.flow.gain, state_.free);
+}
+
+/// One body, if any, that has used up its margin in a cell that flows: candidates are found anew then.
+void StepGraph::find_flow_escape(SlotRange range, std::uint32_t share) {
+  const Bodies& bodies = state_.bodies;
+  const FlowMargins margins(state_.domain, state_.flow);
+  for (std::size_t s = range.begin; s < range.end; ++s) {
+    const double reach = state_.reach_then[s];
+    const double need =
+        bodies.radius[s] + contact_margin(margins.speed(bodies.x[s], bodies.velocity[s], reach),
+                                          parameters_.time_step, parameters_.alert);
+    if (need + margins.moved(bodies.x[s], state_.x_then[s], reach) <= reach) continue;
+    left_[share].push_back({});
+    return;
+  }
+}
+
+/// What the reach of each body is made of: the speed that counts against its margin.
+std::vector<double> StepGraph::speeds() const {
+  const Bodies& bodies = state_.bodies;
+  std::vector<double> speeds(bodies.size());
+  if (!state_.domain.flows) {
+    for (std::size_t s = 0; s < bodies.size(); ++s) speeds[s] = speed(bodies.velocity[s]);
+    return speeds;
+  }
+  const FlowMargins margins(state_.domain, state_.flow);
+  for (std::size_t s = 0; s < bodies.size(); ++s)
+    speeds[s] = margins.speed(bodies.x[s], bodies.velocity[s],
+                              2 * bodies.radius[s] + parameters_.alert + parameters_.skin);
+  return speeds;
+}
+
+/// Centres and velocities of images in the cell.
+void StepGraph::wrap_bodies() {
+  Bodies& bodies = state_.bodies;
+  if (!state_.domain.flows) {
+    for (Vec3& x : bodies.x) x = state_.domain.wrap(x);
+    return;
+  }
+  upright(state_.domain, state_.flow);
+  state_.flow.edges_then = edges_of(state_.domain);
+  for (std::size_t s = 0; s < bodies.size(); ++s) wrap_body(state_.domain, bodies.x[s], bodies.velocity[s]);
+  find_free_velocities({0, bodies.size()});
 }
 
 /// Margin of a wall: what brings a grain nearer to it and is not in the grain's own margin. That is the way
@@ -69,7 +122,7 @@ bool StepGraph::needs_broad_phase() {
   double needed[2] = {!state_.candidates_valid || walls_left_margin() || out_of_balance() ? 1.0 : 0.0,
                       left ? 1.0 : 0.0};
   ranks_.max(needed);
-  return needed[0] > 0 || (needed[1] > 0 && !candidates_hold());
+  return needed[0] > 0 || (needed[1] > 0 && (state_.domain.flows || !candidates_hold()));
 }
 
 /// Whether the grains that left their margins, few of them, meet none but their candidates. Collective; the
@@ -114,14 +167,14 @@ void StepGraph::make_cells() {
   sums_.broad_phase = needs_broad_phase();
   if (!sums_.broad_phase) return;
   Bodies& bodies = state_.bodies;
-  if (state_.domain.repeats)
-    for (Vec3& x : bodies.x) x = state_.domain.wrap(x);
+  if (state_.domain.repeats) wrap_bodies();
+  const std::vector<double> speed_of = speeds();
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
   // Grains that fly between others use up half a skin at once: they get one more, or their way
   // of three steps.
   for (std::size_t s = 0; s < bodies.size(); ++s) {
-    const double v = speed(bodies.velocity[s]);
+    const double v = speed_of[s];
     reach[s] = bodies.radius[s] + half_skin + contact_margin(v, h, parameters_.alert) +
                std::min(3 * h * v, parameters_.skin);
   }
@@ -249,7 +302,8 @@ void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
   if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
     state_.contacts.cohesion.resize(state_.candidates.size());
-  const bool drifts = std::ranges::any_of(state_.walls, &Wall::has_drift);
+  state_.contacts.drifts_between = state_.domain.flows;
+  const bool drifts = state_.domain.flows || std::ranges::any_of(state_.walls, &Wall::has_drift);
   for (auto* values : {&state_.contacts.vx, &state_.contacts.vy, &state_.contacts.vz})
     values->resize(drifts ? state_.candidates.size() : 0);
   state_.contacts.spin.resize(drifts ? state_.contacts.arm.size() : 0, Vec3::Zero());
@@ -266,8 +320,7 @@ void StepGraph::renew_slots() {
   around_ = {};
   state_.free.u.resize(bodies.size());
   state_.free.w.resize(parameters_.rotates ? bodies.size() : 0);
-  free_velocities({0, bodies.size()}, bodies.velocity, parameters_.impulse_time(), parameters_.gravity,
-                  state_.free);
+  find_free_velocities({0, bodies.size()});
 }
 
 void StepGraph::narrow_share(std::uint32_t share) {

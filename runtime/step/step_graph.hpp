@@ -79,6 +79,10 @@ class StepGraph {
  private:
   void build();
   void predict_share(std::uint32_t share);
+  void find_free_velocities(SlotRange range);
+  void find_flow_escape(SlotRange range, std::uint32_t share);
+  std::vector<double> speeds() const;
+  void wrap_bodies();
   bool partition_due() const;
   bool needs_broad_phase();
   bool candidates_hold() const;

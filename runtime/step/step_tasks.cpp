@@ -116,7 +116,8 @@ void StepGraph::finish_share(std::uint32_t share) {
                           {.time_step = parameters_.time_step,
                            .copies = uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{},
                            .reflection = parameters_.reflection,
-                           .gain = parameters_.impulse_time() * parameters_.gravity});
+                           .gain = parameters_.impulse_time() * parameters_.gravity,
+                           .cell = state_.domain.flows ? &state_.flow.gain : nullptr});
   loop_.positions().move(range, bodies.x);
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * parameters_.time_step);
   turn_clumps(range, bodies, state_.clumps, 0.5 * parameters_.time_step);
@@ -141,6 +142,7 @@ std::vector<double> StepGraph::copies_of_walls(const std::vector<WallCopy>& copi
 
 void StepGraph::finish_walls() {
   iterated_ = graph::seconds_now();
+  if (state_.domain.flows) end_flow(state_.flow, state_.domain);
   const auto velocities =
       copies_of_walls(state_.copies, [](const WallState& wall) -> const Vec3& { return wall.free_velocity; });
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {

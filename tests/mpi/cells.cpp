@@ -79,5 +79,19 @@ TEST_F(CellsOnRanks, GoOnFromACheckpointToTheSameBits) {
   EXPECT_EQ(digest_of("parts"), digest_of("whole"));
 }
 
+TEST_F(CellsOnRanks, FlowToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
+  std::string scene = pressed_cell;
+  scene.replace(scene.find("end = { steps = 150 }"), 0,
+                "shear_rates = [20.0, 0.0, 0.0]\nstrain_rates = [-0.5, 0.2, 0.0]\n");
+  write(at("scene.toml"), scene);
+  expect_same_bits(4, {{1, 2}, {2, 1}}, "one");
+  const std::string command = "run scene.toml --set decomposition.subdomains=4 --threads 1 --out parts";
+  const Outcome first = run(2, command + " --steps 67");
+  ASSERT_EQ(first.code, 0) << first.messages;
+  const Outcome rest = run(1, command + " --resume");
+  ASSERT_EQ(rest.code, 0) << rest.messages;
+  EXPECT_EQ(digest_of("parts"), digest_of("one"));
+}
+
 }  // namespace
 }  // namespace talus::test

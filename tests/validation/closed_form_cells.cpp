@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
+#include <vector>
 
 #include "tests/validation/experiment.hpp"
 
@@ -48,7 +50,8 @@ TEST(GrainInAHollowAcrossAFace, IsHeldByBothGrainsAndPressesTheRow) {
   scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
   scene.wall("back", Vec3::Zero(), Vec3::UnitY());
   scene.wall("front", {0, 2 * radius, 0}, -Vec3::UnitY());
-  for (const double x : {1.0, 3.0, 5.0}) scene.sphere({x * radius + opening / 2, radius, radius}, radius, mass);
+  for (const double x : {1.0, 3.0, 5.0})
+    scene.sphere({x * radius + opening / 2, radius, radius}, radius, mass);
   const double half = radius + opening / 2, height = std::sqrt(4 * radius * radius - half * half);
   scene.sphere({0, radius, radius + height}, radius, mass);
   Experiment run(std::move(scene));
@@ -110,7 +113,62 @@ TEST(GrainThatFallsThroughTheCell, PassesItsFacesAsIfThereWereNone) {
   const Vec3 way = Vec3(1, 2, 3) + 0.5 * g, x = Vec3::Constant(0.25) + way;
   const Vec3 off = run.x() - x;
   EXPECT_LT((off - 0.5 * (off / 0.5).array().round().matrix()).norm(), 1e-10);
-  EXPECT_LT(run.x().cwiseAbs().maxCoeff(), 0.6);
+  const Vec3 written = run.simulation().frame().x.front();
+  EXPECT_GE(written.minCoeff(), 0) << "frames have the image in the cell";
+  EXPECT_LE(written.maxCoeff(), 0.5);
+}
+
+/// Grains that touch nothing go with the cell: their places in it, in edges, stay.
+TEST(FreeGrains, FollowTheHomogeneousFlowOfTheCell) {
+  Scene scene(h);
+  const Vec3 low(-0.2, 0.1, 3), lengths(1, 1.2, 0.9);
+  scene.setup.domain = periodic_domain(lengths, low);
+  scene.stage().strain_rates = {-0.4, 0.3, 0.1};
+  scene.stage().shear_rates = {0.2, 1.7, -0.6};
+  const std::vector<Vec3> places = {{0.1, 0.1, 0.1}, {0.5, 0.5, 0.5}, {0.9, 0.3, 0.85}, {0.2, 0.8, 0.6}};
+  for (const Vec3& place : places) scene.sphere(low + lengths.cwiseProduct(place), radius / 5, mass);
+  Experiment run(std::move(scene));
+  for (int k = 0; k < 700; ++k) ASSERT_TRUE(run.step().converged) << "step " << k;
+  const Domain& domain = run.simulation().state().domain;
+  const Mat3 edges = edges_of(domain), rates = matrix_of(domain.rates);
+  EXPECT_LE(std::abs(domain.cell.xz), 0.6 * domain.cell.xx) << "it was set upright again";
+  EXPECT_NEAR(domain.cell.xx, std::exp(-0.4 * 0.7), 1e-3) << "from rest to the flow in half a step";
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const auto id = static_cast<std::int64_t>(k);
+    const Vec3 place = edges.inverse() * (run.x(id) - low), off = place - places[k];
+    // Leaning edges that were exchanged move whole edges along x and y.
+    EXPECT_NEAR(off[2], std::round(off[2]), 1e-11);
+    EXPECT_LT((run.u(id) - rates * place).norm(), 1e-11);
+  }
+  EXPECT_NEAR((rates * edges.inverse() - run.simulation().parameters().velocity_gradient).norm(), 0, 1e-12);
+}
+
+/// Two grains that are pulled apart across a face, and pushed together, feel what they would feel inside.
+TEST(PairInAShearedCell, FeelsTheSameForceAcrossAFaceAsInside) {
+  const auto made = [&](double z) {
+    Scene scene(h);
+    scene.friction(0.3);
+    scene.setup.domain = periodic_domain(Vec3::Constant(1));
+    scene.stage().shear_rates = {0, 2, 0};
+    scene.stage().strain_rates = {0, 0, -0.5};
+    scene.sphere({0.5, 0.5, z}, radius, mass);
+    scene.sphere({0.5 - 0.8 * radius, 0.5, z - 1.84 * radius}, radius, 3 * mass);
+    return Experiment(std::move(scene));
+  };
+  Experiment inside = made(0.5), across = made(0.04);
+  double most = 0;
+  for (int k = 0; k < 120; ++k) {
+    inside.step();
+    across.step();
+    const Frame a = inside.simulation().frame(), b = across.simulation().frame();
+    ASSERT_EQ(a.contact_force.size(), b.contact_force.size()) << "step " << k;
+    for (std::size_t c = 0; c < a.contact_force.size(); ++c) {
+      EXPECT_LT((a.contact_force[c] - b.contact_force[c]).norm(), 1e-8 * (1 + a.contact_force[c].norm()));
+      most = std::max(most, a.contact_force[c].norm());
+    }
+    EXPECT_LT((inside.w(0) - across.w(0)).norm(), 1e-11);
+  }
+  EXPECT_GT(most, 0.1) << "they touch";
 }
 
 }  // namespace

@@ -157,7 +157,16 @@ Section<Stage> stage_keys() {
       key<Stage>("time_step_min", "s", positive, "Shortest time step.", &Stage::time_step_min)
           .or_auto(0, "that of the scene, else the longest over 1024")
           .only("time_step = \"auto\"", chooses),
-      key<Stage>("gravity", "m/s²", any, "Gravity.", &Stage::gravity).or_else("that of the scene")};
+      key<Stage>("gravity", "m/s²", any, "Gravity.", &Stage::gravity).or_else("that of the scene"),
+      key<Stage>("strain_rates", "1/s", any,
+                 "Of the periodic cell: dv_x/dx, dv_y/dy, dv_z/dz, negative where it shrinks.",
+                 &Stage::strain_rates)
+          .blank_when_zero()
+          .or_else("`[0.0, 0.0, 0.0]`"),
+      key<Stage>("shear_rates", "1/s", any, "Of the periodic cell: dv_x/dy, dv_x/dz, dv_y/dz.",
+                 &Stage::shear_rates)
+          .blank_when_zero()
+          .or_else("`[0.0, 0.0, 0.0]`")};
   for (Key<Stage>& law_key : stage_law_keys()) keys.push_back(std::move(law_key));
   return {"[[stage]]",
           "Stages run one after the other. What a stage does not give is that of the scene; loads of walls "

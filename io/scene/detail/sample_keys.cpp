@@ -127,8 +127,7 @@ Section<Region> region_keys() {
   return {"[sample.region]",
           "A part of space: the one that a lattice fills or random grains stand in (box), and likewise "
           "`[insert.region]`, where grains are put (box, cylinder, disc), `[remove.region]`, where they are "
-          "taken "
-          "away (box, cylinder, beyond), and `[probe.region]`, where they are looked at.",
+          "taken away (box, cylinder, beyond), and `[probe.region]`, where they are looked at.",
           {choice<R>("shape", {"box", "cylinder", "disc", "beyond", "plane"},
                      "`box`: between two corners; `cylinder`: solid; `disc`: round, flat, centres lie on it; "
                      "`beyond`: all that lies behind a plane; `plane`: the plane.",

@@ -130,8 +130,8 @@ Section<OutputSpec> output_keys() {
           .only("contacts", [](const OutputSpec& o) { return o.contacts; }),
       key<OutputSpec>(
           "tables_every", "", countable,
-          "Steps from line to line of walls.csv and triaxial.csv, and of probes.csv where a probe says no "
-          "more; steps.csv has all of them.",
+          "Steps from line to line of walls.csv, triaxial.csv and cell.csv, and of probes.csv where a probe "
+          "says no more; steps.csv has all of them.",
           &OutputSpec::tables_every)};
   for (auto& format_key : within(format_keys(), &OutputSpec::format)) keys.push_back(std::move(format_key));
   for (auto& sink_key : sink_keys()) keys.push_back(std::move(sink_key));

@@ -46,8 +46,9 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
   const Vec3 between = in.domain.separation(in.x[at(pair.first)], in.x[at(pair.second)]);
   const Vec3 arm = touch.point - in.x[at(pair.first)];
   meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between)};
-  meeting.v =
-      velocity_at(in, pair.first, meeting.levers.first) - velocity_at(in, pair.second, meeting.levers.second);
+  meeting.v = velocity_at(in, pair.first, meeting.levers.first) -
+              velocity_at(in, pair.second, meeting.levers.second) -
+              in.domain.image_velocity(in.x[at(pair.first)], in.x[at(pair.second)]);
   meeting.passed = passed(touch.separation, in.time_step * meeting.v, touch.separation.norm() - touch.gap,
                           touch.smaller_radius);
   return meeting;
@@ -125,6 +126,8 @@ void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates&
     if (wall && !contacts.vx.empty())
       set_drift(contacts, place,
                 in.walls[at(chunks.wall[chunk])].drift_at(meeting.touch.point, meeting.touch.normal));
+    if (!wall && in.domain.flows)
+      set_drift(contacts, place, in.domain.image_drift(in.x[at(meeting.first)], in.x[at(meeting.second)]));
     write(meeting, found.bias, k, place++, contacts);
   }
   contacts.passed[chunk] = through;

@@ -22,6 +22,7 @@ struct PairView {
   std::size_t count;                    ///< of pairs
   const double* restitution = nullptr;  ///< per pair; null: all have that of the rule
   const PeriodicSpace* cell = nullptr;  ///< null: between walls
+  const EdgeRates* rates = nullptr;     ///< null: the cell does not change
 };
 
 /// What is found, per pair.

@@ -89,7 +89,7 @@ template <class V, class S, class E>
                                                   const GapRule& rule, E restitution, const GapTarget& out,
                                                   std::size_t at) {
   Pairing<V> pair = meet(pairs, slots.i, slots.j, V{});
-  space.shorten(pair.d.x, pair.d.y, pair.d.z);
+  space.meet(pair.d.x, pair.d.y, pair.d.z, pair.v.x, pair.v.y, pair.v.z);
   const V distance = root(dot(pair.d, pair.d));
   const BitsOf<V> off = distance > 0;
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
@@ -162,6 +162,8 @@ template <int W, class S, class E>
 template <int W>
 bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& target) {
   const auto with = [&](const auto& restitution) {
+    if (view.rates)
+      return find_gaps_with<W>(view, FlowingSpace{*view.cell, *view.rates}, rule, restitution, target);
     if (view.cell) return find_gaps_with<W>(view, PeriodicSpace(*view.cell), rule, restitution, target);
     return find_gaps_with<W>(view, WalledSpace{}, rule, restitution, target);
   };

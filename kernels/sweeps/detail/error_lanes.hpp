@@ -94,6 +94,10 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
     m.du = m.du - wall;
     m.w_nn = m.w_nn + of.wall_inv_mass;
     sums.wall_impulse = sums.wall_impulse + load_impulse<Friction, V>(c, 0, only, n);
+  } else if (rule.contacts.vx) {
+    Space<V> drift{};
+    add_drift<V>(rule.contacts, at, only, drift);
+    m.du = m.du - drift;
   }
   // Not approach_of: errors do not ask for w_tt, and with it the spins would be gathered, too.
   const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.bias, 0, only), m.w_nn, V{}};

@@ -124,12 +124,32 @@ template <class V, class Only>
   return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
 }
 
-/// How the contacts of a chunk are swept: their friction, and where they start.
-template <class Mu, class Start>
+/// Bodies are as fast as they say ...
+struct NoDrift {
+  NoDrift from(std::size_t) const { return {}; }
+  template <class V, class Only>
+  [[gnu::always_inline]] void take(Space<V>&, std::size_t, Only) const {}
+};
+/// ... or the second one of each contact stands for an image that drifts.
+template <class Number>
+struct PairDrift {
+  const Number *x, *y, *z;
+  [[gnu::always_inline]] PairDrift from(std::size_t k) const { return {x + k, y + k, z + k}; }
+  template <class V, class Only>
+  [[gnu::always_inline]] void take(Space<V>& du, std::size_t at, Only only) const {
+    du = du - Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)};
+  }
+};
+
+/// How the contacts of a chunk are swept: their friction, where they start, and what their bodies drift.
+template <class Mu, class Start, class Drift = NoDrift>
 struct SweepRule {
   Mu friction;
   Start start;
-  [[gnu::always_inline]] SweepRule from(std::size_t k) const { return {friction, start.from(k)}; }
+  Drift drift;
+  [[gnu::always_inline]] SweepRule from(std::size_t k) const {
+    return {friction, start.from(k), drift.from(k)};
+  }
 };
 
 /// Contacts in lanes as their law sees them, from what their bodies do.
@@ -180,6 +200,7 @@ template <bool Friction, class V, int Blocks, class Rule, class Grains, class On
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k) {
     const auto at = static_cast<std::size_t>(W * k);
+    rule.drift.take(m[k].du, at, only);
     dr[k] = renew_impulse<Friction>(c, out, at, only, approach_of<Friction>(c, at, only, m[k]), rule);
   }
 #pragma GCC unroll 4
@@ -238,28 +259,40 @@ template <bool Friction, class V, class Rule, class Number>
 
 template <class Mu>
 [[gnu::always_inline]] inline SweepRule<Mu, PlainStart> plain_rule(double mu) {
-  return {Mu{mu}, {}};
+  return {Mu{mu}, {}, {}};
 }
 template <class Mu>
 [[gnu::always_inline]] inline SweepRule<Mu, MomentumStart> momentum_rule(double mu, const MomentumView& m) {
-  return {Mu{mu}, {m.x, m.y, m.z, m.n, m.beta, m.omega}};
+  return {Mu{mu}, {m.x, m.y, m.z, m.n, m.beta, m.omega}, {}};
+}
+
+/// Sweeps grains by the rule, with their drifts where contacts have any.
+template <bool Friction, class V, class Mu, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_grains_of(const SweepRule<Mu, Start>& rule,
+                                                   const ContactViewOf<Number>& c,
+                                                   const ImpulseViewOf<Number>& r, Number* bodies) {
+  if (c.vx)
+    sweep_grains_by<Friction, V>(
+        SweepRule<Mu, Start, PairDrift<Number>>{rule.friction, rule.start, {c.vx, c.vy, c.vz}}, c, r, bodies);
+  else
+    sweep_grains_by<Friction, V>(rule, c, r, bodies);
 }
 
 template <bool Friction, int W, class Mu>
 void sweep_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu) {
-  sweep_grains_by<Friction, Lanes<W>>(plain_rule<Mu>(mu), c, r, bodies);
+  sweep_grains_of<Friction, Lanes<W>>(plain_rule<Mu>(mu), c, r, bodies);
 }
 
 template <bool Friction, int W, class Mu>
 void momentum_grains(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
                      const MomentumView& momentum) {
-  sweep_grains_by<Friction, Lanes<W>>(momentum_rule<Mu>(mu, momentum), c, r, bodies);
+  sweep_grains_of<Friction, Lanes<W>>(momentum_rule<Mu>(mu, momentum), c, r, bodies);
 }
 
 template <bool Friction, class V, class Mu>
 void single_grains(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
                    const MomentumView& momentum) {
-  sweep_grains_by<Friction, V>(momentum_rule<Mu>(mu, momentum), c, r, bodies);
+  sweep_grains_of<Friction, V>(momentum_rule<Mu>(mu, momentum), c, r, bodies);
 }
 
 /// V += M^-1 H r for W contacts.

@@ -67,6 +67,8 @@ struct Simulation::Implementation {
     begin_stage();
     state.walls = from.walls;
     state.candidates = from.candidates;
+    state.domain = from.domain;
+    state.flow = from.flow;
     state.given_overlaps = from.given_overlaps;
     report = from.report;
     stage_steps = from.steps_of_stage;
@@ -271,6 +273,9 @@ struct Simulation::Implementation {
   /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
     state.time = report.time;
+    if (state.domain.flows)
+      begin_flow(parameters.velocity_gradient, parameters.time_step, parameters.reflection, state.domain,
+                 state.flow);
     demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
     prepare_walls(report.time, parameters.time_step, state, ranks);
     apply_loads(parameters, next_step(), state);

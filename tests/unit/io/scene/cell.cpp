@@ -43,8 +43,9 @@ void refuse(const std::string& text, const std::string& key, const std::string& 
 }
 
 TEST(CellScene, ReadsEdgesOriginAndShears) {
-  const Scene scene = parsed(replaced(
-      cube, "lengths = [0.1, 0.1, 0.1]", "lengths = [0.1, 0.2, 0.3]\norigin = [1, 2, 3]\nshears = [0, 0.02, 0]"));
+  const Scene scene =
+      parsed(replaced(cube, "lengths = [0.1, 0.1, 0.1]",
+                      "lengths = [0.1, 0.2, 0.3]\norigin = [1, 2, 3]\nshears = [0, 0.02, 0]"));
   EXPECT_EQ(scene.setup.domain.edges(), Vec3(0.1, 0.2, 0.3));
   EXPECT_EQ(scene.setup.domain.low, Vec3(1, 2, 3));
   EXPECT_EQ(scene.setup.domain.cell.xz, 0.02);
@@ -93,15 +94,18 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[-0.1, 0.1, 0.1]"), "cell.lengths", "must be >= 0");
   refuse(replaced(cube, "time_step", "box = true\ntime_step"), "cell",
          "wall 'x-' bounds the sample along x, where the cell is periodic");
-  refuse(replaced(cube, "[[stage]]", "[[wall]]\nname = \"tilted\"\nnormal = [0, 1, 1]\npoint = [0, 0, 0]\n[[stage]]"),
-         "cell", "wall 'tilted' bounds the sample along y");
   refuse(replaced(cube, "[[stage]]",
-                  "[[wall]]\nname = \"pipe\"\nshape = \"cylinder\"\nstart = [0, 0, 0]\nend = [0, 0, 1]\nradius = "
-                  "0.05\n[[stage]]"),
+                  "[[wall]]\nname = \"tilted\"\nnormal = [0, 1, 1]\npoint = [0, 0, 0]\n[[stage]]"),
+         "cell", "wall 'tilted' bounds the sample along y");
+  refuse(replaced(
+             cube, "[[stage]]",
+             "[[wall]]\nname = \"pipe\"\nshape = \"cylinder\"\nstart = [0, 0, 0]\nend = [0, 0, 1]\nradius = "
+             "0.05\n[[stage]]"),
          "cell", "wall 'pipe' is no plane");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]"), "sample.region", "nothing repeats along z");
   refuse(replaced(cube, "count = 100", "count = 4000"), "sample[0].count", "no room for a grain");
-  refuse(replaced(cube, "lengths", "shears = [0.01, 0, 0]\nlength"), "cell.length", "did you mean 'lengths'?");
+  refuse(replaced(cube, "lengths", "shears = [0.01, 0, 0]\nlength"), "cell.length",
+         "did you mean 'lengths'?");
 }
 
 TEST(CellScene, RandomGrainsBetweenWallsNeedABox) {

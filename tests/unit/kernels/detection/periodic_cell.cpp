@@ -138,8 +138,7 @@ TEST(PeriodicCell, BodiesOfAnyReachComeOnceInEachPair) {
   std::vector<Vec3> x;
   for (int k = 0; k < 30; ++k) x.push_back(place_in(cell, random));
   for (const double reach : {3.0, 30.0, 1e9}) {
-    const std::vector<GrainPair> pairs =
-        near_pairs(cell.domain(), x, std::vector<double>(x.size(), reach));
+    const std::vector<GrainPair> pairs = near_pairs(cell.domain(), x, std::vector<double>(x.size(), reach));
     EXPECT_TRUE(std::ranges::is_sorted(pairs, [](const GrainPair& a, const GrainPair& b) {
       return std::pair(a.first, a.second) <= std::pair(b.first, b.second);
     }));
@@ -162,8 +161,9 @@ TEST(PeriodicCell, ContactsAreThoseOfTheNearestImages) {
       sample.candidates.impulse.assign_zeros(sample.candidates.size());
       sample.chunks = cut_chunks(sample.candidates, sample.bodies.size(), 64);
       allocate(sample.contacts, sample.candidates, sample.chunks, true);
-      NarrowPhase in{sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls,
-                     1e-3,            0.1,                  {},                     Vec3::Zero()};
+      NarrowPhase in{
+          sample.bodies.x, sample.bodies.radius, sample.bodies.velocity, sample.walls, 1e-3, 0.1, {},
+          Vec3::Zero()};
       in.domain = cell.domain();
       std::size_t found = 0, across = 0;
       for (std::size_t c = 0; c < sample.chunks.size(); ++c) {

@@ -1,0 +1,98 @@
+#include "runtime/step/cell_flow.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+
+namespace talus {
+
+namespace {
+
+/// Columns along axes of walls are unit vectors, so that the matrix has an inverse: nothing moves along them.
+Mat3 invertible(Mat3 edges) {
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (edges(axis, axis) == 0) edges(axis, axis) = 1;
+  return edges;
+}
+
+EdgeRates rates_of(const Mat3& m) {
+  return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)};
+}
+
+}  // namespace
+
+Mat3 edges_of(const Domain& domain) {
+  const PeriodicSpace& c = domain.cell;
+  return matrix_of({c.xx, c.yy, c.zz, c.xy, c.xz, c.yz});
+}
+
+Mat3 matrix_of(const EdgeRates& r) {
+  Mat3 m;
+  m << r.xx, r.xy, r.xz, 0, r.yy, r.yz, 0, 0, r.zz;
+  return m;
+}
+
+void set_edges(Domain& domain, const Mat3& h) {
+  const auto inverse = [](double edge) { return edge > 0 ? 1 / edge : 0; };
+  domain.cell = {h(0, 0), h(1, 1),          h(2, 2),          h(0, 1),         h(0, 2),
+                 h(1, 2), inverse(h(0, 0)), inverse(h(1, 1)), inverse(h(2, 2))};
+}
+
+void begin_flow(const Mat3& gradient, double time_step, double reflection, Domain& domain, CellFlow& flow) {
+  const Mat3 rates = matrix_of(domain.rates), middle = edges_of(domain) + 0.5 * time_step * rates;
+  flow.edges_end = (Mat3::Identity() - 0.5 * time_step * gradient).inverse() * middle;
+  const Mat3 rates_end = gradient * flow.edges_end, change = (rates_end - rates) / (1 + reflection);
+  flow.rates_end = rates_of(rates_end);
+  flow.gain = {change * invertible(middle).inverse(), domain.low};
+  domain.drift_rates = rates_of(rates + change);
+  set_edges(domain, middle);
+}
+
+void end_flow(const CellFlow& flow, Domain& domain) {
+  set_edges(domain, flow.edges_end);
+  domain.rates = flow.rates_end;
+}
+
+void upright(Domain& domain, CellFlow& flow) {
+  // By how many edges another one leans: column `of` loses so many of column `by`.
+  const auto take = [&](Eigen::Index of, Eigen::Index by) {
+    const Mat3 edges = edges_of(domain);
+    const double turns = edges(by, by) > 0 ? nearest_integer(edges(by, of) / edges(by, by)) : 0;
+    if (turns == 0) return;
+    const auto taken = [&](Mat3 m) {
+      m.col(of) -= turns * m.col(by);
+      return m;
+    };
+    set_edges(domain, taken(edges));
+    flow.edges_end = taken(flow.edges_end);
+    for (EdgeRates* rates : {&domain.rates, &domain.drift_rates, &flow.rates_end})
+      *rates = rates_of(taken(matrix_of(*rates)));
+  };
+  take(2, 1);
+  take(2, 0);
+  take(1, 0);
+}
+
+void wrap_body(const Domain& domain, Vec3& x, Velocity& velocity) {
+  const Vec3 beyond = domain.edges_beyond(x);
+  if (beyond == Vec3::Zero()) return;
+  x = domain.wrap(x);
+  Eigen::Map<Vec3>(velocity.u) -= Domain::times(domain.rates, beyond);
+}
+
+FlowMargins::FlowMargins(const Domain& domain, const CellFlow& flow) : low_(domain.low) {
+  const Mat3 now = invertible(edges_of(domain));
+  gradient_ = matrix_of(domain.rates) * now.inverse();
+  deformation_ = now * invertible(flow.edges_then).inverse();
+  gradient_norm_ = gradient_.norm();
+  strain_norm_ = (deformation_ - Mat3::Identity()).norm();
+}
+
+double FlowMargins::speed(const Vec3& x, const Velocity& velocity, double reach) const {
+  return (Eigen::Map<const Vec3>(velocity.u) - gradient_ * (x - low_)).norm() + gradient_norm_ * reach;
+}
+
+double FlowMargins::moved(const Vec3& x, const Vec3& x_then, double reach) const {
+  return (x - low_ - deformation_ * (x_then - low_)).norm() + strain_norm_ * reach;
+}
+
+}  // namespace talus

@@ -1,0 +1,56 @@
+#pragma once
+
+/// A cell that changes: its edges are the columns of a matrix h with dh/dt = L h, L the velocity gradient
+/// that the stage prescribes (docs/theory.md, "Periodic cells").
+
+#include <vector>
+
+#include "kernels/bodies/motion.hpp"
+#include "kernels/detection/domain.hpp"
+
+namespace talus {
+
+/// The edges of a cell as columns [m]; 0 along axes of walls. And back: edges and what follows from them.
+Mat3 edges_of(const Domain& domain);
+Mat3 matrix_of(const EdgeRates& rates);
+void set_edges(Domain& domain, const Mat3& edges);
+
+/// What a cell does in a step.
+struct CellFlow {
+  Mat3 edges_end = Mat3::Zero();   ///< at the end of the step [m]
+  EdgeRates rates_end;             ///< then [m/s]
+  AffineGain gain;                 ///< of the free velocities, from V- to those that are solved for
+  Mat3 edges_then = Mat3::Zero();  ///< at the last broad phase [m]
+};
+
+/// Brings the domain to the middle of the step, and finds how it ends: by the trapezoidal rule, as bodies
+/// move. `gradient` L [1/s], upper triangular, 0 beside axes of walls; `reflection` E of the step.
+void begin_flow(const Mat3& gradient, double time_step, double reflection, Domain& domain, CellFlow& flow);
+
+/// The domain of the end of the step.
+void end_flow(const CellFlow& flow, Domain& domain);
+
+/// Where an edge leans over by more than half of another, the same images are those of one that leans less:
+/// takes that one.
+void upright(Domain& domain, CellFlow& flow);
+
+/// Wraps a body in mid-step: its image goes on with the velocity of an image.
+void wrap_body(const Domain& domain, Vec3& x, Velocity& velocity);
+
+/// Which motion counts against the margin of a body: that against the homogeneous one of the cell.
+class FlowMargins {
+ public:
+  FlowMargins(const Domain& domain, const CellFlow& flow);
+  /// Speed against the cell's flow, and what two bodies gain against one another by it over `reach` [m/s].
+  double speed(const Vec3& x, const Velocity& velocity, double reach) const;
+  /// How far x has moved from where the flow has carried x_then since the last broad phase, and how much the
+  /// strain since has changed a distance of `reach` [m].
+  double moved(const Vec3& x, const Vec3& x_then, double reach) const;
+
+ private:
+  Vec3 low_;
+  Mat3 gradient_, deformation_;
+  double gradient_norm_, strain_norm_;
+};
+
+}  // namespace talus

@@ -1,0 +1,87 @@
+#include "runtime/step/cell_report.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "runtime/step/cell_flow.hpp"
+
+namespace talus {
+
+namespace {
+
+/// xx, yy, zz, xy, xz, yz of the symmetric part.
+std::array<double, 6> symmetric(const Mat3& m) {
+  return {
+      m(0, 0), m(1, 1), m(2, 2), (m(0, 1) + m(1, 0)) / 2, (m(0, 2) + m(2, 0)) / 2, (m(1, 2) + m(2, 1)) / 2};
+}
+
+Mat3 deviator(const Mat3& m) {
+  const Mat3 even = 0.5 * (m + m.transpose());
+  return even - even.trace() / 3 * Mat3::Identity();
+}
+
+/// Sum of m v (x) v over the grains, v against the flow of the cell [J]: subdomain by subdomain.
+Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {
+  struct Row {
+    double subdomain, moment[9];
+  };
+  const Decomposition& all = state.decomposition;
+  std::vector<Row> rows;
+  for (const SubdomainPlace e : all.here.indices()) {
+    const SlotRange range = all.several() ? all.slots_of(e) : SlotRange{0, state.bodies.size()};
+    Mat3 sum = Mat3::Zero();
+    for (std::size_t s = range.begin; s < range.end; ++s) {
+      if (!counts(all, s)) continue;
+      const Velocity body = whole_velocity(all, state.bodies, s);
+      const Vec3 v = Eigen::Map<const Vec3>(body.u) - gradient * (state.bodies.x[s] - state.domain.low);
+      sum += v * v.transpose() / body.inv_mass;
+    }
+    Row& row = rows.emplace_back();
+    row.subdomain = all.here[e].value();
+    Eigen::Map<Mat3>(row.moment) = sum;
+  }
+  rows = ranks.gather_records(std::span<const Row>(rows));
+  std::ranges::sort(rows, {}, &Row::subdomain);
+  Mat3 sum = Mat3::Zero();
+  for (const Row& row : rows) sum += Eigen::Map<const Mat3>(row.moment);
+  return sum;
+}
+
+}  // namespace
+
+std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepReport& report,
+                                      const graph::Communicator& ranks) {
+  const StepState& state = outcome.state;
+  const double volume = state.domain.volume(state.walls);
+  if (!state.domain.repeats || !(volume > 0)) return std::nullopt;
+  CellReport out;
+  out.step = report.step;
+  out.time = report.time;
+  out.stage = outcome.step.stage;
+  const PeriodicSpace& cell = state.domain.cell;
+  out.edges = {cell.xx, cell.yy, cell.zz, cell.xy, cell.xz, cell.yz};
+  Mat3 edges = edges_of(state.domain);
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (edges(axis, axis) == 0) edges(axis, axis) = 1;
+  const Mat3 gradient = matrix_of(state.domain.rates) * edges.inverse();
+  const Mat3 contact = outcome.sums.contacts.moment / (volume * outcome.parameters.impulse_time()),
+             kinetic = kinetic_moment(state, gradient, ranks) / volume;
+  out.stress = symmetric(contact);
+  out.kinetic_stress = symmetric(kinetic);
+  out.p = contact.trace() / 3;
+  out.q = std::sqrt(1.5) * deviator(contact).norm();
+  out.q_over_p = out.p > 0 ? out.q / out.p : 0;
+  out.solid_fraction = report.solid_fraction;
+  out.contacts_a_grain = 2 * static_cast<double>(report.active) /
+                         static_cast<double>(std::max<std::int64_t>(1, outcome.sample.bodies));
+  out.coordination = coordination(state, ranks, contacts_to_hold(outcome.parameters));
+  const double rate = std::sqrt(2.0) * deviator(gradient).norm();
+  const double density = outcome.sample.volume > 0 ? outcome.sample.total_mass / outcome.sample.volume : 0;
+  out.inertial_number = out.p > 0 ? rate * outcome.sample.mean_diameter * std::sqrt(density / out.p) : 0;
+  out.converged = report.converged;
+  return out;
+}
+
+}  // namespace talus
