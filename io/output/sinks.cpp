@@ -38,6 +38,7 @@ std::set<std::string> default_sinks() {
 
 bool is_output_name(const std::string& name) {
   return name == "scene.resolved.toml" || name == "trace.h5" || name == "run.log" || name == "status.json" ||
+         name == "report.html" || name == "grains.lammpstrj" || name == "grains.vtkhdf" ||
          is_numbered_name(name, "checkpoint_", ".h5") || is_numbered_name(name, "archive_", ".h5") ||
          is_numbered_name(name, "trace_rank_", ".h5") || is_numbered_name(name, "fclib_", ".hdf5") ||
          std::ranges::any_of(sink_registry(), [&](const auto& sink) { return sink.make->writes(name); });

@@ -18,12 +18,15 @@ constexpr ColumnMeaning steps_meaning[] = {
     {"iterations", "1", "sweeps"},
     {"error_rms", "1", "natural map of all contacts, rms, over the velocity scale of the step"},
     {"error_max", "1", "that of the worst contact"},
-    {"error_quantile", "1", "residual that a share solver.quantile of the contacts does not exceed; 0 unless asked for"},
+    {"error_quantile", "1",
+     "residual that a share solver.quantile of the contacts does not exceed; 0 unless asked for"},
     {"worst_contact_body", "1", "id of the first body of the worst contact of a step that missed, else -1"},
     {"worst_contact_with", "1", "id of the second, -(1 + k) at wall k; else -1"},
-    {"worst_body", "1", "id of the body whose velocity its contacts would change most in a step that missed, else 0"},
+    {"worst_body", "1",
+     "id of the body whose velocity its contacts would change most in a step that missed, else 0"},
     {"worst_body_error", "1", "by how much, over the velocity scale; else 0"},
-    {"balance", "1", "estimated error of forces on walls, heavy bodies and cuts, or momentum defect, if larger"},
+    {"balance", "1",
+     "estimated error of forces on walls, heavy bodies and cuts, or momentum defect, if larger"},
     {"jump", "1", "interface jump of velocities; 0 with one subdomain"},
     {"penetration_mean", "1", "mean overlap over the smallest radius"},
     {"penetration_max", "1", "largest overlap over the smallest radius"},
@@ -120,9 +123,9 @@ constexpr ColumnMeaning errors_meaning[] = {
 };
 
 constexpr TableMeaning dictionary[] = {
-    {"steps.csv", steps_meaning},       {"walls.csv", walls_meaning},
-    {"bodies.csv", bodies_meaning},     {"inserted.csv", inserted_meaning},
-    {"removed.csv", removed_meaning},   {"triaxial.csv", triaxial_meaning},
+    {"steps.csv", steps_meaning},          {"walls.csv", walls_meaning},
+    {"bodies.csv", bodies_meaning},        {"inserted.csv", inserted_meaning},
+    {"removed.csv", removed_meaning},      {"triaxial.csv", triaxial_meaning},
     {"error_history.csv", errors_meaning},
 };
 

@@ -1,0 +1,84 @@
+#include "apps/commands/convert.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
+#include "io/files/error.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/results/lammps_dump.hpp"
+#include "io/results/results.hpp"
+#include "io/results/vtkhdf.hpp"
+
+namespace talus {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What the options mean. Throws std::exception where they mean nothing.
+struct Conversion {
+  fs::path results, out;
+  std::size_t frames = 0;
+};
+
+Conversion conversion_of(const ConvertOptions& options) {
+  if (options.format != "lammps" && options.format != "vtkhdf")
+    throw std::invalid_argument(fmt::format("there is no format '{}': lammps or vtkhdf", options.format));
+  Conversion todo;
+  todo.results = fs::is_directory(options.run) ? fs::path(options.run) / "results.h5" : fs::path(options.run);
+  if (!fs::exists(todo.results))
+    throw std::invalid_argument(fmt::format("{}: no results.h5 of a run there", fs::is_directory(options.run)
+                                                                                    ? options.run
+                                                                                    : todo.results.string()));
+  const char* name = options.format == "lammps" ? "grains.lammpstrj" : "grains.vtkhdf";
+  todo.out = options.out.empty() ? todo.results.parent_path() / name : fs::path(options.out);
+  io::check_output_files({todo.results.string()}, {todo.out.string()}, options.force);
+  todo.frames = io::frame_count(todo.results);
+  if (todo.frames == 0)
+    throw std::invalid_argument(fmt::format("{}: holds no frame yet", todo.results.string()));
+  return todo;
+}
+
+void write_lammps(const Conversion& todo, const fs::path& part) {
+  std::ofstream file(part, std::ios::binary);
+  for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(io::read_frame(todo.results, k));
+  file.close();
+  if (!file) throw io::FileError(part.string(), "cannot be written: no room or no right to");
+}
+
+void write_vtkhdf(const Conversion& todo, const fs::path& part) {
+  io::VtkHdfWriter writer(part);
+  for (std::size_t k = 0; k < todo.frames; ++k) writer.append(io::read_frame(todo.results, k));
+  writer.close();
+}
+
+}  // namespace
+
+int convert_command(const ConvertOptions& options) {
+  Conversion todo;
+  try {
+    todo = conversion_of(options);
+  } catch (const std::exception& error) {
+    print_error("talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
+  const fs::path part = todo.out.string() + ".part";
+  try {
+    (options.format == "lammps" ? write_lammps : write_vtkhdf)(todo, part);
+    fs::rename(part, todo.out);
+  } catch (const std::exception& error) {
+    std::error_code ignored;
+    fs::remove(part, ignored);
+    print_error("talus: error: {}\n", error.what());
+    return exit_failure;
+  }
+  print_error("talus: {} written, {} frames\n", todo.out.string(), todo.frames);
+  return exit_done;
+}
+
+}  // namespace talus

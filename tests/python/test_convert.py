@@ -1,0 +1,122 @@
+"""`talus convert` against readers of the two formats that share nothing with their writers."""
+
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+
+import talus
+
+# Grains come while the run goes on, so that frames differ in their number.
+RAIN = {
+    "name": "rain", "gravity": [0, 0, -9.81], "time_step": 1e-3, "orientation": True,
+    "material": {"density": 2600},
+    "wall": [{"name": "floor", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+    "insert": [{"name": "rain", "radius": 0.01, "rate": 200, "count": 12,
+                "region": {"shape": "box", "low": [0, 0, 0.1], "high": [0.2, 0.2, 0.3]}}],
+    "stage": [{"name": "fall", "end": {"steps": 60}}],
+    "output": {"every_steps": 20},
+}
+
+
+@pytest.fixture(scope="module")
+def rain(tmp_path_factory):
+    run = talus.run(RAIN, tmp_path_factory.mktemp("rain") / "run", threads=1, progress=False)
+    counts = [len(frame.ids) for frame in run.frames]
+    assert counts[0] == 0 and counts[1] < counts[-1], counts
+    return run
+
+
+def convert(*words):
+    return subprocess.run([talus.find_program(), "convert", *map(str, words)], capture_output=True, text=True)
+
+
+def read_dump(path):
+    """Frames of a LAMMPS dump: (step, time, {column: values}), by the rules of its manual."""
+    lines = iter(path.read_text().splitlines())
+    frames, now = [], {}
+    for line in lines:
+        kind, _, rest = line.removeprefix("ITEM: ").partition(" ")
+        assert line.startswith("ITEM: "), line
+        if kind in ("UNITS", "TIME", "TIMESTEP"):
+            now[kind] = next(lines)
+        elif line == "ITEM: NUMBER OF ATOMS":
+            now["count"] = int(next(lines))
+        elif line.startswith("ITEM: BOX BOUNDS"):
+            now["box"] = [[float(edge) for edge in next(lines).split()] for _ in range(3)]
+        elif kind == "ATOMS":
+            rows = np.array([[float(cell) for cell in next(lines).split()] for _ in range(now["count"])])
+            frames.append((now, {name: rows.reshape(-1, len(rest.split()))[:, k] for k, name in enumerate(rest.split())}))
+            now = {}
+        else:
+            raise AssertionError(line)
+    return frames
+
+
+def test_a_lammps_dump_has_the_frames_to_the_bit(rain):
+    assert convert(rain.directory, "--to", "lammps").returncode == 0
+    dumped = read_dump(rain.directory / "grains.lammpstrj")
+    assert len(dumped) == len(rain.frames)
+    for (head, atoms), frame in zip(dumped, rain.frames):
+        assert int(head["TIMESTEP"]) == frame.step and float(head["TIME"]) == frame.time and head["UNITS"] == "si"
+        assert np.array_equal(atoms["id"], frame.ids + 1) and np.all(atoms["type"] == 1)
+        assert np.array_equal(atoms["radius"], frame.radii)
+        for columns, values in [(("x", "y", "z"), frame.positions), (("vx", "vy", "vz"), frame.velocities),
+                                (("quatw", "quati", "quatj", "quatk"), frame.orientations)] if len(frame.ids) else []:
+            assert np.array_equal(np.stack([atoms[column] for column in columns], -1), values)
+        for axis, (low, high) in enumerate(head["box"] if len(frame.ids) else []):
+            assert low <= (frame.positions[:, axis] - frame.radii).min()
+            assert high >= (frame.positions[:, axis] + frame.radii).max()
+
+
+def step_of(root, s):
+    """Points and point data of step s, as docs.vtk.org says that PolyData with time is to be read."""
+    steps = root["Steps"]
+    part, parts = steps["PartOffsets"][s], steps["NumberOfParts"][s]
+    assert parts == 1
+    count, first = root["NumberOfPoints"][part], steps["PointOffsets"][s]
+    for k, topology in enumerate(("Vertices", "Lines", "Polygons", "Strips")):
+        group = root[topology]
+        cells, ids = group["NumberOfCells"][part], group["NumberOfConnectivityIds"][part]
+        start, begin = steps["CellOffsets"][s, k] + part, steps["ConnectivityIdOffsets"][s, k]
+        offsets, connectivity = group["Offsets"][start:start + cells + 1], group["Connectivity"][begin:begin + ids]
+        assert len(offsets) == cells + 1 and offsets[0] == 0 and offsets[-1] == len(connectivity) == ids
+        assert cells == (count if k == 0 else 0)
+        if k == 0:
+            assert np.array_equal(connectivity, np.arange(count)) and np.all(np.diff(offsets) == 1)
+    data = {}
+    for name, values in root["PointData"].items():
+        at = steps[f"PointDataOffsets/{name}"][s]
+        data[name] = values[at:at + count]
+    return root["Points"][first:first + count], data
+
+
+def test_a_vtkhdf_file_has_the_frames_to_the_bit(rain):
+    assert convert(rain.directory, "--to", "vtkhdf").returncode == 0
+    with h5py.File(rain.directory / "grains.vtkhdf") as file:
+        root = file["VTKHDF"]
+        assert root.attrs["Type"] == b"PolyData" and list(root.attrs["Version"]) == [2, 0]
+        assert root.attrs.get_id("Type").get_type().get_cset() == h5py.h5t.CSET_ASCII
+        assert root["Steps"].attrs["NSteps"] == len(rain.frames)
+        assert np.array_equal(root["Steps/Values"], rain.frames.times)
+        for s, frame in enumerate(rain.frames):
+            points, data = step_of(root, s)
+            assert np.array_equal(points, frame.positions) and np.array_equal(data["id"], frame.ids)
+            assert np.array_equal(data["velocity"], frame.velocities) and np.array_equal(data["radius"], frame.radii)
+            if len(frame.ids):  # an empty frame does not say whether grains turn
+                assert np.array_equal(data["orientation"], frame.orientations)
+        missing = []
+        file.visititems(lambda name, item: missing.append(name)
+                        if isinstance(item, h5py.Dataset) and "units" not in item.attrs else None)
+        assert not missing
+
+
+def test_what_cannot_be_converted_is_refused_and_nothing_is_replaced(rain, tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    for words, message in [((rain.directory, "--to", "vtk"), "no format 'vtk': lammps or vtkhdf"),
+                           ((tmp_path, "--to", "lammps"), "no results.h5"),
+                           ((rain.directory, "--to", "lammps", "-o", tmp_path / "mine"), "--force")]:
+        ended = convert(*words)
+        assert ended.returncode == 2 and message in ended.stderr, ended.stderr
+    assert (tmp_path / "mine").read_text() == "mine"
