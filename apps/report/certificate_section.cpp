@@ -27,13 +27,15 @@ struct Bounded {
 io::HtmlFigure bounded_figure(const RunFolder& run, const Bounded& what) {
   const auto &time = run.steps["time"], &value = run.steps[what.column];
   io::Chart chart = small_chart(what.title, "time [s]", what.label, true);
-  chart.series.push_back({what.label, thinned(time, value, Thinned::largest), colour_of_error});
+  chart.series.push_back({"", thinned(time, value, Thinned::largest), colour_of_error});
   std::vector<double> missed_time, missed;
   for (std::size_t k = 0; k < value.size() && what.tolerance > 0; ++k)
     if (value[k] > what.tolerance) missed_time.push_back(time[k]), missed.push_back(value[k]);
-  if (!missed.empty())
-    chart.series.push_back({fmt::format("beyond its tolerance: {} steps", missed.size()),
+  if (!missed.empty()) {
+    chart.series.front().name = "all steps";
+    chart.series.push_back({fmt::format("beyond its tolerance: {}", missed.size()),
                             thinned(missed_time, missed, Thinned::largest), colour_of_missed, 0, true});
+  }
   if (what.tolerance > 0)
     chart.levels.push_back({what.tolerance, fmt::format("tolerance {:g}", what.tolerance)});
   return figure_of(chart, what.caption);
@@ -79,7 +81,9 @@ HtmlSections certificate_section(const RunFolder& run) {
                 "Estimated error of the forces on walls and heavy bodies and through any cut, or defect of "
                 "momentum, whichever is larger."}),
       bounded_figure(run, {"Overlap", "overlap", "overlap", run.scene ? solver.overlap_tolerance : 0,
-                           "Largest overlap that the run has made, over the smaller radius of the pair."})};
+                           "Largest overlap at the end of the step, beyond those that the sample began with, "
+                           "over the smaller "
+                           "radius of the pair."})};
   return {section};
 }
 

@@ -88,13 +88,14 @@ HtmlSections time_section(const RunFolder& run) {
       {"threads",
        text_of(run.provenance, "threads") + " a rank, instructions " + text_of(run.provenance, "simd")},
   };
-  io::Chart of_steps = small_chart("Sweeps of a step", "time [s]", "sweeps", true);
-  of_steps.series.push_back({"largest of each stretch", thinned(time, sweeps, Thinned::largest), 0});
+  io::Chart of_steps = small_chart("Sweeps of a step, largest of each stretch", "time [s]", "sweeps", true);
+  of_steps.series.push_back({"", thinned(time, sweeps, Thinned::largest), 0});
   if (run.scene)
     of_steps.levels.push_back(
         {static_cast<double>(run.scene->setup.solver.max_iterations), "most that are made"});
-  io::Chart of_time = small_chart("Elapsed time of a step", "time [s]", "elapsed [s]", true);
-  of_time.series.push_back({"largest of each stretch", thinned(time, elapsed, Thinned::largest), 1});
+  io::Chart of_time =
+      small_chart("Elapsed time of a step, largest of each stretch", "time [s]", "elapsed [s]", true);
+  of_time.series.push_back({"", thinned(time, elapsed, Thinned::largest), 1});
   section.figures = {{io::draw_chart(of_steps), ""}, {io::draw_chart(of_time), ""}};
   section.code = trace_text(run.directory / "trace.h5");
   if (section.code.empty())

@@ -64,7 +64,7 @@ HtmlSections triaxial(const RunFolder& run) {
                                       "compression.",
                                       shear.stage)};
   io::Chart ratio = small_chart("Stress ratio", strain_label, "q/p");
-  add(ratio, "q/p", strain, of_stage("q_over_p"));
+  add(ratio, "", strain, of_stage("q_over_p"));
   io::Chart volume = small_chart("Volume strain", strain_label, "volume strain [%]");
   add(volume, "positive: the sample dilates", strain, scaled(of_stage("strain_volume"), 100));
   io::Chart stress = small_chart("Stresses of the whole run", time_label, "stress [kPa]");

@@ -80,24 +80,34 @@ std::string end_words(const StageEnd& end) {
   return "until " + joined(ends, " or ");
 }
 
-/// "0.35", or "0.2 to 0.35" over the pairs of materials.
-std::string range_of(const PairTable& laws, double PairLaw::*number) {
-  double low = std::numeric_limits<double>::infinity(), high = 0;
-  for (const PairLaw& law : laws.laws()) low = std::min(low, law.*number), high = std::max(high, law.*number);
-  return low == high ? fmt::format("{:g}", high) : fmt::format("{:g} to {:g}", low, high);
+/// "friction 0.35", "friction 0.35, at walls 0.1"; of several materials "friction 0.2 to 0.35". "" where it
+/// is 0.
+std::string law_words(const char* name, const PairTable& laws, double PairLaw::*number,
+                      const char* unit = "") {
+  constexpr std::size_t one_material = 3;  // pairs: grains, walls, both
+  const double most = laws.largest(number);
+  if (most == 0) return "";
+  if (laws.laws().size() == one_material) {
+    const double grains = laws.between(material_of_grains, material_of_grains).*number;
+    const double walls = laws.between(material_of_grains, material_of_walls).*number;
+    return fmt::format("; {} {:g}{}{}", name, grains, unit,
+                       walls == grains ? "" : fmt::format(", at walls {:g}{}", walls, unit));
+  }
+  double least = most;
+  for (const PairLaw& law : laws.laws()) least = std::min(least, law.*number);
+  return least == most ? fmt::format("; {} {:g}{}", name, most, unit)
+                       : fmt::format("; {} {:g} to {:g}{}", name, least, most, unit);
 }
 
 std::string stage_words(const Stage& stage) {
   std::string text = end_words(stage.end) + "; ";
   text +=
       stage.chooses_time_step ? "time steps are chosen" : "time step " + with_prefix(stage.time_step, "s");
-  text += "; friction " + range_of(stage.laws, &PairLaw::friction);
-  if (stage.laws.largest(&PairLaw::restitution) > 0)
-    text += ", restitution " + range_of(stage.laws, &PairLaw::restitution);
-  if (stage.laws.largest(&PairLaw::cohesion) > 0)
-    text += ", cohesion " + range_of(stage.laws, &PairLaw::cohesion) + " N";
-  if (stage.laws.largest(&PairLaw::rolling_resistance) > 0)
-    text += ", rolling resistance " + range_of(stage.laws, &PairLaw::rolling_resistance);
+  if (stage.laws.largest(&PairLaw::friction) == 0) text += "; no friction";
+  text += law_words("friction", stage.laws, &PairLaw::friction);
+  text += law_words("restitution", stage.laws, &PairLaw::restitution);
+  text += law_words("cohesion", stage.laws, &PairLaw::cohesion, " N");
+  text += law_words("rolling resistance", stage.laws, &PairLaw::rolling_resistance);
   if (stage.gravity.norm() > 0) text += fmt::format("; gravity {:g} m/s²", stage.gravity.norm());
   for (const auto& [wall, load] : stage.loads) text += "; wall '" + wall + "' " + load_words(load);
   return text;

@@ -33,10 +33,11 @@ double entry_width(const ChartSeries& series) {
   return 42 + letter_width * static_cast<double>(series.name.size());
 }
 std::size_t legend_rows(const Chart& chart, double width) {
-  std::size_t rows = 1;
-  double used = 0;
+  std::size_t rows = 0;
+  double used = width;
   for (const ChartSeries& series : chart.series) {
-    if (used > 0 && used + entry_width(series) > width) ++rows, used = 0;
+    if (series.name.empty()) continue;
+    if (used + entry_width(series) > width) ++rows, used = 0;
     used += entry_width(series);
   }
   return rows;
@@ -210,6 +211,7 @@ class Drawing {
   void legend_above() const {
     double x = page_.left, y = page_.subtitle_y - (chart_.subtitle.empty() ? 4 : -14);
     for (const ChartSeries& series : chart_.series) {
+      if (series.name.empty()) continue;
       if (x > page_.left && x + entry_width(series) > page_.right) x = page_.left, y += legend_pitch;
       entry(series, x, y, 12);
       x += entry_width(series);

@@ -10,7 +10,7 @@
 namespace talus::io {
 
 struct ChartSeries {
-  std::string name;  ///< in the legend
+  std::string name;  ///< in the legend; of a compact chart "": not there
   std::vector<std::array<double, 2>> points;
   std::size_t hue = 0;   ///< colour, counted from 0 and repeated when there are more than the palette has
   std::size_t dash = 0;  ///< 0: full line; others: patterns, repeated likewise
