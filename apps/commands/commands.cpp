@@ -6,6 +6,7 @@ std::vector<Command> commands() {
   return {
       run_entry(),
       status_entry(),
+      report_entry(),
       convert_entry(),
       plan_entry(),
       partition_entry(),

@@ -12,6 +12,7 @@ std::vector<Command> commands();
 /// The commands of the table, each from a file in entries/.
 Command run_entry();
 Command status_entry();
+Command report_entry();
 Command convert_entry();
 Command plan_entry();
 Command partition_entry();

@@ -19,6 +19,7 @@
 #include "apps/commands/run_status.hpp"
 #include "apps/commands/run_steps.hpp"
 #include "apps/commands/step_list.hpp"
+#include "apps/report/run_report.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
 #include "apps/shared/sample_builder.hpp"
@@ -208,6 +209,15 @@ void print_resumption(const Terminal& terminal, const ResumePoint& point) {
   for (const io::SceneChange& change : point.changes) terminal.say("from here on {}", io::describe(change));
 }
 
+/// The page of the run. What it lacks room or memory for is no fault of the run.
+void write_page(const Terminal& terminal, const std::string& directory) {
+  try {
+    io::write_whole(directory + "/report.html", run_report(directory));
+  } catch (const std::exception& error) {
+    terminal.warn("warning: report.html was not written: {}", error.what());
+  }
+}
+
 /// Rank 0 waits for this rank, and cannot write that the run has failed.
 void say_for_rank_0(const std::string& directory, const io::Provenance& provenance, io::Summary summary,
                     const graph::Communicator& ranks) {
@@ -236,9 +246,10 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
                              run.granted,  run.directory, provenance,
                              run.warnings};
   const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
-  if (ranks.rank() == 0)
+  if (ranks.rank() == 0) {
     print_end(terminal, summary, scene.setup.solver, run.directory);
-  else if (summary.status == "failed")
+    if (scene.output.sinks.contains("pictures")) write_page(terminal, run.directory);
+  } else if (summary.status == "failed")
     terminal.warn("rank {}: {}", ranks.rank(), summary.message);
   if (summary.status == "failed" && ranks.ranks() > 1)
     end_all(summary.exit_code, ranks, [&] { say_for_rank_0(run.directory, provenance, summary, ranks); });

@@ -16,8 +16,42 @@ using detail::Svg;
 namespace style = detail::style;
 using Point = std::array<double, 2>;
 
-constexpr double width = 980, height = 540;
-constexpr double left = 96, right = 650, top = 84, bottom = 460;
+/// Where things stand [px].
+struct Layout {
+  double width, height;
+  double left, right, top, bottom;  ///< of the plot
+  double y_label, x_label;          ///< of y: from the left; of x: below the plot
+  double title_size, title_y, subtitle_y;
+  bool legend_above;
+};
+constexpr Layout wide{980, 540, 96, 650, 84, 460, 28, 48, 18, 34, 58, false};
+constexpr double legend_pitch = 18;
+
+/// Entries of a legend in one row above a plot of that width, and the rows that all of them take.
+constexpr double letter_width = 6.6;  // of 12 px, mean
+double entry_width(const ChartSeries& series) {
+  return 42 + letter_width * static_cast<double>(series.name.size());
+}
+std::size_t legend_rows(const Chart& chart, double width) {
+  std::size_t rows = 0;
+  double used = width;
+  for (const ChartSeries& series : chart.series) {
+    if (series.name.empty()) continue;
+    if (used + entry_width(series) > width) ++rows, used = 0;
+    used += entry_width(series);
+  }
+  return rows;
+}
+
+Layout layout_of(const Chart& chart) {
+  if (!chart.compact) return wide;
+  Layout compact{480, 0, 66, 466, 0, 0, 16, 40, 15, 20, 38, true};
+  const double legend = legend_pitch * static_cast<double>(legend_rows(chart, compact.right - compact.left));
+  compact.top = (chart.subtitle.empty() ? 32 : 50) + legend + 6;
+  compact.bottom = compact.top + 230;
+  compact.height = compact.bottom + 50;
+  return compact;
+}
 
 std::string power_of_ten(int exponent) {
   if (exponent >= -2 && exponent <= 3) return fmt::format("{:g}", std::pow(10.0, exponent));
@@ -111,57 +145,92 @@ std::vector<Point> shown(const Chart& chart, const ChartSeries& series) {
   return points;
 }
 
-void draw_frame(Svg& svg, const Chart& chart, const Axis& x, const Axis& y) {
-  for (const Tick& tick : x.ticks()) {
-    const double at = x.place(tick.value);
-    svg.line(at, top, at, bottom, {style::grid, tick.text.empty() ? 0.5 : 1.2});
-    svg.text(at, bottom + 20, tick.text, {12, style::soft_ink, "middle"});
-  }
-  for (const Tick& tick : y.ticks()) {
-    const double at = y.place(tick.value);
-    svg.line(left, at, right, at, {style::grid, tick.text.empty() ? 0.5 : 1.2});
-    svg.text(left - 8, at + 4, tick.text, {12, style::soft_ink, "end"});
-  }
-  svg.line(left, bottom, right, bottom, {style::soft_ink, 1});
-  svg.line(left, top, left, bottom, {style::soft_ink, 1});
-  svg.text((left + right) / 2, bottom + 48, chart.x_label, {13, style::ink, "middle", true});
-  svg.text(28, (top + bottom) / 2, chart.y_label, {13, style::ink, "middle", true, -90});
-}
+/// Parts of the picture, over axes that show its data.
+class Drawing {
+ public:
+  Drawing(Svg& svg, const Chart& chart, const Layout& page, const Axis& x, const Axis& y)
+      : svg_(svg), chart_(chart), page_(page), x_(x), y_(y) {}
 
-void draw_levels(Svg& svg, const Chart& chart, const Axis& y) {
-  for (const ChartLevel& level : chart.levels) {
-    const double at = y.place(level.y);
-    svg.line(left, at, right, at, {style::soft_ink, 1.2, "2 3"});
-    svg.text(right + 6, at + 4, level.name, {11, style::soft_ink});
+  void frame() const {
+    const auto& p = page_;
+    for (const Tick& tick : x_.ticks()) {
+      const double at = x_.place(tick.value);
+      svg_.line(at, p.top, at, p.bottom, {style::grid, tick.text.empty() ? 0.5 : 1.2});
+      svg_.text(at, p.bottom + 20, tick.text, {12, style::soft_ink, "middle"});
+    }
+    for (const Tick& tick : y_.ticks()) {
+      const double at = y_.place(tick.value);
+      svg_.line(p.left, at, p.right, at, {style::grid, tick.text.empty() ? 0.5 : 1.2});
+      svg_.text(p.left - 8, at + 4, tick.text, {12, style::soft_ink, "end"});
+    }
+    svg_.line(p.left, p.bottom, p.right, p.bottom, {style::soft_ink, 1});
+    svg_.line(p.left, p.top, p.left, p.bottom, {style::soft_ink, 1});
+    svg_.text((p.left + p.right) / 2, p.bottom + p.x_label, chart_.x_label, {13, style::ink, "middle", true});
+    svg_.text(p.y_label, (p.top + p.bottom) / 2, chart_.y_label, {13, style::ink, "middle", true, -90});
   }
-}
 
-void draw_series(Svg& svg, const Chart& chart, const ChartSeries& series, const Axis& x, const Axis& y) {
-  const std::string_view colour = detail::hue(series.hue);
-  std::vector<Point> line;
-  for (const Point& p : shown(chart, series)) {
-    const Point at{x.place(p[0]), y.place(p[1])};
-    if (chart.staircase && !line.empty()) line.push_back({at[0], line.back()[1]});
-    line.push_back(at);
+  void levels() const {
+    const auto& p = page_;
+    for (const ChartLevel& level : chart_.levels) {
+      const double at = y_.place(level.y);
+      svg_.line(p.left, at, p.right, at, {style::soft_ink, 1.2, "2 3"});
+      if (p.legend_above)  // above its line, or below it where there is no room
+        svg_.text(p.right - 4, at < p.top + 16 ? at + 14 : at - 5, level.name, {11, style::soft_ink, "end"});
+      else
+        svg_.text(p.right + 6, at + 4, level.name, {11, style::soft_ink});
+    }
   }
-  if (chart.staircase && !line.empty()) line.push_back({right, line.back()[1]});
-  svg.polyline(line, {colour, 2, detail::dashes(series.dash)});
-  // Marks say where something was measured; where they would touch, the line says it.
-  if (!chart.staircase && line.size() <= 40)
-    for (const Point& at : line) svg.circle(at[0], at[1], 3.2, colour);
-}
 
-void draw_legend(Svg& svg, const Chart& chart) {
-  const double x = right + (chart.levels.empty() ? 28 : 96);
-  const double pitch =
-      std::min(20.0, (bottom - top) / std::max<double>(1, static_cast<double>(chart.series.size())));
-  for (std::size_t k = 0; k < chart.series.size(); ++k) {
-    const ChartSeries& series = chart.series[k];
-    const double y = top + 8 + static_cast<double>(k) * pitch;
-    svg.line(x, y, x + 30, y, {detail::hue(series.hue), 2.4, detail::dashes(series.dash)});
-    svg.text(x + 38, y + 4, series.name, {std::min(12.0, pitch), style::ink});
+  void series(const ChartSeries& series) const {
+    const std::string_view colour = detail::hue(series.hue);
+    std::vector<Point> line;
+    for (const Point& p : shown(chart_, series)) {
+      const Point at{x_.place(p[0]), y_.place(p[1])};
+      if (chart_.staircase && !line.empty()) line.push_back({at[0], line.back()[1]});
+      line.push_back(at);
+    }
+    if (chart_.staircase && !line.empty()) line.push_back({page_.right, line.back()[1]});
+    if (!series.marks)
+      svg_.polyline(line, {colour, page_.legend_above ? 1.6 : 2, detail::dashes(series.dash)});
+    // Marks say where something was measured; where they would touch, the line says it.
+    if (series.marks || (!chart_.staircase && line.size() <= 40))
+      for (const Point& at : line) svg_.circle(at[0], at[1], 3.2, colour);
   }
-}
+
+  void legend() const {
+    const auto& p = page_;
+    if (p.legend_above) return legend_above();
+    const double x = p.right + (chart_.levels.empty() ? 28 : 96);
+    const double pitch =
+        std::min(20.0, (p.bottom - p.top) / std::max<double>(1, static_cast<double>(chart_.series.size())));
+    for (std::size_t k = 0; k < chart_.series.size(); ++k)
+      entry(chart_.series[k], x, p.top + 8 + static_cast<double>(k) * pitch, std::min(12.0, pitch));
+  }
+
+ private:
+  void legend_above() const {
+    double x = page_.left, y = page_.subtitle_y - (chart_.subtitle.empty() ? 4 : -14);
+    for (const ChartSeries& series : chart_.series) {
+      if (series.name.empty()) continue;
+      if (x > page_.left && x + entry_width(series) > page_.right) x = page_.left, y += legend_pitch;
+      entry(series, x, y, 12);
+      x += entry_width(series);
+    }
+  }
+  void entry(const ChartSeries& series, double x, double y, double size) const {
+    const double length = page_.legend_above ? 20 : 30;
+    if (series.marks)
+      svg_.circle(x + length / 2, y, 3.2, detail::hue(series.hue));
+    else
+      svg_.line(x, y, x + length, y, {detail::hue(series.hue), 2.4, detail::dashes(series.dash)});
+    svg_.text(x + length + (page_.legend_above ? 6 : 8), y + 4, series.name, {size, style::ink});
+  }
+
+  Svg& svg_;
+  const Chart& chart_;
+  const Layout& page_;
+  const Axis &x_, &y_;
+};
 
 }  // namespace
 
@@ -174,23 +243,30 @@ std::string draw_chart(const Chart& chart) {
   };
   for (const ChartSeries& series : chart.series)
     for (const Point& p : shown(chart, series)) widen(0, p[0]), widen(1, p[1]);
-  Svg svg(width, height);
-  svg.text(left, 34, chart.title, {18, style::ink, "start", true});
-  svg.text(left, 58, chart.subtitle, {13, style::soft_ink});
+  const Layout page = layout_of(chart);
+  Svg svg(page.width, page.height);
+  svg.text(page.legend_above ? 2 : page.left, page.title_y, chart.title,
+           {page.title_size, style::ink, "start", true});
+  svg.text(page.legend_above ? 2 : page.left, page.subtitle_y, chart.subtitle, {13, style::soft_ink});
   if (!std::isfinite(low[0])) {
-    svg.text((left + right) / 2, (top + bottom) / 2, "No data", {14, style::soft_ink, "middle"});
+    svg.text((page.left + page.right) / 2, (page.top + page.bottom) / 2, "No data",
+             {14, style::soft_ink, "middle"});
     return svg.finish();
   }
   Chart kept = chart;
   std::erase_if(kept.levels, [&](const ChartLevel& level) {
     return !std::isfinite(level.y) || (chart.log_y && level.y <= 0);
   });
-  for (const ChartLevel& level : kept.levels) widen(1, level.y);
-  const Axis x(chart.log_x, low[0], high[0], left, right), y(chart.log_y, low[1], high[1], bottom, top);
-  draw_frame(svg, kept, x, y);
-  draw_levels(svg, kept, y);
-  for (const ChartSeries& series : kept.series) draw_series(svg, kept, series, x, y);
-  draw_legend(svg, kept);
+  // Above a level there is room for its name.
+  for (const ChartLevel& level : kept.levels)
+    widen(1, page.legend_above && chart.log_y ? 2 * level.y : level.y);
+  const Axis x(chart.log_x, low[0], high[0], page.left, page.right);
+  const Axis y(chart.log_y, low[1], high[1], page.bottom, page.top);
+  const Drawing drawing(svg, kept, page, x, y);
+  drawing.frame();
+  drawing.levels();
+  for (const ChartSeries& series : kept.series) drawing.series(series);
+  drawing.legend();
   return svg.finish();
 }
 

@@ -10,10 +10,11 @@
 namespace talus::io {
 
 struct ChartSeries {
-  std::string name;  ///< in the legend
+  std::string name;  ///< in the legend; of a compact chart "": not there
   std::vector<std::array<double, 2>> points;
   std::size_t hue = 0;   ///< colour, counted from 0 and repeated when there are more than the palette has
   std::size_t dash = 0;  ///< 0: full line; others: patterns, repeated likewise
+  bool marks = false;    ///< points without a line
 };
 
 /// A horizontal line that says what a value means.
@@ -28,6 +29,7 @@ struct Chart {
   std::string x_label, y_label;  ///< with units
   bool log_x = true, log_y = true;
   bool staircase = false;  ///< a value holds up to the next point
+  bool compact = false;    ///< half as wide, legend above: for phones, and two beside one another
   std::vector<ChartSeries> series;
   std::vector<ChartLevel> levels = {};
 };

@@ -1,7 +1,9 @@
 #include "io/results/csv_reader.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -45,6 +47,7 @@ class Cells {
   void end() const {
     if (!ended_) fail();
   }
+  bool ended() const { return ended_; }
 
  private:
   [[noreturn]] void fail() const {
@@ -87,6 +90,40 @@ std::vector<TriaxialReport> read_triaxial(const std::filesystem::path& path) {
   std::getline(file, line);  // the header
   while (std::getline(file, line)) rows.push_back(report_of(line, path));
   return rows;
+}
+
+const std::vector<double>& TableColumns::operator[](const std::string& name) const {
+  static const std::vector<double> none;
+  const auto found = numbers.find(name);
+  return found == numbers.end() ? none : found->second;
+}
+
+TableColumns read_columns(const std::filesystem::path& path, const std::vector<std::string>& names,
+                          const std::string& text) {
+  TableColumns table;
+  std::ifstream file(path);
+  std::string line;
+  if (!std::getline(file, line)) return table;
+  std::vector<std::vector<double>*> place;  // of each column: where its numbers go
+  std::size_t text_column = std::numeric_limits<std::size_t>::max();
+  for (Cells header(line, path); !header.ended();) {
+    const std::string name = header.text();
+    if (!text.empty() && name == text) text_column = place.size();
+    const bool wanted = std::find(names.begin(), names.end(), name) != names.end();
+    place.push_back(wanted ? &table.numbers[name] : nullptr);
+  }
+  while (std::getline(file, line) && !file.eof()) {
+    Cells cells(line, path);
+    for (std::size_t k = 0; k < place.size(); ++k) {
+      const std::string cell = cells.text();
+      if (k == text_column) table.texts.push_back(cell);
+      if (!place[k]) continue;
+      double number = std::numeric_limits<double>::quiet_NaN();
+      std::from_chars(cell.data(), cell.data() + cell.size(), number);
+      place[k]->push_back(number);
+    }
+  }
+  return table;
 }
 
 }  // namespace talus::io

@@ -54,6 +54,8 @@ void validate_cell(const Setup& setup) {
   }
   if (!setup.inserts.empty() || !setup.removes.empty())
     refuse("grains cannot come or go in a periodic cell; remove [[insert]] and [[remove]]");
+  if (!setup.probes.empty() || !setup.fields.empty())
+    refuse("regions and grids know no images; remove [[probe]] and [[field]] (cell.csv has means)");
 }
 
 double candidate_margin(const DetectionSettings& detection, double smallest) {

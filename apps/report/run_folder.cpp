@@ -1,0 +1,46 @@
+#include "apps/report/run_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+namespace talus {
+
+namespace {
+
+using nlohmann::json;
+
+json read_object(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  json read = json::parse(file, nullptr, false);
+  return read.is_object() ? read : json::object();
+}
+
+}  // namespace
+
+RunFolder read_run_folder(const std::filesystem::path& directory) {
+  if (!std::filesystem::exists(directory / "run.json"))
+    throw std::invalid_argument(fmt::format("{}: no run was begun there", directory.string()));
+  RunFolder run;
+  run.directory = directory;
+  const json all = read_object(directory / "run.json");
+  run.provenance = all.value("provenance", json::object());
+  run.summary = all.value("summary", json::object());
+  run.status = read_object(directory / "status.json");
+  std::ifstream file(directory / "scene.resolved.toml", std::ios::binary);
+  run.resolved.assign(std::istreambuf_iterator<char>(file), {});
+  try {
+    run.scene = io::parse_scene(run.resolved, (directory / "scene.resolved.toml").string());
+  } catch (const std::exception&) {
+    // Its words need the scene; everything else is told without it.
+  }
+  run.steps = io::read_columns(
+      directory / "steps.csv",
+      {"step", "time", "time_step", "contacts", "active", "iterations", "error_rms", "error_max", "balance",
+       "overlap", "kinetic_translation", "kinetic_rotation", "wall_s", "converged"});
+  return run;
+}
+
+}  // namespace talus

@@ -1,0 +1,167 @@
+/// What was simulated: in sentences, and as a table.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "apps/report/sections.hpp"
+
+namespace talus {
+
+namespace {
+
+std::string joined(const std::vector<std::string>& words, const char* last) {
+  std::string text;
+  for (std::size_t k = 0; k < words.size(); ++k)
+    text += (k == 0 ? "" : k + 1 == words.size() ? std::string(last) : ", ") + words[k];
+  return text;
+}
+
+std::string counted(std::size_t count, const char* what) {
+  return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+/// "radius 8 to 12 mm", from their distribution.
+std::string radii_of(const SizeDistribution& radii) {
+  const double low = smallest_radius(radii), high = largest_radius(radii);
+  return low == high ? "radius " + with_prefix(low, "m")
+                     : "radius " + with_prefix(low, "m") + " to " + with_prefix(high, "m");
+}
+
+std::string sample_words(const io::SampleSpec& sample) {
+  using Kind = io::SampleSpec::Kind;
+  const std::string grains =
+      sample.grains() > 0 ? counted(static_cast<std::size_t>(sample.grains()), "grain") : "grains";
+  switch (sample.kind) {
+    case Kind::deposition:
+      return fmt::format("{} of {}, deposited layer by layer", grains, radii_of(sample.radii));
+    case Kind::lattice:
+      return fmt::format("{} of {} on a lattice", grains, radii_of(sample.radii));
+    case Kind::bodies:
+      return "grains from a file";
+    case Kind::state:
+      return "the state of an earlier run";
+    case Kind::body:
+      return fmt::format("a sphere '{}' of {}", sample.name, radii_of(sample.radii));
+  }
+  return grains;
+}
+
+std::string load_words(const WallLoad& load) {
+  switch (load.drive) {
+    case WallDrive::fixed:
+      return "is fixed";
+    case WallDrive::velocity:
+      return "moves at " + with_prefix(load.velocity.norm(), "m/s");
+    case WallDrive::pressure:
+      return "is pressed with " + with_prefix(load.pressure, "Pa");
+    case WallDrive::force:
+      return "is pushed with " + with_prefix(load.force, "N");
+  }
+  return "";
+}
+
+std::string wall_words(const Wall& wall) {
+  std::string text =
+      wall.shape.name + ", " + (wall.motion.empty() ? load_words(wall.load) : "moves by itself");
+  if (!wall.from_stage.empty()) text += ", from stage '" + wall.from_stage + "' on";
+  if (!wall.until_stage.empty()) text += ", until stage '" + wall.until_stage + "'";
+  return text;
+}
+
+std::string end_words(const StageEnd& end) {
+  std::vector<std::string> ends;
+  if (end.steps) ends.push_back(counted(static_cast<std::size_t>(*end.steps), "step"));
+  if (end.time) ends.push_back(with_prefix(*end.time, "s"));
+  if (end.strain)
+    ends.push_back(fmt::format("a strain of {:g} along {}", *end.strain, "xyz"[end.strain_axis]));
+  if (end.equilibrium) ends.push_back(fmt::format("equilibrium within {:g}", *end.equilibrium));
+  return "until " + joined(ends, " or ");
+}
+
+/// "friction 0.35", "friction 0.35, at walls 0.1"; of several materials "friction 0.2 to 0.35". "" where it
+/// is 0.
+std::string law_words(const char* name, const PairTable& laws, double PairLaw::*number,
+                      const char* unit = "") {
+  constexpr std::size_t one_material = 3;  // pairs: grains, walls, both
+  const double most = laws.largest(number);
+  if (most == 0) return "";
+  if (laws.laws().size() == one_material) {
+    const double grains = laws.between(material_of_grains, material_of_grains).*number;
+    const double walls = laws.between(material_of_grains, material_of_walls).*number;
+    return fmt::format("; {} {:g}{}{}", name, grains, unit,
+                       walls == grains ? "" : fmt::format(", at walls {:g}{}", walls, unit));
+  }
+  double least = most;
+  for (const PairLaw& law : laws.laws()) least = std::min(least, law.*number);
+  return least == most ? fmt::format("; {} {:g}{}", name, most, unit)
+                       : fmt::format("; {} {:g} to {:g}{}", name, least, most, unit);
+}
+
+std::string stage_words(const Stage& stage) {
+  std::string text = end_words(stage.end) + "; ";
+  text +=
+      stage.chooses_time_step ? "time steps are chosen" : "time step " + with_prefix(stage.time_step, "s");
+  if (stage.laws.largest(&PairLaw::friction) == 0) text += "; no friction";
+  text += law_words("friction", stage.laws, &PairLaw::friction);
+  text += law_words("restitution", stage.laws, &PairLaw::restitution);
+  text += law_words("cohesion", stage.laws, &PairLaw::cohesion, " N");
+  text += law_words("rolling resistance", stage.laws, &PairLaw::rolling_resistance);
+  if (stage.gravity.norm() > 0) text += fmt::format("; gravity {:g} m/s²", stage.gravity.norm());
+  for (const auto& [wall, load] : stage.loads) text += "; wall '" + wall + "' " + load_words(load);
+  return text;
+}
+
+std::string insert_words(const InsertRule& insert) {
+  std::string text = "spheres of " + radii_of(insert.radii);
+  if (insert.rate) text += fmt::format(", {:g} a second", *insert.rate);
+  if (insert.mass_rate) text += fmt::format(", {:g} kg a second", *insert.mass_rate);
+  if (insert.count) text += fmt::format(", {} in all", *insert.count);
+  if (insert.mass) text += fmt::format(", {:g} kg in all", *insert.mass);
+  return text;
+}
+
+std::string overview(const io::Scene& scene) {
+  std::vector<std::string> what;
+  for (const io::SampleSpec& sample : scene.samples) what.push_back(sample_words(sample));
+  if (!scene.setup.inserts.empty()) what.push_back("grains that are inserted while it runs");
+  std::string text = joined(what, " and ");
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  std::vector<std::string> stages;
+  for (const Stage& stage : scene.setup.stages) stages.push_back("'" + stage.name + "'");
+  return text + fmt::format(", between {}, in {}: {}.", counted(scene.setup.walls.size(), "wall"),
+                            counted(stages.size(), "stage"), joined(stages, ", then "));
+}
+
+}  // namespace
+
+HtmlSections scene_section(const RunFolder& run) {
+  io::HtmlSection section{"What was simulated", ""};
+  auto& rows = section.table.rows;
+  if (!run.scene) {
+    section.text = "The scene reads files that are no longer there; it stands at the end of this page.";
+  } else {
+    const io::Scene& scene = *run.scene;
+    section.text = overview(scene);
+    for (const io::SampleSpec& sample : scene.samples) rows.push_back({"sample", sample_words(sample)});
+    for (const InsertRule& insert : scene.setup.inserts)
+      rows.push_back({"insert '" + insert.name + "'", insert_words(insert)});
+    if (scene.density > 0) rows.push_back({"density", fmt::format("{:g} kg/m³", scene.density)});
+    for (const io::MaterialSpec& material : scene.materials)
+      rows.push_back({"material '" + material.name + "'", fmt::format("{:g} kg/m³", material.density)});
+    for (const Wall& wall : scene.setup.walls) rows.push_back({"wall '" + wall.name + "'", wall_words(wall)});
+    for (const Stage& stage : scene.setup.stages)
+      rows.push_back({"stage '" + stage.name + "'", stage_words(stage)});
+    rows.push_back({"solver", fmt::format("{}, tolerance {:g}, at most {} sweeps a step",
+                                          scene.setup.solver.method.name(), scene.setup.solver.tolerance,
+                                          scene.setup.solver.max_iterations)});
+  }
+  if (const auto bodies = run.summary.value("bodies", std::size_t{0}); bodies > 0)
+    rows.push_back({"grains at the end", fmt::format("{}", bodies)});
+  for (const auto& warning : run.summary.value("warnings", nlohmann::json::array()))
+    if (warning.is_string()) rows.push_back({"warning", warning.get<std::string>()});
+  return {section};
+}
+
+}  // namespace talus
