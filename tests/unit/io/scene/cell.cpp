@@ -102,6 +102,10 @@ TEST(CellScene, RefusesWhatACellHasNoRoomFor) {
              "[[wall]]\nname = \"pipe\"\nshape = \"cylinder\"\nstart = [0, 0, 0]\nend = [0, 0, 1]\nradius = "
              "0.05\n[[stage]]"),
          "cell", "wall 'pipe' is no plane");
+  refuse(replaced(
+             cube, "[[stage]]",
+             "[[probe]]\nregion = { shape = \"box\", low = [0, 0, 0], high = [0.05, 0.1, 0.1] }\n[[stage]]"),
+         "cell", "know no images");
   refuse(replaced(cube, "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0.0]"), "sample.region", "nothing repeats along z");
   refuse(replaced(cube, "count = 100", "count = 4000"), "sample[0].count", "no room for a grain");
   refuse(replaced(cube, "lengths", "shears = [0.01, 0, 0]\nlength"), "cell.length",
