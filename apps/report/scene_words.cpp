@@ -38,6 +38,8 @@ std::string sample_words(const io::SampleSpec& sample) {
       return fmt::format("{} of {}, deposited layer by layer", grains, radii_of(sample.radii));
     case Kind::lattice:
       return fmt::format("{} of {} on a lattice", grains, radii_of(sample.radii));
+    case Kind::random:
+      return fmt::format("{} of {} at random places", grains, radii_of(sample.radii));
     case Kind::bodies:
       return "grains from a file";
     case Kind::state:
