@@ -131,7 +131,7 @@ TEST(FreeGrains, FollowTheHomogeneousFlowOfTheCell) {
   for (int k = 0; k < 700; ++k) ASSERT_TRUE(run.step().converged) << "step " << k;
   const Domain& domain = run.simulation().state().domain;
   const Mat3 edges = edges_of(domain), rates = matrix_of(domain.rates);
-  EXPECT_LE(std::abs(domain.cell.xz), 0.6 * domain.cell.xx) << "it was set upright again";
+  EXPECT_LE(std::abs(domain.cell.xz), 0.7 * domain.cell.xx) << "it was set upright again";
   EXPECT_NEAR(domain.cell.xx, std::exp(-0.4 * 0.7), 1e-3) << "from rest to the flow in half a step";
   for (std::size_t k = 0; k < places.size(); ++k) {
     const auto id = static_cast<std::int64_t>(k);
@@ -152,7 +152,7 @@ TEST(PairInAShearedCell, FeelsTheSameForceAcrossAFaceAsInside) {
     scene.stage().shear_rates = {0, 2, 0};
     scene.stage().strain_rates = {0, 0, -0.5};
     scene.sphere({0.5, 0.5, z}, radius, mass);
-    scene.sphere({0.5 - 0.8 * radius, 0.5, z - 1.84 * radius}, radius, 3 * mass);
+    scene.sphere({0.5 + 0.8 * radius, 0.5, z - 1.84 * radius}, radius, 3 * mass);
     return Experiment(std::move(scene));
   };
   Experiment inside = made(0.5), across = made(0.04);
@@ -162,10 +162,12 @@ TEST(PairInAShearedCell, FeelsTheSameForceAcrossAFaceAsInside) {
     across.step();
     const Frame a = inside.simulation().frame(), b = across.simulation().frame();
     ASSERT_EQ(a.contact_force.size(), b.contact_force.size()) << "step " << k;
-    for (std::size_t c = 0; c < a.contact_force.size(); ++c) {
-      EXPECT_LT((a.contact_force[c] - b.contact_force[c]).norm(), 1e-8 * (1 + a.contact_force[c].norm()));
-      most = std::max(most, a.contact_force[c].norm());
-    }
+    const auto on_first = [](const Frame& frame) -> Vec3 {
+      if (frame.contact_force.empty()) return Vec3::Zero();
+      return frame.contact_bodies[0][0] == 0 ? frame.contact_force[0] : Vec3(-frame.contact_force[0]);
+    };
+    EXPECT_LT((on_first(a) - on_first(b)).norm(), 1e-8 * (1 + on_first(a).norm())) << "step " << k;
+    most = std::max(most, on_first(a).norm());
     EXPECT_LT((inside.w(0) - across.w(0)).norm(), 1e-11);
   }
   EXPECT_GT(most, 0.1) << "they touch";

@@ -179,7 +179,7 @@ std::map<BodyId, Vec3> against_flow(const Setup& setup, const Vec3& shift) {
 }
 
 TEST(PeriodicRun, ForcesInAFlowDoNotDependOnWhereTheFacesLie) {
-  const Setup setup = flowing(60);
+  const talus::Setup setup = flowing(60);
   const std::map<BodyId, Vec3> one = against_flow(setup, Vec3::Zero());
   double scale = 0;
   for (const auto& [id, u] : one) scale = std::max(scale, u.norm());
@@ -195,7 +195,7 @@ TEST(PeriodicRun, ForcesInAFlowDoNotDependOnWhereTheFacesLie) {
 TEST(PeriodicRun, FlowsToTheSameBitsOnAnyRanksAndThreads) {
   for (const std::size_t which : {3U, 1U, 7U}) {
     const auto& variant = decomposition_test::variants[which];
-    Setup setup = flowing(90);
+    talus::Setup setup = flowing(90);
     setup.solver.max_iterations = 40;
     setup.solver.overlap_correction = variant.coupling == Coupling::schwarz ? 0 : 0.1;
     decomposition_test::choose(setup, variant, 8);
