@@ -172,7 +172,7 @@ struct Frame {
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
-  std::vector<FieldGrid> grids;  ///< that the scene asks for
+  std::vector<FieldGrid> grids;  ///< that the scene asks for; none before the first step
   bool with_contacts = true;     ///< false: its contacts, of which there may be some, are left out
 };
 
