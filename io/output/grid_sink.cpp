@@ -28,28 +28,36 @@ class GridSink : public OutputSink {
   }
   void resume(const OutputMark& mark) override {
     open();
-    times_ = mark.frame_times;
-    if (!writes_) return;
+    frames_ = mark.frame_times.size();
+    if (!writes_ || names_.empty()) return;
     std::error_code ignored;
+    for (std::size_t frame = 0; frame < frames_; ++frame)
+      if (std::filesystem::exists(file_of(names_.front(), frame), ignored))
+        written_.push_back({frame, mark.frame_times[frame]});
     for (const std::string& name : names_) {
-      for (std::size_t later = times_.size(); std::filesystem::remove(file_of(name, later), ignored);
-           ++later) {
+      for (std::size_t later = frames_; std::filesystem::remove(file_of(name, later), ignored); ++later) {
       }
       std::filesystem::remove(collection_of(name), ignored);
-      if (!times_.empty()) collect(name);
+      if (!written_.empty()) collect(name);
     }
   }
   void frame(const Frame& part) override {
+    const std::size_t number = frames_++;
     if (!writes_ || part.grids.empty()) return;
-    times_.push_back(part.time);
+    written_.push_back({number, part.time});
     for (const FieldGrid& field : part.grids) {
-      write_whole(file_of(field.name, times_.size() - 1),
+      write_whole(file_of(field.name, number),
                   [&](const WriteText& out) { write_field_vti(field, part.time, out); });
       collect(field.name);
     }
   }
 
  private:
+  /// A frame that has fields.
+  struct Written {
+    std::size_t frame;
+    double time;  ///< [s]
+  };
   static std::string file_name(const std::string& field, std::size_t frame) {
     return fmt::format("field_{}_{:06}.vti", field, frame);
   }
@@ -61,15 +69,15 @@ class GridSink : public OutputSink {
   }
   void collect(const std::string& field) const {
     std::vector<FieldFile> files;
-    for (std::size_t frame = 0; frame < times_.size(); ++frame)
-      files.push_back({times_[frame], 0, file_name(field, frame)});
+    for (const auto& [frame, time] : written_) files.push_back({time, 0, file_name(field, frame)});
     write_whole(collection_of(field), collection_pvd(files));
   }
 
   std::filesystem::path directory_;
   std::vector<std::string> names_;
   bool writes_;
-  std::vector<double> times_;  ///< [s] of the frames
+  std::vector<Written> written_;
+  std::size_t frames_ = 0;  ///< of the run, those without fields among them
 };
 
 }  // namespace

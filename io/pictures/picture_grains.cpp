@@ -41,11 +41,11 @@ std::string_view speed_colour(double speed, double usual) {
   return speeds[std::min(place, speeds.size() - 1)];
 }
 
-/// A page with a title, and the grains of a slab in their colours; then draw(svg, view, top of the legend).
+/// A page with a title, the grains of a slab in their colours, and a legend that begins at (x, y).
 struct GrainPage {
   std::string title;
   std::function<std::string_view(std::size_t)> colour;
-  std::function<void(Svg&, const View&)> over;
+  std::function<void(Svg&, const View&, std::size_t)> over;  ///< on a grain
   std::function<void(Svg&, double x, double y)> legend;
 };
 
@@ -66,10 +66,11 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
   std::vector<std::size_t> order = slab.grains;
   std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::size_t k) { return frame.x[k].y(); });
   svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.4")", style::grain_edge));
-  for (const std::size_t k : order)
+  for (const std::size_t k : order) {
     svg.circle(view.x(frame.x[k].x()), view.y(frame.x[k].z()), frame.radius[k] * view.scale, page.colour(k));
+    if (page.over) page.over(svg, view, k);
+  }
   svg.end_group();
-  if (page.over) page.over(svg, view);
   const double length = detail::nice_ticks(0, view.x_high - view.x_low, 8).at(1);
   svg.line(margin_left, bottom + 22, margin_left + length * view.scale, bottom + 22, {style::ink, 3});
   svg.text(margin_left, bottom + 44, detail::with_unit(length, "m"), {12, style::ink});
@@ -77,17 +78,12 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
   return svg.finish();
 }
 
-/// A line from each centre along the velocity, as long as a diameter where the speed is the usual one.
-void draw_arrows(Svg& svg, const View& view, const Frame& frame, const detail::Slab& slab, double usual) {
-  svg.begin_group(R"(stroke-linecap="round")");
-  for (const std::size_t k : slab.grains) {
-    const double speed = frame.u[k].norm();
-    if (!(speed > 0.05 * usual)) continue;
-    const double length = 2 * frame.radius[k] * std::min(speed / usual, 1.0) / speed;
-    svg.line(view.x(frame.x[k].x()), view.y(frame.x[k].z()), view.x(frame.x[k].x() + length * frame.u[k].x()),
-             view.y(frame.x[k].z() + length * frame.u[k].z()), {style::ink, 0.8});
-  }
-  svg.end_group();
+/// From the centre along the velocity, as long as a diameter where the speed is the usual one.
+void draw_arrow(Svg& svg, const View& view, const Frame& frame, std::size_t k, double usual) {
+  const double speed = frame.u[k].norm();
+  if (!(usual > 0 && speed > 0.05 * usual)) return;
+  const Vec3 end = frame.x[k] + 2 * frame.radius[k] * std::min(speed / usual, 1.0) / speed * frame.u[k];
+  svg.line(view.x(frame.x[k].x()), view.y(frame.x[k].z()), view.x(end.x()), view.y(end.z()), {"#e0661f", 1});
 }
 
 }  // namespace
@@ -98,9 +94,7 @@ std::string draw_velocities(const Frame& frame, const GrainPicture& options) {
   GrainPage page;
   page.title = "Velocities";
   page.colour = [&](std::size_t k) { return speed_colour(frame.u[k].norm(), usual); };
-  page.over = [&](Svg& svg, const View& view) {
-    if (usual > 0) draw_arrows(svg, view, frame, slab, usual);
-  };
+  page.over = [&](Svg& svg, const View& view, std::size_t k) { draw_arrow(svg, view, frame, k, usual); };
   page.legend = [&](Svg& svg, double x, double y) {
     if (!(usual > 0)) return svg.text(x, y + 4, "at rest", {12, style::ink});
     for (std::size_t c = 0; c < speeds.size(); ++c)

@@ -87,7 +87,7 @@ std::vector<FieldGrid> coarse_fields(std::span<const FieldRule> rules, const Ste
         part.numbers.assign(numbers, 0.0);
         spread_bodies(state, all.several() ? all.slots_of(here) : SlotRange{0, state.bodies.size()},
                       field.grid, lucy, part);
-        if (impulse_time > 0) spread_contacts(state, here, impulse_time, field.grid, lucy, part);
+        spread_contacts(state, here, impulse_time, field.grid, lucy, part);
       }
       std::size_t at = 0;
       ranks.records_to_first(std::span<const double>(part.numbers), [&](std::span<const double> piece) {

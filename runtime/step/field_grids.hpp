@@ -23,9 +23,9 @@ struct FieldGrid {
   GridSums sums;  ///< on rank 0; empty on others
 };
 
-/// The fields of `rules` with the poses and velocities of the end of the step; forces are impulses over
-/// `impulse_time` [s], and are left out where that is 0. Subdomain after subdomain: the same bits on any
-/// ranks and threads. Each rank holds one grid at a time. Collective.
+/// The fields of `rules` behind a step, with the poses and velocities of its end; forces are impulses over
+/// `impulse_time` > 0 [s]. Subdomain after subdomain: the same bits on any ranks and threads. Each rank holds
+/// one grid at a time. Collective.
 std::vector<FieldGrid> coarse_fields(std::span<const FieldRule> rules, const StepState& state,
                                      double impulse_time, const graph::Communicator& ranks);
 

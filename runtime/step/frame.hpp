@@ -191,7 +191,7 @@ struct Frame {
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
   Domain domain = {};            ///< that they stand in; x and contact_point are wrapped
-  std::vector<FieldGrid> grids;  ///< that the scene asks for
+  std::vector<FieldGrid> grids;  ///< that the scene asks for; none before the first step
   bool with_contacts = true;     ///< false: its contacts, of which there may be some, are left out
 };
 

@@ -21,7 +21,7 @@ struct ProbeRule {
   std::optional<std::int64_t> every_steps;  ///< steps likewise; whichever comes first
 };
 
-/// Coarse-grained fields on a grid of cells, made with every frame.
+/// Coarse-grained fields on a grid of cells, made with every frame behind a step.
 struct FieldRule {
   std::string name;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  ///< [m] corners of the grid

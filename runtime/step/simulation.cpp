@@ -187,9 +187,10 @@ Frame Simulation::frame(bool contacts) const {
              impl_->parameters.impulse_time(), frame);
   frame.walls = walls();
   frame.with_contacts = contacts;
-  if (!impl_->setup.fields.empty())
-    frame.grids = coarse_fields(impl_->setup.fields, impl_->state,
-                                frame.step > 0 ? impl_->parameters.impulse_time() : 0, impl_->ranks);
+  // The first step deals bodies out to subdomains, whose order sums go by.
+  if (frame.step > 0)
+    frame.grids =
+        coarse_fields(impl_->setup.fields, impl_->state, impl_->parameters.impulse_time(), impl_->ranks);
   return frame;
 }
 

@@ -43,13 +43,29 @@ std::string without(const std::string& table, const std::string& column) {
   return kept;
 }
 
+/// What is summed up over a run, and what a frame has besides.
+const std::string probes = R"(
+[[probe]]
+name = "middle"
+region = { shape = "plane", point = [0.06, 0.06, 0.06], normal = [1, 0.3, 0.2] }
+[[probe]]
+name = "part"
+every = 0.0035
+region = { shape = "cylinder", start = [0, 0.06, 0.05], end = [0.12, 0.06, 0.05], radius = 0.04 }
+[[field]]
+low = [0, 0, 0]
+high = [0.12, 0.12, 0.12]
+cells = [6, 6, 6]
+width = 0.03
+)";
+
 class Resumed : public OnRanks {
  protected:
   void SetUp() override {
     std::string scene = six_subdomains;
     for (std::size_t at; (at = scene.find("steps = 5 }")) != std::string::npos;)
       scene.replace(at, 11, "steps = 12 }");
-    write(at_("scene.toml"), scene);
+    write(at_("scene.toml"), scene + probes);
   }
   fs::path at_(const std::string& name) const { return folder_.path() / name; }
 
