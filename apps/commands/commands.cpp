@@ -4,6 +4,7 @@ namespace talus {
 
 std::vector<Command> commands() {
   return {
+      new_entry(),
       run_entry(),
       status_entry(),
       report_entry(),
@@ -20,6 +21,8 @@ std::vector<Command> commands() {
        .subcommands = {study_error_entry(), study_scaling_entry(), study_stability_entry(),
                        study_certificate_entry()}},
       scene_reference_entry(),
+      completion_entry(),
+      man_entry(),
   };
 }
 

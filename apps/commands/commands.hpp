@@ -24,6 +24,9 @@ Command study_error_entry();
 Command study_scaling_entry();
 Command study_stability_entry();
 Command study_certificate_entry();
+Command new_entry();
 Command scene_reference_entry();
+Command completion_entry();
+Command man_entry();
 
 }  // namespace talus

@@ -1,6 +1,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <hdf5.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -8,8 +9,11 @@
 #include "apps/commands/commands.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
+#include "io/results/run_json.hpp"
 #include "io/results/version.hpp"
 #include "io/scene/detail/spelling.hpp"
+#include "kernels/sweeps/sweep_kernels.hpp"
+#include "runtime/graph/clock.hpp"
 
 #include <cerrno>
 #include <csignal>
@@ -23,6 +27,12 @@
 namespace talus {
 
 namespace {
+
+#ifdef H5_HAVE_PARALLEL
+constexpr bool parallel_hdf5 = true;
+#else
+constexpr bool parallel_hdf5 = false;
+#endif
 
 /// The commands of `app` as far as they were recognised, "talus study error", and the last of them.
 std::pair<std::string, const CLI::App*> recognised(const CLI::App* app) {
@@ -54,6 +64,19 @@ struct AddedCommand {
   const CLI::App* app;
   CommandRun run;
 };
+
+/// Version, build and licence; the first line is the version alone.
+std::string version_text() {
+  const io::Provenance build = io::collect_provenance();
+  return fmt::format(
+      "talus {}\ncommit {}{}, {} build by {}: {}\nfeatures: {}, OpenMP, HDF5 {}.{}.{}{}, METIS; sweeps here "
+      "by "
+      "{}\nlicence: Apache-2.0",
+      io::version(), build.git_hash, build.git_dirty ? " with changes" : "", build.build_type, build.compiler,
+      build.flags, graph::simulated_ranks ? "simulated ranks (SimGrid)" : "MPI", H5_VERS_MAJOR, H5_VERS_MINOR,
+      H5_VERS_RELEASE, parallel_hdf5 ? " (parallel)" : "",
+      name_of(SweepKernels(InstructionSet::automatic).set()));
+}
 
 /// Adds the commands and groups of the table to `parent`, and to `added` what can be run.
 void add_commands(CLI::App& parent, const std::vector<Command>& table, std::vector<AddedCommand>& added) {
@@ -108,7 +131,7 @@ int main(int argc, char** argv) {
   // The same for files beyond a limit: else the system ends a run that says "running" for ever.
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app{"Talus: dense granular matter by nonsmooth contact dynamics"};
-  app.set_version_flag("--version", "talus " + io::version());
+  app.set_version_flag("--version", version_text());
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done; 1 failed; 2 bad input, nothing was written; 3 done, but a step or problem missed "

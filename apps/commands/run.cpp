@@ -248,7 +248,7 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
   const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
   if (ranks.rank() == 0) {
     print_end(terminal, summary, scene.setup.solver, run.directory);
-    if (scene.output.sinks.contains("pictures")) write_page(terminal, run.directory);
+    write_page(terminal, run.directory);
   } else if (summary.status == "failed")
     terminal.warn("rank {}: {}", ranks.rank(), summary.message);
   if (summary.status == "failed" && ranks.ranks() > 1)

@@ -174,10 +174,19 @@ class Drawing {
     for (const ChartLevel& level : chart_.levels) {
       const double at = y_.place(level.y);
       svg_.line(p.left, at, p.right, at, {style::soft_ink, 1.2, "2 3"});
-      if (p.legend_above)  // above its line, or below it where there is no room
-        svg_.text(p.right - 4, at < p.top + 16 ? at + 14 : at - 5, level.name, {11, style::soft_ink, "end"});
-      else
-        svg_.text(p.right + 6, at + 4, level.name, {11, style::soft_ink});
+      if (!p.legend_above) svg_.text(p.right + 6, at + 4, level.name, {11, style::soft_ink});
+    }
+  }
+
+  /// Names of levels within the plot, over the curves: above their lines, or below where there is no room.
+  void level_names() const {
+    const auto& p = page_;
+    for (const ChartLevel& level : chart_.levels) {
+      if (!p.legend_above) continue;
+      const double at = y_.place(level.y), base = at < p.top + 16 ? at + 14 : at - 5;
+      const double length = letter_width * static_cast<double>(level.name.size()) * 11 / 12;
+      svg_.rectangle(p.right - 8 - length, base - 10, length + 8, 13, "#ffffff");
+      svg_.text(p.right - 4, base, level.name, {11, style::soft_ink, "end"});
     }
   }
 
@@ -266,6 +275,7 @@ std::string draw_chart(const Chart& chart) {
   drawing.frame();
   drawing.levels();
   for (const ChartSeries& series : kept.series) drawing.series(series);
+  drawing.level_names();
   drawing.legend();
   return svg.finish();
 }

@@ -35,7 +35,7 @@ TEST_F(Command, WithoutWhatItNeedsSaysSoAndReturnsTwo) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_TRUE(says(outcome, "--help")) << arguments << ": " << outcome.messages;
-    EXPECT_LT(outcome.messages.size(), 200U) << outcome.messages;
+    EXPECT_LT(outcome.messages.size(), 240U) << outcome.messages;
   }
   EXPECT_TRUE(says(run("rnu scene.toml"), "'rnu' is no command of talus; did you mean 'run'?"));
   EXPECT_TRUE(says(run("study eror scene.toml"), "`talus study --help`"));
@@ -181,11 +181,12 @@ TEST_F(Command, NamesADirectoryItCannotWriteTo) {
 // No file may grow beyond 4 kB, 32 kB: what a full disk looks like at the start and in the middle.
 TEST_F(Command, EndsWithOneAndTheNameOfTheFileWhenTheDiskIsFull) {
   write(at("scene.toml"), pressed_box);
-  for (const std::string blocks : {"8", "64"}) {
+  const std::map<std::string, std::string> first_to_fail{{"8", "columns.json"}, {"64", "results.h5"}};
+  for (const auto& [blocks, file] : first_to_fail) {
     const Outcome outcome = run("run scene.toml --out results --force", "ulimit -f " + blocks + ";");
     EXPECT_EQ(outcome.code, 1) << outcome.messages;
     EXPECT_TRUE(says(outcome, "error: ")) << outcome.messages;
-    EXPECT_TRUE(says(outcome, "results/results.h5: ")) << outcome.messages;
+    EXPECT_TRUE(says(outcome, "results/" + file)) << outcome.messages;
   }
   EXPECT_EQ(summary(at("results")).at("status"), "failed");
   EXPECT_EQ(summary(at("results")).at("exit_code"), 1);

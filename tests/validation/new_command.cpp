@@ -1,0 +1,73 @@
+// Scenes to start from, and what shells and `man` know of the command.
+
+#include <gtest/gtest.h>
+
+#include "tests/validation/command_helpers.hpp"
+
+namespace talus::new_command_test {
+namespace {
+
+using namespace talus::test;
+
+class NewScene : public testing::TestWithParam<const char*> {};
+
+TEST_P(NewScene, IsSoundAndRuns) {
+  const ScratchDirectory scratch;
+  const Outcome made = run(scratch.path(), std::string("new first --kind ") + GetParam());
+  ASSERT_EQ(made.code, 0) << made.messages;
+  const Outcome checked = run(scratch.path(), "run first.toml --dry-run");
+  EXPECT_EQ(checked.code, 0) << checked.messages;
+  EXPECT_EQ(checked.messages.find("warning"), std::string::npos) << checked.messages;
+  const Outcome ran = run(scratch.path(), "run first.toml --out out --steps 20 --threads 1 --quiet");
+  EXPECT_EQ(ran.code, 0) << ran.messages;
+  EXPECT_NE(content(scratch / "out/report.html").find("20 steps"), std::string::npos)
+      << "every run has its page";
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, NewScene, testing::Values("triaxial", "silo", "drum", "heap"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
+TEST(NewCommand, ReplacesNothingAndRefusesWhatNoSceneCanBe) {
+  const ScratchDirectory scratch;
+  write(scratch / "mine.toml", "mine");
+  EXPECT_EQ(run(scratch.path(), "new mine --kind silo").code, 2);
+  EXPECT_EQ(content(scratch / "mine.toml"), "mine");
+  const Outcome unknown = run(scratch.path(), "new other --kind volcano");
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.messages.find("triaxial, silo, drum, heap"), std::string::npos) << unknown.messages;
+  EXPECT_EQ(run(scratch.path(), "new 'a b' --kind silo").code, 2)
+      << "a name with a space is that of no scene";
+  EXPECT_FALSE(fs::exists(scratch / "other.toml") || fs::exists(scratch / "a b.toml"));
+}
+
+TEST(Completion, KnowsCommandsOptionsAndGroups) {
+  const ScratchDirectory scratch;
+  write(scratch / "complete.sh",
+        "source <(\"$1\" completion bash); shift\n"
+        "COMP_WORDS=(talus \"$@\"); COMP_CWORD=$#; _talus; echo \"${COMPREPLY[*]}\"\n");
+  const auto completed = [&](const std::string& words) {
+    const Outcome outcome = run(scratch.path(), words, "bash complete.sh");
+    EXPECT_EQ(outcome.code, 0) << outcome.messages;
+    return outcome.output;
+  };
+  EXPECT_EQ(completed("sta"), "status\n");
+  EXPECT_EQ(completed("run --for"), "--force\n");
+  EXPECT_EQ(completed("study err"), "error\n");
+  EXPECT_EQ(completed("run comp"), "complete.sh\n") << "files, where no option begins like this";
+}
+
+TEST(ManPage, HasEveryCommandAndItsOptions) {
+  const ScratchDirectory scratch;
+  const Outcome page = run(scratch.path(), "man");
+  ASSERT_EQ(page.code, 0) << page.messages;
+  for (const char* part :
+       {".TH TALUS 1", ".SS \"talus run\"", ".SS \"talus study error\"", "\n.B \\-\\-resume\n",
+        "\n.B scene FILE\n", ".SS \"talus convert\"", ".SH EXIT STATUS"})
+    EXPECT_NE(page.output.find(part), std::string::npos) << part;
+  const Outcome version = run(scratch.path(), "--version");
+  for (const char* part : {"talus ", "commit ", "features: ", "licence: Apache-2.0"})
+    EXPECT_NE(version.output.find(part), std::string::npos) << version.output;
+}
+
+}  // namespace
+}  // namespace talus::new_command_test
