@@ -11,8 +11,8 @@ namespace talus::io {
 
 /// Writes grains as PolyData that changes over time (VTKHDF 2.0, "Temporal Poly Data"): a vertex for each
 /// grain, with point data id, radius [m], velocity [m/s], and omega [rad/s], orientation (w, x, y, z) and
-/// material where the first frame with grains has them. All are in full precision, and every dataset has an attribute
-/// `units`.
+/// material where the first frame with grains has them. All are in full precision, and every dataset has an
+/// attribute `units`.
 ///
 ///     VtkHdfWriter writer("grains.vtkhdf");
 ///     for (...) writer.append(frame);
