@@ -38,7 +38,7 @@ const std::vector<Room>& rooms() {
       {"kernels/global", {"kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
       {"kernels/delassus", {"kernels/bodies", "kernels/law", "kernels/shapes", "kernels/detection"}},
       {"kernels/clusters", {"kernels/bodies", "kernels/law", "kernels/global", "kernels/delassus"}},
-      {"kernels/samples", {"kernels/bodies", "kernels/shapes"}},
+      {"kernels/samples", {"kernels/bodies", "kernels/shapes", "kernels/detection"}},
       {"io/files", {}},
       {"io/fclib", {"io/files"}},
       {"io/results", {"io/files"}},
