@@ -272,7 +272,8 @@ class SceneReader {
       fail_at(*node, end_path, fmt::format("stage '{}' never ends: give {}", stage.name, conditions));
     if (end.strain && !bounded(end.strain_axis))
       fail_at(*node, end_path + ".strain",
-              fmt::format("neither two walls nor a cell bound the sample along {}", "xyz"[end.strain_axis]));
+              fmt::format("no two walls bound the sample along {0}, and nothing is periodic there",
+                          "xyz"[end.strain_axis]));
     const bool pushed = std::any_of(in_force.begin(), in_force.end(), [](const WallLoad& load) {
       return (load.drive == WallDrive::pressure && load.pressure > 0) ||
              (load.drive == WallDrive::force && load.force > 0);

@@ -91,7 +91,8 @@ struct Gathered {
 };
 
 Gathered exchange_surroundings(const Decomposition& decomposition, const graph::Communicator& ranks,
-                               const Bodies& bodies, std::span<const double> reach, const Domain& domain) {
+                               const RankSample& sample, std::span<const double> reach) {
+  const Bodies& bodies = sample.bodies;
   Gathered gathered;
   gathered.own.reserve(bodies.size());
   double largest[1] = {0};
@@ -106,7 +107,7 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
       gathered.own.push_back(static_cast<Slot>(s));
       continue;
     }
-    domain.each_image(bodies.x[s], 3 * largest[0], [&](const Vec3&, const Vec3& image) {
+    sample.domain.each_image(bodies.x[s], 3 * largest[0], [&](const Vec3&, const Vec3& image) {
       for (const SubdomainId subdomain : subdomains_within(decomposition.partition, image, 3 * largest[0])) {
         const std::size_t rank = at(decomposition.rank_of[subdomain]);
         if (sent[rank] == s) continue;
@@ -208,8 +209,8 @@ namespace {
 
 /// Collective. Makes the partition anew, near the one before.
 void cut_space(Decomposition& decomposition, const DecompositionSettings& settings,
-               const graph::Communicator& ranks, const RankSample& sample, const Domain& domain) {
-  const auto& [bodies, candidates] = sample;
+               const graph::Communicator& ranks, const RankSample& sample) {
+  const auto& [bodies, candidates, domain] = sample;
   std::int64_t all[1] = {static_cast<std::int64_t>(candidates.size())};
   ranks.sum(all);
   decomposition.blind = all[0] == 0;
@@ -236,10 +237,10 @@ void index_by_id(Surroundings& around, std::span<const BodyId> id_of_slot) {
 
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
                                   const graph::Communicator& ranks, const RankSample& sample,
-                                  std::span<const double> reach, bool partition_anew, const Domain& domain) {
+                                  std::span<const double> reach, bool partition_anew) {
   Bodies& bodies = sample.bodies;
-  if (partition_anew) cut_space(decomposition, settings, ranks, sample, domain);
-  Gathered gathered = exchange_surroundings(decomposition, ranks, bodies, reach, domain);
+  if (partition_anew) cut_space(decomposition, settings, ranks, sample);
+  Gathered gathered = exchange_surroundings(decomposition, ranks, sample, reach);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
   /// `source`: into the own slots, then into what came.
   struct Place {

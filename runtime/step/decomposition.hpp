@@ -98,6 +98,7 @@ struct Surroundings {
 struct RankSample {
   Bodies& bodies;
   Candidates& candidates;
+  Domain domain;  ///< that they stand in, now
 };
 
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of
@@ -108,7 +109,7 @@ struct RankSample {
 /// `distribute`.
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
                                   const graph::Communicator& ranks, const RankSample& sample,
-                                  std::span<const double> reach, bool partition_anew, const Domain& domain);
+                                  std::span<const double> reach, bool partition_anew);
 
 /// Candidates found among the surroundings.
 struct FoundCandidates {
@@ -117,7 +118,6 @@ struct FoundCandidates {
   /// Candidates between places in the surroundings whose impulses those found begin from, in the place of
   /// those of the sample; null: the sample's.
   const Candidates* begun_from = nullptr;
-  Domain domain = {};
 };
 
 /// Collective. From the candidates found to the copies, candidates with the impulses of those in `sample`,

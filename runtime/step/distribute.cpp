@@ -35,7 +35,7 @@ Vec3 point_of(const Candidates& candidates, std::size_t k, std::span<const Vec3>
 /// The impulses of the last step, with slots of the surroundings. Those whose point of contact now lies in a
 /// subdomain of another rank are sent there; `candidates` are freed.
 Candidates collect_impulses(const Decomposition& decomposition, const graph::Communicator& ranks,
-                            const Surroundings& around, const RankSample& sample, const Domain& domain) {
+                            const Surroundings& around, const RankSample& sample) {
   const Bodies& bodies = sample.bodies;
   Candidates candidates = std::move(sample.candidates);
   const std::size_t grains = candidates.grain_pairs.size();
@@ -52,11 +52,9 @@ Candidates collect_impulses(const Decomposition& decomposition, const graph::Com
     const bool wall = k >= grains;
     const GrainPair pair = wall ? GrainPair{} : candidates.grain_pairs[k];
     const WallPair at_wall = wall ? candidates.wall_pairs[k - grains] : WallPair{};
-    const std::int32_t rank =
-        ranks.ranks() == 1
-            ? 0
-            : decomposition
-                  .rank_of[decomposition.partition.subdomain_of(point_of(candidates, k, bodies.x, domain))];
+    const std::int32_t rank = ranks.ranks() == 1 ? 0
+                                                 : decomposition.rank_of[decomposition.partition.subdomain_of(
+                                                       point_of(candidates, k, bodies.x, sample.domain))];
     if (rank == ranks.rank()) {
       if (wall)
         old.wall_pairs.push_back({at_wall.wall, around.of_slot[at(at_wall.body)], at_wall.feature});
@@ -258,7 +256,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
                                        FoundCandidates among, const RankSample& sample) {
   const Partition& partition = decomposition.partition;
   Candidates& found = among.candidates;
-  const Candidates old = collect_impulses(decomposition, ranks, around, sample, among.domain);
+  const Candidates old = collect_impulses(decomposition, ranks, around, sample);
   match_impulses(among.begun_from ? *among.begun_from : old, found);
   sample.candidates = {};
   release(sample.bodies.x);
@@ -270,7 +268,7 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
   {
     std::vector<SubdomainId> subdomain(found.size()), home;
     for (std::size_t k = 0; k < found.size(); ++k)
-      subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x, among.domain));
+      subdomain[k] = partition.subdomain_of(point_of(found, k, around.bodies.x, sample.domain));
     for (const Vec3& x : around.bodies.x) home.push_back(partition.subdomain_of(x));
     const auto stand = [&] {
       return grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);

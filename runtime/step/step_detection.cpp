@@ -201,8 +201,8 @@ void StepGraph::make_cells() {
     make_room();
     const double began = graph::seconds_now();
     trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
-    around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_, {bodies, state_.candidates},
-                                   reach, anew, state_.domain);
+    around_ = collect_surroundings(state_.decomposition, decomposition_, ranks_,
+                                   {bodies, state_.candidates, state_.domain}, reach, anew);
     span.end();
     sums_.times.dealing = graph::seconds_now() - began;
     sort_into_cells(around_.bodies.x, around_.reach);
@@ -256,8 +256,8 @@ void StepGraph::make_chunks() {
   if (several) {
     const trace::Span span(executor_.trace(), kind_of(TaskKind::partition));
     groups = distribute(state_.decomposition, decomposition_, ranks_, around_,
-                        {std::move(fresh), glued, begins ? &given : nullptr, state_.domain},
-                        {state_.bodies, state_.candidates});
+                        {std::move(fresh), glued, begins ? &given : nullptr},
+                        {state_.bodies, state_.candidates, state_.domain});
     sums_.migrants = state_.decomposition.migrants;
     renew_slots();
     sums_.times.dealing += graph::seconds_now() - began;

@@ -83,13 +83,21 @@ struct LaneSlots {
   const std::size_t *i, *j;
 };
 
+/// In which space contacts are looked for, and by which rule.
+template <class S>
+struct GapSearch {
+  S space;
+  const GapRule& rule;
+};
+
 /// W pairs from `at` of `out` on; returns the lanes that came far.
 template <class V, class S, class E>
-[[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const S& space, LaneSlots slots,
-                                                  const GapRule& rule, E restitution, const GapTarget& out,
+[[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const GapSearch<S>& search,
+                                                  LaneSlots slots, E restitution, const GapTarget& out,
                                                   std::size_t at) {
+  const GapRule& rule = search.rule;
   Pairing<V> pair = meet(pairs, slots.i, slots.j, V{});
-  space.meet(pair.d.x, pair.d.y, pair.d.z, pair.v.x, pair.v.y, pair.v.z);
+  search.space.meet(pair.d.x, pair.d.y, pair.d.z, pair.v.x, pair.v.y, pair.v.z);
   const V distance = root(dot(pair.d, pair.d));
   const BitsOf<V> off = distance > 0;
   const Space<V> n = {off ? pair.d.x / distance : V{}, off ? pair.d.y / distance : V{},
@@ -108,7 +116,7 @@ template <class V, class S, class E>
 }
 
 template <int W, class S, class E>
-[[gnu::always_inline]] inline bool find_gaps_with(const PairView& view, const S& space, const GapRule& rule,
+[[gnu::always_inline]] inline bool find_gaps_with(const PairView& view, const GapSearch<S>& search,
                                                   E restitution, const GapTarget& target) {
   using V = Lanes<W>;
   const PairView pairs = view;  // local ones, so that no store can change them
@@ -138,13 +146,13 @@ template <int W, class S, class E>
         ask(pairs.second[next]);
       }
     }
-    far |= gap_block<V>(pairs, space, {i, j}, rule, restitution.template of<V>(k, AllLanes{}), out, k);
+    far |= gap_block<V>(pairs, search, {i, j}, restitution.template of<V>(k, AllLanes{}), out, k);
   }
   if (const std::size_t rest = pairs.count - k; rest > 0) {  // the last pair fills the lanes behind it
     for (std::size_t l = 0; l < W; ++l) slots(k + (l < rest ? l : rest - 1), l);
     double nx[W], ny[W], nz[W], bias[W];
     std::int64_t contact[W];
-    far |= gap_block<V>(pairs, space, {i, j}, rule, restitution.template of<V>(k, FirstLanes{rest}),
+    far |= gap_block<V>(pairs, search, {i, j}, restitution.template of<V>(k, FirstLanes{rest}),
                         {nx, ny, nz, bias, contact}, 0);
     for (std::size_t l = 0; l < rest; ++l) {
       out.nx[k + l] = nx[l];
@@ -163,9 +171,11 @@ template <int W>
 bool find_gaps(const PairView& view, const GapRule& rule, const GapTarget& target) {
   const auto with = [&](const auto& restitution) {
     if (view.rates)
-      return find_gaps_with<W>(view, FlowingSpace{*view.cell, *view.rates}, rule, restitution, target);
-    if (view.cell) return find_gaps_with<W>(view, PeriodicSpace(*view.cell), rule, restitution, target);
-    return find_gaps_with<W>(view, WalledSpace{}, rule, restitution, target);
+      return find_gaps_with<W>(view, GapSearch<FlowingSpace>{{*view.cell, *view.rates}, rule}, restitution,
+                               target);
+    if (view.cell)
+      return find_gaps_with<W>(view, GapSearch<PeriodicSpace>{*view.cell, rule}, restitution, target);
+    return find_gaps_with<W>(view, GapSearch<WalledSpace>{{}, rule}, restitution, target);
   };
   return view.restitution ? with(OwnRestitution{view.restitution}) : with(OneRestitution{rule.restitution});
 }
