@@ -25,7 +25,12 @@ struct Bounded {
 };
 
 io::HtmlFigure bounded_figure(const RunFolder& run, const Bounded& what) {
-  const auto &time = run.steps["time"], &value = run.steps[what.column];
+  const auto& time = run.steps["time"];
+  // What is far below its tolerance, as before grains touch, would press the rest of the curve flat.
+  constexpr double floor = 1e-4;
+  std::vector<double> value = run.steps[what.column];
+  for (double& v : value)
+    if (v < floor * what.tolerance) v = floor * what.tolerance;
   io::Chart chart = small_chart(what.title, "time [s]", what.label, true);
   chart.series.push_back({"", thinned(time, value, Thinned::largest), colour_of_error});
   std::vector<double> missed_time, missed;
@@ -66,7 +71,9 @@ HtmlSections certificate_section(const RunFolder& run) {
   const SolverSettings solver = run.scene ? run.scene->setup.solver : SolverSettings{};
   const auto missed = static_cast<std::size_t>(std::count(converged.begin(), converged.end(), 0.0));
   io::HtmlSection section{"May it be believed?", verdict(run, converged.size(), missed)};
-  section.text += " Where steps are many, the worst of each stretch is drawn.";
+  section.text +=
+      " Where steps are many, the worst of each stretch is drawn; what is below a ten-thousandth of its "
+      "tolerance is drawn there.";
   section.figures = {
       bounded_figure(run,
                      {"Error of the contacts", "error, rms", "error_rms", run.scene ? solver.tolerance : 0,

@@ -266,9 +266,10 @@ std::string draw_chart(const Chart& chart) {
   std::erase_if(kept.levels, [&](const ChartLevel& level) {
     return !std::isfinite(level.y) || (chart.log_y && level.y <= 0);
   });
-  // Above a level there is room for its name.
-  for (const ChartLevel& level : kept.levels)
-    widen(1, page.legend_above && chart.log_y ? 2 * level.y : level.y);
+  for (const ChartLevel& level : kept.levels) widen(1, level.y);
+  // Above the highest level there is room for its name, which would hide curves elsewhere.
+  if (page.legend_above && chart.log_y)
+    for (const ChartLevel& level : kept.levels) widen(1, level.y * std::pow(high[1] / low[1], 0.12));
   const Axis x(chart.log_x, low[0], high[0], page.left, page.right);
   const Axis y(chart.log_y, low[1], high[1], page.bottom, page.top);
   const Drawing drawing(svg, kept, page, x, y);

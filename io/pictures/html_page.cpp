@@ -33,7 +33,7 @@ figcaption { font-size: 14px; color: var(--soft); margin: 0.3em 0 0; max-width: 
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26em), 1fr)); gap: 1.6em 1.2em;
            margin: 1em 0; align-items: start; }
 .figures svg { width: 100%; }
-.picture { max-width: 42em; }
+.picture { max-width: 42em; } .figures .chart { max-width: 33em; }
 .kept { background: #ffffff; border-radius: 6px; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 14px; margin: 1em 0; font-variant-numeric: tabular-nums; }

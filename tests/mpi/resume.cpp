@@ -73,8 +73,8 @@ class Resumed : public OnRanks {
     std::map<std::string, std::string> results = files_below(folder);
     std::erase_if(results, [](const auto& file) {
       const std::string& name = file.first;
-      return name == "run.json" || name == "run.log" || name == "status.json" || name == "results.h5" ||
-             name.starts_with("checkpoint_");
+      return name == "run.json" || name == "report.html" || name == "run.log" || name == "status.json" ||
+             name == "results.h5" || name.starts_with("checkpoint_");
     });
     results["steps.csv"] = without(results.at("steps.csv"), "wall_s");
     if (results.contains("error_history.csv"))
