@@ -110,6 +110,10 @@ std::string stage_words(const Stage& stage) {
   text += law_words("restitution", stage.laws, &PairLaw::restitution);
   text += law_words("cohesion", stage.laws, &PairLaw::cohesion, " N");
   text += law_words("rolling resistance", stage.laws, &PairLaw::rolling_resistance);
+  if (stage.flows())
+    text += fmt::format("; the cell flows, strain rates {:g}, {:g}, {:g}, shear rates {:g}, {:g}, {:g} 1/s",
+                        stage.strain_rates[0], stage.strain_rates[1], stage.strain_rates[2],
+                        stage.shear_rates[0], stage.shear_rates[1], stage.shear_rates[2]);
   if (stage.gravity.norm() > 0) text += fmt::format("; gravity {:g} m/s²", stage.gravity.norm());
   for (const auto& [wall, load] : stage.loads) text += "; wall '" + wall + "' " + load_words(load);
   return text;
@@ -124,6 +128,18 @@ std::string insert_words(const InsertRule& insert) {
   return text;
 }
 
+/// ", in a periodic cell of 1 m x 1 m, between 2 walls".
+std::string space_words(const Setup& setup) {
+  std::string text;
+  const Vec3 edges = setup.domain.edges();
+  for (const Eigen::Index k : {0, 1, 2})
+    if (edges[k] > 0)
+      text += (text.empty() ? ", in a periodic cell of " : " × ") + with_prefix(edges[k], "m");
+  if (!setup.walls.empty() || text.empty())
+    text += fmt::format(", between {}", counted(setup.walls.size(), "wall"));
+  return text;
+}
+
 std::string overview(const io::Scene& scene) {
   std::vector<std::string> what;
   for (const io::SampleSpec& sample : scene.samples) what.push_back(sample_words(sample));
@@ -132,8 +148,8 @@ std::string overview(const io::Scene& scene) {
   if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
   std::vector<std::string> stages;
   for (const Stage& stage : scene.setup.stages) stages.push_back("'" + stage.name + "'");
-  return text + fmt::format(", between {}, in {}: {}.", counted(scene.setup.walls.size(), "wall"),
-                            counted(stages.size(), "stage"), joined(stages, ", then "));
+  return text + space_words(scene.setup) +
+         fmt::format(", in {}: {}.", counted(stages.size(), "stage"), joined(stages, ", then "));
 }
 
 }  // namespace

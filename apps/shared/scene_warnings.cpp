@@ -89,7 +89,8 @@ void add_segregation(const io::Scene& scene, const Sample& sample, std::vector<s
 
 std::vector<std::string> scene_warnings(const io::Scene& scene, const Sample& sample) {
   std::vector<std::string> warnings;
-  if (scene.setup.walls.empty()) warnings.push_back("the scene has no walls: nothing holds the grains");
+  if (scene.setup.walls.empty() && scene.setup.domain.edges().minCoeff() == 0)
+    warnings.push_back("the scene has no walls: nothing holds the grains");
   add_gravity(scene, warnings);
   add_regions(scene, warnings);
   add_segregation(scene, sample, warnings);
