@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/bodies.hpp"
 #include "runtime/step/cell.hpp"
+#include "runtime/step/field_grids.hpp"
 
 namespace talus {
 
