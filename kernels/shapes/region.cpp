@@ -1,5 +1,7 @@
 #include "kernels/shapes/region.hpp"
 
+#include <Eigen/Geometry>
+
 #include <cmath>
 #include <limits>
 
