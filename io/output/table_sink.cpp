@@ -8,6 +8,7 @@
 #include "io/output/sinks.hpp"
 #include "io/results/column_dictionary.hpp"
 #include "io/results/csv_writer.hpp"
+#include "io/results/probe_csv.hpp"
 
 namespace talus::io {
 namespace {
@@ -27,7 +28,9 @@ class TableSink : public OutputSink {
 
   void open() override {
     if (!writes_) return;
-    write_whole(directory_ / "columns.json", columns_json());
+    std::vector<TableMeaning> tables = table_meanings();
+    tables.push_back(probes_meaning(context_.material_names));
+    write_whole(directory_ / "columns.json", columns_json(tables));
     lines_of(steps);
     lines_of(walls);
   }

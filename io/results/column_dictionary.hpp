@@ -5,11 +5,12 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace talus::io {
 
 struct ColumnMeaning {
-  std::string_view name;     ///< as in the header
+  std::string name;          ///< as in the header
   std::string_view unit;     ///< SI; "1" where there is none, "" for texts
   std::string_view meaning;  ///< one line
 };
@@ -17,13 +18,10 @@ struct ColumnMeaning {
 /// The columns of one table, in the order of its header.
 struct TableMeaning {
   std::string_view file;  ///< "steps.csv"
-  std::span<const ColumnMeaning> columns;
+  std::vector<ColumnMeaning> columns;
 };
 
-/// All tables that a run may write.
-std::span<const TableMeaning> column_dictionary();
-
-/// The dictionary as JSON: {"steps.csv": [{"name": "step", "unit": "1", "meaning": "..."}, ...], ...}.
-std::string columns_json();
+/// The tables as JSON: {"steps.csv": [{"name": "step", "unit": "1", "meaning": "..."}, ...], ...}.
+std::string columns_json(std::span<const TableMeaning> tables);
 
 }  // namespace talus::io

@@ -1,27 +1,25 @@
 #include "io/results/csv_writer.hpp"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-
 #include <iterator>
 #include <span>
-#include <utility>
 
 #include "io/files/detail/csv_cell.hpp"
-#include "io/files/error.hpp"
 
 namespace talus::io {
 namespace {
 
 using detail::put;
 
-/// One column: its name and how a row's value is written. The tables below drive both the header and the
-/// rows.
+/// One column: what it is (ColumnMeaning) and how a row's value is written. The tables below drive the
+/// header, the rows and columns.json.
 template <class Row>
 struct Column {
-  std::string_view name;
+  std::string_view name, unit, meaning;
   void (*append)(std::string&, const Row&);
 };
+
+constexpr std::string_view step_text = "time steps done, from 1";
+constexpr std::string_view time_text = "time at the end of the step";
 
 struct WallRow {
   const StepReport& step;
@@ -49,148 +47,220 @@ struct ErrorRow {
 };
 
 constexpr Column<StepReport> steps_columns[] = {
-    {"step", [](std::string& t, const StepReport& r) { put(t, r.step); }},
-    {"time", [](std::string& t, const StepReport& r) { put(t, r.time); }},
-    {"time_step", [](std::string& t, const StepReport& r) { put(t, r.time_step); }},
-    {"candidates", [](std::string& t, const StepReport& r) { put(t, r.candidates); }},
-    {"contacts", [](std::string& t, const StepReport& r) { put(t, r.contacts); }},
-    {"active", [](std::string& t, const StepReport& r) { put(t, r.active); }},
-    {"iterations", [](std::string& t, const StepReport& r) { put(t, r.iterations); }},
-    {"error_rms", [](std::string& t, const StepReport& r) { put(t, r.error_rms); }},
-    {"error_max", [](std::string& t, const StepReport& r) { put(t, r.error_max); }},
-    {"error_quantile", [](std::string& t, const StepReport& r) { put(t, r.error_quantile); }},
-    {"worst_contact_body", [](std::string& t, const StepReport& r) { put(t, r.worst.contact.body); }},
-    {"worst_contact_with", [](std::string& t, const StepReport& r) { put(t, r.worst.contact.with); }},
-    {"worst_body", [](std::string& t, const StepReport& r) { put(t, r.worst.body); }},
-    {"worst_body_error", [](std::string& t, const StepReport& r) { put(t, r.worst.body_error); }},
-    {"balance", [](std::string& t, const StepReport& r) { put(t, r.balance); }},
-    {"jump", [](std::string& t, const StepReport& r) { put(t, r.jump); }},
-    {"penetration_mean", [](std::string& t, const StepReport& r) { put(t, r.penetration_mean); }},
-    {"penetration_max", [](std::string& t, const StepReport& r) { put(t, r.penetration_max); }},
-    {"overlap", [](std::string& t, const StepReport& r) { put(t, r.overlap); }},
-    {"overlap_body",
-     [](std::string& t, const StepReport& r) { put(t, r.overlapping ? r.overlapping->body : -1); }},
-    {"overlap_with",
-     [](std::string& t, const StepReport& r) { put(t, r.overlapping ? r.overlapping->with : -1); }},
-    {"kinetic_translation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_translation); }},
-    {"kinetic_rotation", [](std::string& t, const StepReport& r) { put(t, r.kinetic_rotation); }},
-    {"solid_fraction", [](std::string& t, const StepReport& r) { put(t, r.solid_fraction); }},
-    {"equilibrium", [](std::string& t, const StepReport& r) { put(t, r.equilibrium); }},
-    {"migrants", [](std::string& t, const StepReport& r) { put(t, r.migrants); }},
-    {"imbalance", [](std::string& t, const StepReport& r) { put(t, r.imbalance); }},
-    {"wall_s", [](std::string& t, const StepReport& r) { put(t, r.wall_s); }},
-    {"converged", [](std::string& t, const StepReport& r) { put(t, r.converged); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.time); }},
+    {"time_step", "s", "length of the step", [](std::string& t, const auto& r) { put(t, r.time_step); }},
+    {"candidates", "1", "pairs kept by the broad phase",
+     [](std::string& t, const auto& r) { put(t, r.candidates); }},
+    {"contacts", "1", "pairs within the alert distance",
+     [](std::string& t, const auto& r) { put(t, r.contacts); }},
+    {"active", "1", "contacts with a normal impulse",
+     [](std::string& t, const auto& r) { put(t, r.active); }},
+    {"iterations", "1", "sweeps", [](std::string& t, const auto& r) { put(t, r.iterations); }},
+    {"error_rms", "1", "natural map of all contacts, rms, over the velocity scale of the step",
+     [](std::string& t, const auto& r) { put(t, r.error_rms); }},
+    {"error_max", "1", "that of the worst contact",
+     [](std::string& t, const auto& r) { put(t, r.error_max); }},
+    {"error_quantile", "1",
+     "residual that a share solver.quantile of the contacts does not exceed; 0 unless asked for",
+     [](std::string& t, const auto& r) { put(t, r.error_quantile); }},
+    {"worst_contact_body", "1", "id of the first body of the worst contact of a step that missed, else -1",
+     [](std::string& t, const auto& r) { put(t, r.worst.contact.body); }},
+    {"worst_contact_with", "1", "id of the second, -(1 + k) at wall k; else -1",
+     [](std::string& t, const auto& r) { put(t, r.worst.contact.with); }},
+    {"worst_body", "1",
+     "id of the body whose velocity its contacts would change most in a step that missed, else 0",
+     [](std::string& t, const auto& r) { put(t, r.worst.body); }},
+    {"worst_body_error", "1", "by how much, over the velocity scale; else 0",
+     [](std::string& t, const auto& r) { put(t, r.worst.body_error); }},
+    {"balance", "1",
+     "estimated error of forces on walls, heavy bodies and cuts, or momentum defect, if larger",
+     [](std::string& t, const auto& r) { put(t, r.balance); }},
+    {"jump", "1", "interface jump of velocities; 0 with one subdomain",
+     [](std::string& t, const auto& r) { put(t, r.jump); }},
+    {"penetration_mean", "1", "mean overlap over the smallest radius",
+     [](std::string& t, const auto& r) { put(t, r.penetration_mean); }},
+    {"penetration_max", "1", "largest overlap over the smallest radius",
+     [](std::string& t, const auto& r) { put(t, r.penetration_max); }},
+    {"overlap", "1", "largest overlap that the run has made, over the smaller radius of the pair",
+     [](std::string& t, const auto& r) { put(t, r.overlap); }},
+    {"overlap_body", "1", "id of the first body of that pair where it is beyond its tolerance, else -1",
+     [](std::string& t, const auto& r) { put(t, r.overlapping ? r.overlapping->body : -1); }},
+    {"overlap_with", "1", "id of the second, -(1 + k) at wall k; else -1",
+     [](std::string& t, const auto& r) { put(t, r.overlapping ? r.overlapping->with : -1); }},
+    {"kinetic_translation", "J", "kinetic energy of translation of the grains",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_translation); }},
+    {"kinetic_rotation", "J", "kinetic energy of rotation of the grains",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_rotation); }},
+    {"solid_fraction", "1", "volume of grains over that of the box; 0 where walls close none",
+     [](std::string& t, const auto& r) { put(t, r.solid_fraction); }},
+    {"equilibrium", "1", "distance from equilibrium; inf without a load",
+     [](std::string& t, const auto& r) { put(t, r.equilibrium); }},
+    {"migrants", "1", "bodies new in a subdomain", [](std::string& t, const auto& r) { put(t, r.migrants); }},
+    {"imbalance", "1", "largest over mean work of the subdomains",
+     [](std::string& t, const auto& r) { put(t, r.imbalance); }},
+    {"wall_s", "s", "elapsed time of the step; differs from run to run",
+     [](std::string& t, const auto& r) { put(t, r.wall_s); }},
+    {"converged", "1", "1: within all tolerances; 0: the step missed one",
+     [](std::string& t, const auto& r) { put(t, r.converged); }},
 };
 
 constexpr Column<WallRow> walls_columns[] = {
-    {"step", [](std::string& t, const WallRow& r) { put(t, r.step.step); }},
-    {"time", [](std::string& t, const WallRow& r) { put(t, r.step.time); }},
-    {"wall", [](std::string& t, const WallRow& r) { put(t, r.wall.name); }},
-    {"position", [](std::string& t, const WallRow& r) { put(t, r.wall.position); }},
-    {"velocity", [](std::string& t, const WallRow& r) { put(t, r.wall.velocity); }},
-    {"force_x", [](std::string& t, const WallRow& r) { put(t, r.wall.force.x()); }},
-    {"force_y", [](std::string& t, const WallRow& r) { put(t, r.wall.force.y()); }},
-    {"force_z", [](std::string& t, const WallRow& r) { put(t, r.wall.force.z()); }},
-    {"torque_x", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.x()); }},
-    {"torque_y", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.y()); }},
-    {"torque_z", [](std::string& t, const WallRow& r) { put(t, r.wall.torque.z()); }},
-    {"work", [](std::string& t, const WallRow& r) { put(t, r.wall.work); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.step.time); }},
+    {"wall", "", "name of the wall or group", [](std::string& t, const auto& r) { put(t, r.wall.name); }},
+    {"position", "m", "normal times point of a plane, else 0",
+     [](std::string& t, const auto& r) { put(t, r.wall.position); }},
+    {"velocity", "m/s", "velocity of a plane along its normal, else 0",
+     [](std::string& t, const auto& r) { put(t, r.wall.velocity); }},
+    {"force_x", "N", "force on the grains, mean over the step, x",
+     [](std::string& t, const auto& r) { put(t, r.wall.force.x()); }},
+    {"force_y", "N", "the same, y", [](std::string& t, const auto& r) { put(t, r.wall.force.y()); }},
+    {"force_z", "N", "the same, z", [](std::string& t, const auto& r) { put(t, r.wall.force.z()); }},
+    {"torque_x", "N m", "torque on the grains about the wall's own point, mean over the step, x",
+     [](std::string& t, const auto& r) { put(t, r.wall.torque.x()); }},
+    {"torque_y", "N m", "the same, y", [](std::string& t, const auto& r) { put(t, r.wall.torque.y()); }},
+    {"torque_z", "N m", "the same, z", [](std::string& t, const auto& r) { put(t, r.wall.torque.z()); }},
+    {"work", "J", "work done on the grains since the run began",
+     [](std::string& t, const auto& r) { put(t, r.wall.work); }},
 };
 
 constexpr Column<BodyRow> bodies_columns[] = {
-    {"step", [](std::string& t, const BodyRow& r) { put(t, r.step.step); }},
-    {"time", [](std::string& t, const BodyRow& r) { put(t, r.step.time); }},
-    {"body", [](std::string& t, const BodyRow& r) { put(t, r.body.name); }},
-    {"x", [](std::string& t, const BodyRow& r) { put(t, r.body.x.x()); }},
-    {"y", [](std::string& t, const BodyRow& r) { put(t, r.body.x.y()); }},
-    {"z", [](std::string& t, const BodyRow& r) { put(t, r.body.x.z()); }},
-    {"vx", [](std::string& t, const BodyRow& r) { put(t, r.body.u.x()); }},
-    {"vy", [](std::string& t, const BodyRow& r) { put(t, r.body.u.y()); }},
-    {"vz", [](std::string& t, const BodyRow& r) { put(t, r.body.u.z()); }},
-    {"wx", [](std::string& t, const BodyRow& r) { put(t, r.body.omega.x()); }},
-    {"wy", [](std::string& t, const BodyRow& r) { put(t, r.body.omega.y()); }},
-    {"wz", [](std::string& t, const BodyRow& r) { put(t, r.body.omega.z()); }},
-    {"force_x", [](std::string& t, const BodyRow& r) { put(t, r.body.force.x()); }},
-    {"force_y", [](std::string& t, const BodyRow& r) { put(t, r.body.force.y()); }},
-    {"force_z", [](std::string& t, const BodyRow& r) { put(t, r.body.force.z()); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.step.time); }},
+    {"body", "", "name of the body", [](std::string& t, const auto& r) { put(t, r.body.name); }},
+    {"x", "m", "centre at the end of the step, x",
+     [](std::string& t, const auto& r) { put(t, r.body.x.x()); }},
+    {"y", "m", "the same, y", [](std::string& t, const auto& r) { put(t, r.body.x.y()); }},
+    {"z", "m", "the same, z", [](std::string& t, const auto& r) { put(t, r.body.x.z()); }},
+    {"vx", "m/s", "velocity of the centre, x", [](std::string& t, const auto& r) { put(t, r.body.u.x()); }},
+    {"vy", "m/s", "the same, y", [](std::string& t, const auto& r) { put(t, r.body.u.y()); }},
+    {"vz", "m/s", "the same, z", [](std::string& t, const auto& r) { put(t, r.body.u.z()); }},
+    {"wx", "rad/s", "angular velocity, x", [](std::string& t, const auto& r) { put(t, r.body.omega.x()); }},
+    {"wy", "rad/s", "the same, y", [](std::string& t, const auto& r) { put(t, r.body.omega.y()); }},
+    {"wz", "rad/s", "the same, z", [](std::string& t, const auto& r) { put(t, r.body.omega.z()); }},
+    {"force_x", "N", "force of its contacts on the body, mean over the step, x",
+     [](std::string& t, const auto& r) { put(t, r.body.force.x()); }},
+    {"force_y", "N", "the same, y", [](std::string& t, const auto& r) { put(t, r.body.force.y()); }},
+    {"force_z", "N", "the same, z", [](std::string& t, const auto& r) { put(t, r.body.force.z()); }},
 };
 
 constexpr Column<InsertRow> inserted_columns[] = {
-    {"step", [](std::string& t, const InsertRow& r) { put(t, r.step.step); }},
-    {"time", [](std::string& t, const InsertRow& r) { put(t, r.step.time); }},
-    {"insert", [](std::string& t, const InsertRow& r) { put(t, r.insert.name); }},
-    {"placed", [](std::string& t, const InsertRow& r) { put(t, r.insert.placed); }},
-    {"mass", [](std::string& t, const InsertRow& r) { put(t, r.insert.mass); }},
-    {"waiting", [](std::string& t, const InsertRow& r) { put(t, r.insert.waiting); }},
-    {"no_room", [](std::string& t, const InsertRow& r) { put(t, r.insert.no_room); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.step.time); }},
+    {"insert", "", "name of the insertion", [](std::string& t, const auto& r) { put(t, r.insert.name); }},
+    {"placed", "1", "grains that came since the beginning",
+     [](std::string& t, const auto& r) { put(t, r.insert.placed); }},
+    {"mass", "kg", "mass of these", [](std::string& t, const auto& r) { put(t, r.insert.mass); }},
+    {"waiting", "1", "grains that are due and have found no room yet",
+     [](std::string& t, const auto& r) { put(t, r.insert.waiting); }},
+    {"no_room", "1", "steps in which a grain found none",
+     [](std::string& t, const auto& r) { put(t, r.insert.no_room); }},
 };
 
 constexpr Column<RemoveRow> removed_columns[] = {
-    {"step", [](std::string& t, const RemoveRow& r) { put(t, r.step.step); }},
-    {"time", [](std::string& t, const RemoveRow& r) { put(t, r.step.time); }},
-    {"remove", [](std::string& t, const RemoveRow& r) { put(t, r.remove.name); }},
-    {"material", [](std::string& t, const RemoveRow& r) { put(t, r.remove.material); }},
-    {"count", [](std::string& t, const RemoveRow& r) { put(t, r.remove.count); }},
-    {"mass", [](std::string& t, const RemoveRow& r) { put(t, r.remove.mass); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.step.time); }},
+    {"remove", "", "name of the removal", [](std::string& t, const auto& r) { put(t, r.remove.name); }},
+    {"material", "", "name of the material; empty where materials have none",
+     [](std::string& t, const auto& r) { put(t, r.remove.material); }},
+    {"count", "1", "grains that went since the beginning",
+     [](std::string& t, const auto& r) { put(t, r.remove.count); }},
+    {"mass", "kg", "mass of these", [](std::string& t, const auto& r) { put(t, r.remove.mass); }},
 };
 
 constexpr Column<TriaxialReport> triaxial_columns[] = {
-    {"step", [](std::string& t, const TriaxialReport& r) { put(t, r.step); }},
-    {"time", [](std::string& t, const TriaxialReport& r) { put(t, r.time); }},
-    {"stage", [](std::string& t, const TriaxialReport& r) { put(t, r.stage); }},
-    {"strain_x", [](std::string& t, const TriaxialReport& r) { put(t, r.strain[0]); }},
-    {"strain_y", [](std::string& t, const TriaxialReport& r) { put(t, r.strain[1]); }},
-    {"strain_z", [](std::string& t, const TriaxialReport& r) { put(t, r.strain[2]); }},
-    {"strain_volume", [](std::string& t, const TriaxialReport& r) { put(t, r.strain_volume); }},
-    {"strain_shear", [](std::string& t, const TriaxialReport& r) { put(t, r.strain_shear); }},
-    {"solid_fraction", [](std::string& t, const TriaxialReport& r) { put(t, r.solid_fraction); }},
-    {"stress_x", [](std::string& t, const TriaxialReport& r) { put(t, r.stress[0]); }},
-    {"stress_y", [](std::string& t, const TriaxialReport& r) { put(t, r.stress[1]); }},
-    {"stress_z", [](std::string& t, const TriaxialReport& r) { put(t, r.stress[2]); }},
-    {"p", [](std::string& t, const TriaxialReport& r) { put(t, r.p); }},
-    {"q", [](std::string& t, const TriaxialReport& r) { put(t, r.q); }},
-    {"q_over_p", [](std::string& t, const TriaxialReport& r) { put(t, r.q_over_p); }},
-    {"coordination", [](std::string& t, const TriaxialReport& r) { put(t, r.coordination); }},
-    {"converged", [](std::string& t, const TriaxialReport& r) { put(t, r.converged); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.time); }},
+    {"stage", "", "name of the stage", [](std::string& t, const auto& r) { put(t, r.stage); }},
+    {"strain_x", "1", "logarithmic strain since the stage began, negative in compression, x",
+     [](std::string& t, const auto& r) { put(t, r.strain[0]); }},
+    {"strain_y", "1", "the same, y", [](std::string& t, const auto& r) { put(t, r.strain[1]); }},
+    {"strain_z", "1", "the same, z", [](std::string& t, const auto& r) { put(t, r.strain[2]); }},
+    {"strain_volume", "1", "volume strain since the stage began",
+     [](std::string& t, const auto& r) { put(t, r.strain_volume); }},
+    {"strain_shear", "1", "shear strain since the stage began",
+     [](std::string& t, const auto& r) { put(t, r.strain_shear); }},
+    {"solid_fraction", "1", "volume of grains over that of the box",
+     [](std::string& t, const auto& r) { put(t, r.solid_fraction); }},
+    {"stress_x", "Pa", "normal stress, positive in compression, x",
+     [](std::string& t, const auto& r) { put(t, r.stress[0]); }},
+    {"stress_y", "Pa", "the same, y", [](std::string& t, const auto& r) { put(t, r.stress[1]); }},
+    {"stress_z", "Pa", "the same, z", [](std::string& t, const auto& r) { put(t, r.stress[2]); }},
+    {"p", "Pa", "mean stress", [](std::string& t, const auto& r) { put(t, r.p); }},
+    {"q", "Pa", "axial minus mean lateral stress", [](std::string& t, const auto& r) { put(t, r.q); }},
+    {"q_over_p", "1", "their ratio", [](std::string& t, const auto& r) { put(t, r.q_over_p); }},
+    {"coordination", "1", "active contacts per grain, without rattlers",
+     [](std::string& t, const auto& r) { put(t, r.coordination); }},
+    {"converged", "1", "1: the step is within all tolerances; 0: it missed one",
+     [](std::string& t, const auto& r) { put(t, r.converged); }},
 };
 
 constexpr Column<CellReport> cell_columns[] = {
-    {"step", [](std::string& t, const CellReport& r) { put(t, r.step); }},
-    {"time", [](std::string& t, const CellReport& r) { put(t, r.time); }},
-    {"stage", [](std::string& t, const CellReport& r) { put(t, r.stage); }},
-    {"edge_xx", [](std::string& t, const CellReport& r) { put(t, r.edges[0]); }},
-    {"edge_yy", [](std::string& t, const CellReport& r) { put(t, r.edges[1]); }},
-    {"edge_zz", [](std::string& t, const CellReport& r) { put(t, r.edges[2]); }},
-    {"edge_xy", [](std::string& t, const CellReport& r) { put(t, r.edges[3]); }},
-    {"edge_xz", [](std::string& t, const CellReport& r) { put(t, r.edges[4]); }},
-    {"edge_yz", [](std::string& t, const CellReport& r) { put(t, r.edges[5]); }},
-    {"stress_xx", [](std::string& t, const CellReport& r) { put(t, r.stress[0]); }},
-    {"stress_yy", [](std::string& t, const CellReport& r) { put(t, r.stress[1]); }},
-    {"stress_zz", [](std::string& t, const CellReport& r) { put(t, r.stress[2]); }},
-    {"stress_xy", [](std::string& t, const CellReport& r) { put(t, r.stress[3]); }},
-    {"stress_xz", [](std::string& t, const CellReport& r) { put(t, r.stress[4]); }},
-    {"stress_yz", [](std::string& t, const CellReport& r) { put(t, r.stress[5]); }},
-    {"kinetic_xx", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[0]); }},
-    {"kinetic_yy", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[1]); }},
-    {"kinetic_zz", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[2]); }},
-    {"kinetic_xy", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[3]); }},
-    {"kinetic_xz", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[4]); }},
-    {"kinetic_yz", [](std::string& t, const CellReport& r) { put(t, r.kinetic_stress[5]); }},
-    {"p", [](std::string& t, const CellReport& r) { put(t, r.p); }},
-    {"q", [](std::string& t, const CellReport& r) { put(t, r.q); }},
-    {"q_over_p", [](std::string& t, const CellReport& r) { put(t, r.q_over_p); }},
-    {"solid_fraction", [](std::string& t, const CellReport& r) { put(t, r.solid_fraction); }},
-    {"contacts_a_grain", [](std::string& t, const CellReport& r) { put(t, r.contacts_a_grain); }},
-    {"coordination", [](std::string& t, const CellReport& r) { put(t, r.coordination); }},
-    {"inertial_number", [](std::string& t, const CellReport& r) { put(t, r.inertial_number); }},
-    {"converged", [](std::string& t, const CellReport& r) { put(t, r.converged); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step); }},
+    {"time", "s", time_text, [](std::string& t, const auto& r) { put(t, r.time); }},
+    {"stage", "", "name of the stage", [](std::string& t, const auto& r) { put(t, r.stage); }},
+    {"edge_xx", "m", "edge of the cell along x, 0 along an axis of walls",
+     [](std::string& t, const auto& r) { put(t, r.edges[0]); }},
+    {"edge_yy", "m", "edge of the cell along y, 0 along an axis of walls",
+     [](std::string& t, const auto& r) { put(t, r.edges[1]); }},
+    {"edge_zz", "m", "edge of the cell along z, 0 along an axis of walls",
+     [](std::string& t, const auto& r) { put(t, r.edges[2]); }},
+    {"edge_xy", "m", "by how much the edge along y leans along x",
+     [](std::string& t, const auto& r) { put(t, r.edges[3]); }},
+    {"edge_xz", "m", "by how much that along z leans along x",
+     [](std::string& t, const auto& r) { put(t, r.edges[4]); }},
+    {"edge_yz", "m", "by how much that along z leans along y",
+     [](std::string& t, const auto& r) { put(t, r.edges[5]); }},
+    {"stress_xx", "Pa", "stress of the contacts, symmetric part, positive in compression, xx",
+     [](std::string& t, const auto& r) { put(t, r.stress[0]); }},
+    {"stress_yy", "Pa", "stress of the contacts, symmetric part, positive in compression, yy",
+     [](std::string& t, const auto& r) { put(t, r.stress[1]); }},
+    {"stress_zz", "Pa", "stress of the contacts, symmetric part, positive in compression, zz",
+     [](std::string& t, const auto& r) { put(t, r.stress[2]); }},
+    {"stress_xy", "Pa", "stress of the contacts, symmetric part, positive in compression, xy",
+     [](std::string& t, const auto& r) { put(t, r.stress[3]); }},
+    {"stress_xz", "Pa", "stress of the contacts, symmetric part, positive in compression, xz",
+     [](std::string& t, const auto& r) { put(t, r.stress[4]); }},
+    {"stress_yz", "Pa", "stress of the contacts, symmetric part, positive in compression, yz",
+     [](std::string& t, const auto& r) { put(t, r.stress[5]); }},
+    {"kinetic_xx", "Pa", "stress of the velocities against the flow, xx",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_stress[0]); }},
+    {"kinetic_yy", "Pa", "stress of the velocities against the flow, yy",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_stress[1]); }},
+    {"kinetic_zz", "Pa", "stress of the velocities against the flow, zz",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_stress[2]); }},
+    {"kinetic_xy", "Pa", "stress of the velocities against the flow, xy",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_stress[3]); }},
+    {"kinetic_xz", "Pa", "stress of the velocities against the flow, xz",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_stress[4]); }},
+    {"kinetic_yz", "Pa", "stress of the velocities against the flow, yz",
+     [](std::string& t, const auto& r) { put(t, r.kinetic_stress[5]); }},
+    {"p", "Pa", "mean stress of the contacts", [](std::string& t, const auto& r) { put(t, r.p); }},
+    {"q", "Pa", "root of 3/2 of the squared deviator of the stress of the contacts",
+     [](std::string& t, const auto& r) { put(t, r.q); }},
+    {"q_over_p", "1", "their ratio; 0 without stress",
+     [](std::string& t, const auto& r) { put(t, r.q_over_p); }},
+    {"solid_fraction", "1", "volume of grains over that of the cell",
+     [](std::string& t, const auto& r) { put(t, r.solid_fraction); }},
+    {"contacts_a_grain", "1", "twice the active contacts over all grains",
+     [](std::string& t, const auto& r) { put(t, r.contacts_a_grain); }},
+    {"coordination", "1", "active contacts per grain, without rattlers",
+     [](std::string& t, const auto& r) { put(t, r.coordination); }},
+    {"inertial_number", "1", "I = rate d (density/p)^1/2; 0 without stress",
+     [](std::string& t, const auto& r) { put(t, r.inertial_number); }},
+    {"converged", "1", "1: the step is within all tolerances; 0: it missed one",
+     [](std::string& t, const auto& r) { put(t, r.converged); }},
 };
 
 constexpr Column<ErrorRow> error_history_columns[] = {
-    {"step", [](std::string& t, const ErrorRow& r) { put(t, r.step); }},
-    {"iterations", [](std::string& t, const ErrorRow& r) { put(t, r.check.iterations); }},
-    {"seconds", [](std::string& t, const ErrorRow& r) { put(t, r.check.seconds); }},
-    {"error_rms", [](std::string& t, const ErrorRow& r) { put(t, r.check.error_rms); }},
+    {"step", "1", step_text, [](std::string& t, const auto& r) { put(t, r.step); }},
+    {"iterations", "1", "sweeps done at the check",
+     [](std::string& t, const auto& r) { put(t, r.check.iterations); }},
+    {"seconds", "s", "elapsed since the iterations of the step began; differs from run to run",
+     [](std::string& t, const auto& r) { put(t, r.check.seconds); }},
+    {"error_rms", "1", "natural map of all contacts, rms, over the velocity scale of the step",
+     [](std::string& t, const auto& r) { put(t, r.check.error_rms); }},
 };
 
 template <class Row>
@@ -201,6 +271,13 @@ std::string header_line(std::span<const Column<Row>> columns) {
     text += column.name;
   }
   return text + '\n';
+}
+
+template <class Row>
+std::vector<ColumnMeaning> meanings(std::span<const Column<Row>> columns) {
+  std::vector<ColumnMeaning> all;
+  for (const auto& column : columns) all.push_back({std::string(column.name), column.unit, column.meaning});
+  return all;
 }
 
 template <class Row>
@@ -271,41 +348,15 @@ void append_error_history_row(std::string& text, std::int64_t step, const ErrorC
   append_line<ErrorRow>(text, error_history_columns, ErrorRow{step, check});
 }
 
-CsvFile::CsvFile(const std::filesystem::path& path, std::string_view header)
-    : file_(path, O_WRONLY | O_CREAT | O_TRUNC), pending_(header) {
-  flush();
-}
-
-CsvFile::CsvFile(const std::filesystem::path& path, std::int64_t bytes)
-    : file_(path, O_WRONLY | O_APPEND), bytes_(bytes) {
-  file_.cut(bytes);
-}
-
-CsvFile::~CsvFile() {
-  try {
-    close();
-  } catch (const FileError&) {
-    // Nobody is left to be told; close() is the way to know.
-  }
-}
-
-void CsvFile::flush() {
-  if (pending_.empty()) return;
-  // Emptied first: lines that failed are not tried again, lest half of them appear twice.
-  const std::string lines = std::exchange(pending_, {});
-  file_.write(lines);
-  bytes_ += static_cast<std::int64_t>(lines.size());
-}
-
-std::int64_t CsvFile::sync() {
-  flush();
-  file_.sync();
-  return bytes_;
-}
-
-void CsvFile::close() {
-  flush();
-  file_.close();
+std::vector<TableMeaning> table_meanings() {
+  return {{"steps.csv", meanings<StepReport>(steps_columns)},
+          {"walls.csv", meanings<WallRow>(walls_columns)},
+          {"bodies.csv", meanings<BodyRow>(bodies_columns)},
+          {"inserted.csv", meanings<InsertRow>(inserted_columns)},
+          {"removed.csv", meanings<RemoveRow>(removed_columns)},
+          {"triaxial.csv", meanings<TriaxialReport>(triaxial_columns)},
+          {"cell.csv", meanings<CellReport>(cell_columns)},
+          {"error_history.csv", meanings<ErrorRow>(error_history_columns)}};
 }
 
 }  // namespace talus::io

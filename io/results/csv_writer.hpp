@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "io/files/detail/descriptor.hpp"
+#include "io/results/column_dictionary.hpp"
 #include "runtime/step/error_history.hpp"
 #include "runtime/step/frame.hpp"
 
@@ -23,6 +25,8 @@ std::string removed_csv_header();
 std::string triaxial_csv_header();
 std::string cell_csv_header();
 std::string error_history_csv_header();
+/// What the columns of these tables mean.
+std::vector<TableMeaning> table_meanings();
 
 /// Appends one line, with line end. Numbers are the shortest text that reads back as the same double; true
 /// and false are 1 and 0; names are quoted only where they must be (RFC 4180).

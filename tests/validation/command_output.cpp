@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 
 #include "io/results/results.hpp"
@@ -46,6 +49,78 @@ TEST_F(ThinnedOutput, HasContactsInEverySecondFrame) {
     with += has ? 1 : 0;
   }
   EXPECT_GT(with, 1U);
+}
+
+class ColumnDictionary : public CommandTest {
+ protected:
+  /// Runs the scene; `tables` are the tables that it is to write.
+  void expect_every_column_told(const std::string& scene, const std::set<std::string>& tables) {
+    write(at("scene.toml"), scene);
+    const Outcome outcome = run("run scene.toml --out out --force");
+    ASSERT_EQ(outcome.code, 0) << outcome.messages;
+    const auto told = nlohmann::json::parse(content(at("out/columns.json")));
+    std::set<std::string> written;
+    for (const auto& entry : fs::directory_iterator(at("out"))) {
+      if (entry.path().extension() != ".csv") continue;
+      const std::string table = entry.path().filename().string();
+      written.insert(table);
+      std::string names;
+      for (const auto& column : told.at(table)) {
+        names += (names.empty() ? "" : ",") + column.at("name").get<std::string>();
+        EXPECT_FALSE(column.at("meaning").get<std::string>().empty()) << table << column;
+      }
+      std::string header;
+      std::ifstream file(entry.path());
+      std::getline(file, header);
+      EXPECT_EQ(names, header) << table;
+    }
+    EXPECT_EQ(written, tables);
+  }
+};
+
+TEST_F(ColumnDictionary, SaysOfEveryColumnThatARunWritesWhatItIs) {
+  expect_every_column_told(
+      R"(time_step = 1e-3
+gravity = [0, 0, -9.81]
+[[material]]
+name = "glass"
+density = 2500
+[[material]]
+name = "steel"
+density = 7800
+[[sample]]
+kind = "body"
+name = "ball"
+position = [0, 0, 0.05]
+radius = 0.05
+[[insert]]
+radius = 0.01
+count = 3
+region = { shape = "box", low = [0.1, 0.1, 0.1], high = [0.3, 0.3, 0.3] }
+[[remove]]
+region = { shape = "beyond", point = [9, 0, 0], normal = [1, 0, 0] }
+[[probe]]
+region = { shape = "box", low = [-1, -1, 0], high = [1, 1, 1] }
+[[wall]]
+name = "z-"
+position = 0
+[[stage]]
+end = { steps = 3 }
+)",
+      {"bodies.csv", "inserted.csv", "probes.csv", "removed.csv", "steps.csv", "walls.csv"});
+  expect_every_column_told(R"(time_step = 1e-3
+[material]
+density = 2500
+[cell]
+lengths = [0.1, 0.1, 0.1]
+[sample]
+kind = "random"
+count = 20
+radius = 0.005
+[[stage]]
+end = { steps = 3 }
+)",
+                           {"cell.csv", "steps.csv", "triaxial.csv", "walls.csv"});
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
-#include "io/results/column_dictionary.hpp"
 #include "io/results/csv_writer.hpp"
 #include "io/results/progress.hpp"
 #include "io/results/run_json.hpp"
@@ -339,28 +338,6 @@ TEST(ProgressLine, MarksAStepThatMissedItsTolerance) {
       .step = 1234, .time = 0.0123, .contacts = 6012, .iterations = 45, .error_rms = 8.2e-4};
   EXPECT_EQ(progress_line(report, "shear", 0.999, 3700),
             "shear  99 %  step 1234  t 12.3 ms  6012 contacts  45 it  err 8.2e-04 MISSED  ETA 1:01:40");
-}
-
-TEST(ColumnDictionary, HasEveryColumnOfEveryTableInTheOrderOfItsHeader) {
-  const std::map<std::string, std::string> headers{
-      {"steps.csv", steps_csv_header()},
-      {"walls.csv", walls_csv_header()},
-      {"bodies.csv", bodies_csv_header()},
-      {"inserted.csv", inserted_csv_header()},
-      {"removed.csv", removed_csv_header()},
-      {"triaxial.csv", triaxial_csv_header()},
-      {"error_history.csv", error_history_csv_header()},
-  };
-  const auto written = nlohmann::json::parse(columns_json());
-  EXPECT_EQ(written.size(), headers.size());
-  for (const auto& [file, header] : headers) {
-    std::string names;
-    for (const auto& column : written.at(file)) {
-      names += (names.empty() ? "" : ",") + column.at("name").get<std::string>();
-      EXPECT_FALSE(column.at("meaning").get<std::string>().empty()) << file << ": " << column;
-    }
-    EXPECT_EQ(names + '\n', header) << file;
-  }
 }
 
 }  // namespace
