@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "apps/commands/due_clock.hpp"
 #include "apps/commands/run_messages.hpp"
 #include "apps/shared/terminal.hpp"
 #include "io/checkpoint/checkpoint_file.hpp"
 #include "io/output/recorder.hpp"
 #include "io/scene/scene.hpp"
+#include "runtime/step/due_clock.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -53,7 +53,7 @@ class CheckpointKeeper {
   /// As of what a checkpoint remembers, or as of a new run; the clock of every_wall begins.
   void start(const RunMemory& memory);
   /// One is due by steps or simulated time: the same on all ranks, to be asked behind every step.
-  bool due(const StepReport& report) { return due_.due(report); }
+  bool due(const StepReport& report) { return due_.due(report.step, report.time); }
   /// By this rank's clock.
   bool wall_due(double now) const { return spec_.every_wall > 0 && now - last_save_ >= spec_.every_wall; }
 

@@ -11,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "apps/commands/due_clock.hpp"
 #include "apps/commands/dump_fclib.hpp"
 #include "apps/commands/recorder_feed.hpp"
 #include "apps/commands/run_checkpoints.hpp"
@@ -27,6 +26,7 @@
 #include "runtime/graph/clock.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/dealing.hpp"
+#include "runtime/step/due_clock.hpp"
 #include "runtime/step/simulation.hpp"
 
 namespace talus {
@@ -127,7 +127,8 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   const bool due = keeper.due(report);
   const bool stage_ends = simulation.stage_fraction() >= 1;
   const bool last = options.steps && report.step >= *options.steps;
-  const bool written = all.frames.due(report) || (stage_ends && run.scene.output.stage_frames);
+  const bool written =
+      all.frames.due(report.step, report.time) || (stage_ends && run.scene.output.stage_frames);
   if (written) all.write_frame();
   lines.update(simulation);
   if (stage_ends) {

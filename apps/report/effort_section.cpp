@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "apps/report/sections.hpp"
+#include "io/files/detail/with_unit.hpp"
 #include "io/trace/trace_file.hpp"
 #include "runtime/trace/analysis.hpp"
 
@@ -79,12 +80,12 @@ HtmlSections time_section(const RunFolder& run) {
   io::HtmlSection section{"Where time went", ""};
   section.table.rows = {
       {"steps", fmt::format("{} in {:.4g} s elapsed: {} a step", elapsed.size(), seconds,
-                            with_prefix(seconds / static_cast<double>(elapsed.size()), "s"))},
+                            io::detail::with_unit(seconds / static_cast<double>(elapsed.size()), "s"))},
       {"simulated", fmt::format("{:.6g} s: {:.3g} s elapsed for each", time.back(),
                                 seconds / std::max(time.back(), 1e-300))},
       {"sweeps", fmt::format("{:.0f}, {:.3g} a step; all of a step's time over its sweeps and contacts: {}",
                              all_sweeps, all_sweeps / static_cast<double>(elapsed.size()),
-                             with_prefix(seconds / std::max(contacts, 1.0), "s"))},
+                             io::detail::with_unit(seconds / std::max(contacts, 1.0), "s"))},
       {"threads",
        text_of(run.provenance, "threads") + " a rank, instructions " + text_of(run.provenance, "simd")},
   };

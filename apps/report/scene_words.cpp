@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "apps/report/sections.hpp"
+#include "io/files/detail/with_unit.hpp"
 
 namespace talus {
 
@@ -25,8 +26,9 @@ std::string counted(std::size_t count, const char* what) {
 /// "radius 8 to 12 mm", from their distribution.
 std::string radii_of(const SizeDistribution& radii) {
   const double low = smallest_radius(radii), high = largest_radius(radii);
-  return low == high ? "radius " + with_prefix(low, "m")
-                     : "radius " + with_prefix(low, "m") + " to " + with_prefix(high, "m");
+  return low == high
+             ? "radius " + io::detail::with_unit(low, "m")
+             : "radius " + io::detail::with_unit(low, "m") + " to " + io::detail::with_unit(high, "m");
 }
 
 std::string sample_words(const io::SampleSpec& sample) {
@@ -55,11 +57,11 @@ std::string load_words(const WallLoad& load) {
     case WallDrive::fixed:
       return "is fixed";
     case WallDrive::velocity:
-      return "moves at " + with_prefix(load.velocity.norm(), "m/s");
+      return "moves at " + io::detail::with_unit(load.velocity.norm(), "m/s");
     case WallDrive::pressure:
-      return "is pressed with " + with_prefix(load.pressure, "Pa");
+      return "is pressed with " + io::detail::with_unit(load.pressure, "Pa");
     case WallDrive::force:
-      return "is pushed with " + with_prefix(load.force, "N");
+      return "is pushed with " + io::detail::with_unit(load.force, "N");
   }
   return "";
 }
@@ -75,7 +77,7 @@ std::string wall_words(const Wall& wall) {
 std::string end_words(const StageEnd& end) {
   std::vector<std::string> ends;
   if (end.steps) ends.push_back(counted(static_cast<std::size_t>(*end.steps), "step"));
-  if (end.time) ends.push_back(with_prefix(*end.time, "s"));
+  if (end.time) ends.push_back(io::detail::with_unit(*end.time, "s"));
   if (end.strain)
     ends.push_back(fmt::format("a strain of {:g} along {}", *end.strain, "xyz"[end.strain_axis]));
   if (end.equilibrium) ends.push_back(fmt::format("equilibrium within {:g}", *end.equilibrium));
@@ -103,8 +105,8 @@ std::string law_words(const char* name, const PairTable& laws, double PairLaw::*
 
 std::string stage_words(const Stage& stage) {
   std::string text = end_words(stage.end) + "; ";
-  text +=
-      stage.chooses_time_step ? "time steps are chosen" : "time step " + with_prefix(stage.time_step, "s");
+  text += stage.chooses_time_step ? "time steps are chosen"
+                                  : "time step " + io::detail::with_unit(stage.time_step, "s");
   if (stage.laws.largest(&PairLaw::friction) == 0) text += "; no friction";
   text += law_words("friction", stage.laws, &PairLaw::friction);
   text += law_words("restitution", stage.laws, &PairLaw::restitution);
@@ -134,7 +136,7 @@ std::string space_words(const Setup& setup) {
   const Vec3 edges = setup.domain.edges();
   for (const Eigen::Index k : {0, 1, 2})
     if (edges[k] > 0)
-      text += (text.empty() ? ", in a periodic cell of " : " × ") + with_prefix(edges[k], "m");
+      text += (text.empty() ? ", in a periodic cell of " : " × ") + io::detail::with_unit(edges[k], "m");
   if (!setup.walls.empty() || text.empty())
     text += fmt::format(", between {}", counted(setup.walls.size(), "wall"));
   return text;

@@ -1,25 +1,9 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "apps/report/sections.hpp"
 
 namespace talus {
-
-std::string with_prefix(double value, std::string_view unit) {
-  struct Prefix {
-    double factor;
-    std::string_view letter;
-  };
-  static constexpr std::array<Prefix, 7> prefixes{
-      {{1e9, "G"}, {1e6, "M"}, {1e3, "k"}, {1, ""}, {1e-3, "m"}, {1e-6, "µ"}, {1e-9, "n"}}};
-  if (value == 0 || !std::isfinite(value)) return fmt::format("{:g} {}", value, unit);
-  for (const auto& [factor, letter] : prefixes)
-    if (std::abs(value) >= 0.9995 * factor) return fmt::format("{:.3g} {}{}", value / factor, letter, unit);
-  return fmt::format("{:.3g} {}", value, unit);
-}
 
 std::vector<std::array<double, 2>> thinned(std::span<const double> x, std::span<const double> y,
                                            Thinned how) {

@@ -2,9 +2,9 @@
 
 /// The sections of a run's page. Each is empty where the run has nothing for it.
 
+#include <array>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "apps/report/run_folder.hpp"
@@ -22,9 +22,6 @@ HtmlSections picture_section(const RunFolder& run);
 HtmlSections time_section(const RunFolder& run);
 HtmlSections left_out_section(const RunFolder& run);
 HtmlSections repeat_section(const RunFolder& run);
-
-/// A quantity with a prefix of the SI, to three digits: "10 kPa", "1 ms", "8 mm"; "0 s".
-std::string with_prefix(double value, std::string_view unit);
 
 /// How many points stand for many rows in a chart.
 enum class Thinned {

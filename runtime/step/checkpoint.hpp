@@ -177,8 +177,8 @@ void each_member(Head& head, const Visit& visit) {
   visit("size_orientation", head.size.orientation);
   visit("size_materials", head.size.materials);
   visit("shares", head.shares);
-  head.population.each_number(visit);
-  head.probes.each_number(visit);
+  PopulationState::each_number(head.population, visit);
+  ProbeState::each_number(head.probes, visit);
   visit("wall_points", head.wall_points);
   visit("wall_velocities", head.wall_velocities);
   visit("wall_then", head.wall_then);
@@ -205,7 +205,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("time_step", head.time_step);
   visit("impulse_time", head.impulse_time);
   visit("lengths_at_start", head.lengths_at_start);
-  head.clock.each_number(visit);
+  StageClock::each_number(head.clock, visit);
   each_number(head.report, visit);
   visit("graph_steps", head.graph_steps);
   visit("partitioned", head.partitioned);
@@ -213,7 +213,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("contacts_before", head.contacts_before);
   visit("imbalance_before", head.imbalance_before);
   visit("farthest", head.farthest);
-  head.stiffness.each_number(visit);
+  StiffnessMemory::each_number(head.stiffness, visit);
 }
 
 struct Checkpoint {

@@ -32,7 +32,7 @@ void spread_bodies(const StepState& state, SlotRange range, const Grid& grid, co
 
 void spread_contacts(const StepState& state, SubdomainPlace e, double impulse_time, const Grid& grid,
                      const Lucy& lucy, GridSums& sums) {
-  const Poses poses{state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)};
+  const Poses poses = poses_of(state);
   for (std::size_t c = 0; c < state.chunks.size(); ++c) {
     if (static_cast<std::size_t>(state.chunks.subdomain[c]) != e.at()) continue;
     const std::int32_t w = state.chunks.wall[c];

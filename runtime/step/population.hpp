@@ -45,19 +45,9 @@ struct PopulationState {
   std::vector<std::int64_t> tracked_rule;   ///< of each grain whose path is told: its insertion
   std::vector<std::int64_t> tracked_id;     ///< likewise
 
-  /// visit(name, member) for each member.
-  template <class Visit>
-  void each_number(const Visit& visit) {
-    visit_all(*this, visit);
-  }
-  template <class Visit>
-  void each_number(const Visit& visit) const {
-    visit_all(*this, visit);
-  }
-
- private:
+  /// visit(name, member) for each member of a state, which may be const.
   template <class Self, class Visit>
-  static void visit_all(Self& self, const Visit& visit) {
+  static void each_number(Self& self, const Visit& visit) {
     visit("population_next_id", self.next_id);
     visit("population_unsorted", self.unsorted);
     visit("population_drawn", self.drawn);

@@ -98,7 +98,7 @@ std::vector<RegionSums> sum_over_regions(std::span<const Region> regions, std::s
       for (std::size_t p = 0; counts(all, s) && p < regions.size(); ++p)
         add_body(state, s, regions[p], sums[e.at() * regions.size() + p]);
   }
-  const Poses poses{state.bodies.x, state.bodies.radius, state.walls, clumps_of(state)};
+  const Poses poses = poses_of(state);
   for (std::size_t c = 0; c < state.chunks.size(); ++c) {
     const std::int32_t w = state.chunks.wall[c];
     const Wall* const wall = w < 0 ? nullptr : &state.walls[static_cast<std::size_t>(w)];

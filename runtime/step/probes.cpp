@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "kernels/shapes/region_parts.hpp"
+#include "runtime/step/due_clock.hpp"
 #include "runtime/step/probe_contents.hpp"
 
 namespace talus {
@@ -34,13 +35,9 @@ void Probes::begin_step(const StepState& state) {
 
 bool Probes::is_due(std::size_t probe, const ProbedStep& step) {
   const ProbeRule& rule = setup_.probes[probe];
-  bool due = rule.every_steps && step.step % *rule.every_steps == 0;
-  if (rule.every) {
-    // Rounding of a sum of time steps must not put off what falls on one of them.
-    const auto passed = static_cast<std::int64_t>(step.time / *rule.every * (1 + 1e-12));
-    due |= passed > now_.passed[probe];
-    now_.passed[probe] = passed;
-  }
+  DueClock clock(rule.every_steps, rule.every, now_.passed[probe]);
+  const bool due = clock.due(step.step, step.time);
+  now_.passed[probe] = clock.passed();
   return due;
 }
 

@@ -23,19 +23,9 @@ struct ProbeState {
   std::vector<double> time_told;         ///< p: of the last report [s]
   std::vector<std::int64_t> passed;      ///< p: multiples of ProbeRule::every that are behind
 
-  /// visit(name, member) for each member.
-  template <class Visit>
-  void each_number(const Visit& visit) {
-    visit_all(*this, visit);
-  }
-  template <class Visit>
-  void each_number(const Visit& visit) const {
-    visit_all(*this, visit);
-  }
-
- private:
+  /// visit(name, member) for each member of a state, which may be const.
   template <class Self, class Visit>
-  static void visit_all(Self& self, const Visit& visit) {
+  static void each_number(Self& self, const Visit& visit) {
     visit("probe_count", self.count);
     visit("probe_mass", self.mass);
     visit("probe_count_told", self.count_told);

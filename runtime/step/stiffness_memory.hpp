@@ -43,19 +43,9 @@ class StiffnessMemory {
   double sweeps_needed(const Problem& problem, double stiff, const std::function<double()>& estimate);
   bool grains_alike() const { return spread_ < reuse_.alike; }
 
-  /// visit(name, number) for all that outlives a step.
-  template <class Visit>
-  void each_number(const Visit& visit) {
-    numbers_of(*this, visit);
-  }
-  template <class Visit>
-  void each_number(const Visit& visit) const {
-    numbers_of(*this, visit);
-  }
-
- private:
+  /// visit(name, member) for each member of a state, which may be const.
   template <class Memory, class Visit>
-  static void numbers_of(Memory& memory, const Visit& visit) {
+  static void each_number(Memory& memory, const Visit& visit) {
     visit("stiffness", memory.then_);
     visit("stiffness_contacts", memory.problem_.contacts);
     visit("stiffness_carrying", memory.problem_.carrying);
@@ -63,6 +53,7 @@ class StiffnessMemory {
     visit("stiffness_spread", memory.spread_);
   }
 
+ private:
   static constexpr double unknown = -1;
   bool holds(const Problem& problem, double stiff) const;
 

@@ -68,19 +68,9 @@ class StageClock {
   /// one may go beyond the end.
   void move_end(std::optional<double> end);
 
-  /// visit(name, number) for each of its numbers.
-  template <class Visit>
-  void each_number(const Visit& visit) {
-    numbers_of(*this, visit);
-  }
-  template <class Visit>
-  void each_number(const Visit& visit) const {
-    numbers_of(*this, visit);
-  }
-
- private:
+  /// visit(name, member) for each member of a state, which may be const.
   template <class Clock, class Visit>
-  static void numbers_of(Clock& clock, const Visit& visit) {
+  static void each_number(Clock& clock, const Visit& visit) {
     visit("clock_begin", clock.begin_);
     visit("clock_longest", clock.longest_);
     visit("clock_levels", clock.levels_);
@@ -89,6 +79,7 @@ class StageClock {
     visit("clock_last", clock.last_);
   }
 
+ private:
   std::int64_t ticks_of(int level) const { return std::int64_t{1} << (levels_ - level); }
 
   double begin_ = 0;        ///< time of the run when the stage began [s]

@@ -147,13 +147,5 @@ TEST(RunReport, AStretchOfRowsIsDrawnByItsLargestValue) {
   EXPECT_EQ(std::count(points.begin(), points.end(), std::array<double, 2>{54321, 7}), 1);
 }
 
-TEST(RunReport, QuantitiesHaveThePrefixOfTheirSize) {
-  EXPECT_EQ(with_prefix(1e4, "Pa"), "10 kPa");
-  EXPECT_EQ(with_prefix(1e-3, "s"), "1 ms");
-  EXPECT_EQ(with_prefix(0.9999, "m"), "1 m");
-  EXPECT_EQ(with_prefix(0, "N"), "0 N");
-  EXPECT_EQ(with_prefix(2.5e-12, "m"), "2.5e-12 m");
-}
-
 }  // namespace
 }  // namespace talus::run_report_test

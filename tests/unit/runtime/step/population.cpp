@@ -253,7 +253,7 @@ TEST(Population, ACheckpointOfOtherRulesIsRefused) {
   EXPECT_NO_THROW(population.go_on_from(right));
   int arrays = 0;
   PopulationState wrong = right;
-  wrong.each_number([&](const char* name, auto& member) {
+  PopulationState::each_number(wrong, [&](const char* name, auto& member) {
     if constexpr (requires { member.push_back({}); }) {
       ++arrays;
       member.push_back({});
