@@ -147,11 +147,7 @@ void draw_force(Svg& svg, const Segment& at, double normal, const ForceSlab& sla
 }
 
 void draw_legend(Svg& svg, const ForceSlab& slab, const View& view, double top) {
-  const double length = detail::nice_ticks(0, view.x_high - view.x_low, 16).at(1);
-  const double bar = length * view.scale;
-  svg.line(margin_left, top + 18, margin_left + bar, top + 18, {style::ink, 3});
-  svg.text(margin_left, top + 38, detail::with_unit(length, "m"), {12, style::ink});
-  double x = margin_left + bar + 60;
+  double x = margin_left + detail::draw_scale(svg, view, top + 18, 16) + 60;
   if (!(slab.mean_force > 0)) return;
   for (const double multiple : {0.5, 1.0, 2.0, 4.0}) {
     draw_force(svg, {x, top + 18, x + 36, top + 18}, multiple * slab.mean_force, slab, view);

@@ -71,10 +71,8 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
     if (page.over) page.over(svg, view, k);
   }
   svg.end_group();
-  const double length = detail::nice_ticks(0, view.x_high - view.x_low, 8).at(1);
-  svg.line(margin_left, bottom + 22, margin_left + length * view.scale, bottom + 22, {style::ink, 3});
-  svg.text(margin_left, bottom + 44, detail::with_unit(length, "m"), {12, style::ink});
-  page.legend(svg, margin_left + length * view.scale + 48, bottom + 22);
+  const double bar = detail::draw_scale(svg, view, bottom + 22, 8);
+  page.legend(svg, margin_left + bar + 48, bottom + 22);
   return svg.finish();
 }
 

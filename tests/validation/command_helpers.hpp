@@ -156,6 +156,24 @@ balance_tolerance = 0.5
 every_steps = 4
 )";
 
+/// Twenty grains in a periodic cube.
+inline const std::string cell_scene = R"(time_step = 1e-3
+
+[material]
+density = 2600
+
+[cell]
+lengths = [0.1, 0.1, 0.1]
+
+[sample]
+kind = "random"
+count = 20
+radius = 0.005
+
+[[stage]]
+end = { steps = 3 }
+)";
+
 /// Three grains on a floor, a column that no single sweep solves.
 inline const std::string column_scene = R"(name = "column"
 gravity = [0, 0, -9.81]

@@ -108,19 +108,7 @@ position = 0
 end = { steps = 3 }
 )",
       {"bodies.csv", "inserted.csv", "probes.csv", "removed.csv", "steps.csv", "walls.csv"});
-  expect_every_column_told(R"(time_step = 1e-3
-[material]
-density = 2500
-[cell]
-lengths = [0.1, 0.1, 0.1]
-[sample]
-kind = "random"
-count = 20
-radius = 0.005
-[[stage]]
-end = { steps = 3 }
-)",
-                           {"cell.csv", "steps.csv", "triaxial.csv", "walls.csv"});
+  expect_every_column_told(cell_scene, {"cell.csv", "steps.csv", "triaxial.csv", "walls.csv"});
 }
 
 }  // namespace

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <limits>
 
+#include "io/files/detail/with_unit.hpp"
+#include "io/pictures/detail/chart_style.hpp"
+
 namespace talus::io::detail {
 
 Slab cut_slab(const Frame& frame, double thickness) {
@@ -37,6 +40,13 @@ View view_of(const Frame& frame, const Slab& slab, double side, double left, dou
   x_low -= border, z_low -= border, x_high += border, z_high += border;
   const double scale = side / std::max(x_high - x_low, z_high - z_low);
   return {x_low, z_low, x_high, z_high, scale, left, top};
+}
+
+double draw_scale(Svg& svg, const View& view, double y, int parts) {
+  const double length = nice_ticks(0, view.x_high - view.x_low, parts).at(1), bar = length * view.scale;
+  svg.line(view.left, y, view.left + bar, y, {style::ink, 3});
+  svg.text(view.left, y + 20, with_unit(length, "m"), {12, style::ink});
+  return bar;
 }
 
 }  // namespace talus::io::detail

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "io/pictures/detail/svg.hpp"
 #include "runtime/step/frame.hpp"
 
 namespace talus::io::detail {
@@ -33,5 +34,9 @@ struct View {
 
 /// The grains of the slab and a border of a mean radius, with `side` [px] for the longer edge.
 View view_of(const Frame& frame, const Slab& slab, double side, double left, double top);
+
+/// Draws a bar of a round length, about 1/`parts` of the view's width, at its left edge and the height y
+/// [px], with the length below. Returns the length of the bar [px].
+double draw_scale(Svg& svg, const View& view, double y, int parts);
 
 }  // namespace talus::io::detail
