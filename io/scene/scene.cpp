@@ -87,6 +87,7 @@ class SceneReader {
     if (!root_.get("cell")) return;
     CellSpec& cell = scene_.cell;
     read_table(table_at(root_, "cell"), "cell", keys_.cell, {}, cell);
+    scene_.setup.cell_inertia = cell.inertia;
     check_by_cell([&] { scene_.setup.domain = periodic_domain(cell.lengths, cell.origin, cell.shears); });
   }
 
@@ -198,7 +199,9 @@ class SceneReader {
       if (!scene_.materials.empty() && table->get("wall_friction"))
         fail_at(*table->get("wall_friction"), path + ".wall_friction",
                 "walls have materials of their own here: give friction in a [[stage.pair]]");
-      read_table(*table, path, keys_.stage, {"end", "load", "pair"}, stage);
+      read_table(*table, path, keys_.stage, {"end", "stress", "load", "pair"}, stage);
+      if (table->get("stress"))
+        read_table(table_at(*table, "stress"), path + ".stress", keys_.stage_stress, {}, stage.stress);
       read_stage_pairs(*table, path, scene_, stage);
       check_name(*table, path, stage.name);
       for (const Stage& earlier : scene_.setup.stages)
@@ -247,6 +250,14 @@ class SceneReader {
     DecompositionSettings& settings = scene_.setup.decomposition;
     const toml::table& table = table_at(root_, "decomposition");
     read_table(table, "decomposition", keys_.decomposition, {}, settings);
+    const bool stressed =
+        std::ranges::any_of(scene_.setup.stages, [](const Stage& s) { return s.stress.any(); });
+    if (stressed && !table.get("coupling")) settings.coupling = Coupling::nscdd;
+    try {
+      validate_coupling(scene_.setup);
+    } catch (const std::invalid_argument& error) {
+      fail_at(*table.get("coupling"), "decomposition.coupling", error.what());
+    }
     const auto& [x, y, z] = settings.boxes;
     const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
     if (boxes == 0) return;
@@ -278,9 +289,9 @@ class SceneReader {
       return (load.drive == WallDrive::pressure && load.pressure > 0) ||
              (load.drive == WallDrive::force && load.force > 0);
     });
-    if (end.equilibrium && !pushed && stage.gravity.norm() == 0)
+    if (end.equilibrium && !pushed && !stage.stress.any() && stage.gravity.norm() == 0)
       fail_at(*node, end_path + ".equilibrium",
-              "neither gravity nor a pushed wall loads the sample in this stage");
+              "neither gravity, a pushed wall nor the stress of a cell loads the sample in this stage");
   }
 
   bool bounded(int axis) const {

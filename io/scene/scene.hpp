@@ -85,6 +85,7 @@ struct CellSpec {
   Vec3 lengths = Vec3::Zero();  ///< [m]; 0 along an axis that does not repeat
   Vec3 origin = Vec3::Zero();   ///< [m]
   Vec3 shears = Vec3::Zero();   ///< [m] xy, xz, yz
+  double inertia = 1;           ///< Setup::cell_inertia
 };
 
 /// A [[material]].

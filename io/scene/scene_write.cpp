@@ -100,6 +100,7 @@ std::string resolved_scene(const Scene& scene) {
     for (const Key<Stage>& key : stage_law_keys()) left_out.insert(key.name);
   for (const Stage& stage : scene.setup.stages) {
     write_section(out, keys.stage, stage, left_out);
+    if (stage.stress.any()) write_section(out, keys.stage_stress, stage.stress);
     write_section(out, keys.stage_end, stage.end);
     for (const NamedLoad& load : stage.loads) write_section(out, keys.stage_load, load);
     for (const PairSpec& pair : pairs_of(stage.laws, scene.materials))

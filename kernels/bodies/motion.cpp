@@ -33,6 +33,11 @@ void add_gain(SlotRange range, std::span<const Vec3> x, const AffineGain& gain, 
   }
 }
 
+void add_gain(SlotRange range, std::span<const Vec3> x, const AffineGain& gain,
+              std::span<Velocity> velocity) {
+  for (std::size_t s = range.begin; s < range.end; ++s) Eigen::Map<Vec3>(velocity[s].u) += gain.at(x[s]);
+}
+
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity) {
   for (Slot slot : slots) {
     const auto s = static_cast<std::size_t>(slot);

@@ -57,6 +57,8 @@ struct AffineGain {
 
 /// Adds the gain to the free velocities.
 void add_gain(SlotRange range, std::span<const Vec3> x, const AffineGain& gain, FreeVelocity& free);
+/// ... or to the velocities.
+void add_gain(SlotRange range, std::span<const Vec3> x, const AffineGain& gain, std::span<Velocity> velocity);
 
 /// How a step ends.
 struct StepFinish {

@@ -127,7 +127,7 @@ std::size_t memory_used(const Contacts& contacts) {
   for (const auto* values :
        {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias, &contacts.rx, &contacts.ry, &contacts.rz,
         &contacts.rn, &contacts.mu, &contacts.cohesion, &contacts.mx, &contacts.my, &contacts.mz,
-        &contacts.arm, &contacts.vx, &contacts.vy, &contacts.vz})
+        &contacts.arm, &contacts.vx, &contacts.vy, &contacts.vz, &contacts.reach})
     bytes += values->capacity() * sizeof(double);
   return bytes +
          (contacts.first.capacity() + contacts.second.capacity() + contacts.first_record.capacity() +

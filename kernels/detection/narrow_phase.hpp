@@ -27,6 +27,7 @@ struct NarrowPhase {
   std::span<const Material> material = {};  ///< of the bodies; empty: material_of_grains
   ClumpView clumps = {};
   Domain domain = {};
+  double cell_length = 0;  ///< of Contacts::reach [m]; 0 where no cell follows a stress
 };
 
 /// Finds the contacts of one chunk and starts them from the candidates' impulses.

@@ -32,6 +32,9 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceTh
     const Vec3 r = problem.impulse[k], v = constrained(c, relative_velocity(c, V) + c.offset);
     if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
       wishes.pressed += std::abs(c.normal.dot(r));
+    if (c.cell >= 0)  // what its faces carry, as walls would
+      wishes.pressed +=
+          c.reach / problem.bodies[static_cast<std::size_t>(c.cell)].radius * std::abs(c.normal.dot(r));
     wishes.fastest = std::max(wishes.fastest, c.offset.norm());
     const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
     const Vec3 shifted = v + shift * c.normal;

@@ -87,6 +87,7 @@ std::vector<std::vector<std::int32_t>> heavy_unknowns(const BodyParts& parts, do
       if (c.second < 0) continue;
       around[p][at(c.first)].u += Vec3(problem.bodies[at(c.second)].mass, 1, 0);
       around[p][at(c.second)].u += Vec3(problem.bodies[at(c.first)].mass, 1, 0);
+      if (c.cell >= 0) around[p][at(c.cell)].u += Vec3(0, 1, 0);
     }
   });
   parts.link().sum_copies(around);
@@ -96,7 +97,8 @@ std::vector<std::vector<std::int32_t>> heavy_unknowns(const BodyParts& parts, do
     for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
       const double mass = around[p][b].u[0], neighbours = around[p][b].u[1];
       if (problem.counted(b) && neighbours > 0 &&
-          (problem.bodies[b].wall || problem.bodies[b].mass * neighbours > ratio * mass))
+          (problem.bodies[b].wall || problem.bodies[b].cell ||
+           problem.bodies[b].mass * neighbours > ratio * mass))
         heavy[p].push_back(static_cast<std::int32_t>(b));
     }
   });

@@ -42,6 +42,16 @@ BodyUnknown unknown_of_wall(const WallMotion& wall) {
   return body;
 }
 
+BodyUnknown unknown_of_cell(const CellMotion& cell) {
+  BodyUnknown body;
+  body.mass = body.spin_mass = cell.mass;
+  body.radius = cell.edge;
+  body.axis = cell.stretches;
+  body.shears = cell.shears;
+  body.cell = true;
+  return body;
+}
+
 /// `part` null: all of it.
 std::array<std::size_t, 2> slots_of(const BodyProblemSource& source, const BodyProblemPart* part) {
   return part ? std::array{part->begin, part->end} : std::array{std::size_t{0}, source.velocity.size()};
@@ -84,6 +94,13 @@ ContactGraph graph_of(const BodyProblemSource& source, const BodyProblemPart* pa
     }
     graph.mass.push_back(1 / source.walls[w].inv_mass);
   }
+  if (source.cell.mass > 0) {
+    if (part) {
+      graph.counts.push_back(part->subdomain == 0 ? 1 : 0);
+      graph.shared.push_back(static_cast<std::int32_t>(graph.mass.size()));
+    }
+    graph.mass.push_back(source.cell.mass);
+  }
   const auto first_slot = static_cast<Slot>(begin);
   std::size_t count = 0;
   each_chunk(source, part, [&](std::size_t c) { count += at(source.contacts.count[c]); });
@@ -120,6 +137,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
   for (std::size_t slot = begin; slot < end; ++slot) problem.bodies.push_back(unknown_of_slot(source, slot));
   for (const WallMotion& wall : source.walls)
     if (wall.inv_mass != 0) problem.bodies.push_back(unknown_of_wall(wall));
+  if (source.cell.mass > 0) problem.bodies.push_back(unknown_of_cell(source.cell));
 
   const Contacts& contacts = source.contacts;
   problem.contacts.reserve(graph.pairs.size());
@@ -143,6 +161,10 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
       const Vec3 drift = drift_of(contacts, k);
       contact.drive = drift.norm();
       contact.offset -= drift;
+    }
+    if (source.cell.mass > 0) {
+      contact.cell = static_cast<std::int32_t>(problem.bodies.size()) - 1;
+      contact.reach = contacts.reach[k];
     }
     contact.place = static_cast<std::int32_t>(k);
     contact.wall = w;

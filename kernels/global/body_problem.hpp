@@ -5,7 +5,8 @@
 ///   min 1/2 (V - V_free)^T M (V - V_free),   H^T V + b n + mu |v_t| n  in  K_mu*  at every contact
 ///
 /// (docs/theory.md). Unknowns are the grains, 6 numbers each, then the walls of finite mass, 1 each along its
-/// normal. Driven walls are data. With several subdomains each holds a part of the problem (body_parts.hpp).
+/// normal, and last a periodic cell that follows a stress, up to 6. Driven walls are data. With several
+/// subdomains each holds a part of the problem (body_parts.hpp).
 
 #include <Eigen/Geometry>
 #include <array>
@@ -18,6 +19,7 @@
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/contacts.hpp"
 #include "kernels/law/pair_table.hpp"
+#include "kernels/sweeps/cell_copy.hpp"
 
 namespace talus {
 
@@ -31,19 +33,23 @@ inline double dot(const Twist& a, const Twist& b) {
   return a.u.dot(b.u) + a.w.dot(b.w);
 }
 
-/// One body. A wall never rotates and moves along `axis` only; its part of a Twist is (velocity x axis, 0).
+/// One body. A wall never rotates and moves along `axis` only; its part of a Twist is (velocity x axis, 0). A
+/// cell (kernels/sweeps/cell_copy.hpp) has u = (xx, yy, zz) and w = (xy, xz, yz), of which those move whose
+/// entry of `axis`, and of `shears`, is 1; its `radius` is its edge over d.
 struct BodyUnknown {
-  double mass = 0;           ///< [kg] > 0
-  double spin_mass = 0;      ///< I/R^2 [kg]; 0: does not turn
-  Vec3 x = Vec3::Zero();     ///< centre [m]
-  double radius = 0;         ///< [m]
-  Vec3 axis = Vec3::Zero();  ///< of a wall: its normal, unit
-  bool wall = false;
+  double mass = 0;             ///< [kg] > 0
+  double spin_mass = 0;        ///< I/R^2 [kg]; 0: does not turn
+  Vec3 x = Vec3::Zero();       ///< centre [m]
+  double radius = 0;           ///< [m]
+  Vec3 axis = Vec3::Zero();    ///< of a wall: its normal, unit
+  Vec3 shears = Vec3::Zero();  ///< of a cell
+  bool wall = false, cell = false;
   Twist free;  ///< velocity without contacts
 };
 
 /// One contact: v = u_first - u_second + n x (w_first + w_second) - drive, the second missing at a driven
-/// wall. With levers v = u_first - u_second + B_first w_first - B_second w_second - drive.
+/// wall. With levers v = u_first - u_second + B_first w_first - B_second w_second - drive. In a cell that
+/// follows a stress v gains U b/d (cell_copy.hpp).
 struct ContactEquation {
   Vec3 normal;  ///< unit, to the first body
   Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]
@@ -52,6 +58,8 @@ struct ContactEquation {
   std::int32_t second = -1;        ///< unknown; -1 at a driven wall
   std::int32_t place = -1;         ///< in `Contacts`
   std::int32_t wall = -1;          ///< number of the wall; -1 between bodies
+  std::int32_t cell = -1;          ///< unknown; -1 where no cell follows a stress
+  double reach = 0;                ///< |b|/d there
   double drive = 0;                ///< speed of the driven wall [m/s]; 0 between bodies
   const Levers* levers = nullptr;  ///< of a contact of blocks, in `Contacts`
 };
@@ -70,6 +78,9 @@ struct BodyProblem {
   std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
 
   bool counted(std::size_t body) const { return counts.empty() || counts[body] != 0; }
+  /// A cell that follows a stress stands last, behind the walls.
+  bool has_cell() const { return !bodies.empty() && bodies.back().cell; }
+  std::size_t walls() const { return bodies.size() - grains - (has_cell() ? 1 : 0); }  ///< of finite mass
 };
 
 /// Who touches whom in a problem or its part, and how heavy they are; unknowns as there.
@@ -91,6 +102,13 @@ struct WallMotion {
   double inv_mass = 0;
 };
 
+/// A cell that follows a stress, as the problem sees it.
+struct CellMotion {
+  double mass = 0;                                       ///< [kg]; 0: there is none
+  Vec3 stretches = Vec3::Zero(), shears = Vec3::Zero();  ///< 1 for the components that move
+  double edge = 0;                                       ///< of the cell over d
+};
+
 /// Where the problem stands in the arrays of a step.
 struct BodyProblemSource {
   std::span<const Vec3> x;             ///< [m]
@@ -102,6 +120,7 @@ struct BodyProblemSource {
   const Contacts& contacts;
   const PairTable& laws;
   Multiplicities parts;  ///< of the slots: copies carry M/parts
+  CellMotion cell = {};
 };
 
 /// The slots and chunks of one subdomain among those of a step.
@@ -142,7 +161,14 @@ Vec3 relative_velocity_of_spheres(const Contact& c, std::span<const Twist> V) {
   const Twist& b = V[static_cast<std::size_t>(c.second)];
   return a.u - b.u + c.normal.cross(a.w + b.w);
 }
+/// U b/d of the cell of a contact [m/s].
+inline Vec3 velocity_of_cell(const ContactEquation& c, std::span<const Twist> V) {
+  const auto& [u, w] = V[static_cast<std::size_t>(c.cell)];
+  return velocity_at({u[0], u[1], u[2], w[0], w[1], w[2]}, c.reach * c.normal);
+}
+
 inline Vec3 relative_velocity(const ContactEquation& c, std::span<const Twist> V) {
+  if (c.cell >= 0) return relative_velocity_of_spheres(c, V) + velocity_of_cell(c, V);
   if (c.levers == nullptr) return relative_velocity_of_spheres(c, V);
   const Twist& a = V[static_cast<std::size_t>(c.first)];
   const Vec3 v = a.u + c.levers->first * a.w;
@@ -184,7 +210,17 @@ void add_force_of_spheres(const Contact& c, const Vec3& r, std::span<Twist> F) {
   b.u -= r;
   b.w -= turn;
 }
+/// Its part of F += H r, before `restrict_to_freedoms`.
+inline void add_force_on_cell(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
+  CellVelocity f{};
+  add_impulse(r, c.reach * c.normal, f);
+  Twist& cell = F[static_cast<std::size_t>(c.cell)];
+  cell.u += Vec3(f[0], f[1], f[2]);
+  cell.w += Vec3(f[3], f[4], f[5]);
+}
+
 inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
+  if (c.cell >= 0) add_force_on_cell(c, r, F);
   if (c.levers == nullptr) return add_force_of_spheres(c, r, F);
   Twist& a = F[static_cast<std::size_t>(c.first)];
   a.u += r;
@@ -197,6 +233,10 @@ inline void add_force(const ContactEquation& c, const Vec3& r, std::span<Twist> 
 
 /// Drops what cannot move a body: of walls all but the part along the axis, of bodies that do not turn w.
 inline void restrict_to_freedoms(const BodyUnknown& body, Twist& f) {
+  if (body.cell) {
+    f = {f.u.cwiseProduct(body.axis), f.w.cwiseProduct(body.shears)};
+    return;
+  }
   if (body.wall) f.u = body.axis.dot(f.u) * body.axis;
   if (body.wall || body.spin_mass == 0) f.w.setZero();
 }

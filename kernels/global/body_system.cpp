@@ -34,6 +34,16 @@ void BodySystem::add_block_of_blocks(const ContactEquation& contact, double rho)
   if (contact.second >= 0) add(contact.second, contact.levers->second);
 }
 
+/// The same for the cell that a contact pushes.
+void BodySystem::add_block_of_cell(const ContactEquation& contact, double rho) {
+  touched_[at(contact.cell)] = 1;
+  const Vec3 b = contact.reach * contact.normal;
+  Eigen::Matrix<double, 3, 6> motion;
+  motion << b[0], 0, 0, b[1], b[2], 0, 0, b[1], 0, 0, 0, b[2], 0, 0, b[2], 0, 0, 0;
+  if (contact.mu == 0) motion = (contact.normal * (contact.normal.transpose() * motion)).eval();
+  diagonal_[at(contact.cell)] += rho * motion.transpose() * motion;
+}
+
 /// f less the row's part from the other body.
 inline void BodySystem::take(const Edge& edge, std::span<const Twist> x, Twist& f) const {
   if (edge.kind >= 0) return take_from_block(edge, x, f);
@@ -94,6 +104,7 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
       add_block_of_blocks(c, rho[k]);
     else
       add_own_block(c.normal, rho[k], kind, diagonal_[at(c.first)]);
+    if (c.cell >= 0) add_block_of_cell(c, rho[k]);
     if (c.second < 0) continue;
     if (c.levers == nullptr) add_own_block(-c.normal, rho[k], kind, diagonal_[at(c.second)]);
     if (row(c.first) && row(c.second)) {
@@ -126,7 +137,15 @@ void BodySystem::close() {
     if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];
     Matrix6 inverse = Matrix6::Zero();
-    if (body.wall) {
+    if (body.cell) {
+      Matrix6 block = diagonal_[b];
+      block.diagonal().array() += body.mass;
+      Eigen::Matrix<double, 6, 1> free;
+      free << body.axis, body.shears;
+      block = free.asDiagonal() * block * free.asDiagonal();
+      block.diagonal() += Eigen::Matrix<double, 6, 1>(Eigen::Matrix<double, 6, 1>::Ones() - free);
+      inverse = free.asDiagonal() * block.llt().solve(Matrix6::Identity()) * free.asDiagonal();
+    } else if (body.wall) {
       const double stiffness = body.mass + body.axis.dot(diagonal_[b].topLeftCorner<3, 3>() * body.axis);
       inverse.topLeftCorner<3, 3>() = body.axis * body.axis.transpose() / stiffness;
     } else if (body.spin_mass == 0) {
@@ -173,7 +192,20 @@ void BodySystem::multiply(std::span<const Twist> x, std::span<Twist> y) const {
     if (link.kind == slick) v = link.normal.dot(v) * link.normal;
     add_force_of_spheres(link, link.rho * v, y);
   }
+  if (problem_.has_cell()) multiply_with_cell(x, y);
   restrict_all(y);
+}
+
+/// What the cell adds to the product: in each contact v gains U b/d.
+void BodySystem::multiply_with_cell(std::span<const Twist> x, std::span<Twist> y) const {
+  for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
+    const ContactEquation& c = problem_.contacts[k];
+    const double rho = links_[k].rho;
+    const Vec3 of_cell = constrained(c, velocity_of_cell(c, x)),
+               of_bodies = constrained(c, relative_velocity_of_spheres(c, x));
+    add_force_of_spheres(c, rho * of_cell, y);
+    add_force_on_cell(c, rho * (of_bodies + of_cell), y);
+  }
 }
 
 void BodySystem::smooth_forward(std::span<const Twist> f, std::span<Twist> x) const {

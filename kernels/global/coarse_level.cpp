@@ -119,7 +119,7 @@ void CoarseLevel::join(std::span<const std::vector<char>> touched, int target) {
   for (std::size_t k = 0; k < counts.size(); ++k)
     begin[k + 1] = begin[k] + static_cast<std::int64_t>(counts[k]);
   aggregates_ = begin.back();
-  walls_ = static_cast<std::int64_t>(parts_[0].bodies.size() - parts_[0].grains);
+  walls_ = static_cast<std::int64_t>(parts_[0].walls());
 
   PartField arm = parts_.field(), name = parts_.field();
   parts_.each([&](std::size_t p) {
@@ -203,7 +203,7 @@ class CoarseLevel::BlockMap {
       keys_.insert(keys_.end(),
                    {key(one, one), key(other, other), key(std::max(one, other), std::min(one, other))});
     }
-    for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+    for (std::size_t b = 0; b < problem.grains + problem.walls(); ++b)
       if (const std::int64_t g = group_of(static_cast<std::int32_t>(b)); problem.counted(b) && g >= 0)
         keys_.push_back(key(g, g));
     std::sort(keys_.begin(), keys_.end());

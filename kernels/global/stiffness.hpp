@@ -24,7 +24,7 @@ inline double effective_mass(const BodyProblem& problem, const ContactEquation& 
   const auto mobility = [&](std::int32_t body) {
     return body < 0 ? 0 : 1 / problem.bodies[static_cast<std::size_t>(body)].mass;
   };
-  return 1 / (mobility(c.first) + mobility(c.second));
+  return 1 / (mobility(c.first) + mobility(c.second) + c.reach * c.reach * mobility(c.cell));
 }
 
 }  // namespace talus

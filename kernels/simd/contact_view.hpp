@@ -18,6 +18,7 @@ struct ContactViewOf {
   const Number* rn;                     ///< without
   const Number* mu;                     ///< where each contact has friction of its own
   const Number *vx, *vy, *vz;           ///< drifts, or null
+  const double* reach;                  ///< in a cell under stress, else void
   const std::uint32_t *first, *second;  ///< where the records of the bodies begin, in numbers
   const std::uint8_t* group;  ///< sizes of the groups from `begin` on, each 1..16: no grain twice in one
   std::size_t begin, end;
@@ -56,6 +57,12 @@ struct WallView {
   double inv_mass;   ///< [1/kg]
 };
 
+/// A cell under stress, or a chunk's copy of it: xx, yy, zz, xy, xz, yz.
+struct CellView {
+  double* velocity;        ///< 6 [m/s]
+  const double* inv_mass;  ///< 6 [1/kg]
+};
+
 /// Of which copies a wall's error is asked, and in how many parts the bodies stand.
 struct WholeView {
   const double* wall;          ///< its velocity, 3 [m/s]
@@ -72,6 +79,9 @@ struct LaneKernels {
   void (*sweep_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, const WallView&);
   void (*momentum_wall)(const ContactView&, const ImpulseView&, double* bodies, double mu, const WallView&,
                         const MomentumView&);
+  void (*sweep_cell)(const ContactView&, const ImpulseView&, double* bodies, double mu, const CellView&);
+  void (*momentum_cell)(const ContactView&, const ImpulseView&, double* bodies, double mu, const CellView&,
+                        const MomentumView&);
   /// Momentum in single precision.
   void (*single_grains)(const SingleContactView&, const SingleImpulseView&, float* bodies, double mu,
                         const MomentumView&);
@@ -81,6 +91,8 @@ struct LaneKernels {
   void (*accumulate_wall)(const ContactView&, double* bodies, const WallView&);
   ErrorTotals (*error_grains)(const ContactView&, const double* bodies, double mu, const WholeView&);
   ErrorTotals (*error_wall)(const ContactView&, const double* bodies, double mu, const WholeView&);
+  ErrorTotals (*error_cell)(const ContactView&, const double* bodies, double mu, const WholeView&,
+                            const CellView&);
   /// Momentum of whole records at `slots`.
   void (*advance_bodies)(double* bodies, double* last, const std::int32_t* slots, std::size_t count,
                          double beta);

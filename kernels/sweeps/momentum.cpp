@@ -56,8 +56,9 @@ std::size_t bytes(const Impulses& impulses) {
 
 }  // namespace
 
-void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts, std::size_t bodies,
-              std::size_t chunks) {
+void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts,
+              const AccelerationRoom& room) {
+  const auto& [bodies, chunks, cell_copies] = room;
   const auto like = [&](auto& impulses) {
     impulses.x.resize(contacts.rx.size());
     impulses.y.resize(contacts.ry.size());
@@ -66,11 +67,13 @@ void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& co
   };
   if (bodies > 0) acceleration.last_v.resize(bodies);  // else a sweep that is on its way may still read it
   acceleration.last_wall_v.resize(chunks);
+  acceleration.last_cell_v.resize(cell_copies);
   if (carry == Carry::momentum) return like(acceleration.steps);
   like(acceleration.last);
   like(acceleration.step);
   acceleration.step_v.resize(bodies);
   acceleration.step_wall_v.resize(chunks);
+  acceleration.step_cell_v.resize(cell_copies);
 }
 
 void begin_steps(ContactRange range, SweepSteps& steps) {
@@ -126,6 +129,13 @@ void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy,
                 acceleration.step_wall_v.empty() ? nullptr : acceleration.step_wall_v[chunk].data(), 3);
 }
 
+void carry_cell(Carry carry, double beta, std::size_t chunk, CellCopy& copy,
+                AccelerationHistory& acceleration) {
+  carry_numbers(carry, beta, copy.velocity.data(), acceleration.last_cell_v[chunk],
+                acceleration.step_cell_v.empty() ? nullptr : acceleration.step_cell_v[chunk].data(),
+                cell_freedoms);
+}
+
 template <class Number>
 void loosen(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& velocity,
             std::vector<VelocityOf<Number>>& last) {
@@ -145,6 +155,13 @@ void loosen(std::size_t chunk, const WallCopy& copy, AccelerationHistory& accele
 }
 void fasten(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration) {
   for (std::size_t k = 0; k < 3; ++k) acceleration.last_wall_v[chunk][k] += copy.velocity[k];
+}
+
+void loosen(std::size_t chunk, const CellCopy& copy, AccelerationHistory& acceleration) {
+  for (std::size_t k = 0; k < cell_freedoms; ++k) acceleration.last_cell_v[chunk][k] -= copy.velocity[k];
+}
+void fasten(std::size_t chunk, const CellCopy& copy, AccelerationHistory& acceleration) {
+  for (std::size_t k = 0; k < cell_freedoms; ++k) acceleration.last_cell_v[chunk][k] += copy.velocity[k];
 }
 
 double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
@@ -173,7 +190,8 @@ std::size_t memory_used(const AccelerationHistory& acceleration) {
   return bytes(acceleration.steps) + bytes(acceleration.last) + bytes(acceleration.step) +
          sizeof(Velocity) * (acceleration.last_v.capacity() + acceleration.step_v.capacity()) +
          sizeof(std::array<double, 3>) *
-             (acceleration.last_wall_v.capacity() + acceleration.step_wall_v.capacity());
+             (acceleration.last_wall_v.capacity() + acceleration.step_wall_v.capacity()) +
+         sizeof(CellVelocity) * (acceleration.last_cell_v.capacity() + acceleration.step_cell_v.capacity());
 }
 
 }  // namespace talus

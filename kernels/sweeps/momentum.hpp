@@ -6,6 +6,7 @@
 
 #include "kernels/bodies/bodies.hpp"
 #include "kernels/detection/contacts.hpp"
+#include "kernels/sweeps/cell_copy.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 
 namespace talus {
@@ -32,12 +33,21 @@ struct AccelerationHistory {
   std::vector<Velocity> step_v;
   std::vector<std::array<double, 3>> last_wall_v;  ///< per chunk: of its wall copy [m/s]
   std::vector<std::array<double, 3>> step_wall_v;
+  std::vector<CellVelocity> last_cell_v;  ///< per chunk, in a cell that follows a stress: of its copy [m/s]
+  std::vector<CellVelocity> step_cell_v;
 };
 
-/// Room for the contacts, bodies (none where they are carried in single precision) and chunks; what was not
-/// there is void. What only the other rule remembers stays: a sweep under it may still be on its way.
-void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts, std::size_t bodies,
-              std::size_t chunks);
+/// How much there is to remember.
+struct AccelerationRoom {
+  std::size_t bodies;  ///< none where they are carried in single precision
+  std::size_t chunks;
+  std::size_t cell_copies;  ///< as many as chunks, or none
+};
+
+/// Room for the contacts, bodies and copies; what was not there is void. What only the other rule remembers
+/// stays: a sweep under it may still be on its way.
+void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts,
+              const AccelerationRoom& room);
 
 /// Momentum of the impulses of a range begins: no step yet.
 void begin_steps(ContactRange range, SweepSteps& steps);
@@ -56,6 +66,10 @@ void carry_velocities(const SweepKernels& kernels, double beta, std::span<const 
 void carry_wall(Carry carry, double beta, std::size_t chunk, WallCopy& copy,
                 AccelerationHistory& acceleration);
 
+/// The same to the chunk's copy of a cell.
+void carry_cell(Carry carry, double beta, std::size_t chunk, CellCopy& copy,
+                AccelerationHistory& acceleration);
+
 /// Making velocities afresh from the impulses removes their rounding drift. The velocities that the
 /// acceleration remembers still contain it; the rule would take the difference for motion and amplify it by
 /// beta/(1 - beta), at every refresh. So the remembered velocities are shifted by the same difference: call
@@ -70,9 +84,13 @@ void fasten(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& 
 /// The same with the wall copy of a chunk.
 void loosen(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration);
 void fasten(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration);
+/// ... and of a cell.
+void loosen(std::size_t chunk, const CellCopy& copy, AccelerationHistory& acceleration);
+void fasten(std::size_t chunk, const CellCopy& copy, AccelerationHistory& acceleration);
 
 /// Sum of W_nn |s - y|^2 over a range [J]: the square of what the sweep changed, in the metric of the sweep.
-/// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls.
+/// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls. Of a cell that
+/// follows a stress nothing is counted: its share of W_nn is small.
 double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
                       double wall_inv_mass, const AccelerationHistory& acceleration);
 

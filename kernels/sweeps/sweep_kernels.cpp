@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels/simd/contact_view.hpp"
+#include "kernels/sweeps/cell_copy.hpp"
 #include "kernels/sweeps/single_precision.hpp"
 
 namespace talus {
@@ -53,6 +54,7 @@ ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, Conta
           drift(arrays.vx),
           drift(arrays.vy),
           drift(arrays.vz),
+          contacts.reach.data(),
           contacts.first_record.data(),
           contacts.second_record.data(),
           contacts.group.data() + range.begin,
@@ -91,6 +93,9 @@ ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
 
 WallView view(WallCopy& wall) {
   return {wall.velocity, wall.inv_mass};
+}
+CellView view(CellCopy& cell) {
+  return {cell.velocity.data(), cell.inv_mass.data()};
 }
 
 /// Half records in lanes of 4 are swept faster than in lanes of 8: 3.5 against 4.2 ns per contact. V afresh
@@ -150,6 +155,21 @@ void SweepKernels::sweep_wall(Contacts& contacts, ContactRange range, std::span<
 }
 
 template <bool Friction>
+void SweepKernels::sweep_cell(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                              ChunkFriction friction, CellCopy& cell) const {
+  lanes<Friction>(friction).sweep_cell(view(contacts, range, velocity, Between::grains), impulses(contacts),
+                                       records(velocity), friction.mu, view(cell));
+}
+
+template <bool Friction>
+void SweepKernels::sweep_cell(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                              ChunkFriction friction, CellCopy& cell, const SweepMomentum& momentum) const {
+  lanes<Friction>(friction).momentum_cell(view(contacts, range, velocity, Between::grains),
+                                          impulses(contacts), records(velocity), friction.mu, view(cell),
+                                          view(momentum));
+}
+
+template <bool Friction>
 void SweepKernels::sweep_grains(const Contacts& contacts, SingleState& single, ContactRange range,
                                 ChunkFriction friction, const SweepMomentum& momentum) const {
   lanes<Friction>(friction).single_grains(
@@ -199,6 +219,18 @@ ErrorSums SweepKernels::error_wall(const Contacts& contacts, ContactRange range,
       range);
 }
 
+template <bool Friction>
+ErrorSums SweepKernels::error_cell(const Contacts& contacts, ContactRange range,
+                                   std::span<const Velocity> velocity, ChunkFriction friction,
+                                   const CellCopy& cell, Multiplicities parts) const {
+  CellVelocity velocity_of_cell = cell.velocity;  // read only
+  return sums_of(lanes<Friction>(friction).error_cell(
+                     view(contacts, range, velocity, Between::grains), records(velocity), friction.mu,
+                     {.wall = nullptr, .wall_inv_mass = 0, .parts = parts.data()},
+                     {velocity_of_cell.data(), cell.inv_mass.data()}),
+                 range);
+}
+
 void SweepKernels::advance(std::span<const Slot> slots, std::span<Velocity> velocity,
                            std::span<Velocity> last, double beta) const {
   lanes_[1]->advance_bodies(records(velocity), records(last), slots.data(), slots.size(), beta);
@@ -209,6 +241,18 @@ void SweepKernels::advance(std::span<const Slot> slots, std::span<SingleVelocity
   lanes_[1]->advance_single(records(velocity), records(last), slots.data(), slots.size(), beta);
 }
 
+template void SweepKernels::sweep_cell<true>(Contacts&, ContactRange, std::span<Velocity>, ChunkFriction,
+                                             CellCopy&) const;
+template void SweepKernels::sweep_cell<true>(Contacts&, ContactRange, std::span<Velocity>, ChunkFriction,
+                                             CellCopy&, const SweepMomentum&) const;
+template ErrorSums SweepKernels::error_cell<true>(const Contacts&, ContactRange, std::span<const Velocity>,
+                                                  ChunkFriction, const CellCopy&, Multiplicities) const;
+template void SweepKernels::sweep_cell<false>(Contacts&, ContactRange, std::span<Velocity>, ChunkFriction,
+                                              CellCopy&) const;
+template void SweepKernels::sweep_cell<false>(Contacts&, ContactRange, std::span<Velocity>, ChunkFriction,
+                                              CellCopy&, const SweepMomentum&) const;
+template ErrorSums SweepKernels::error_cell<false>(const Contacts&, ContactRange, std::span<const Velocity>,
+                                                   ChunkFriction, const CellCopy&, Multiplicities) const;
 template void SweepKernels::sweep_grains<true>(const Contacts&, SingleState&, ContactRange, ChunkFriction,
                                                const SweepMomentum&) const;
 template void SweepKernels::sweep_wall<true>(const Contacts&, SingleState&, ContactRange, ChunkFriction,

@@ -10,6 +10,7 @@
 
 namespace talus {
 
+struct CellCopy;
 struct LaneKernels;
 struct SingleState;
 
@@ -59,6 +60,15 @@ class SweepKernels {
   void sweep_wall(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                   ChunkFriction friction, WallCopy& wall, const SweepMomentum& momentum) const;
 
+  /// sweep_grains in a cell that follows a stress (cell_copy.hpp): W_nn and W_tt gain (|b|/d)^2/m of the
+  /// copy, a bound where not all components are free. The copy is split into 8 once more, as that of a wall.
+  template <bool Friction>
+  void sweep_cell(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                  ChunkFriction friction, CellCopy& cell) const;
+  template <bool Friction>
+  void sweep_cell(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
+                  ChunkFriction friction, CellCopy& cell, const SweepMomentum& momentum) const;
+
   /// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
   /// (single_precision.hpp); of `contacts` groups and bodies are read. The steps are in the units of
   /// `single`.
@@ -86,6 +96,10 @@ class SweepKernels {
   template <bool Friction>
   ErrorSums error_wall(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                        ChunkFriction friction, const WallCopy& wall, Multiplicities parts = {}) const;
+  /// `cell` has the velocity of the chunk's copy, and 1/M.
+  template <bool Friction>
+  ErrorSums error_cell(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
+                       ChunkFriction friction, const CellCopy& cell, Multiplicities parts = {}) const;
 
   /// Momentum of bodies: s goes on to s + beta (s - last), and `last` becomes s. Of whole records at `slots`,
   /// whose masses, equal in both, stay to the bit.

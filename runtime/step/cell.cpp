@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
+
+#include "runtime/step/stressed_cell.hpp"
 
 namespace talus {
 
@@ -33,10 +36,41 @@ void validate_flow(const Setup& setup, const Stage& stage) {
     refuse(fmt::format("the cell is strained by more than {} in a step; make the time step shorter", most));
 }
 
+/// Components that follow a stress: of a cell of spheres that repeats itself along all axes.
+void validate_stress(const Setup& setup, const Stage& stage) {
+  const StressLoad& load = stage.stress;
+  const bool swings = std::ranges::any_of(load.amplitude, [](double a) { return a != 0; });
+  if (!load.any() && !swings) return;
+  const auto refuse = [&](const std::string& what) {
+    throw std::invalid_argument(fmt::format("stage '{}', stress: {}", stage.name, what));
+  };
+  constexpr const char* names[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
+  if (setup.domain.edges().minCoeff() == 0)
+    refuse("the cell must be periodic along x, y and z; give all three of cell.lengths");
+  if (!setup.clumps.empty()) refuse("grains that are no spheres cannot push a cell yet");
+  const CellVelocity rates{stage.strain_rates[0], stage.strain_rates[1], stage.strain_rates[2],
+                           stage.shear_rates[0],  stage.shear_rates[1],  stage.shear_rates[2]};
+  for (std::size_t k = 0; k < cell_freedoms; ++k) {
+    if (load.to[k] && rates[k] != 0)
+      refuse(fmt::format("{} has a rate, too; a component follows either a rate or a stress", names[k]));
+    if ((load.to[k] && !std::isfinite(*load.to[k])) || !std::isfinite(load.amplitude[k]))
+      refuse(fmt::format("{} must be finite [Pa]", names[k]));
+    if (!load.to[k] && load.amplitude[k] != 0)
+      refuse(fmt::format("amplitude_{0} swings about {0}, which is not given", names[k]));
+  }
+  if (swings && !(load.period > 0)) refuse("swings need a period > 0 [s]");
+  if (!(load.ramp_time >= 0 && std::isfinite(load.ramp_time))) refuse("ramp_time must be a number >= 0 [s]");
+}
+
 }  // namespace
 
 void validate_cell(const Setup& setup) {
-  for (const Stage& stage : setup.stages) validate_flow(setup, stage);
+  if (!(setup.cell_inertia > 0 && std::isfinite(setup.cell_inertia)))
+    throw std::invalid_argument("cell: inertia must be a number > 0");
+  for (const Stage& stage : setup.stages) {
+    validate_flow(setup, stage);
+    validate_stress(setup, stage);
+  }
   if (!setup.domain.repeats) return;
   const auto refuse = [](const std::string& what) { throw std::invalid_argument("cell: " + what); };
   for (const Wall& wall : setup.walls) {
@@ -56,6 +90,14 @@ void validate_cell(const Setup& setup) {
     refuse("grains cannot come or go in a periodic cell; remove [[insert]] and [[remove]]");
   if (!setup.probes.empty() || !setup.fields.empty())
     refuse("regions and grids know no images; remove [[probe]] and [[field]] (cell.csv has means)");
+}
+
+void validate_coupling(const Setup& setup) {
+  if (setup.decomposition.coupling != Coupling::nscdd &&
+      std::ranges::any_of(setup.stages, [](const Stage& stage) { return stage.stress.any(); }))
+    throw std::invalid_argument(
+        "a cell that follows a stress is pushed by all subdomains at once; take "
+        "\"nscdd\"");
 }
 
 double candidate_margin(const DetectionSettings& detection, double smallest) {

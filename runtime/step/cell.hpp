@@ -11,6 +11,9 @@ namespace talus {
 /// repeats, walls that are no planes or that turn, and grains that come or go.
 void validate_cell(const Setup& setup);
 
+/// Throws std::invalid_argument where a cell follows a stress and subdomains are not coupled by NSCDD.
+void validate_coupling(const Setup& setup);
+
 /// Distance of two grains at rest within which they are candidates [m], where the smallest has this radius.
 double candidate_margin(const DetectionSettings& detection, double smallest);
 

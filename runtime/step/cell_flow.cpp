@@ -37,14 +37,44 @@ void set_edges(Domain& domain, const Mat3& h) {
                  h(1, 2), inverse(h(0, 0)), inverse(h(1, 1)), inverse(h(2, 2))};
 }
 
-void begin_flow(const Mat3& gradient, double time_step, double reflection, Domain& domain, CellFlow& flow) {
-  const Mat3 rates = matrix_of(domain.rates), middle = edges_of(domain) + 0.5 * time_step * rates;
-  flow.edges_end = (Mat3::Identity() - 0.5 * time_step * gradient).inverse() * middle;
-  const Mat3 rates_end = gradient * flow.edges_end, change = (rates_end - rates) / (1 + reflection);
+namespace {
+
+Mat3 edges_in_middle(const Domain& domain, double time_step) {
+  return edges_of(domain) + 0.5 * time_step * matrix_of(domain.rates);
+}
+
+}  // namespace
+
+Mat3 gradient_before(const Domain& domain, double time_step) {
+  return matrix_of(domain.rates) * invertible(edges_in_middle(domain, time_step)).inverse();
+}
+
+void begin_flow(const CellDrive& drive, double time_step, double reflection, Domain& domain, CellFlow& flow) {
+  const Mat3 rates = matrix_of(domain.rates), middle = edges_in_middle(domain, time_step);
+  const Mat3 &gradient = drive.gradient, to_end = (Mat3::Identity() - 0.5 * time_step * gradient).inverse();
+  flow.before = gradient_before(domain, time_step);
+  flow.edges_end = to_end * middle;
+  Mat3 rates_end = gradient * flow.edges_end;
+  if (!drive.follows.isZero(0)) {
+    const Mat3 prescribed = gradient * to_end;
+    const auto follow = drive.follows.array();
+    const Mat3 end = (follow > 0).select(flow.before + (1 + reflection) * drive.gain, prescribed);
+    rates_end = end * middle;
+    flow.edges_end = middle + 0.5 * time_step * rates_end;
+  }
+  const Mat3 change = (rates_end - rates) / (1 + reflection);
   flow.rates_end = rates_of(rates_end);
   flow.gain = {change * invertible(middle).inverse(), domain.low};
   domain.drift_rates = rates_of(rates + change);
   set_edges(domain, middle);
+}
+
+void speed_up(const Mat3& gained, double time_step, double reflection, const Domain& domain, CellFlow& flow) {
+  const Mat3 middle = edges_of(domain);
+  flow.gain.gradient += gained;
+  const Mat3 rates_end = (flow.before + (1 + reflection) * flow.gain.gradient) * middle;
+  flow.rates_end = rates_of(rates_end);
+  flow.edges_end = middle + 0.5 * time_step * rates_end;
 }
 
 void end_flow(const CellFlow& flow, Domain& domain) {

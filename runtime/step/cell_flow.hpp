@@ -1,7 +1,7 @@
 #pragma once
 
-/// A cell that changes: its edges are the columns of a matrix h with dh/dt = L h, L the velocity gradient
-/// that the stage prescribes (docs/theory.md, "Periodic cells").
+/// A cell that changes: its edges are the columns of a matrix h with dh/dt = L h, L the velocity gradient.
+/// The stage prescribes its components, or the stress that they follow (docs/theory.md, "Periodic cells").
 
 #include <vector>
 
@@ -15,17 +15,31 @@ Mat3 edges_of(const Domain& domain);
 Mat3 matrix_of(const EdgeRates& rates);
 void set_edges(Domain& domain, const Mat3& edges);
 
+/// How the flow of a cell is driven in a step.
+struct CellDrive {
+  Mat3 gradient = Mat3::Zero();  ///< L where it is prescribed [1/s]: upper triangular, 0 beside axes of walls
+  Mat3 follows = Mat3::Zero();   ///< 1 for components that follow a stress
+  Mat3 gain = Mat3::Zero();      ///< what the stress gives those in the step's impulse time [1/s]
+};
+
 /// What a cell does in a step.
 struct CellFlow {
   Mat3 edges_end = Mat3::Zero();   ///< at the end of the step [m]
   EdgeRates rates_end;             ///< then [m/s]
+  Mat3 before = Mat3::Zero();      ///< G with which it began, of the edges in the middle of the step [1/s]
   AffineGain gain;                 ///< of the free velocities, from V- to those that are solved for
   Mat3 edges_then = Mat3::Zero();  ///< at the last broad phase [m]
 };
 
-/// Brings the domain to the middle of the step, and finds how it ends: by the trapezoidal rule, as bodies
-/// move. `gradient` L [1/s], upper triangular, 0 beside axes of walls; `reflection` E of the step.
-void begin_flow(const Mat3& gradient, double time_step, double reflection, Domain& domain, CellFlow& flow);
+/// Brings the domain to the middle of the step, and finds how it ends if contacts give it nothing: by the
+/// trapezoidal rule, as bodies move. `reflection` E of the step.
+void begin_flow(const CellDrive& drive, double time_step, double reflection, Domain& domain, CellFlow& flow);
+
+/// G of the velocities with which a step begins, dh/dt = G h of the edges h in its middle [1/s].
+Mat3 gradient_before(const Domain& domain, double time_step);
+
+/// The contacts have given G so much more [1/s], before what E adds: `flow` ends so.
+void speed_up(const Mat3& gained, double time_step, double reflection, const Domain& domain, CellFlow& flow);
 
 /// The domain of the end of the step.
 void end_flow(const CellFlow& flow, Domain& domain);

@@ -22,7 +22,8 @@ Mat3 deviator(const Mat3& m) {
   return even - even.trace() / 3 * Mat3::Identity();
 }
 
-/// Sum of m v (x) v over the grains, v against the flow of the cell [J]: subdomain by subdomain.
+}  // namespace
+
 Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {
   struct Row {
     double subdomain, moment[9];
@@ -48,8 +49,6 @@ Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::C
   for (const Row& row : rows) sum += Eigen::Map<const Mat3>(row.moment);
   return sum;
 }
-
-}  // namespace
 
 std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepReport& report,
                                       const graph::Communicator& ranks) {

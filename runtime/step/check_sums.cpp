@@ -8,7 +8,7 @@ namespace talus {
 
 namespace {
 
-/// A row as it travels, all doubles; three impulses per wall follow.
+/// A row as it travels, all doubles; the vectors of impulses follow.
 struct CheckRow {
   double subdomain, residual2, residual_max2, impulse2, velocity2, contacts, active, jump2, jump_velocity2;
 };
@@ -42,19 +42,28 @@ std::vector<const double*> by_subdomain(std::span<const double> rows, std::size_
 
 }  // namespace
 
-std::size_t check_row_width(std::size_t walls) {
-  return width_of<CheckRow> + 3 * walls;
+std::size_t pushed_vectors(const StepState& state) {
+  return state.walls.size() + (state.cell.loaded() ? cell_freedoms / 3 : 0);
 }
 
-std::vector<double> check_rows(const StepState& state, std::span<const ErrorSums> sums,
+std::size_t check_row_width(std::size_t vectors) {
+  return width_of<CheckRow> + 3 * vectors;
+}
+
+std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors,
                                std::span<const JumpSums> jumps) {
-  const std::size_t width = check_row_width(state.walls.size());
+  const auto& [sums, cell] = errors;
+  const std::size_t width = check_row_width(pushed_vectors(state));
   const auto& here = state.decomposition.here;
   std::vector<double> rows(here.size() * width, 0.0);
   std::vector<ErrorSums> added(here.size());
   for (std::size_t c = 0; c < sums.size(); ++c) {
     const auto e = static_cast<std::size_t>(state.chunks.subdomain[c]);
     added[e].add(sums[c]);
+    if (!cell.empty()) {
+      double* const of_cell = &rows[(e + 1) * width - cell_freedoms];
+      for (std::size_t k = 0; k < cell_freedoms; ++k) of_cell[k] += cell[c][k];
+    }
     if (state.chunks.wall[c] < 0) continue;
     double* wall = &rows[e * width + width_of<CheckRow> + 3 * static_cast<std::size_t>(state.chunks.wall[c])];
     for (std::size_t k = 0; k < 3; ++k) wall[k] += sums[c].wall_impulse[k];
@@ -76,11 +85,11 @@ std::vector<double> check_rows(const StepState& state, std::span<const ErrorSums
   return rows;
 }
 
-CheckSums add_check_rows(std::span<const double> rows, std::size_t walls, std::int32_t subdomains) {
+CheckSums add_check_rows(std::span<const double> rows, std::size_t vectors, std::int32_t subdomains) {
   CheckSums all;
-  all.wall_impulse.assign(walls, Vec3::Zero());
+  all.wall_impulse.assign(vectors, Vec3::Zero());
   std::int64_t fullest = 0;
-  for (const double* from : by_subdomain(rows, check_row_width(walls), subdomains)) {
+  for (const double* from : by_subdomain(rows, check_row_width(vectors), subdomains)) {
     const auto row = read_row<CheckRow>(from);
     ErrorSums part;
     part.residual2 = row.residual2;
@@ -93,7 +102,7 @@ CheckSums add_check_rows(std::span<const double> rows, std::size_t walls, std::i
     fullest = std::max(fullest, part.contacts);
     all.jump.jump2 += row.jump2;
     all.jump.velocity2 += row.jump_velocity2;
-    for (std::size_t w = 0; w < walls; ++w)
+    for (std::size_t w = 0; w < vectors; ++w)
       all.wall_impulse[w] += Eigen::Map<const Vec3>(from + width_of<CheckRow> + 3 * w);
   }
   if (all.error.contacts > 0)

@@ -16,17 +16,26 @@ namespace talus {
 struct CheckSums {
   ErrorSums error;  ///< but for its wall_impulse
   JumpSums jump;
-  std::vector<Vec3> wall_impulse;  ///< per wall, on the grains [N s]
-  double imbalance = 0;            ///< contacts of the fullest subdomain over those of the mean one, less 1
+  /// Per wall, on the grains [N s]; behind them, of a cell that follows a stress, the two halves of what
+  /// contacts do to it.
+  std::vector<Vec3> wall_impulse;
+  double imbalance = 0;  ///< contacts of the fullest subdomain over those of the mean one, less 1
 };
 
+/// How many vectors of three that is.
+std::size_t pushed_vectors(const StepState& state);
 /// Doubles in the row that a subdomain sends per check.
-std::size_t check_row_width(std::size_t walls);
-/// The rows of the subdomains here. `sums`: per chunk; `jumps`: per subdomain here, or none.
-std::vector<double> check_rows(const StepState& state, std::span<const ErrorSums> sums,
+std::size_t check_row_width(std::size_t vectors);
+/// What a check has measured of each chunk.
+struct ChunkErrors {
+  std::span<const ErrorSums> sums;
+  std::span<const CellVelocity> cell = {};  ///< impulses on a cell that follows a stress [N s], or none
+};
+/// The rows of the subdomains here. `jumps`: per subdomain here, or none.
+std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors,
                                std::span<const JumpSums> jumps);
 /// From the rows of all subdomains, each once, in any order.
-CheckSums add_check_rows(std::span<const double> rows, std::size_t walls, std::int32_t subdomains);
+CheckSums add_check_rows(std::span<const double> rows, std::size_t vectors, std::int32_t subdomains);
 
 /// The same of a single number per chunk, such as what a sweep changed.
 std::vector<double> number_rows(const StepState& state, std::span<const double> numbers);

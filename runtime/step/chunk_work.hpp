@@ -41,6 +41,8 @@ class ChunkWork {
   const Course& course(int epoch) const { return courses_.of(schedule_.sweep(epoch)); }
 
   const std::vector<ErrorSums>& errors() const { return errors_; }  ///< per chunk, of the last measure
+  /// Likewise what contacts do to a cell that follows a stress [N s]; empty without one.
+  const std::vector<CellVelocity>& cell_impulses() const { return cell_impulses_; }
   /// Per chunk, with conjugate gradients: what the last sweep changed, squared [J].
   const std::vector<double>& changes() const { return changes_; }
   /// Per subdomain here: time of its chunks since the plan [s]; zeros unless timed.
@@ -66,6 +68,7 @@ class ChunkWork {
   void to_double(std::size_t c, int epoch, bool before);
   ChunkFriction friction_of(std::size_t c) const;
   bool at_wall(std::size_t c) const { return state_.chunks.wall[c] >= 0; }
+  bool stressed() const { return !state_.cell.copies.empty(); }
   bool blocks(std::size_t c) const { return state_.chunks.kind[c] == ChunkKind::blocks; }
 
   StepState& state_;
@@ -75,6 +78,7 @@ class ChunkWork {
   const Courses& courses_;
   bool keep_impulses_ = false;
   std::vector<ErrorSums> errors_;
+  std::vector<CellVelocity> cell_impulses_;
   std::vector<std::vector<double>> before_;  ///< damped: per chunk at the interface, impulses before a sweep
   AccelerationHistory acceleration_;         ///< empty with plain sweeps
   std::vector<double> changes_;

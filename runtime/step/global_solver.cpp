@@ -110,10 +110,27 @@ std::vector<WallMotion> motions_of(const StepState& state) {
   return walls;
 }
 
+CellMotion motion_of(const StressedCell& cell, const Domain& domain) {
+  if (!cell.loaded()) return {};
+  const auto moves = [&](std::size_t k) { return cell.follows[k] ? 1.0 : 0.0; };
+  return {cell.mass,
+          {moves(0), moves(1), moves(2)},
+          {moves(3), moves(4), moves(5)},
+          std::cbrt(domain.edges().prod()) / cell.length};
+}
+
 BodyProblemSource source_of(const StepState& state, const StepParameters& parameters,
                             const std::vector<WallMotion>& walls) {
-  return {state.bodies.x, state.bodies.radius, state.bodies.velocity,    state.free, walls, state.chunks,
-          state.contacts, parameters.laws,     state.decomposition.parts};
+  return {state.bodies.x,
+          state.bodies.radius,
+          state.bodies.velocity,
+          state.free,
+          walls,
+          state.chunks,
+          state.contacts,
+          parameters.laws,
+          state.decomposition.parts,
+          motion_of(state.cell, state.domain)};
 }
 
 /// Contacts do something besides r: BodyProblem::known.
@@ -187,7 +204,8 @@ double GlobalSolver::sweeps_needed() const {
 void GlobalSolver::find_clusters(int most_direct) {
   small_ = false;
   large_ = true;
-  if (most_direct == 0) return;
+  // A cell that follows a stress ties all contacts together.
+  if (most_direct == 0 || state_.cell.loaded()) return;
   const Whole span(*this);
   const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
   const Clusters clusters = clusters_of(graphs, *link_);

@@ -23,19 +23,42 @@ using detail::start;
 using detail::taken_over;
 using detail::write_velocities;
 
+/// Vectors of three numbers that go through the root whatever bodies do: of each wall of finite mass one, of
+/// a cell that follows a stress two.
+std::size_t Gluing::vectors() const {
+  return walls_.size() + (state_.cell.loaded() ? cell_freedoms / 3 : 0);
+}
+
+/// Of such a vector.
+std::int64_t Gluing::copies_everywhere(std::size_t g) const {
+  return g < walls_.size() ? state_.wall_states[at(walls_[g])].copies_everywhere
+                           : state_.cell.copies_everywhere;
+}
+
+/// The vector in the copy of a chunk.
+double* Gluing::copy_of(std::size_t g, ChunkId chunk) {
+  if (g < walls_.size()) return state_.copies[chunk.at()].velocity;
+  return &state_.cell.copies[chunk.at()].velocity[3 * (g - walls_.size())];
+}
+
 void Gluing::begin() {
   for (Subdomain& subdomain : subdomains_) {
     subdomain.waited = 0;
     for (auto& copies : subdomain.wall_copies) copies.clear();
   }
   if (root_) root_->waited = 0;
-  std::vector<std::int64_t> copies(state_.walls.size(), 0);
+  std::vector<std::int64_t> copies(state_.walls.size() + 1, 0);
+  copies.back() = static_cast<std::int64_t>(state_.cell.held.size());
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     copies[w] = static_cast<std::int64_t>(state_.wall_states[w].copies.size());
-  if (!walls_.empty()) ranks_.sum(copies);
+  if (vectors() > 0) ranks_.sum(copies);
+  state_.cell.copies_everywhere = copies.back();
   for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].copies_everywhere = copies[w];
   for (std::size_t g = 0; g < walls_.size(); ++g)
     for (const ChunkId c : state_.wall_states[at(walls_[g])].copies)
+      subdomains_[SubdomainPlace(state_.chunks.subdomain[c.at()])].wall_copies[g].push_back(c);
+  for (std::size_t g = walls_.size(); g < vectors(); ++g)
+    for (const ChunkId c : state_.cell.held)
       subdomains_[SubdomainPlace(state_.chunks.subdomain[c.at()])].wall_copies[g].push_back(c);
 }
 
@@ -83,7 +106,7 @@ void Gluing::publish_bodies(SubdomainPlace e, std::span<const Record> velocity) 
     write_velocities<Width>(velocity, std::span<const Slot>(side.slots), detail::bytes_of(side.link.out));
   }
   if (mine.hub_item.empty()) return;
-  double* out = &mine.partial[3 * walls_.size()];
+  double* out = &mine.partial[3 * vectors()];
   for (const std::int32_t hub : state_.decomposition.interfaces[e].hubs) {
     const Numbers<Width, Record> numbers = numbers_of<Width>(velocity[at(mine.shared[at(hub)])]);
     out = std::copy(numbers.begin(), numbers.end(), out);
@@ -104,11 +127,11 @@ void Gluing::publish(SubdomainPlace e, Mode mode, bool single) {
 void Gluing::tell(SubdomainPlace e, Mode mode) {
   if (mode == Mode::local) return;
   Subdomain& mine = subdomains_[e];
-  for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
+  for (std::size_t g = 0; g < vectors() && mode != Mode::sum; ++g) {
     double* sum = &mine.partial[3 * g];
     std::fill_n(sum, 3, 0.0);
     for (const ChunkId c : mine.wall_copies[g])
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += state_.copies[c.at()].velocity[k];
+      for (std::size_t k = 0; k < 3; ++k) sum[k] += copy_of(g, c)[k];
   }
   if (!root_->up || !root_->links.empty()) return;
   // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
@@ -117,18 +140,27 @@ void Gluing::tell(SubdomainPlace e, Mode mode) {
   send_up();
 }
 
+/// The copies of a subdomain get the mean of their velocities: their momentum is kept, as they have equal
+/// masses. Summed in order.
+void Gluing::glue_here(std::size_t g, std::span<const ChunkId> copies) {
+  Vec3 sum = Vec3::Zero();
+  for (const ChunkId c : copies) sum += Eigen::Map<const Vec3>(copy_of(g, c));
+  for (const ChunkId c : copies)
+    Eigen::Map<Vec3>(copy_of(g, c)) = 1 / static_cast<double>(copies.size()) * sum;
+}
+
 void Gluing::glue(SubdomainPlace e, Mode mode, bool single) {
   Subdomain& mine = subdomains_[e];
-  for (std::size_t g = 0; g < walls_.size() && mode != Mode::sum; ++g) {
+  for (std::size_t g = 0; g < vectors() && mode != Mode::sum; ++g) {
     const auto& copies = mine.wall_copies[g];
     if (copies.empty()) continue;
     if (mode == Mode::local) {
-      glue_copies(state_.copies, numbers(std::span<const ChunkId>(copies)));
+      glue_here(g, copies);
       continue;
     }
-    const double part = 1 / static_cast<double>(state_.wall_states[at(walls_[g])].copies_everywhere);
+    const double part = 1 / static_cast<double>(copies_everywhere(g));
     for (const ChunkId c : copies)
-      for (std::size_t k = 0; k < 3; ++k) state_.copies[c.at()].velocity[k] = part * root_->sums[3 * g + k];
+      for (std::size_t k = 0; k < 3; ++k) copy_of(g, c)[k] = part * root_->sums[3 * g + k];
   }
   if (mode == Mode::local || !state_.decomposition.several()) return;
   const auto of_glue = [&](const Side& side) {
@@ -268,7 +300,7 @@ void Gluing::glue_bodies(SubdomainPlace e, Mode mode, std::span<Record> velocity
       if (interface.copies_begin[s] < interface.copies_begin[s + 1]) settle_copies(s);
   }
   for (std::size_t h = 0; h < interface.hubs.size(); ++h) {
-    const double* const from = &root_->sums[3 * walls_.size() + mine.hub_item[h] * Width];
+    const double* const from = &root_->sums[3 * vectors() + mine.hub_item[h] * Width];
     Own sum;
     for (std::size_t k = 0; k < Width; ++k) sum[k] = static_cast<Number>(from[k]);
     const std::size_t hub = at(interface.hubs[h]);
@@ -286,8 +318,12 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
       for (const Slot slot : subdomains_[e].shared)
         work(state_.bodies.velocity[at(slot)], field[e.at()][at(slot) - all.slots_of(e).begin], k++);
   };
+  // A cell is the last unknown; its two vectors are u and w of it.
+  const std::size_t unknowns = walls_.size() + (vectors() > walls_.size() ? 1 : 0);
   const auto wall = [&](SubdomainPlace e, std::size_t g) -> Vec3& {
-    return field[e.at()][field[e.at()].size() - walls_.size() + g].u;
+    std::vector<Twist>& of = field[e.at()];
+    return g < walls_.size() ? of[of.size() - unknowns + g].u
+                             : (g == walls_.size() ? of.back().u : of.back().w);
   };
   kept_.clear();
   each_shared([&](Velocity& v, const Twist& twist, std::size_t) {
@@ -296,7 +332,7 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
     std::copy_n(twist.w.data(), 3, v.w);
   });
   for (const SubdomainPlace e : subdomains_.indices()) {
-    for (std::size_t g = 0; g < walls_.size(); ++g)
+    for (std::size_t g = 0; g < vectors(); ++g)
       std::copy_n(wall(e, g).data(), 3, &subdomains_[e].partial[3 * g]);
     publish(e, Mode::sum);
   }
@@ -304,7 +340,7 @@ void Gluing::sum_copies(std::span<std::vector<Twist>> field) {
   root(Mode::sum);
   for (const SubdomainPlace e : subdomains_.indices()) {
     glue(e, Mode::sum);
-    for (std::size_t g = 0; g < walls_.size(); ++g) wall(e, g) = Eigen::Map<const Vec3>(&root_->sums[3 * g]);
+    for (std::size_t g = 0; g < vectors(); ++g) wall(e, g) = Eigen::Map<const Vec3>(&root_->sums[3 * g]);
   }
   each_shared([&](Velocity& v, Twist& twist, std::size_t k) {
     std::copy_n(v.u, 3, twist.u.data());

@@ -36,7 +36,8 @@ struct JumpSums {
 ///   publish[e]   after the border chunks of subdomain e: its interface velocities leave
 ///   collect      on ranks between the top and the leaves of the tree of ranks: what came from below goes up
 ///   root       once a rank: what goes through one rank (CCS; always walls of finite mass and bodies with
-///                m_i >= 9, or 33 with subdomain colours, so that k copies cost O(k) messages)
+///                m_i >= 9, or 33 with subdomain colours, so that k copies cost O(k) messages). A cell that
+///                follows a stress counts as two walls: its copies have 6 numbers
 ///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
 ///                what all have gained (Schwarz); summed in order of subdomain
 ///
@@ -69,7 +70,6 @@ class Gluing {
 
   /// False when there is nothing to glue: no tasks then.
   bool needed() const { return needed_; }
-  std::span<const std::int32_t> walls() const { return walls_; }  ///< of finite mass
   /// Subdomains here that read what e publishes; ascending, without e. They do so in
   /// their take where reads_early() is true, else in their glue.
   std::vector<SubdomainPlace> readers_here(SubdomainPlace e) const;
@@ -122,6 +122,10 @@ class Gluing {
   struct Subdomain;
   struct Root;
   struct RootTraffic;
+  std::size_t vectors() const;
+  std::int64_t copies_everywhere(std::size_t g) const;
+  double* copy_of(std::size_t g, ChunkId chunk);
+  void glue_here(std::size_t g, std::span<const ChunkId> copies);
   void plan_sides(SubdomainPlace e);
   void plan_copies(SubdomainPlace e);
   std::span<const CopySource> copies_of(SubdomainPlace e, std::size_t s) const;
@@ -155,8 +159,8 @@ class Gluing {
   const DecompositionSettings& settings_;
   const graph::Communicator& ranks_;
   bool needed_ = false;
-  std::size_t width_ = 6;  ///< numbers per body
-  std::vector<std::int32_t> walls_;
+  std::size_t width_ = 6;            ///< numbers per body
+  std::vector<std::int32_t> walls_;  ///< of finite mass
   Per<SubdomainPlace, Subdomain> subdomains_;
   graph::Tree tree_;
   std::unique_ptr<Root> root_;

@@ -25,7 +25,7 @@ void Gluing::plan(bool rotation) {
   walls_.clear();
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     if (state_.walls[w].inv_mass() > 0) walls_.push_back(static_cast<std::int32_t>(w));
-  needed_ = all.several() || !walls_.empty();
+  needed_ = all.several() || vectors() > 0;
   if (const std::int64_t subdomains = all.partition.subdomains;
       ranks_.ranks() > 1 && subdomains * subdomains + detail::root_tag > ranks_.largest_tag())
     throw std::invalid_argument(fmt::format(
@@ -42,7 +42,8 @@ void Gluing::plan(bool rotation) {
   for (const SubdomainPlace e : subdomains_.indices()) {
     plan_sides(e);
     plan_copies(e);
-    subdomains_[e].tells = all.several() && !walls_.empty() && all.interfaces[e].hubs.empty();
+    subdomains_[e].tells =
+        all.several() && vectors() > 0 && !state_.cell.loaded() && all.interfaces[e].hubs.empty();
   }
   for (const SubdomainPlace e : subdomains_.indices())
     for (Side& side : subdomains_[e].sides) {
@@ -60,7 +61,7 @@ void Gluing::plan_sides(SubdomainPlace e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];
   mine.subdomain_colour = subdomain_colour(e);
-  mine.wall_copies.resize(walls_.size());
+  mine.wall_copies.resize(vectors());
   if (!all.several()) return;
   const SubdomainInterface& interface = all.interfaces[e];
   const auto slot_of = [&](std::int32_t body) { return static_cast<Slot>(all.slots_of(e).begin + at(body)); };
@@ -142,8 +143,8 @@ void Gluing::count_messages() {
   for (const Subdomain& subdomain : subdomains_) {
     for (const Side& side : subdomain.sides) add(side.slots.size() * width_, side.local.none());
     if (subdomain.partial.empty() || !state_.decomposition.several()) continue;
-    add(subdomain.partial.size(), false);                                // to the root
-    add(3 * walls_.size() + subdomain.hub_item.size() * width_, false);  // and back
+    add(subdomain.partial.size(), false);                            // to the root
+    add(3 * vectors() + subdomain.hub_item.size() * width_, false);  // and back
   }
   if (root_ && root_->up) {
     count[2] += 2;
@@ -168,7 +169,7 @@ std::vector<trace::Message> Gluing::message_plan() const {
       add(own, all.interfaces[e].neighbours[n].subdomain.value(), subdomain.sides[n].slots.size() * width_);
     if (subdomain.partial.empty()) continue;
     add(own, trace::root_group, subdomain.partial.size());
-    add(trace::root_group, own, 3 * walls_.size() + subdomain.hub_item.size() * width_);
+    add(trace::root_group, own, 3 * vectors() + subdomain.hub_item.size() * width_);
   }
   return plan;
 }

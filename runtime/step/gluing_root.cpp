@@ -52,7 +52,7 @@ void Gluing::root(Mode mode) {
   }
   await_children();
   std::fill(root.sums.begin(), root.sums.end(), 0.0);
-  const std::size_t at_walls = 3 * walls_.size();
+  const std::size_t at_walls = 3 * vectors();
   for (const Root::Contribution& contribution : root.contributions) {
     for (std::size_t k = 0; k < at_walls; ++k) root.sums[k] += contribution.partial[k];
     for (std::size_t h = 0; h < contribution.item.size(); ++h)
@@ -67,7 +67,7 @@ void Gluing::root(Mode mode) {
 /// To each child what its branch asks for.
 void Gluing::answer() {
   const Root& root = *root_;
-  const std::size_t at_walls = 3 * walls_.size();
+  const std::size_t at_walls = 3 * vectors();
   for (std::size_t child = 0; child < root.links.size(); ++child) {
     Link& link = *root.links[child];
     await(*link.sender, root_->waited, ranks_.trace(), link.out_name);

@@ -68,7 +68,7 @@ Gluing::RootTraffic Gluing::gather_traffic() const {
   RootTraffic traffic;
   traffic.hubs = ranks_.gather_records(std::span<const RootTraffic::Hub>(mine));
   std::ranges::stable_sort(traffic.hubs, {}, &RootTraffic::Hub::subdomain);
-  traffic.length.assign(at(all.partition.subdomains), 3 * walls_.size());
+  traffic.length.assign(at(all.partition.subdomains), 3 * vectors());
   for (const auto& hub : traffic.hubs) traffic.length[hub.subdomain] += width_;
   traffic.length_of_rank.assign(at(ranks_.ranks()), 0);
   for (const SubdomainId e : traffic.length.indices())
@@ -93,7 +93,7 @@ std::vector<std::int64_t> Gluing::items_below(const RootTraffic& traffic, int to
 void Gluing::plan_parts(const RootTraffic& traffic) {
   const Decomposition& all = state_.decomposition;
   const std::vector<std::int64_t> items = items_below(traffic, ranks_.rank());
-  root_->sums.resize(3 * walls_.size() + items.size() * width_);
+  root_->sums.resize(3 * vectors() + items.size() * width_);
   for (const SubdomainPlace e : all.here.indices()) {
     Subdomain& subdomain = subdomains_[e];
     subdomain.partial.resize(traffic.length[all.here[e]]);
@@ -126,7 +126,7 @@ void Gluing::open_links(const RootTraffic& traffic) {
     std::vector<std::size_t>& wanted = root_->items_of_child.emplace_back();
     for (std::int64_t id : items_below(traffic, child)) wanted.push_back(place_of(items, id));
     root_->links.push_back(
-        open(child, 3 * walls_.size() + wanted.size() * width_, traffic.length_of(tree_.branch(child))));
+        open(child, 3 * vectors() + wanted.size() * width_, traffic.length_of(tree_.branch(child))));
   }
   if (me != tree_.top()) root_->up = open(me, traffic.length_of(tree_.branch(me)), root_->sums.size());
 }

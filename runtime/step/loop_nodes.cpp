@@ -6,8 +6,9 @@ namespace talus {
 
 namespace {
 
-/// Where a subdomain sends nothing to the root, its chunks at glued walls belong to the border.
-graph::LoopWork::Side side_of(ChunkSide side, bool tells) {
+/// Where a subdomain sends nothing to the root, its chunks at glued walls belong to the border; so do all
+/// chunks where all `push` what goes through the root.
+graph::LoopWork::Side side_of(ChunkSide side, bool tells, bool push) {
   using enum graph::LoopWork::Side;
   switch (side) {
     case ChunkSide::wall:
@@ -15,7 +16,7 @@ graph::LoopWork::Side side_of(ChunkSide side, bool tells) {
     case ChunkSide::border:
       return border;
     case ChunkSide::inside:
-      return inside;
+      return push ? border : inside;
     case ChunkSide::late:
       break;
   }
@@ -53,7 +54,7 @@ graph::LoopSpec loop_spec(const StepState& state, const Gluing& gluing, const De
   }
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const SubdomainPlace e(chunks.subdomain[c]);
-    spec.work.push_back({.side = side_of(chunks.side[c], gluing.tells(e)),
+    spec.work.push_back({.side = side_of(chunks.side[c], gluing.tells(e), state.cell.loaded()),
                          .group = static_cast<std::uint32_t>(e.value()),
                          .colour = static_cast<std::uint32_t>(chunks.colour[c]),
                          .weight = work_of_chunk(state, c),

@@ -214,6 +214,7 @@ void validate(const Setup& setup) {
   if (rolls(setup)) demand_plain_sweeps(setup, "moments of rolling resistance");
   if (!setup.clumps.empty()) validate_clumps(setup);
   validate_cell(setup);
+  validate_coupling(setup);
   require(setup.solver.check_every >= 2, "solver.check_every must be >= 2");
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,

@@ -2,6 +2,7 @@
 
 /// What a simulation is made of, once files have been read: no paths, no formats, SI units.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -44,6 +45,21 @@ struct StageEnd {
   double equilibrium_hold = 3;
 };
 
+/// The stress that components of a periodic cell follow, as it pushes the grains together: xx, yy, zz, xy,
+/// xz, yz [Pa]. In a stage that began t ago a component aims at
+///   from + (to - from) min(1, t/ramp_time) + amplitude sin(2 pi t/period),
+/// `from` what the stage before aimed at in its end, or 0 where it prescribed the flow.
+struct StressLoad {
+  std::array<std::optional<double>, 6> to;  ///< [Pa]; without one a component is driven at its rate
+  double ramp_time = 0;                     ///< [s]; 0: at once
+  std::array<double, 6> amplitude{};        ///< [Pa]
+  double period = 0;                        ///< [s]; > 0 where any amplitude is not 0
+
+  bool any() const {
+    return std::ranges::any_of(to, [](const auto& component) { return component.has_value(); });
+  }
+};
+
 /// One stage: a time interval with its own loads.
 struct Stage {
   std::string name;
@@ -54,7 +70,8 @@ struct Stage {
   Vec3 gravity = Vec3::Zero();       ///< [m/s^2]
   Vec3 strain_rates = Vec3::Zero();  ///< of the periodic cell: dv_x/dx, dv_y/dy, dv_z/dz [1/s]
   Vec3 shear_rates = Vec3::Zero();   ///< dv_x/dy, dv_x/dz, dv_y/dz [1/s]
-  bool flows() const { return !strain_rates.isZero(0) || !shear_rates.isZero(0); }
+  StressLoad stress;                 ///< of the periodic cell
+  bool flows() const { return !strain_rates.isZero(0) || !shear_rates.isZero(0) || stress.any(); }
   PairTable laws;                                       ///< of the setup's materials
   std::vector<std::pair<std::string, WallLoad>> loads;  ///< walls whose load changes when the stage begins
   StageEnd end;
@@ -193,6 +210,9 @@ struct Setup {
   std::vector<FieldRule> fields;
   std::vector<std::string> material_names;  ///< by number; empty where the scene names none
   Domain domain;                            ///< that the grains stand in
+  /// Mass of a cell that follows a stress, over that of all grains, > 0 (docs/theory.md, "Cells under
+  /// stress").
+  double cell_inertia = 1;
   std::vector<Wall> walls;
   std::vector<WallGroup> groups = {};  ///< that walls name
   std::vector<Clump> clumps;           ///< shapes of bodies that are no spheres (Bodies::shape)

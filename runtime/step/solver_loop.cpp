@@ -125,7 +125,8 @@ const graph::LoopPlan& SolverLoop::plan_nodes(int threads) {
   return plan_;
 }
 
-/// Each chunk at a wall that has contacts holds a copy of it. Collective.
+/// Each chunk at a wall that has contacts holds a copy of it; of a cell that follows a stress, each that has
+/// any. Collective.
 void SolverLoop::split_walls() {
   const Chunks& chunks = state_.chunks;
   for (WallState& wall : state_.wall_states) {
@@ -136,8 +137,15 @@ void SolverLoop::split_walls() {
   for (std::size_t c = 0; c < chunks.size(); ++c)
     if (chunks.wall[c] >= 0 && state_.contacts.count[c] > 0)
       state_.wall_states[static_cast<std::size_t>(chunks.wall[c])].copies.emplace_back(c);
+  StressedCell& cell = state_.cell;
+  cell.held.clear();
+  cell.copies.assign(cell.loaded() ? chunks.size() : 0, {});
+  for (std::size_t c = 0; c < cell.copies.size(); ++c)
+    if (state_.contacts.count[c] > 0) cell.held.emplace_back(c);
   gluing_.begin();
   gluing_.forget_jumps();
+  const CellVelocity split_cell = cell.inv_mass(static_cast<double>(cell.copies_everywhere));
+  for (const ChunkId c : cell.held) cell.copies[c.at()].inv_mass = split_cell;
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     const WallState& wall = state_.wall_states[w];
     const double split = static_cast<double>(wall.copies_everywhere) * state_.walls[w].inv_mass();
@@ -159,6 +167,9 @@ void SolverLoop::begin() {
       std::numeric_limits<double>::epsilon() * parameters_.alert / parameters_.time_step;
   for (const WallState& wall : state_.wall_states)
     scales.wall_pushes.push_back(parameters_.impulse_time() * wall.applied);
+  if (state_.cell.loaded())
+    for (std::size_t k = 0; k < cell_freedoms; k += 3)
+      scales.wall_pushes.push_back(Eigen::Map<const Vec3>(&state_.cell.push[k]).norm());
   certificate_.begin(std::move(scales));
   problem_.begin();
   pending_.reset();
@@ -180,7 +191,8 @@ void SolverLoop::begin_course(const SweepPlan& plan, int from) {
 bool SolverLoop::single_will_do(SweepKind kind) const {
   const ErrorHistory& history = certificate_.history();
   return kind == SweepKind::momentum && settings_.precision == Precision::mixed && !schwarz() &&
-         problem_.grains_alike() && problem_.candidates() >= single_use.least_candidates &&
+         !state_.cell.loaded() && problem_.grains_alike() &&
+         problem_.candidates() >= single_use.least_candidates &&
          (history.empty() || history.last().error_rms > single_use.least_error);
 }
 
@@ -248,6 +260,22 @@ std::optional<std::size_t> SolverLoop::subdomain_of(std::uint32_t node) const {
 }
 
 bool SolverLoop::decide(int epoch) {
+  if (goes_on(epoch)) return true;
+  if (state_.cell.loaded()) settle_cell();
+  return false;
+}
+
+/// What the step has found of a cell that follows a stress, from the ranks that hold a copy. Collective.
+void SolverLoop::settle_cell() {
+  StressedCell& cell = state_.cell;
+  cell.velocity.fill(cell.copies_everywhere == 0 ? 0 : -std::numeric_limits<double>::infinity());
+  if (!cell.held.empty()) cell.velocity = cell.copies[cell.held.front().at()].velocity;
+  ranks_.max(cell.velocity);
+  speed_up(gradient_of(cell.velocity, cell.length), parameters_.time_step, parameters_.reflection,
+           state_.domain, state_.flow);
+}
+
+bool SolverLoop::goes_on(int epoch) {
   if (schedule_.work(epoch) == Work::position) {
     positions_.end();
     return false;
@@ -265,11 +293,11 @@ bool SolverLoop::measured(int epoch) {
   schedule_.measured();
   measured_ = graph::seconds_now();
   trace::Span span(ranks_.trace(), kind_of(TaskKind::sums), 0, trace::Span::in_check);
-  std::vector<double> rows = check_rows(state_, work_.errors(), gluing_.jumps());
+  std::vector<double> rows = check_rows(state_, {work_.errors(), work_.cell_impulses()}, gluing_.jumps());
   span.end();
   std::vector<std::size_t> lengths(static_cast<std::size_t>(ranks_.ranks()), 0);
   for (std::int32_t rank : state_.decomposition.rank_of)
-    lengths[static_cast<std::size_t>(rank)] += check_row_width(state_.walls.size());
+    lengths[static_cast<std::size_t>(rank)] += check_row_width(pushed_vectors(state_));
   pending_ = ranks_.start_gather(std::move(rows), lengths);
   if (waits) {
     if (!judge()) return false;
@@ -313,9 +341,13 @@ int SolverLoop::sweeps_ahead() const {
 /// Judges the sums of the last measure. False: the step ends with them.
 bool SolverLoop::judge() {
   const CheckSums sums =
-      add_check_rows(pending_->wait(), state_.walls.size(), state_.decomposition.partition.subdomains);
+      add_check_rows(pending_->wait(), pushed_vectors(state_), state_.decomposition.partition.subdomains);
   imbalance_ = sums.imbalance;
   for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].impulse = sums.wall_impulse[w];
+  if (state_.cell.loaded())
+    for (std::size_t k = 0; k < cell_freedoms; ++k)
+      state_.cell.impulse[k] =
+          sums.wall_impulse[state_.walls.size() + k / 3][static_cast<Eigen::Index>(k % 3)];
   const SweepPlan now = courses_.now().plan;
   const std::optional<SweepPlan> other = method_->after_stagnation(now);
   const Verdict verdict = certificate_.judge(sums,

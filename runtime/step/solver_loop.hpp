@@ -106,6 +106,8 @@ class SolverLoop {
   }
   Gluing::Mode gluing_mode(int epoch) const;
   void split_walls();
+  bool goes_on(int epoch);
+  void settle_cell();
   void take(SubdomainPlace e, int epoch);
   /// False: the velocities of the step stand.
   bool decide_on_velocities(int epoch) {

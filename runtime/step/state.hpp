@@ -17,6 +17,7 @@
 #include "runtime/step/given_forces.hpp"
 #include "runtime/step/overlap.hpp"
 #include "runtime/step/setup.hpp"
+#include "runtime/step/stressed_cell.hpp"
 
 namespace talus {
 
@@ -42,9 +43,6 @@ struct StepParameters {
   double impulse_time() const { return time_step / (1 + reflection); }
 };
 
-/// Number of a chunk of this rank, as in Chunks.
-using ChunkId = Index<struct ChunkTag>;
-
 /// One wall during a step.
 struct WallState {
   Vec3 free_velocity = Vec3::Zero();   ///< without contacts [m/s]
@@ -68,6 +66,7 @@ struct StepState {
   std::vector<Clump> clumps;  ///< of the setup
   Domain domain;              ///< now
   CellFlow flow;              ///< of its edges
+  StressedCell cell;          ///< what follows a stress of it
   std::vector<Wall> walls;
   std::vector<WallState> wall_states;  ///< like walls
   FreeVelocity free;                   ///< n, or empty parts

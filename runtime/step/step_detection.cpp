@@ -303,6 +303,7 @@ void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
   if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
     state_.contacts.cohesion.resize(state_.candidates.size());
   state_.contacts.drifts_between = state_.domain.flows;
+  state_.contacts.reach.resize(state_.cell.loaded() ? state_.candidates.size() : 0);
   const bool drifts = state_.domain.flows || std::ranges::any_of(state_.walls, &Wall::has_drift);
   for (auto* values : {&state_.contacts.vx, &state_.contacts.vy, &state_.contacts.vz})
     values->resize(drifts ? state_.candidates.size() : 0);
@@ -331,10 +332,20 @@ void StepGraph::narrow_share(std::uint32_t share) {
                end = static_cast<std::size_t>(state_.chunks.begin[own.end]);
     std::ranges::fill(state_.candidates.impulse.values(begin, end), 0.0);
   }
-  const NarrowPhase in{
-      bodies.x,          bodies.radius,     bodies.velocity,     state_.walls,        parameters_.time_step,
-      parameters_.alert, parameters_.laws,  parameters_.gravity, parameters_.turning, parameters_.reflection,
-      bodies.material,   clumps_of(state_), state_.domain};
+  const NarrowPhase in{bodies.x,
+                       bodies.radius,
+                       bodies.velocity,
+                       state_.walls,
+                       parameters_.time_step,
+                       parameters_.alert,
+                       parameters_.laws,
+                       parameters_.gravity,
+                       parameters_.turning,
+                       parameters_.reflection,
+                       bodies.material,
+                       clumps_of(state_),
+                       state_.domain,
+                       state_.cell.loaded() ? state_.cell.length : 0};
   const SlotRange range = range_of_share(state_.chunks.size(), share);
   for (std::size_t c = range.begin; c < range.end; ++c) {
     narrow_chunk(in, state_.candidates, state_.chunks, c, loop_.kernels().set(), state_.contacts);

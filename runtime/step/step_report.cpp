@@ -21,6 +21,10 @@ namespace {
 double load_of(const StepOutcome& outcome) {
   double load = outcome.sample.total_mass * outcome.parameters.gravity.norm();
   for (const WallState& wall : outcome.state.wall_states) load += std::abs(wall.applied);
+  const StressedCell& cell = outcome.state.cell;
+  const Vec3 edges = outcome.state.domain.edges();
+  for (const Eigen::Index k : {0, 1, 2})
+    if (cell.loaded()) load += std::abs(cell.aim[static_cast<std::size_t>(k)]) * edges.prod() / edges[k];
   return load;
 }
 
@@ -35,6 +39,9 @@ double distance_from_equilibrium(const StepOutcome& outcome) {
     net = std::max(net, std::abs(state.wall_states[w].impulse.dot(state.walls[w].normal) / h - applied) /
                             std::abs(applied));
   }
+  for (std::size_t k = 0; k < 3; ++k)
+    if (state.cell.follows[k] && state.cell.push[k] != 0)
+      net = std::max(net, std::abs(state.cell.impulse[k] / state.cell.push[k] + 1));
   const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
   if (load == 0) return energy > 0 ? std::numeric_limits<double>::infinity() : 0;
   const Vec3 gained = sums.motion.impulse / h + sample.total_mass * parameters.gravity;
@@ -58,6 +65,10 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
     from_walls += wall.impulse;
     impulse_unit = std::max(impulse_unit, wall.impulse.norm());
   }
+  // What the faces of a cell carry, as walls would.
+  if (const StressedCell& cell = state.cell; cell.loaded())
+    impulse_unit = std::max(impulse_unit, Eigen::Map<const Vec3>(cell.impulse.data()).norm() * cell.length /
+                                              std::cbrt(state.domain.edges().prod()));
   // What rounding leaves of the sample's momentum, at most sqrt(2 E M), is no defect.
   const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
   impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * sample.total_mass));

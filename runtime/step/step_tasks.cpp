@@ -112,6 +112,11 @@ void StepGraph::finish_share(std::uint32_t share) {
   const SlotRange range = slots(share);
   const Decomposition& all = state_.decomposition;
   const bool uneven = decomposition_.coupling != Coupling::nscdd;
+  if (state_.cell.loaded()) {
+    const AffineGain gained{gradient_of(state_.cell.velocity, state_.cell.length), state_.domain.low};
+    add_gain(range, bodies.x, gained, state_.free);
+    add_gain(range, bodies.x, gained, bodies.velocity);
+  }
   motion_[share] = finish(range, bodies.x, bodies.velocity, state_.free,
                           {.time_step = parameters_.time_step,
                            .copies = uneven ? CopyShares{all.multiplicity, all.parts} : CopyShares{},

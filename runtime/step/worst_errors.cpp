@@ -35,7 +35,8 @@ WorstErrors worst_errors_of(const BodyParts& parts, const Residuals& residuals, 
     }
     for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
       const double error = residuals.body[p][b];
-      if (!problem.counted(b) || !(error > 0) || error < worst.body_error) continue;
+      if (!problem.counted(b) || problem.bodies[b].cell) continue;  // a cell has no name
+      if (!(error > 0) || error < worst.body_error) continue;
       worst.take({0,
                   {},
                   error,

@@ -1,5 +1,7 @@
 #include "io/scene/detail/cell_keys.hpp"
 
+#include <array>
+
 namespace talus::io::detail {
 
 Section<CellSpec> cell_keys() {
@@ -24,7 +26,41 @@ Section<CellSpec> cell_keys() {
            "x, and that along z along y.",
            &C::shears)
            .blank_when_zero()
-           .or_else("`[0.0, 0.0, 0.0]`")}};
+           .or_else("`[0.0, 0.0, 0.0]`"),
+       key<C>("inertia", "", positive,
+              "Mass of a cell that follows a stress, over that of all grains: a larger one follows more "
+              "slowly.",
+              &C::inertia)}};
+}
+
+Section<StressLoad> stress_keys() {
+  static constexpr std::array<const char*, 6> names = {"xx", "yy", "zz", "xy", "xz", "yz"};
+  static constexpr std::array<const char*, 6> swings = {"amplitude_xx", "amplitude_yy", "amplitude_zz",
+                                                        "amplitude_xy", "amplitude_xz", "amplitude_yz"};
+  std::vector<Key<StressLoad>> keys;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    keys.push_back(key<StressLoad>(
+        names[k], "Pa", any,
+        "Component that the cell follows, positive where it pushes grains "
+        "together; one that is not given is driven at its rate.",
+        [k](auto& load) -> auto& { return load.to[k]; }));
+  keys.push_back(
+      key<StressLoad>("ramp_time", "s", not_negative,
+                      "Time in which they come, evenly, from what the stage before aimed at, or from "
+                      "0 where it had no such stress.",
+                      &StressLoad::ramp_time));
+  for (std::size_t k = 0; k < swings.size(); ++k)
+    keys.push_back(key<StressLoad>(
+                       swings[k], "Pa", any, "Swings about it, as a sine of the stage's time.",
+                       [k](auto& load) -> auto& { return load.amplitude[k]; })
+                       .blank_when_zero());
+  keys.push_back(key<StressLoad>("period", "s", not_negative, "Of those swings.", &StressLoad::period)
+                     .blank_when_zero());
+  return {"[stage.stress]",
+          "Of a cell that is periodic along x, y and z: components of the stress that its edges follow, each "
+          "within the contact problem of the step, so that the stress of a step is that of its own solution "
+          "([theory.md](theory.md), \"Cells under stress\").",
+          std::move(keys)};
 }
 
 }  // namespace talus::io::detail

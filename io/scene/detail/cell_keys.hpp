@@ -6,5 +6,7 @@
 namespace talus::io::detail {
 
 Section<CellSpec> cell_keys();
+/// Of a stage: the stress that components of the cell follow.
+Section<StressLoad> stress_keys();
 
 }  // namespace talus::io::detail

@@ -158,11 +158,11 @@ Section<CheckpointSpec> checkpoint_keys() {
 
 const SceneKeys& scene_keys() {
   static const SceneKeys keys = {
-      top_keys(),    material_keys(),      named_material_keys(), pair_keys(),       cell_keys(),
-      sample_keys(), region_keys(),        insert_keys(),         remove_keys(),     probe_keys(),
-      field_keys(),  wall_keys(),          wall_motion_keys(),    group_keys(),      group_motion_keys(),
-      stage_keys(),  stage_end_keys(),     stage_load_keys(),     stage_pair_keys(), detection_keys(),
-      solver_keys(), decomposition_keys(), output_keys(),         checkpoint_keys()};
+      top_keys(),       material_keys(), named_material_keys(), pair_keys(),       cell_keys(),
+      sample_keys(),    region_keys(),   insert_keys(),         remove_keys(),     probe_keys(),
+      field_keys(),     wall_keys(),     wall_motion_keys(),    group_keys(),      group_motion_keys(),
+      stage_keys(),     stress_keys(),   stage_end_keys(),      stage_load_keys(), stage_pair_keys(),
+      detection_keys(), solver_keys(),   decomposition_keys(),  output_keys(),     checkpoint_keys()};
   return keys;
 }
 

@@ -24,6 +24,7 @@ struct SceneKeys {
   Section<WallGroup> group;
   Section<MotionPart> group_motion;
   Section<Stage> stage;
+  Section<StressLoad> stage_stress;
   Section<StageEnd> stage_end;
   Section<NamedLoad> stage_load;
   Section<PairSpec> stage_pair;
@@ -40,7 +41,7 @@ void for_each_section(Keys&& keys, F&& f) {
   f(keys.top), f(keys.material), f(keys.named_material), f(keys.pair), f(keys.cell), f(keys.sample);
   f(keys.region), f(keys.insert), f(keys.remove), f(keys.probe), f(keys.field), f(keys.wall);
   f(keys.wall_motion), f(keys.group), f(keys.group_motion);
-  f(keys.stage), f(keys.stage_end), f(keys.stage_load), f(keys.stage_pair);
+  f(keys.stage), f(keys.stage_stress), f(keys.stage_end), f(keys.stage_load), f(keys.stage_pair);
   f(keys.detection), f(keys.solver), f(keys.decomposition), f(keys.output), f(keys.checkpoint);
 }
 

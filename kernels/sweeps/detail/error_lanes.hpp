@@ -6,6 +6,7 @@
 
 #include "kernels/law/contact_law.hpp"
 #include "kernels/sweeps/detail/advance_lanes.hpp"
+#include "kernels/sweeps/detail/cell_lanes.hpp"
 #include "kernels/sweeps/detail/wall_lanes.hpp"
 
 namespace talus {
@@ -28,11 +29,12 @@ template <class V>
 }
 
 /// What the error of a chunk is measured with.
-template <class Mu>
+template <class Mu, class Cell>
 struct ErrorRule {
   Mu friction;
   const WholeView& whole;
   const ContactView& contacts;
+  Cell cell;
 };
 
 /// As many lanes as are meant.
@@ -99,6 +101,7 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
     add_drift<V>(rule.contacts, at, only, drift);
     m.du = m.du - drift;
   }
+  rule.cell.take(rule.contacts, at, only, m);
   // Not approach_of: errors do not ask for w_tt, and with it the spins would be gathered, too.
   const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.bias, 0, only), m.w_nn, V{}};
   if constexpr (Friction)
@@ -110,11 +113,11 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
               sums);
 }
 
-template <bool Friction, bool AtWall, int W, class Mu>
+template <bool Friction, bool AtWall, int W, class Mu, class Cell = NoCell>
 [[gnu::always_inline]] inline ErrorTotals error_of(const ContactView& view, const double* bodies, double mu,
-                                                   const WholeView& whole) {
+                                                   const WholeView& whole, const Cell& cell = {}) {
   const ContactView c = view;
-  const ErrorRule<Mu> rule{Mu{mu}, whole, c};
+  const ErrorRule<Mu, Cell> rule{Mu{mu}, whole, c, cell};
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
   // At a wall nothing is read of b.
@@ -143,18 +146,27 @@ ErrorTotals error_wall(const ContactView& c, const double* bodies, double mu, co
   return error_of<Friction, true, W, Mu>(c, bodies, mu, whole);
 }
 
+template <bool Friction, int W, class Mu>
+ErrorTotals error_cell(const ContactView& c, const double* bodies, double mu, const WholeView& whole,
+                       const CellView& cell) {
+  return error_of<Friction, false, W, Mu>(c, bodies, mu, whole, WholeCell{cell});
+}
+
 /// `Mu` is OneFriction or OwnFriction.
 template <bool Friction, int W, class Mu>
 constexpr LaneKernels kernels_of_lanes = {sweep_grains<Friction, W, Mu>,
                                           momentum_grains<Friction, W, Mu>,
                                           sweep_wall<Friction, W, Mu>,
                                           momentum_wall<Friction, W, Mu>,
+                                          sweep_cell<Friction, W, Mu>,
+                                          momentum_cell<Friction, W, Mu>,
                                           single_grains<Friction, NarrowOctet, Mu>,
                                           single_wall<Friction, NarrowOctet, Mu>,
                                           accumulate_grains<Friction, W>,
                                           accumulate_wall<Friction, W>,
                                           error_grains<Friction, W, Mu>,
                                           error_wall<Friction, W, Mu>,
+                                          error_cell<Friction, W, Mu>,
                                           advance_bodies<Lanes<W>, double>,
                                           advance_bodies<NarrowOctet, float>};
 

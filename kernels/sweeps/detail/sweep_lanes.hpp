@@ -128,7 +128,9 @@ template <class V, class Only>
 struct NoDrift {
   NoDrift from(std::size_t) const { return {}; }
   template <class V, class Only>
-  [[gnu::always_inline]] void take(Space<V>&, std::size_t, Only) const {}
+  [[gnu::always_inline]] void take(const Slice<NumberOf<V>>&, Meeting<V>&, std::size_t, Only) const {}
+  template <class V, class Only>
+  [[gnu::always_inline]] void give(const Slice<NumberOf<V>>&, const Space<V>&, std::size_t, Only) const {}
 };
 /// ... or the second one of each contact stands for an image that drifts.
 template <class Number>
@@ -136,12 +138,15 @@ struct PairDrift {
   const Number *x, *y, *z;
   [[gnu::always_inline]] PairDrift from(std::size_t k) const { return {x + k, y + k, z + k}; }
   template <class V, class Only>
-  [[gnu::always_inline]] void take(Space<V>& du, std::size_t at, Only only) const {
-    du = du - Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)};
+  [[gnu::always_inline]] void take(const Slice<Number>&, Meeting<V>& m, std::size_t at, Only only) const {
+    m.du = m.du - Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)};
   }
+  template <class V, class Only>
+  [[gnu::always_inline]] void give(const Slice<Number>&, const Space<V>&, std::size_t, Only) const {}
 };
 
-/// How the contacts of a chunk are swept: their friction, where they start, and what their bodies drift.
+/// How the contacts of a chunk are swept: their friction, where they start, and what moves their bodies
+/// besides themselves, which takes a part of what they see and is given what they do.
 template <class Mu, class Start, class Drift = NoDrift>
 struct SweepRule {
   Mu friction;
@@ -200,8 +205,9 @@ template <bool Friction, class V, int Blocks, class Rule, class Grains, class On
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k) {
     const auto at = static_cast<std::size_t>(W * k);
-    rule.drift.take(m[k].du, at, only);
+    rule.drift.take(c, m[k], at, only);
     dr[k] = renew_impulse<Friction>(c, out, at, only, approach_of<Friction>(c, at, only, m[k]), rule);
+    rule.drift.give(c, dr[k], at, only);
   }
 #pragma GCC unroll 4
   for (int k = 0; k < Blocks; ++k)

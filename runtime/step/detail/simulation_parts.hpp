@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include "kernels/detection/domain.hpp"
 #include "runtime/step/cell.hpp"
+#include "runtime/step/cell_loads.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
 #include "runtime/step/named_bodies.hpp"
@@ -177,6 +178,7 @@ struct Simulation::Implementation {
   /// What the stage prescribes, but for its loads and its time step.
   void prescribe() {
     parameters = parameters_of(setup, stage(), parameters);
+    prescribe_cell(setup, stage(), size, state.cell);
     state.free.w.resize(parameters.rotates ? state.bodies.size() : 0);
   }
 
@@ -274,8 +276,9 @@ struct Simulation::Implementation {
   void load_walls() {
     state.time = report.time;
     if (state.domain.flows)
-      begin_flow(parameters.velocity_gradient, parameters.time_step, parameters.reflection, state.domain,
-                 state.flow);
+      begin_flow(
+          drive_cell(setup, {stage_index, report.time - stage_begins[stage_index]}, parameters, state, ranks),
+          parameters.time_step, parameters.reflection, state.domain, state.flow);
     demand_motion(report.time, parameters.time_step, next_step().text(), state.walls);
     prepare_walls(report.time, parameters.time_step, state, ranks);
     apply_loads(parameters, next_step(), state);

@@ -109,7 +109,7 @@ TEST(Drift, IsSweptInSinglePrecisionToo) {
     for (std::size_t s = 0; s < all.size(); ++s) all[s] = static_cast<Slot>(s);
     narrow_bodies(all, at.sample.bodies.velocity, single);
     AccelerationHistory history;
-    allocate(history, Carry::momentum, at.sample.contacts, 0, at.sample.chunks.size());
+    allocate(history, Carry::momentum, at.sample.contacts, {0, at.sample.chunks.size(), 0});
     const SweepKernels kernels(InstructionSet::automatic);
     for (std::size_t c = 0; c < at.sample.chunks.size(); ++c) {
       narrow_geometry(at.sample.contacts, at.sample.range(c), single.contacts);

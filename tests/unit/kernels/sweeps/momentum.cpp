@@ -24,7 +24,7 @@ void expect_plain_sweeps_of_what_went_on() {
   Contacts with = sample.contacts, plain = with;
   std::vector<Velocity> velocity = sample.bodies.velocity, same = velocity;
   AccelerationHistory acceleration;
-  allocate(acceleration, Carry::momentum, with, velocity.size(), sample.chunks.size());
+  allocate(acceleration, Carry::momentum, with, {velocity.size(), sample.chunks.size(), 0});
   begin_steps({0, with.rx.size() + with.rn.size()}, acceleration.steps);
   for (const double beta : {0.0, 0.0, 0.5, 0.9}) {
     const auto go_on = [&](std::vector<double>& r, const std::vector<float>& step) {
@@ -55,7 +55,7 @@ TEST(Momentum, ConjugateDirectionIsTheWayOfTheSweepBefore) {
   Contacts contacts;
   contacts.rn = {1.0};
   AccelerationHistory acceleration;
-  allocate(acceleration, Carry::conjugate, contacts, 0, 0);
+  allocate(acceleration, Carry::conjugate, contacts, {0, 0, 0});
   carry_impulses(0, {0, 1}, contacts, acceleration);  // y0 = 1
   contacts.rn = {3.0};                                // s
   carry_impulses(0.5, {0, 1}, contacts, acceleration);
@@ -69,11 +69,11 @@ TEST(Momentum, StaleTrailsAreNeverRead) {
   Contacts contacts;
   contacts.rn = {1.0};
   AccelerationHistory acceleration;
-  allocate(acceleration, Carry::conjugate, contacts, 0, 0);
+  allocate(acceleration, Carry::conjugate, contacts, {0, 0, 0});
   acceleration.last.n = acceleration.step.n = {std::numeric_limits<double>::quiet_NaN()};
   carry_impulses(0, {0, 1}, contacts, acceleration);
   EXPECT_EQ(contacts.rn[0], 1.0);
-  allocate(acceleration, Carry::momentum, contacts, 0, 0);
+  allocate(acceleration, Carry::momentum, contacts, {0, 0, 0});
   acceleration.steps.n = {std::numeric_limits<float>::quiet_NaN()};
   begin_steps({0, 1}, acceleration.steps);
   EXPECT_EQ(acceleration.steps.n[0], 0);
@@ -86,7 +86,7 @@ TEST(Momentum, TakesARefreshForNoMotion) {
   std::vector<Velocity> velocity(1);
   const std::vector<Slot> slots = {0};
   AccelerationHistory acceleration;
-  allocate(acceleration, Carry::momentum, contacts, 1, 1);
+  allocate(acceleration, Carry::momentum, contacts, {1, 1, 0});
   WallCopy wall;
   velocity[0].u[0] = wall.velocity[0] = 1 + 1e-3;  // drifted from 1
   velocity[0].inv_mass = 0.3;

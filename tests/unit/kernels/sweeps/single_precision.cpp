@@ -127,7 +127,7 @@ double difference_to_double(double mu, int sweeps) {
   std::vector<Velocity> velocity = sample.bodies.velocity;
   std::vector<WallCopy> walls(sample.chunks.size(), {{0.1, -0.2, 0.05}, 1e-4});
   AccelerationHistory acceleration;
-  allocate(acceleration, Carry::momentum, contacts, velocity.size(), walls.size());
+  allocate(acceleration, Carry::momentum, contacts, {velocity.size(), walls.size(), 0});
   for (int s = 0; s < sweeps; ++s) {
     const double beta = s == 0 ? 0 : 0.8;
     carry_velocities(kernels, Carry::momentum, beta, slots, velocity, acceleration);
