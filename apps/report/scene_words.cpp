@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "apps/report/sections.hpp"
@@ -80,6 +81,7 @@ std::string end_words(const StageEnd& end) {
   if (end.time) ends.push_back(io::detail::with_unit(*end.time, "s"));
   if (end.strain)
     ends.push_back(fmt::format("a strain of {:g} along {}", *end.strain, "xyz"[end.strain_axis]));
+  if (end.shear_strain) ends.push_back(fmt::format("a shear of {:g}", *end.shear_strain));
   if (end.equilibrium) ends.push_back(fmt::format("equilibrium within {:g}", *end.equilibrium));
   return "until " + joined(ends, " or ");
 }
@@ -103,6 +105,17 @@ std::string law_words(const char* name, const PairTable& laws, double PairLaw::*
                        : fmt::format("; {} {:g} to {:g}{}", name, least, most, unit);
 }
 
+/// " xx 1 kPa, zz 2 kPa".
+std::string stress_words(const StressLoad& load) {
+  constexpr std::array<const char*, 6> names = {"xx", "yy", "zz", "xy", "xz", "yz"};
+  std::string text;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (load.to[k])
+      text += fmt::format("{} {} {}", text.empty() ? "" : ",", names[k],
+                          io::detail::with_unit(*load.to[k], "Pa"));
+  return text;
+}
+
 std::string stage_words(const Stage& stage) {
   std::string text = end_words(stage.end) + "; ";
   text += stage.chooses_time_step ? "time steps are chosen"
@@ -116,6 +129,7 @@ std::string stage_words(const Stage& stage) {
     text += fmt::format("; the cell flows, strain rates {:g}, {:g}, {:g}, shear rates {:g}, {:g}, {:g} 1/s",
                         stage.strain_rates[0], stage.strain_rates[1], stage.strain_rates[2],
                         stage.shear_rates[0], stage.shear_rates[1], stage.shear_rates[2]);
+  if (stage.stress.any()) text += "; the cell follows the stress" + stress_words(stage.stress);
   if (stage.gravity.norm() > 0) text += fmt::format("; gravity {:g} m/s²", stage.gravity.norm());
   for (const auto& [wall, load] : stage.loads) text += "; wall '" + wall + "' " + load_words(load);
   return text;

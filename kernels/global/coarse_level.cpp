@@ -280,7 +280,8 @@ std::vector<CoarseLevel::Block> CoarseLevel::blocks_of(std::size_t p, std::span<
     block(one, one) += a.transpose() * weight * a;
   }
 
-  for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+  // A cell is none of the coarse unknowns.
+  for (std::size_t b = 0; b < problem.grains + problem.walls(); ++b) {
     const BodyUnknown& body = problem.bodies[b];
     const std::int64_t g = block.group_of(static_cast<std::int32_t>(b));
     if (!problem.counted(b) || g < 0) continue;

@@ -31,6 +31,12 @@ Mat3 matrix_of(const EdgeRates& r) {
   return m;
 }
 
+double shear_rate(const Mat3& gradient) {
+  Mat3 rates = 0.5 * (gradient + gradient.transpose());
+  rates.diagonal().array() -= rates.trace() / 3;
+  return std::sqrt(2.0) * rates.norm();
+}
+
 void set_edges(Domain& domain, const Mat3& h) {
   const auto inverse = [](double edge) { return edge > 0 ? 1 / edge : 0; };
   domain.cell = {h(0, 0), h(1, 1),          h(2, 2),          h(0, 1),         h(0, 2),

@@ -31,6 +31,10 @@ struct CellFlow {
   Mat3 edges_then = Mat3::Zero();  ///< at the last broad phase [m]
 };
 
+/// Rate of shear of a flow of gradient G, root of 2 dev D : dev D of its symmetric part [1/s]: of a simple
+/// shear its rate.
+double shear_rate(const Mat3& gradient);
+
 /// Brings the domain to the middle of the step, and finds how it ends if contacts give it nothing: by the
 /// trapezoidal rule, as bodies move. `reflection` E of the step.
 void begin_flow(const CellDrive& drive, double time_step, double reflection, Domain& domain, CellFlow& flow);

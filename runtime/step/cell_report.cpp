@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/step/cell_flow.hpp"
+#include "runtime/step/force_fabric.hpp"
 
 namespace talus {
 
@@ -75,8 +76,13 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.solid_fraction = report.solid_fraction;
   out.contacts_a_grain = 2 * static_cast<double>(report.active) /
                          static_cast<double>(std::max<std::int64_t>(1, outcome.sample.bodies));
+  const ForceFabric fabric = force_fabric(state, ranks);
+  out.fabric = symmetric(fabric.fabric);
+  out.a_c = along_stress(fabric.of_contacts, deviator(contact));
+  out.a_n = along_stress(fabric.of_normal_forces, deviator(contact));
+  out.a_t = along_stress(fabric.of_tangential_forces, deviator(contact));
   out.coordination = coordination(state, ranks, contacts_to_hold(outcome.parameters));
-  const double rate = std::sqrt(2.0) * deviator(gradient).norm();
+  const double rate = shear_rate(gradient);
   const double density = outcome.sample.volume > 0 ? outcome.sample.total_mass / outcome.sample.volume : 0;
   out.inertial_number = out.p > 0 ? rate * outcome.sample.mean_diameter * std::sqrt(density / out.p) : 0;
   out.converged = report.converged;

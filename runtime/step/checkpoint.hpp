@@ -134,6 +134,7 @@ struct CheckpointHead {
   std::int64_t stage_index = 0, stage_steps = 0;
   std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   bool over = false;
+  double sheared = 0;
   double held = 0;
   double time_step = 0;
   double impulse_time = 0;  ///< of the last step [s]: forces are impulses over it
@@ -201,6 +202,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("stage_steps", head.stage_steps);
   visit("stage_begins", head.stage_begins);
   visit("over", head.over);
+  visit("sheared", head.sheared);
   visit("held", head.held);
   visit("time_step", head.time_step);
   visit("impulse_time", head.impulse_time);

@@ -164,10 +164,12 @@ struct CellReport {
   std::array<double, 6> kinetic_stress{};  ///< sum of m v (x) v over the volume, v against the flow [Pa]
   double p = 0, q = 0, q_over_p = 0;  ///< of the contacts: mean stress, root of 3/2 s : s, s its deviator
   double solid_fraction = 0;
-  double contacts_a_grain = 0;  ///< active contacts of a grain, of all grains
-  double coordination = 0;      ///< likewise, those of rattlers and with them left out
-  double inertial_number = 0;   ///< rate of shear x mean diameter x root of density over p; 0 without p
-  bool converged = true;        ///< of the step (StepReport)
+  double contacts_a_grain = 0;       ///< active contacts of a grain, of all grains
+  double coordination = 0;           ///< likewise, those of rattlers and with them left out
+  std::array<double, 6> fabric{};    ///< mean of n (x) n over the contacts that carry, symmetric: xx, ..., yz
+  double a_c = 0, a_n = 0, a_t = 0;  ///< anisotropies along the stress (runtime/step/force_fabric.hpp)
+  double inertial_number = 0;        ///< rate of shear x mean diameter x root of density over p; 0 without p
+  bool converged = true;             ///< of the step (StepReport)
 };
 
 /// State at an output time. Vectors named first are per body, those after `contact` per active contact; on

@@ -189,7 +189,8 @@ void validate(const Setup& setup) {
       require(stage.laws.knows(wall.material),
               fmt::format("stage '{}': its laws do not have material {} of wall '{}'", stage.name,
                           wall.material, wall.name));
-    require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.equilibrium,
+    require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.shear_strain ||
+                stage.end.equilibrium,
             fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
     require(stage.end.equilibrium_hold >= 0 && std::isfinite(stage.end.equilibrium_hold),
             fmt::format("stage '{}': end.equilibrium_hold must be finite and >= 0, got {}", stage.name,

@@ -37,6 +37,8 @@ struct StageEnd {
   std::optional<double> time;    ///< [s] of the stage
   std::optional<double> strain;  ///< |axial strain| (28) since the beginning of the stage, along strain_axis
   int strain_axis = 2;           ///< 0, 1, 2 = x, y, z
+  std::optional<double>
+      shear_strain;  ///< path of the periodic cell's shear: shear_rate (cell_flow.hpp) x time
   /// Bound on StepReport::equilibrium.
   std::optional<double> equilibrium;
   /// Time for which that bound must have held without a break, >= 0, in times that a grain takes to fall by

@@ -40,10 +40,21 @@ void Simulation::follow(trace::Order* order) {
 SavedState Simulation::save() const {
   if (impl_->state.decomposition.several())
     throw std::logic_error("a state is saved from one subdomain; this simulation has several");
-  return {impl_->state.bodies, impl_->state.walls, impl_->state.candidates, impl_->report,
-          impl_->stage_index,  impl_->stage_steps, impl_->lengths_at_start, impl_->state.given_overlaps,
-          impl_->clock,        impl_->held,        impl_->stage_begins,     impl_->population.state(),
-          impl_->state.domain, impl_->state.flow};
+  return {impl_->state.bodies,
+          impl_->state.walls,
+          impl_->state.candidates,
+          impl_->report,
+          impl_->stage_index,
+          impl_->stage_steps,
+          impl_->lengths_at_start,
+          impl_->state.given_overlaps,
+          impl_->clock,
+          impl_->sheared,
+          impl_->held,
+          impl_->stage_begins,
+          impl_->population.state(),
+          impl_->state.domain,
+          impl_->state.flow};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {

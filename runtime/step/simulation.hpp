@@ -32,6 +32,7 @@ struct SavedState {
   Vec3 lengths_of_box = Vec3::Zero();                            ///< at the beginning of the stage [m]
   std::optional<std::vector<GivenOverlap>> given_overlaps = {};  ///< of StepState
   StageClock clock = {};                                         ///< of a stage that chooses its time steps
+  double sheared = 0;                                            ///< path of the cell's shear in the stage
   double held = 0;                        ///< time for which the stage's bound on equilibrium has held [s]
   std::vector<double> stage_begins = {};  ///< times of the run at which this stage and those before began [s]
   PopulationState population = {};

@@ -17,6 +17,7 @@ StageDone stage_done(const Stage& stage, const StageProgress& progress) {
                                              : steps / steps_in(*end.time, stage.time_step));
   if (progress.steps == 0) return nearest;
   if (end.strain) consider("strain", std::abs(progress.strain) / *end.strain);
+  if (end.shear_strain) consider("shear_strain", progress.sheared / *end.shear_strain);
   if (progress.held > 0 && progress.held >= end.equilibrium_hold * progress.fall_time)
     consider("equilibrium", 1);
   return nearest;

@@ -93,5 +93,47 @@ TEST_F(CellsOnRanks, FlowToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
   EXPECT_EQ(digest_of("parts"), digest_of("one"));
 }
 
+/// Grains that a stress squeezes, while they are sheared at constant pressure.
+const std::string stressed_cell = R"(name = "cell"
+time_step = 1e-4
+[material]
+density = 2600
+[cell]
+lengths = [0.0192, 0.0192, 0.0192]
+[sample]
+kind = "random"
+count = 300
+radius = 0.001
+[[stage]]
+name = "press"
+stress = { xx = 100, yy = 100, zz = 100 }
+end = { steps = 150 }
+[[stage]]
+name = "shear"
+friction = 0.3
+shear_rates = [0.0, 5.0, 0.0]
+stress = { zz = 100, ramp_time = 1e-3 }
+end = { steps = 60 }
+[decomposition]
+repartition_every = 5
+[output]
+every_steps = 100
+pictures = false
+)";
+
+TEST_F(CellsOnRanks, FollowAStressToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
+  write(at("scene.toml"), stressed_cell);
+  for (const int subdomains : {1, 2, 8})
+    expect_same_bits(subdomains, {{1, 2}, {2, 1}}, fmt::format("stressed{}", subdomains));
+  const std::string command = "run scene.toml --set decomposition.subdomains=8 --threads 1 --out parts";
+  for (const int steps : {70, 171}) {
+    const Outcome first = run(2, fmt::format("{} --resume --steps {}", command, steps));
+    ASSERT_EQ(first.code, 0) << first.messages;
+  }
+  const Outcome rest = run(1, command + " --resume");
+  ASSERT_EQ(rest.code, 0) << rest.messages;
+  EXPECT_EQ(digest_of("parts"), digest_of("stressed8"));
+}
+
 }  // namespace
 }  // namespace talus::test

@@ -66,6 +66,23 @@ TEST(CubicLatticeUnderStress, CarriesItInEveryContactFromTheFirstStepOn) {
   }
 }
 
+/// What contacts and forces of the lattice say of themselves: n along the axes, forces as the stresses are.
+TEST(CubicLatticeUnderStress, HasTheFabricAndTheForcesOfItsAxes) {
+  Scene scene = lattice(1e-3, 4);
+  scene.stage().stress.to = {1e3, 1e3, 4e3, {}, {}, {}};
+  Experiment run(std::move(scene));
+  ASSERT_TRUE(run.step().converged);
+  const auto cell = run.simulation().cell();
+  ASSERT_TRUE(cell);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(cell->fabric[k], 1.0 / 3, 1e-12);
+  EXPECT_NEAR(cell->a_c, 0, 1e-12);
+  // chi_n = diag(1, 1, 4)/6 of its trace; 15/2 dev = 15/2 (-1, -1, 2)/6, and sqrt(3/2) |.| of that.
+  EXPECT_NEAR(cell->a_n, 7.5 * 3 / 6, 1e-7);
+  EXPECT_NEAR(cell->a_t, 0, 1e-7);
+  EXPECT_NEAR(cell->q_over_p, 1.5, 1e-7);
+  EXPECT_NEAR(0.4 * (cell->a_c + cell->a_n + 1.5 * cell->a_t), cell->q_over_p, 1e-7);
+}
+
 /// Nothing touches: the cell alone, h'' = -(V sigma/(M d^2)) h, and grains that move with it.
 TEST(EmptyCellUnderStress, FallsInAsItsMassSays) {
   const double h = 1e-4, stress = 50, edge = 1;
@@ -174,18 +191,26 @@ struct PlainStep {
   Mat3 gain = Mat3::Zero();
 };
 
-class RandomPackings : public testing::TestWithParam<double> {};
+struct Case {
+  double mu;
+  SolverMethod method;
+  int subdomains = 1;
+};
+class RandomPackings : public testing::TestWithParam<Case> {};
 
 /// 30 grains squeezed together at random, pushed by a stress that shears them, too.
 TEST_P(RandomPackings, MoveUnderAStressAsAPlainSolverOfTheSameStepSays) {
-  const double h = 1e-3, mu = GetParam(), edge = 0.34;
+  const auto [mu, method, subdomains] = GetParam();
+  const double h = 1e-3, edge = 0.34;
   const std::array<double, 6> stress = {2e3, 1e3, 1.5e3, 3e2, -2e2, 0};
   std::mt19937 random(7);
   std::uniform_real_distribution<double> place(0, edge);
   Scene scene(h);
   scene.setup.domain = periodic_domain(Vec3::Constant(edge));
   scene.setup.decomposition.coupling = Coupling::nscdd;
+  scene.setup.decomposition.subdomains = subdomains;
   scene.setup.cell_inertia = 0.5;
+  scene.setup.solver.method = method;
   scene.setup.solver.overlap_tolerance = 10;
   scene.setup.detection.alert = 0.01;
   scene.friction(mu);
@@ -230,7 +255,12 @@ TEST_P(RandomPackings, MoveUnderAStressAsAPlainSolverOfTheSameStepSays) {
     EXPECT_LT((run.u(static_cast<std::int64_t>(k)) - plain.u[k] - plain.gain * plain.x[k]).norm(), 1e-7)
         << "grain " << k;
 }
-INSTANTIATE_TEST_SUITE_P(Friction, RandomPackings, testing::Values(0.0, 0.4));
+INSTANTIATE_TEST_SUITE_P(Solved, RandomPackings,
+                         testing::Values(Case{0.0, SolverMethod::automatic},
+                                         Case{0.4, SolverMethod::automatic}, Case{0.0, SolverMethod::nlgs},
+                                         Case{0.4, SolverMethod::nlgs}, Case{0.4, SolverMethod::nncg},
+                                         Case{0.0, SolverMethod::admm}, Case{0.4, SolverMethod::admm},
+                                         Case{0.4, SolverMethod::automatic, 4}));
 
 }  // namespace
 }  // namespace talus::validation::closed_form_stress_test

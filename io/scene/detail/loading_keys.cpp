@@ -191,6 +191,11 @@ Section<StageEnd> stage_end_keys() {
                            &StageEnd::strain_axis)
               .only("strain is given", [](const StageEnd& end) { return end.strain.has_value(); }),
           key<StageEnd>(
+              "shear_strain", "", positive,
+              "Path of the shear of the periodic cell since the beginning of the stage: of simple shear "
+              "at the rate g for a time t, g t.",
+              &StageEnd::shear_strain),
+          key<StageEnd>(
               "equilibrium", "", positive,
               "Bound on `equilibrium` of steps.csv: net forces over the load, and kinetic energy over load × "
               "mean diameter.",

@@ -75,6 +75,7 @@ struct Simulation::Implementation {
     stage_steps = from.steps_of_stage;
     clock = from.clock;
     held = from.held;
+    sheared = from.sheared;
     population.go_on_from(from.population);
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
@@ -102,6 +103,7 @@ struct Simulation::Implementation {
     if (stage().chooses_time_step) clock.move_end(stage().end.time);
     stage_steps = head.stage_steps;
     held = head.held;
+    sheared = head.sheared;
     lengths_at_start = head.lengths_at_start;
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const std::vector<double> load = numbers_of(state.walls[w].load);
@@ -130,6 +132,7 @@ struct Simulation::Implementation {
     head.stage_begins = stage_begins;
     head.over = over;
     head.held = held;
+    head.sheared = sheared;
     head.time_step = parameters.time_step;
     head.impulse_time = parameters.impulse_time();
     head.lengths_at_start = lengths_at_start;
@@ -208,7 +211,7 @@ struct Simulation::Implementation {
       state.candidates_valid = false;
     }
     stage_steps = 0;
-    held = 0;
+    held = sheared = 0;
     lengths_at_start = state.domain.lengths(state.walls);
   }
 
@@ -262,6 +265,7 @@ struct Simulation::Implementation {
       report.time = clock.time();
     }
     const StageEnd& end = stage().end;
+    sheared += report.time_step * shear_rate_now();
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
     const StepSpan last{report.time - report.time_step, report.time, &stage(), stage_begins[stage_index]};
     if (held > 0 && population.expects_grains(last)) held = 0;
@@ -288,9 +292,15 @@ struct Simulation::Implementation {
     return Domain::strain(state.domain.lengths(state.walls)[axis], lengths_at_start[axis]);
   }
 
+  /// Of the cell.
+  double shear_rate_now() const {
+    if (!state.domain.flows) return 0;
+    return shear_rate(gradient_before(state.domain, 0));
+  }
+
   StageDone done() const {
     const StageEnd& end = stage().end;
-    return stage_done(stage(), {stage_steps, clock, end.strain ? strain(end.strain_axis) : 0, held,
+    return stage_done(stage(), {stage_steps, clock, end.strain ? strain(end.strain_axis) : 0, sheared, held,
                                 held > 0 ? fall_time(outcome()) : 0});
   }
 
@@ -314,8 +324,9 @@ struct Simulation::Implementation {
   StepParameters parameters;
   StepReport report;
   StepGraph graph;
-  StageClock clock;  ///< of a stage that chooses its time steps
-  double held = 0;   ///< time for which the stage's bound on equilibrium has held [s]
+  StageClock clock;    ///< of a stage that chooses its time steps
+  double sheared = 0;  ///< path of the cell's shear since the stage began
+  double held = 0;     ///< time for which the stage's bound on equilibrium has held [s]
   std::size_t stage_index = 0;
   std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   std::int64_t stage_steps = 0;

@@ -55,6 +55,36 @@ TEST(CellScene, ReadsEdgesOriginAndShears) {
   EXPECT_FALSE(parsed(scene_test::scene_with()).setup.domain.repeats);
 }
 
+TEST(CellScene, ReadsTheStressThatAStageFollowsAndWritesItAgain) {
+  const Scene scene = parsed(replaced(
+      replaced(cube, "lengths", "inertia = 4\nlengths"),
+      "end =", "stress = { xx = 1e3, xz = -20, ramp_time = 0.5, amplitude_xx = 10, period = 0.1 }\nend ="));
+  const auto expect = [](const Scene& read) {
+    EXPECT_EQ(read.setup.cell_inertia, 4);
+    const StressLoad& load = read.setup.stages.at(0).stress;
+    EXPECT_EQ(load.to, (std::array<std::optional<double>, 6>{1e3, {}, {}, {}, -20.0, {}}));
+    EXPECT_EQ(load.ramp_time, 0.5);
+    EXPECT_EQ(load.amplitude, (std::array<double, 6>{10, 0, 0, 0, 0, 0}));
+    EXPECT_EQ(load.period, 0.1);
+    EXPECT_EQ(read.setup.decomposition.coupling, Coupling::nscdd);
+  };
+  expect(scene);
+  expect(parse_scene(resolved_scene(scene), "resolved.toml"));
+}
+
+TEST(CellScene, RefusesAStressThatTheCellCannotFollow) {
+  const auto stage = [](const std::string& keys) { return replaced(cube, "end =", keys + "\nend ="); };
+  refuse(
+      replaced(replaced(stage("stress = { xx = 1 }"), "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0]"), "radius = 0.005",
+               "radius = 0.005\nregion = { shape = \"box\", low = [0, 0, 0], high = [0.1, 0.1, 0.1] }"),
+      "cell", "periodic along");
+  refuse(stage("stress = { zz = 1 }\nstrain_rates = [0, 0, -1]"), "cell", "zz has a rate");
+  refuse(stage("stress = { zz = 1, amplitude_xx = 2, period = 1 }"), "cell", "amplitude_xx");
+  refuse(stage("stress = { zz = 1, amplitude_zz = 2 }"), "cell", "period");
+  refuse(stage("stress = { zz = 1 }") + "[decomposition]\ncoupling = \"alternating\"\n",
+         "decomposition.coupling", "nscdd");
+}
+
 TEST(CellScene, RandomGrainsStandInTheCell) {
   const Scene scene = parsed(cube);
   const Sample sample = build_sample(scene);

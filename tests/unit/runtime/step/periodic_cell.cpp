@@ -212,6 +212,41 @@ TEST(PeriodicRun, FlowsToTheSameBitsOnAnyRanksAndThreads) {
   }
 }
 
+/// Pushed together by a stress while it is sheared.
+Setup pushed(std::int64_t steps) {
+  Setup setup = colliding(steps);
+  setup.stages[0].stress.to = {2e3, 1e3, 1e3, std::nullopt, 5e2, std::nullopt};
+  setup.stages[0].shear_rates = {4, 0, 0};
+  setup.decomposition.coupling = Coupling::nscdd;
+  return setup;
+}
+
+TEST(PeriodicRun, ForcesUnderAStressDoNotDependOnWhereTheFacesLie) {
+  const talus::Setup setup = pushed(60);
+  const std::map<BodyId, Vec3> one = against_flow(setup, Vec3::Zero());
+  double scale = 0;
+  for (const auto& [id, u] : one) scale = std::max(scale, u.norm());
+  ASSERT_GT(scale, 0.1);
+  for (const Vec3& shift : {Vec3(0.3 * edge, 0, 0), Vec3(0.1, -0.05, 0.021)}) {
+    const std::map<BodyId, Vec3> other = against_flow(setup, shift);
+    double worst = 0;
+    for (const auto& [id, u] : one) worst = std::max(worst, (other.at(id) - u).norm());
+    EXPECT_LT(worst, 1e-5 * scale) << shift.transpose();
+  }
+}
+
+TEST(PeriodicRun, EverySubdomainCountFindsTheSameMotionUnderAStress) {
+  const Outcome one = simulate(pushed(30), flying());
+  for (const int subdomains : {2, 5, 8}) {
+    talus::Setup setup = pushed(30);
+    setup.decomposition.subdomains = subdomains;
+    const Outcome other = simulate(setup, flying());
+    EXPECT_EQ(other.contacts, one.contacts) << subdomains;
+    for (const auto& [id, grain] : one.grains)
+      EXPECT_LT(setup.domain.separation(other.grains.at(id).first, grain.first).norm(), 1e-5 * radius);
+  }
+}
+
 TEST(PeriodicRun, EverySubdomainCountFindsTheSameMotion) {
   const Outcome one = simulate(colliding(30), flying());
   for (const int subdomains : {2, 5, 8}) {

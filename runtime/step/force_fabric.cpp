@@ -1,0 +1,90 @@
+#include "runtime/step/force_fabric.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace talus {
+
+namespace {
+
+Mat3 deviator_of(const Mat3& m) {
+  const Mat3 even = 0.5 * (m + m.transpose());
+  return even - even.trace() / 3 * Mat3::Identity();
+}
+
+/// The impulse that contact k gives to its bodies, without what the law adds to it [N s].
+Vec3 impulse_of(const Contacts& c, std::size_t k, const Vec3& n) {
+  Vec3 r = c.rx.empty() ? Vec3(c.rn[k] * n) : Vec3(c.rx[k], c.ry[k], c.rz[k]);
+  if (!c.cohesion.empty()) r -= c.cohesion[k] * n;
+  return r;
+}
+
+/// Sums of matrices over the contacts that carry, subdomain by subdomain.
+struct Sums {
+  double subdomain = 0, contacts = 0;
+  double first[9] = {}, second[9] = {};
+};
+
+/// visit(sums of its subdomain, n, r) for each such contact here; then of all ranks, in order of subdomain.
+template <class Visit>
+Sums sum_over_contacts(const StepState& state, const graph::Communicator& ranks, const Visit& visit) {
+  std::vector<Sums> rows(state.decomposition.here.size());
+  for (const SubdomainPlace e : state.decomposition.here.indices())
+    rows[e.at()].subdomain = state.decomposition.here[e].value();
+  const Contacts& c = state.contacts;
+  for (std::size_t chunk = 0; chunk < state.chunks.size(); ++chunk) {
+    if (state.chunks.wall[chunk] >= 0) continue;
+    Sums& sums = rows[static_cast<std::size_t>(state.chunks.subdomain[chunk])];
+    const auto begin = static_cast<std::size_t>(state.chunks.begin[chunk]);
+    for (std::size_t k = begin; k < begin + static_cast<std::size_t>(c.count[chunk]); ++k) {
+      const Vec3 n(c.nx[k], c.ny[k], c.nz[k]), r = impulse_of(c, k, n);
+      if (r == Vec3::Zero()) continue;
+      sums.contacts += 1;
+      visit(sums, n, r);
+    }
+  }
+  rows = ranks.gather_records(std::span<const Sums>(rows));
+  std::ranges::sort(rows, {}, &Sums::subdomain);
+  Sums all;
+  for (const Sums& row : rows) {
+    all.contacts += row.contacts;
+    for (std::size_t k = 0; k < 9; ++k) {
+      all.first[k] += row.first[k];
+      all.second[k] += row.second[k];
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+ForceFabric force_fabric(const StepState& state, const graph::Communicator& ranks) {
+  using Matrix = Eigen::Map<Mat3>;
+  ForceFabric out;
+  Sums directions = sum_over_contacts(
+      state, ranks, [](Sums& sums, const Vec3& n, const Vec3&) { Matrix(sums.first) += n * n.transpose(); });
+  out.contacts = directions.contacts;
+  if (out.contacts == 0) return out;
+  out.fabric = Matrix(directions.first) / out.contacts;
+  out.of_contacts = 7.5 * deviator_of(out.fabric);
+  Sums forces = sum_over_contacts(state, ranks, [&](Sums& sums, const Vec3& n, const Vec3& r) {
+    // Each direction counts alike, however many contacts point there.
+    const double r_n = r.dot(n), density = 1 + n.dot(out.of_contacts * n);
+    if (!(density > 0)) return;
+    Matrix(sums.first) += r_n / density * n * n.transpose();
+    Matrix(sums.second) += (r - r_n * n) / density * n.transpose();
+  });
+  const double mean = Matrix(forces.first).trace();
+  if (!(mean > 0)) return out;
+  out.of_normal_forces = 7.5 / mean * deviator_of(Matrix(forces.first));
+  out.of_tangential_forces = 5 / mean * deviator_of(Matrix(forces.second));
+  return out;
+}
+
+double along_stress(const Mat3& anisotropy, const Mat3& deviator) {
+  const double size = deviator.norm();
+  return size > 0 ? std::sqrt(1.5) * anisotropy.cwiseProduct(deviator).sum() / size : 0;
+}
+
+}  // namespace talus

@@ -1,0 +1,27 @@
+#pragma once
+
+/// How contacts and their forces are directed, in tensors of second order (Rothenburg & Bathurst 1989; in
+/// three dimensions Guo & Zhao, Comput. Geotech. 47 (2013) 1-15, (7)-(13)).
+
+#include "runtime/graph/communicator.hpp"
+#include "runtime/step/state.hpp"
+
+namespace talus {
+
+/// Of the contacts between bodies that carry. Anisotropies are symmetric deviators: contacts point along n
+/// with the density (1 + n.A_c n)/4 pi, the mean normal force there is f_0 (1 + n.A_n n), and the tangential
+/// one f_0 (A_t n - (n.A_t n) n).
+struct ForceFabric {
+  double contacts = 0;
+  Mat3 fabric = Mat3::Zero();  ///< mean of n (x) n
+  Mat3 of_contacts = Mat3::Zero(), of_normal_forces = Mat3::Zero(), of_tangential_forces = Mat3::Zero();
+};
+
+/// The same bits on any ranks. Collective.
+ForceFabric force_fabric(const StepState& state, const graph::Communicator& ranks);
+
+/// The scalar of an anisotropy A beside the stress deviator s: sqrt(3/2) A : s/|s|, negative where A is
+/// opposed to the stress; with it q/p = 0.4 (a_c + a_n + 1.5 a_t) (Guo & Zhao 2013, (16)). 0 where s is.
+double along_stress(const Mat3& anisotropy, const Mat3& deviator);
+
+}  // namespace talus
