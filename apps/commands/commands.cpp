@@ -20,6 +20,7 @@ std::vector<Command> commands() {
        .sentence = "measure how well and how fast scenes are solved",
        .subcommands = {study_error_entry(), study_scaling_entry(), study_stability_entry(),
                        study_certificate_entry()}},
+      validate_entry(),
       scene_reference_entry(),
       completion_entry(),
       man_entry(),

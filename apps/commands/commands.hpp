@@ -24,6 +24,7 @@ Command study_error_entry();
 Command study_scaling_entry();
 Command study_stability_entry();
 Command study_certificate_entry();
+Command validate_entry();
 Command new_entry();
 Command scene_reference_entry();
 Command completion_entry();

@@ -45,8 +45,8 @@ struct Contacts {
                                    ///< moves alone, and no cell flows
   bool drifts_between = false;     ///< between bodies: of the second's image beyond that of the second; void
                                    ///< where false
-  std::vector<double> reach;       ///< distance of the centres over a length (kernels/sweeps/cell_copy.hpp);
-                                   ///< empty where no cell follows a stress
+  std::vector<double> reach;   ///< distance of the centres over a length (kernels/bodies/cell_velocity.hpp);
+                               ///< empty where no cell follows a stress
   std::vector<double> mu;      ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Levers> levers;  ///< of contacts in chunks of blocks; empty where no body is a clump
   std::vector<std::uint16_t> balls;  ///< likewise: Candidates::balls

@@ -15,11 +15,11 @@
 #include <vector>
 
 #include "kernels/bodies/bodies.hpp"
+#include "kernels/bodies/cell_velocity.hpp"
 #include "kernels/bodies/motion.hpp"
 #include "kernels/detection/chunks.hpp"
 #include "kernels/detection/contacts.hpp"
 #include "kernels/law/pair_table.hpp"
-#include "kernels/sweeps/cell_copy.hpp"
 
 namespace talus {
 
@@ -34,8 +34,8 @@ inline double dot(const Twist& a, const Twist& b) {
 }
 
 /// One body. A wall never rotates and moves along `axis` only; its part of a Twist is (velocity x axis, 0). A
-/// cell (kernels/sweeps/cell_copy.hpp) has u = (xx, yy, zz) and w = (xy, xz, yz), of which those move whose
-/// entry of `axis`, and of `shears`, is 1; its `radius` is its edge over d.
+/// cell (kernels/bodies/cell_velocity.hpp) has u = (xx, yy, zz) and w = (xy, xz, yz), of which those move
+/// whose entry of `axis`, and of `shears`, is 1; its `radius` is its edge over d.
 struct BodyUnknown {
   double mass = 0;             ///< [kg] > 0
   double spin_mass = 0;        ///< I/R^2 [kg]; 0: does not turn
@@ -49,7 +49,7 @@ struct BodyUnknown {
 
 /// One contact: v = u_first - u_second + n x (w_first + w_second) - drive, the second missing at a driven
 /// wall. With levers v = u_first - u_second + B_first w_first - B_second w_second - drive. In a cell that
-/// follows a stress v gains U b/d (cell_copy.hpp).
+/// follows a stress v gains U b/d (cell_velocity.hpp).
 struct ContactEquation {
   Vec3 normal;  ///< unit, to the first body
   Vec3 offset;  ///< b n - (velocity of the driven wall) [m/s]

@@ -1,7 +1,7 @@
 #pragma once
 
 /// A periodic cell of which some components of the flow follow a stress: one more body in the contact problem
-/// of the step (docs/theory.md, "Cells under stress"; kernels/sweeps/cell_copy.hpp).
+/// of the step (docs/theory.md, "Cells under stress"; kernels/bodies/cell_velocity.hpp).
 
 #include <array>
 #include <cstdint>

@@ -53,10 +53,11 @@ const std::vector<Room>& rooms() {
       {"apps/study_scaling", {"apps/shared"}},
       {"apps/study_stability", {"apps/shared"}},
       {"apps/study_certificate", {"apps/shared"}},
+      {"apps/validate", {"apps/shared"}},
       {"apps/report", {"apps/shared"}},
       {"apps/commands",
        {"apps/shared", "apps/study_error", "apps/study_scaling", "apps/study_stability",
-        "apps/study_certificate", "apps/report"}},
+        "apps/study_certificate", "apps/validate", "apps/report"}},
   };
   return all;
 }

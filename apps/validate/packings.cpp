@@ -1,0 +1,108 @@
+/// Isotropic packings of equal spheres, pressed together from random places.
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "apps/validate/cell_run.hpp"
+
+namespace talus::literature {
+
+namespace {
+
+constexpr const char* agnolin_roux = "Agnolin & Roux, Phys. Rev. E 76 (2007) 061302";
+
+struct Packings {
+  Mean solid_fraction, coordination;
+};
+
+Packings pack(std::int64_t grains, double friction, const Effort& effort, CaseResult& result) {
+  std::vector<double> solid_fraction, coordination;
+  for (int seed = 1; seed <= effort.seeds; ++seed) {
+    const CellRun run = run_cell({static_cast<std::int64_t>(effort.size * static_cast<double>(grains)),
+                                  static_cast<std::uint64_t>(seed),
+                                  {press_stage(friction, effort.brief ? 40 : 150)},
+                                  effort});
+    result.steps += run.steps;
+    result.missed += run.missed;
+    solid_fraction.push_back(last_of(run, "press").solid_fraction);
+    coordination.push_back(last_of(run, "press").coordination);
+  }
+  return {mean_of(solid_fraction), mean_of(coordination)};
+}
+
+/// Where the straight line through the points, of least squares, meets x = 0.
+double at_zero(const std::vector<double>& x, const std::vector<double>& y) {
+  const auto n = static_cast<double>(x.size());
+  const double mx = std::accumulate(x.begin(), x.end(), 0.0) / n,
+               my = std::accumulate(y.begin(), y.end(), 0.0) / n;
+  double xy = 0, xx = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    xy += (x[k] - mx) * (y[k] - my);
+    xx += (x[k] - mx) * (x[k] - mx);
+  }
+  return my - xy / xx * mx;
+}
+
+io::Chart size_chart(const std::vector<double>& x, const std::vector<double>& y, double published) {
+  io::Chart chart{.name = "packing",
+                  .title = "Solid fraction without friction",
+                  .subtitle = "means over seeds, against the size of the sample",
+                  .x_label = "N^(-1/3)",
+                  .y_label = "solid fraction",
+                  .series = {}};
+  chart.log_x = chart.log_y = false;
+  io::ChartSeries series{"Talus", {}};
+  series.marks = true;
+  for (std::size_t k = 0; k < x.size(); ++k) series.points.push_back({x[k], y[k]});
+  chart.series.push_back(std::move(series));
+  chart.levels.push_back({published, "Agnolin & Roux 2007"});
+  return chart;
+}
+
+}  // namespace
+
+CaseResult frictionless_packing_case(const Effort& effort) {
+  CaseResult result;
+  if (effort.brief) {
+    const Packings small = pack(250, 0, effort, result);
+    // Packings of 250 grains scatter by a hundredth, and are looser than large ones.
+    result.measures = {{"solid fraction, 250 grains", small.solid_fraction.value, small.solid_fraction.error,
+                        0.61, 0.65, agnolin_roux},
+                       {"coordination without rattlers", small.coordination.value, small.coordination.error,
+                        5.6, 6.2, agnolin_roux}};
+    return result;
+  }
+  std::vector<double> x, y;
+  Packings largest;
+  for (const std::int64_t grains : {500, 1000, 2000}) {
+    largest = pack(grains, 0, effort, result);
+    x.push_back(1 / std::cbrt(effort.size * static_cast<double>(grains)));
+    y.push_back(largest.solid_fraction.value);
+    result.measures.push_back({fmt::format("solid fraction, {} grains", grains), largest.solid_fraction.value,
+                               largest.solid_fraction.error});
+  }
+  result.measures.push_back({"solid fraction, extrapolated in N^(-1/3)", at_zero(x, y),
+                             largest.solid_fraction.error, 0.637, 0.641, agnolin_roux});
+  result.measures.push_back({"coordination without rattlers", largest.coordination.value,
+                             largest.coordination.error, 5.97, 6.03, agnolin_roux});
+  result.charts.push_back(size_chart(x, y, 0.639));
+  return result;
+}
+
+CaseResult frictional_packing_case(const Effort& effort) {
+  CaseResult result;
+  const Packings packing = pack(effort.brief ? 250 : 2000, 0.3, effort, result);
+  const double part = effort.brief ? 0.03 : 0.02;
+  result.measures = {{"solid fraction", packing.solid_fraction.value, packing.solid_fraction.error,
+                      (1 - part) * 0.593, (1 + part) * 0.593, agnolin_roux},
+                     {"coordination without rattlers", packing.coordination.value, packing.coordination.error,
+                      (1 - part) * 4.5, (1 + part) * 4.5, agnolin_roux}};
+  // A small sample has a coarse coordination number.
+  if (effort.brief) result.measures[1].low = 4.2, result.measures[1].high = 5.0;
+  return result;
+}
+
+}  // namespace talus::literature
