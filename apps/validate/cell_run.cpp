@@ -27,8 +27,6 @@ struct CellRunParameters {
   double strain_of_step = 1e-3;
   /// Steps from row to row.
   std::int64_t every = 10;
-  /// Part of an overlap that a step undoes: overlaps add up in thousands of steps.
-  double overlap_correction = 0.1;
 };
 constexpr CellRunParameters parameters;
 
@@ -38,14 +36,14 @@ void take_stress(Stage& stage) {
 
 }  // namespace
 
-Stage press_stage(double friction, double most) {
+Stage press_stage(double friction, double rest, double most) {
   Stage stage;
   stage.name = "press";
   stage.time_step = parameters.time_step;
   stage.laws.set_all(&PairLaw::friction, friction);
   take_stress(stage);
   stage.end.time = most;
-  stage.end.equilibrium = 1e-4;
+  stage.end.equilibrium = rest;
   return stage;
 }
 
@@ -70,7 +68,7 @@ CellRun run_cell(const CellPlan& plan) {
   setup.domain = periodic_domain(Vec3::Constant(std::cbrt(volume / parameters.loose)));
   setup.stages = plan.stages;
   setup.solver.tolerance = plan.effort.tolerance;
-  setup.solver.overlap_correction = parameters.overlap_correction;
+  setup.solver.balance_tolerance = std::min(setup.solver.balance_tolerance, 50 * plan.effort.tolerance);
   setup.decomposition.coupling = Coupling::nscdd;
   setup.decomposition.subdomains = 1;
   sample.x =

@@ -23,8 +23,9 @@ struct CellPlan {
   Effort effort;
 };
 
-/// Presses with 1 along all axes, until the sample rests or for `most` inertial times.
-Stage press_stage(double friction, double most = 60);
+/// Presses with 1 along all axes, until the sample rests (StageEnd::equilibrium) or for `most` inertial
+/// times.
+Stage press_stage(double friction, double rest = 1e-3, double most = 60);
 /// Shears at a rate along x over z under 1 along all axes, by `strain` in all.
 Stage shear_stage(double friction, double rate, double strain);
 

@@ -250,14 +250,16 @@ class SceneReader {
     DecompositionSettings& settings = scene_.setup.decomposition;
     const toml::table& table = table_at(root_, "decomposition");
     read_table(table, "decomposition", keys_.decomposition, {}, settings);
-    const bool stressed =
-        std::ranges::any_of(scene_.setup.stages, [](const Stage& s) { return s.stress.any(); });
-    if (stressed && !table.get("coupling")) settings.coupling = Coupling::nscdd;
-    try {
-      validate_coupling(scene_.setup);
-    } catch (const std::invalid_argument& error) {
-      fail_at(*table.get("coupling"), "decomposition.coupling", error.what());
-    }
+    if (any_stress(scene_.setup) && !table.get("coupling")) settings.coupling = Coupling::nscdd;
+    const auto check = [&](const toml::table& of, const char* section, const char* key, const auto& rule) {
+      try {
+        rule(scene_.setup);
+      } catch (const std::invalid_argument& error) {
+        fail_at(*of.get(key), fmt::format("{}.{}", section, key), error.what());
+      }
+    };
+    check(table, "decomposition", "coupling", validate_coupling);
+    check(table_at(root_, "solver"), "solver", "overlap_correction", validate_correction);
     const auto& [x, y, z] = settings.boxes;
     const double boxes = static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
     if (boxes == 0) return;

@@ -64,6 +64,10 @@ void validate_stress(const Setup& setup, const Stage& stage) {
 
 }  // namespace
 
+bool any_stress(const Setup& setup) {
+  return std::ranges::any_of(setup.stages, [](const Stage& stage) { return stage.stress.any(); });
+}
+
 void validate_cell(const Setup& setup) {
   if (!(setup.cell_inertia > 0 && std::isfinite(setup.cell_inertia)))
     throw std::invalid_argument("cell: inertia must be a number > 0");
@@ -93,11 +97,18 @@ void validate_cell(const Setup& setup) {
 }
 
 void validate_coupling(const Setup& setup) {
-  if (setup.decomposition.coupling != Coupling::nscdd &&
-      std::ranges::any_of(setup.stages, [](const Stage& stage) { return stage.stress.any(); }))
+  if (setup.decomposition.coupling != Coupling::nscdd && any_stress(setup))
     throw std::invalid_argument(
         "a cell that follows a stress is pushed by all subdomains at once; take "
         "\"nscdd\"");
+}
+
+void validate_correction(const Setup& setup) {
+  if (setup.solver.overlap_correction > 0 && any_stress(setup))
+    throw std::invalid_argument(
+        "what it pushes apart in a cell that follows a stress is closed again by the stress, and overlaps "
+        "grow; "
+        "take 0, and a smaller tolerance if overlaps are too large");
 }
 
 double candidate_margin(const DetectionSettings& detection, double smallest) {

@@ -11,8 +11,13 @@ namespace talus {
 /// repeats, walls that are no planes or that turn, and grains that come or go.
 void validate_cell(const Setup& setup);
 
-/// Throws std::invalid_argument where a cell follows a stress and subdomains are not coupled by NSCDD.
+/// Some stage has a cell that follows a stress.
+bool any_stress(const Setup& setup);
+/// Throws std::invalid_argument where one does and subdomains are not coupled by NSCDD.
 void validate_coupling(const Setup& setup);
+/// ... or positions are corrected: the correction does not move the cell, so that it would press grains
+/// together elsewhere.
+void validate_correction(const Setup& setup);
 
 /// Distance of two grains at rest within which they are candidates [m], where the smallest has this radius.
 double candidate_margin(const DetectionSettings& detection, double smallest);

@@ -216,6 +216,7 @@ void validate(const Setup& setup) {
   if (!setup.clumps.empty()) validate_clumps(setup);
   validate_cell(setup);
   validate_coupling(setup);
+  validate_correction(setup);
   require(setup.solver.check_every >= 2, "solver.check_every must be >= 2");
   require(
       setup.solver.overlap_correction >= 0 && setup.solver.overlap_correction <= 1,

@@ -83,6 +83,8 @@ TEST(CellScene, RefusesAStressThatTheCellCannotFollow) {
   refuse(stage("stress = { zz = 1, amplitude_zz = 2 }"), "cell", "period");
   refuse(stage("stress = { zz = 1 }") + "[decomposition]\ncoupling = \"alternating\"\n",
          "decomposition.coupling", "nscdd");
+  refuse(stage("stress = { zz = 1 }") + "[solver]\noverlap_correction = 0.1\n", "solver.overlap_correction",
+         "overlaps grow");
 }
 
 TEST(CellScene, RandomGrainsStandInTheCell) {
