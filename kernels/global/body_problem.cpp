@@ -125,6 +125,14 @@ void add_moment(const Contacts& contacts, std::size_t k, BodyProblem& problem) {
   turn(contact.second, -1);
 }
 
+/// What a flow moves two bodies against one another by, where its drift is that of an image so far away.
+double drive_of_flow(const BodyProblem& problem, const ContactEquation& contact, const Vec3& drift) {
+  if (drift == Vec3::Zero()) return 0;
+  const BodyUnknown &a = problem.bodies[at(contact.first)], &b = problem.bodies[at(contact.second)];
+  const double near = a.radius + b.radius, far = (a.x - b.x - near * contact.normal).norm();
+  return far > 0 ? drift.norm() * near / far : 0;
+}
+
 BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part) {
   ContactGraph graph = graph_of(source, part);
   BodyProblem problem;
@@ -159,7 +167,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     }
     if (w < 0 && contacts.drifts_between) {
       const Vec3 drift = drift_of(contacts, k);
-      contact.drive = drift.norm();
+      contact.drive = drive_of_flow(problem, contact, drift);
       contact.offset -= drift;
     }
     if (source.cell.mass > 0) {

@@ -48,6 +48,22 @@ double pressed_area(const StepState& state, std::size_t w, const StepName& step)
   }
 }
 
+namespace {
+
+/// A cell whose shear stress is more than its grains bear is sheared faster and faster.
+void check_strain(const StepState& state, double time_step, const StepName& step) {
+  constexpr double most = 0.2;
+  if (!state.cell.loaded()) return;
+  const double strain = time_step * gradient_before(state.domain, 0).cwiseAbs().maxCoeff();
+  if (strain <= most) return;
+  throw RunawayError(fmt::format(
+      "{}: the stress strains the cell by {:.3g} in a step, more than {}. Reduce the time step, raise "
+      "cell.inertia, or ask for a shear stress that the grains can bear",
+      step.text(), strain, most));
+}
+
+}  // namespace
+
 void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
   const MotionSums& motion = sums.motion;
@@ -65,6 +81,7 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
                     "grains",
                     step.text(), describe(state.bodies, motion.fastest)));
   check_walls_apart(state.walls, step);
+  check_strain(state, parameters.time_step, step);
   double fastest_wall2 = 0;
   for (std::size_t w = 0; w < state.walls.size(); ++w) {
     const double speed = state.wall_states[w].material_speed;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/step/runaway.hpp"
 #include "tests/validation/experiment.hpp"
 
 namespace talus::validation::closed_form_stress_test {
@@ -107,6 +108,18 @@ TEST(EmptyCellUnderStress, FallsInAsItsMassSays) {
     EXPECT_NEAR((run.x(id)[2] - 1) / z, place, 1e-12) << "a grain keeps its place in the cell";
     EXPECT_NEAR(run.u(id)[2], speed * place, 1e-12);
     EXPECT_EQ(run.u(id)[0], 0);
+  }
+}
+
+TEST(CellUnderMoreShearThanItBears, EndsWithAReason) {
+  Scene scene = lattice(1e-2, 4);
+  scene.stage().stress.to = {1e3, 1e3, 1e3, {}, 2e3, {}};
+  Experiment run(std::move(scene));
+  try {
+    run.steps(2000);
+    FAIL() << "it went on";
+  } catch (const RunawayError& error) {
+    EXPECT_NE(std::string(error.what()).find("shear stress"), std::string::npos) << error.what();
   }
 }
 

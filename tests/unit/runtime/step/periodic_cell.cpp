@@ -235,6 +235,47 @@ TEST(PeriodicRun, ForcesUnderAStressDoNotDependOnWhereTheFacesLie) {
   }
 }
 
+/// Certified steps of a dense flow with friction against the same steps solved nearly exactly: the stress is
+/// as right as it claims to be. What grains' velocities differ by is told in docs/certificate.md.
+TEST(PeriodicRun, CertifiedStepsUnderAStressHaveTheStressThatTheyClaim) {
+  talus::Setup setup = pushed(400);
+  setup.stages[0].stress.to[4].reset();  // beyond what friction bears it would speed up for ever
+  setup.stages[0].shear_rates = {0, 4, 0};
+  setup.stages[0].laws = laws_of_one_material(0.3, 0, 0);
+  setup.solver = {};
+  setup.solver.overlap_tolerance = 1;
+  talus::Setup exact = setup;
+  exact.solver.tolerance = 1e-9;
+  exact.solver.balance_tolerance = 1e-7;
+  exact.solver.max_iterations = 100000;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, deal_out(flying(), setup.decomposition, graph::one_rank()), executor);
+  double mass = 0, worst_stress = 0, worst_velocity = 0;
+  for (const Velocity& v : simulation.state().bodies.velocity) mass += 1 / v.inv_mass;
+  int judged = 0;
+  for (; !simulation.finished(); simulation.begin_next_stage()) {
+    const bool looked_at = simulation.report().step % 20 == 19;
+    const SavedState before = simulation.save();
+    const StepReport& report = simulation.step();
+    if (!report.converged || !looked_at || report.contacts < 300) continue;
+    Simulation other(exact, before, executor);
+    ASSERT_TRUE(other.step().converged);
+    const StepState &found = simulation.state(), &truth = other.state();
+    using Three = Eigen::Map<const Vec3>;
+    const Three claimed(found.cell.impulse.data()), right(truth.cell.impulse.data());
+    worst_stress = std::max(worst_stress, (claimed - right).norm() / right.norm());
+    double error = 0;
+    for (std::size_t s = 0; s < found.bodies.size(); ++s)
+      error += (Three(found.bodies.velocity[s].u) - Three(truth.bodies.velocity[s].u)).norm() /
+               found.bodies.velocity[s].inv_mass;
+    worst_velocity = std::max(worst_velocity, error / (mass * 2 * radius * 4));
+    ++judged;
+  }
+  EXPECT_GT(judged, 10);
+  EXPECT_LE(worst_stress, 2 * setup.solver.balance_tolerance);
+  EXPECT_LE(worst_velocity, 0.25) << "of the rate of shear times a diameter";
+}
+
 TEST(PeriodicRun, EverySubdomainCountFindsTheSameMotionUnderAStress) {
   const Outcome one = simulate(pushed(30), flying());
   for (const int subdomains : {2, 5, 8}) {
