@@ -10,6 +10,7 @@ const Registry<std::string_view, CaseMaker>& cases() {
       named("packing-0.3", "isotropic packing with friction 0.3", frictional_packing_case),
       named("shear-0", "slow shear without friction", frictionless_shear_case),
       named("critical-state", "slow shear with friction, from loose and from dense", critical_state_case),
+      named("triaxial", "slow triaxial compression with friction 0.35, without walls", triaxial_case),
       named("rheology", "mu(I) and phi(I) with friction 0.4", rheology_case),
       named("forces", "distribution and anisotropies of forces at the critical state", forces_case),
       named("tolerance", "what a looser tolerance changes in slow shear", tolerance_case),

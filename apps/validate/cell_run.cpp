@@ -58,6 +58,17 @@ Stage shear_stage(double friction, double rate, double strain) {
   return stage;
 }
 
+Stage triaxial_stage(double friction, double rate, double strain) {
+  Stage stage = shear_stage(friction, rate, 1);
+  stage.name = "triaxial";
+  stage.shear_rates.setZero();
+  stage.strain_rates = {0, 0, -rate};
+  stage.stress.to[2].reset();
+  stage.end = {};
+  stage.end.strain = strain;
+  return stage;
+}
+
 CellRun run_cell(const CellPlan& plan) {
   constexpr double radius = 0.5;
   Sample sample;
@@ -65,7 +76,8 @@ CellRun run_cell(const CellPlan& plan) {
   sample.radius.assign(static_cast<std::size_t>(plan.grains), radius);
   Setup setup;
   const double volume = static_cast<double>(plan.grains) * std::numbers::pi / 6;
-  setup.domain = periodic_domain(Vec3::Constant(std::cbrt(volume / parameters.loose)));
+  const double width = std::cbrt(volume / parameters.loose / plan.slender);
+  setup.domain = periodic_domain({width, width, plan.slender * width});
   setup.stages = plan.stages;
   setup.solver.tolerance = plan.effort.tolerance;
   setup.solver.balance_tolerance = std::min(setup.solver.balance_tolerance, 50 * plan.effort.tolerance);

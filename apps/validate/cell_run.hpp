@@ -21,6 +21,7 @@ struct CellPlan {
   std::uint64_t seed = 1;
   std::vector<Stage> stages;
   Effort effort;
+  double slender = 1;  ///< height of the cell over its width
 };
 
 /// Presses with 1 along all axes, until the sample rests (StageEnd::equilibrium) or for `most` inertial
@@ -28,6 +29,9 @@ struct CellPlan {
 Stage press_stage(double friction, double rest = 1e-3, double most = 60);
 /// Shears at a rate along x over z under 1 along all axes, by `strain` in all.
 Stage shear_stage(double friction, double rate, double strain);
+
+/// Squeezes at a rate along z, under 1 along x and y, by a strain of `strain`.
+Stage triaxial_stage(double friction, double rate, double strain);
 
 struct CellRun {
   std::vector<CellReport> rows;  ///< every tenth step

@@ -1,78 +1,75 @@
-/// Simple shear at constant pressure.
+/// Slow flow at constant stress.
 
 #include <fmt/format.h>
 #include <algorithm>
 #include <array>
 
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <vector>
 
-#include "apps/validate/cell_run.hpp"
+#include "apps/validate/steady.hpp"
 
 namespace talus::literature {
 
 namespace {
 
-/// What steady shear comes to, each over the second half of the strain and over seeds.
-struct Steady {
-  Mean ratio, q_over_p, solid_fraction, coordination, forces;  ///< forces: 0.4 (a_c + a_n + 1.5 a_t)
+/// y_0 + c x^a of least squares: a by search between 0.2 and 1, the others linear.
+struct PowerFit {
+  double start = 0, power = 0, residual = std::numeric_limits<double>::infinity();
 };
-
-struct ShearPlan {
-  std::int64_t grains;
-  double friction_of_press, friction, rate, strain;
-};
-
-Steady shear(const ShearPlan& plan, const Effort& effort, CaseResult& result,
-             const std::function<void(const CellRun&)>& look = {}) {
-  std::array<std::vector<double>, 5> found;
-  for (int seed = 1; seed <= effort.seeds; ++seed) {
-    const CellRun run =
-        run_cell({static_cast<std::int64_t>(effort.size * static_cast<double>(plan.grains)),
-                  static_cast<std::uint64_t>(seed),
-                  {press_stage(plan.friction_of_press), shear_stage(plan.friction, plan.rate, plan.strain)},
-                  effort});
-    result.steps += run.steps;
-    result.missed += run.missed;
-    const auto take = [&](std::size_t k, const std::function<double(const CellReport&)>& of) {
-      found[k].push_back(mean_over(run, "shear", 0.5 * plan.strain, of));
-    };
-    take(0, shear_ratio);
-    take(1, [](const CellReport& row) { return row.q_over_p; });
-    take(2, [](const CellReport& row) { return row.solid_fraction; });
-    take(3, [](const CellReport& row) { return row.coordination; });
-    take(4, [](const CellReport& row) { return 0.4 * (row.a_c + row.a_n + 1.5 * row.a_t); });
-    if (look) look(run);
+PowerFit fit_power(const std::vector<double>& x, const std::vector<double>& y) {
+  PowerFit best;
+  for (double power = 0.2; power <= 1; power += 0.005) {
+    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      const double u = std::pow(x[k], power);
+      n += 1, sx += u, sy += y[k], sxx += u * u, sxy += u * y[k];
+    }
+    const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx), start = (sy - slope * sx) / n;
+    double residual = 0;
+    for (std::size_t k = 0; k < x.size(); ++k)
+      residual += std::pow(start + slope * std::pow(x[k], power) - y[k], 2);
+    if (residual < best.residual) best = {start, power, residual};
   }
-  return {mean_of(found[0]), mean_of(found[1]), mean_of(found[2]), mean_of(found[3]), mean_of(found[4])};
+  return best;
 }
 
-/// I of slow flow: slower ones take ten times as long, and change the ratio by less than it scatters.
-constexpr double slow = 3e-3;
-
-io::Chart chart_of(const std::string& name, const std::string& title, const std::string& x,
-                   const std::string& y) {
-  return {
-      .name = name, .title = title, .subtitle = "means over seeds", .x_label = x, .y_label = y, .series = {}};
+double degrees(double ratio) {
+  return std::atan(ratio) * 180 / std::numbers::pi;
 }
 
 }  // namespace
 
 CaseResult frictionless_shear_case(const Effort& effort) {
-  CaseResult result;
-  const Steady steady =
-      shear({effort.brief ? 250 : 1000, 0, 0, effort.brief ? 0.01 : 1e-3, effort.brief ? 0.2 : 0.6}, effort,
-            result);
-  const double angle = std::atan(steady.ratio.value) * 180 / std::numbers::pi,
-               error = steady.ratio.error * 180 / std::numbers::pi;
   const char* const source = "Peyneau & Roux, Phys. Rev. E 78 (2008) 011307";
-  result.measures = {
-      {"macroscopic angle [degrees]", angle, error, effort.brief ? 5.76 : 5.46, effort.brief ? 14 : 6.06,
-       effort.brief ? "larger than of slow shear, 5.76, at I = 0.01" : source},
-      {"solid fraction", steady.solid_fraction.value, steady.solid_fraction.error,
-       effort.brief ? 0.61 : 0.634, 0.645, "no dilatancy: that of the packing, 0.639"}};
+  CaseResult result;
+  if (effort.brief) {
+    const Steady steady = flow({250, 0, 0, 0.01, 0.2}, effort, result);
+    result.measures = {
+        {"macroscopic angle [degrees]", degrees(steady.ratio.value), degrees(steady.ratio.error), 5.76, 14,
+         "larger than of slow shear, 5.76, at I = 0.01"},
+        {"solid fraction", steady.solid_fraction.value, steady.solid_fraction.error, 0.61, 0.645,
+         "no dilatancy: that of the packing, 0.639"}};
+    return result;
+  }
+  // Without friction the ratio falls as a power of I below 1/2: slow shear is extrapolated.
+  std::vector<double> I, ratio;
+  Steady slowest;
+  for (const double rate : {3e-2, 1e-2, 1e-3, 2e-4}) {
+    slowest = flow({500, 0, 0, rate, rate < 5e-4 ? 0.3 : 0.6}, effort, result);
+    I.push_back(rate);
+    ratio.push_back(slowest.ratio.value);
+    result.measures.push_back({fmt::format("macroscopic angle at I = {:g} [degrees]", rate),
+                               degrees(slowest.ratio.value), degrees(slowest.ratio.error)});
+  }
+  const PowerFit fit = fit_power(I, ratio);
+  result.measures.push_back({"exponent of I in the fit", fit.power});
+  result.measures.push_back({"macroscopic angle of slow shear, extrapolated [degrees]", degrees(fit.start),
+                             degrees(slowest.ratio.error), 5.46, 6.06, source});
+  result.measures.push_back({"solid fraction at the slowest", slowest.solid_fraction.value,
+                             slowest.solid_fraction.error, 0.63, 0.645,
+                             "no dilatancy: that of the packing, 0.633 of 500 grains"});
   return result;
 }
 
@@ -92,8 +89,8 @@ CaseResult critical_state_case(const Effort& effort) {
   for (const double mu : frictions) {
     const double strain = effort.brief ? 0.6 : 1.5, rate = effort.brief ? 0.02 : slow;
     const std::int64_t grains = effort.brief ? 250 : 500;
-    const std::array<Steady, 2> ends = {shear({grains, mu, mu, rate, strain}, effort, result),
-                                        shear({grains, 0, mu, rate, strain}, effort, result)};
+    const std::array<Steady, 2> ends = {flow({grains, mu, mu, rate, strain}, effort, result),
+                                        flow({grains, 0, mu, rate, strain}, effort, result)};
     for (std::size_t k = 0; k < 2; ++k) {
       ratios[k].points.push_back({mu, ends[k].ratio.value});
       fractions[k].points.push_back({mu, ends[k].solid_fraction.value});
@@ -125,139 +122,20 @@ CaseResult critical_state_case(const Effort& effort) {
   return result;
 }
 
-namespace {
-
-/// mu_s + (mu_2 - mu_s)/(1 + I_0/I) of least squares: I_0 by search, the others linear.
-struct RheologyFit {
-  double mu_s = 0, mu_2 = 0, I_0 = 0, residual = std::numeric_limits<double>::infinity();
-};
-RheologyFit fit_rheology(const std::vector<double>& I, const std::vector<double>& mu) {
-  RheologyFit best;
-  for (double I_0 = 0.02; I_0 < 3; I_0 *= 1.02) {
-    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-    for (std::size_t k = 0; k < I.size(); ++k) {
-      const double x = 1 / (1 + I_0 / I[k]);
-      n += 1, sx += x, sy += mu[k], sxx += x * x, sxy += x * mu[k];
-    }
-    const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx), start = (sy - slope * sx) / n;
-    double residual = 0;
-    for (std::size_t k = 0; k < I.size(); ++k)
-      residual += std::pow(start + slope / (1 + I_0 / I[k]) - mu[k], 2);
-    if (residual < best.residual) best = {start, start + slope, I_0, residual};
-  }
-  return best;
-}
-
-}  // namespace
-
-CaseResult rheology_case(const Effort& effort) {
+CaseResult triaxial_case(const Effort& effort) {
   CaseResult result;
-  const std::vector<double> rates =
-      effort.brief ? std::vector<double>{0.03, 0.3} : std::vector<double>{1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3};
-  const std::string jop = "Jop, Forterre & Pouliquen, Nature 441 (2006) 727: glass beads";
-  std::vector<double> I, mu, phi;
-  for (const double rate : rates) {
-    const Steady steady =
-        shear({effort.brief ? 250 : 500, 0.4, 0.4, rate, rate < 2e-3 ? 0.6 : 1.5}, effort, result);
-    I.push_back(rate);
-    mu.push_back(steady.ratio.value);
-    phi.push_back(steady.solid_fraction.value);
-    result.measures.push_back(
-        {fmt::format("tau/p at I = {:g}", rate), steady.ratio.value, steady.ratio.error});
-    result.measures.push_back({fmt::format("solid fraction at I = {:g}", rate), steady.solid_fraction.value,
-                               steady.solid_fraction.error});
-  }
-  result.measures.push_back({"tau/p at the fastest less that at the slowest", mu.back() - mu.front(), 0, 0.05,
-                             0.5, "it grows: " + jop});
-  result.measures.push_back({"solid fraction likewise", phi.back() - phi.front(), 0, -0.2, -0.01,
-                             "it falls: GDR MiDi, Eur. Phys. J. E 14 (2004) 341"});
-  if (effort.brief) return result;
-  const RheologyFit fit = fit_rheology(I, mu);
-  result.measures.push_back({"mu_s of the fit", fit.mu_s, 0, 0.30, 0.42, jop + " have 0.383"});
-  result.measures.push_back({"mu_2 of the fit", fit.mu_2});
-  result.measures.push_back({"I_0 of the fit", fit.I_0});
-  io::Chart chart = chart_of("rheology", "Shear ratio against the inertial number", "I", "tau/p");
-  chart.log_y = false;
-  io::ChartSeries found{"Talus, friction 0.4", {}}, line{"fit", {}}, published{"Jop et al. 2006", {}};
-  found.marks = true;
-  line.hue = 1;
-  published.hue = 2;
-  published.dash = 1;
-  for (std::size_t k = 0; k < I.size(); ++k) found.points.push_back({I[k], mu[k]});
-  for (double x = 1e-3; x < 0.35; x *= 1.1) {
-    line.points.push_back({x, fit.mu_s + (fit.mu_2 - fit.mu_s) / (1 + fit.I_0 / x)});
-    published.points.push_back({x, 0.383 + 0.26 / (1 + 0.279 / x)});
-  }
-  chart.series = {found, line, published};
-  result.charts = {chart};
-  return result;
-}
-
-CaseResult forces_case(const Effort& effort) {
-  CaseResult result;
-  std::vector<double> forces;  // over the mean of their sample
-  const auto look = [&](const CellRun& run) {
-    double sum = 0;
-    std::vector<double> own;
-    for (std::size_t k = 0; k < run.last.contact_force.size(); ++k) {
-      own.push_back(run.last.contact_force[k].dot(run.last.contact_normal[k]));
-      sum += own.back();
-    }
-    for (const double f : own) forces.push_back(f / (sum / static_cast<double>(own.size())));
-  };
-  const Steady steady =
-      shear({effort.brief ? 250 : 1000, 0.3, 0.3, effort.brief ? 0.02 : slow, effort.brief ? 0.4 : 1.0},
-            effort, result, look);
+  const Steady steady = flow(
+      {effort.brief ? 300 : 1000, 0.35, 0.35, effort.brief ? 0.01 : slow, effort.brief ? 0.3 : 0.6, true},
+      effort, result);
   const double part = effort.brief ? 0.1 : 0.05;
-  result.measures.push_back({"0.4 (a_c + a_n + 1.5 a_t) over q/p",
-                             steady.forces.value / steady.q_over_p.value,
-                             steady.forces.error / steady.q_over_p.value, 1 - part, 1 + part,
-                             "Guo & Zhao, Comput. Geotech. 47 (2013) 1"});
-  // Beyond the mean the logarithm of the density falls by beta for each mean force: the mean excess over a
-  // bound is 1/beta of an exponential tail, wherever the bound.
-  const auto excess = [&](double bound) {
-    double sum = 0, count = 0;
-    for (const double f : forces)
-      if (f > bound) sum += f - bound, count += 1;
-    return count > 0 ? sum / count : std::nan("");
-  };
-  result.measures.push_back({"decay of the tail of P(f), beyond the mean force", 1 / excess(1), 0, 0.9, 1.9,
-                             "Radjai et al., Phys. Rev. Lett. 77 (1996) 274: 1.4"});
-  result.measures.push_back({"the same beyond twice the mean, over it", excess(1) / excess(2), 0,
-                             effort.brief ? 0.6 : 0.75, effort.brief ? 1.7 : 1.35, "exponential: 1"});
-  double weak = 0;
-  for (const double f : forces) weak += f < 1 ? 1 : 0;
-  result.measures.push_back({"share of forces below the mean", weak / static_cast<double>(forces.size()), 0,
-                             0.55, 0.7, "Radjai et al. 1996: some 0.6"});
-  if (effort.brief) return result;
-  io::Chart chart = chart_of("forces", "Distribution of normal forces", "force over its mean", "density");
-  chart.log_x = false;
-  io::ChartSeries series{"Talus, friction 0.3", {}};
-  constexpr double width = 0.2;
-  std::map<int, double> bins;
-  for (const double f : forces) bins[static_cast<int>(f / width)] += 1;
-  for (const auto& [bin, count] : bins)
-    series.points.push_back({(bin + 0.5) * width, count / width / static_cast<double>(forces.size())});
-  chart.series.push_back(std::move(series));
-  result.charts.push_back(std::move(chart));
-  return result;
-}
-
-CaseResult tolerance_case(const Effort& effort) {
-  CaseResult result;
-  double finest = 0;
-  for (const double tolerance : {1e-4, 1e-3, 1e-2}) {
-    if (effort.brief && tolerance < 1e-3) continue;
-    Effort own = effort;
-    own.tolerance = tolerance;
-    const Steady steady =
-        shear({effort.brief ? 200 : 500, 0.3, 0.3, effort.brief ? 0.03 : slow, effort.brief ? 0.4 : 1.0}, own,
-              result);
-    if (finest == 0) finest = steady.ratio.value;
-    result.measures.push_back({fmt::format("tau/p at tolerance {:g}, over that at the finest", tolerance),
-                               steady.ratio.value / finest, steady.ratio.error / finest, 0.9, 1.1,
-                               "the curve must not depend on the tolerance"});
-  }
+  result.measures = {
+      {"q/p at the critical state", steady.q_over_p.value, steady.q_over_p.error, effort.brief ? 0.62 : 0.68,
+       effort.brief ? 0.85 : 0.76, "0.72 of apps/scenes/triaxial-16k.toml, in a box of walls"},
+      {"solid fraction", steady.solid_fraction.value, steady.solid_fraction.error},
+      {"coordination without rattlers", steady.coordination.value, steady.coordination.error},
+      {"0.4 (a_c + a_n + 1.5 a_t) over q/p", steady.forces.value / steady.q_over_p.value,
+       steady.forces.error / steady.q_over_p.value, 1 - part, 1 + part,
+       "Guo & Zhao, Comput. Geotech. 47 (2013) 1"}};
   return result;
 }
 

@@ -52,6 +52,7 @@ CaseResult frictionless_packing_case(const Effort& effort);
 CaseResult frictional_packing_case(const Effort& effort);
 CaseResult frictionless_shear_case(const Effort& effort);
 CaseResult critical_state_case(const Effort& effort);
+CaseResult triaxial_case(const Effort& effort);
 CaseResult rheology_case(const Effort& effort);
 CaseResult forces_case(const Effort& effort);
 CaseResult tolerance_case(const Effort& effort);
