@@ -52,16 +52,8 @@ void push(const Contacts& c, std::size_t k, const Space<double>& n, const Space<
 }  // namespace
 
 void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which) {
-  if (which.empty()) return;
-  Space<double> sum{0, 0, 0};
-  for (std::int32_t k : which) sum = sum + space_of(copies[static_cast<std::size_t>(k)].velocity);
-  const Space<double> mean = (1 / static_cast<double>(which.size())) * sum;
-  for (std::int32_t k : which) {
-    double* velocity = copies[static_cast<std::size_t>(k)].velocity;
-    velocity[0] = mean.x;
-    velocity[1] = mean.y;
-    velocity[2] = mean.z;
-  }
+  glue_vectors(which.size(),
+               [&](std::size_t k) { return copies[static_cast<std::size_t>(which[k])].velocity; });
 }
 
 template <bool Friction>

@@ -51,8 +51,20 @@ struct ErrorSums {
   void add(const ErrorSums& other);
 };
 
-/// Gives the copies `which` of one wall the mean of their velocities: its momentum is kept, as the copies
-/// have equal masses. Summed in order.
+/// Gives `count` vectors of three numbers, vector(k) the k-th, their mean: of copies of equal masses, whose
+/// momentum is kept so. Summed in order.
+template <class At>
+void glue_vectors(std::size_t count, const At& vector) {
+  if (count == 0) return;
+  double mean[3] = {0, 0, 0};
+  for (std::size_t k = 0; k < count; ++k)
+    for (int d = 0; d < 3; ++d) mean[d] += vector(k)[d];
+  for (double& number : mean) number *= 1 / static_cast<double>(count);
+  for (std::size_t k = 0; k < count; ++k)
+    for (int d = 0; d < 3; ++d) vector(k)[d] = mean[d];
+}
+
+/// The same of the velocities of the copies `which` of one wall.
 void glue_copies(std::span<WallCopy> copies, std::span<const std::int32_t> which);
 
 /// Keeps a part of what a sweep changed: r <- before + part (r - before), and V with it. `before` holds the

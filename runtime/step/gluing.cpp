@@ -140,22 +140,13 @@ void Gluing::tell(SubdomainPlace e, Mode mode) {
   send_up();
 }
 
-/// The copies of a subdomain get the mean of their velocities: their momentum is kept, as they have equal
-/// masses. Summed in order.
-void Gluing::glue_here(std::size_t g, std::span<const ChunkId> copies) {
-  Vec3 sum = Vec3::Zero();
-  for (const ChunkId c : copies) sum += Eigen::Map<const Vec3>(copy_of(g, c));
-  for (const ChunkId c : copies)
-    Eigen::Map<Vec3>(copy_of(g, c)) = 1 / static_cast<double>(copies.size()) * sum;
-}
-
 void Gluing::glue(SubdomainPlace e, Mode mode, bool single) {
   Subdomain& mine = subdomains_[e];
   for (std::size_t g = 0; g < vectors() && mode != Mode::sum; ++g) {
     const auto& copies = mine.wall_copies[g];
     if (copies.empty()) continue;
     if (mode == Mode::local) {
-      glue_here(g, copies);
+      glue_vectors(copies.size(), [&](std::size_t k) { return copy_of(g, copies[k]); });
       continue;
     }
     const double part = 1 / static_cast<double>(copies_everywhere(g));

@@ -125,7 +125,6 @@ class Gluing {
   std::size_t vectors() const;
   std::int64_t copies_everywhere(std::size_t g) const;
   double* copy_of(std::size_t g, ChunkId chunk);
-  void glue_here(std::size_t g, std::span<const ChunkId> copies);
   void plan_sides(SubdomainPlace e);
   void plan_copies(SubdomainPlace e);
   std::span<const CopySource> copies_of(SubdomainPlace e, std::size_t s) const;
