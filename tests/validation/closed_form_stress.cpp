@@ -30,9 +30,14 @@ Scene lattice(double h, int n) {
   return scene;
 }
 
-TEST(CubicLatticeUnderStress, CarriesItInEveryContactFromTheFirstStepOn) {
+/// Of the grains, in (0, 1) or 0.
+class WithRestitution : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Cells, WithRestitution, testing::Values(0.0, 0.5));
+
+TEST_P(WithRestitution, ACubicLatticeCarriesItsStressInEveryContactFromTheFirstStepOn) {
   const std::array<double, 3> stress = {1e3, 2e3, 5e2};
   Scene scene = lattice(1e-3, 4);
+  scene.stage().laws.set_all(&PairLaw::restitution, GetParam());
   for (std::size_t k = 0; k < 3; ++k) scene.stage().stress.to[k] = stress[k];
   Experiment run(std::move(scene));
   for (int step = 0; step < 5; ++step) {
@@ -85,12 +90,13 @@ TEST(CubicLatticeUnderStress, HasTheFabricAndTheForcesOfItsAxes) {
 }
 
 /// Nothing touches: the cell alone, h'' = -(V sigma/(M d^2)) h, and grains that move with it.
-TEST(EmptyCellUnderStress, FallsInAsItsMassSays) {
+TEST_P(WithRestitution, AnEmptyCellFallsInAsItsMassSays) {
   const double h = 1e-4, stress = 50, edge = 1;
   Scene scene(h);
   scene.setup.domain = periodic_domain(Vec3::Constant(edge), Vec3(0.3, -2, 1));
   scene.setup.decomposition.coupling = Coupling::nscdd;
   scene.setup.cell_inertia = 3;
+  scene.stage().laws.set_all(&PairLaw::restitution, GetParam());
   scene.stage().stress.to[2] = stress;
   scene.sphere(Vec3(0.3, -2, 1) + Vec3(0.2, 0.3, 0.2), radius, mass);
   scene.sphere(Vec3(0.3, -2, 1) + Vec3(0.7, 0.8, 0.7), radius, 2 * mass);
@@ -136,6 +142,20 @@ TEST(GasInACellUnderItsOwnStress, HoldsTheCell) {
   run.steps(50);
   EXPECT_NEAR(run.simulation().state().domain.cell.zz, 1, 1e-12);
   EXPECT_NEAR(run.simulation().state().domain.rates.zz, 0, 1e-12);
+}
+
+/// Cohesion pulls at the cell, too: a lattice that a stress pulls apart holds up to it.
+TEST(CohesiveLattice, HoldsACellThatIsPulledApart) {
+  const double pull = 900, strength = 1e3 * diameter * diameter;
+  Scene scene = lattice(1e-3, 4);
+  scene.stage().laws.set_all(&PairLaw::cohesion, strength);
+  for (std::size_t k = 0; k < 3; ++k) scene.stage().stress.to[k] = -pull;
+  Experiment run(std::move(scene));
+  for (int step = 0; step < 5; ++step) {
+    ASSERT_TRUE(run.step().converged) << "step " << step;
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(run.simulation().cell()->stress[k], -pull, 1e-7 * pull) << "step " << step;
+  }
 }
 
 /// One contact of a plain solver.
