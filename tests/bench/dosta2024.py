@@ -13,6 +13,7 @@ those of an earlier run). Exit code 1 where a number leaves its band.
 
 import argparse
 import csv
+import math
 import pathlib
 import resource
 import subprocess
@@ -257,13 +258,39 @@ def maxima(curve):
     return [(t, v) for t, v in curve if t >= 0.3 and all(v >= w for s, w in curve if abs(s - t) <= 0.7)]
 
 
+def wall_layer(results):
+    """Mean velocity along the shell of the grains that lie on it below the bed, over the shell's; for each frame."""
+    import h5py
+    import numpy
+    found = []
+    with h5py.File(results / "results.h5") as file:
+        for name in sorted(file["frames"]):
+            frame = file["frames"][name]
+            bodies = frame["bodies"]
+            x, u, radius = bodies["x"][:], bodies["u"][:], bodies["radius"][:]
+            distance = numpy.hypot(x[:, 0], x[:, 2])
+            below = math.atan2(x[:, 2].mean(), x[:, 0].mean())
+            aside = numpy.angle(numpy.exp(1j * (numpy.arctan2(x[:, 2], x[:, 0]) - below)))
+            layer = (0.1 - radius - distance < 0.25 * radius) & (abs(aside) < math.pi / 6)
+            # omega is -2 rad/s about y, which turns z into x.
+            along = -2.0 * (x[:, 2] * u[:, 0] - x[:, 0] * u[:, 2]) / distance / (2.0 * 2.0 * 0.1)
+            found.append((float(frame.attrs["time"]), float(along[layer].mean()), int(layer.sum())))
+    return found
+
+
 def compare_drum(data, results):
     own = [(float(r["time"]), int(r["count_M1"])) for r in rows(results / "probes.csv")]
     references = curves(data / "drum-zones.csv", "z2_m1")
     print("t [s]  M1 in zone 2: Talus, " + ", ".join(references))
     for t, count in own:
         print(f"{t:5.2f}  {count:6d}  " + "  ".join(f"{at(c, t) or 0:7.0f}" for c in references.values()))
-    ok, tops = True, {code: maxima(c) for code, c in references.items()}
+    print("t [s]  grains on the shell, their velocity over the shell's")
+    layer = wall_layer(results)
+    for t, ratio, count in layer:
+        print(f"{t:5.2f}  {count:5d}  {ratio:.3f}")
+    ok = said("wall layer over the wall, mean from 0.3 s on", sum(v for t, v, _ in layer if t >= 0.3) /
+              sum(t >= 0.3 for t, _, _ in layer), ">= 0.9", all(v >= 0.9 for t, v, _ in layer if t >= 0.3))
+    tops = {code: maxima(c) for code, c in references.items()}
     for k, (t, v) in enumerate(maxima(own)[:3]):
         known = [peaks[k] for peaks in tops.values() if len(peaks) > k]
         mean = sum(p[1] for p in known) / len(known)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Discharge of a silo with grains of 6 mm: Beverloo's law, the head, no friction, a mesh, and looser solutions.
 
-    tests/bench/silo.py orifices|head|fluid|mesh|tolerance OUT [--talus build/release/talus] [--set KEY=VALUE ...]
+    tests/bench/silo.py published|orifices|head|fluid|mesh|tolerance OUT [--talus build/release/talus] [--set KEY=VALUE ...]
 
 The silo is that of Dosta et al. (2024) with its materials: a tube of radius 0.1 m over a funnel of 45 degrees. It is
 filled once, on a funnel that goes on to a radius of 18 mm (OUT/fill-COUNT); each discharge begins from there, with the
@@ -19,7 +19,7 @@ import struct
 import subprocess
 import sys
 
-from dosta2024 import MATERIALS, pairs
+from dosta2024 import MATERIALS, pairs, silo_scene
 
 GRAVITY = 9.8
 RADIUS = 0.003  # of a grain [m]
@@ -67,6 +67,16 @@ allow_unconverged = true
 {MATERIALS}{pairs()}"""
 SOLVER = "[solver]\ntolerance = 1e-2\nbalance_tolerance = 0.2\noverlap_correction = 0.1\n"
 OUTPUT = "[output]\nevery = 10\nfields = false\npictures = false\n"
+
+
+NO_FRICTION = """[[stage.pair]]
+material = "M1"
+friction = 0
+[[stage.pair]]
+material = "M1"
+with = "steel"
+friction = 0
+"""
 
 
 def fill_scene(count):
@@ -253,7 +263,7 @@ def fluid(runs):
     """Without friction: v = c (2 g head)^(1/2) with a c that does not depend on the head."""
     radius = 0.025
     rough = runs.drain("orifice-50", radius, runs.options.longest)
-    smooth = runs.drain("smooth-50", radius, 0.8, stage="friction = 0\nwall_friction = 0\n")
+    smooth = runs.drain("smooth-50", radius, 0.8, stage=NO_FRICTION)
     rough.said()
     smooth.said()
     discharge = []
@@ -294,7 +304,30 @@ def tolerance(runs):
     return True
 
 
-STUDIES = {"orifices": orifices, "head": head, "fluid": fluid, "mesh": mesh_case, "tolerance": tolerance}
+def published(runs):
+    """The published case, but for grains above z = 0.053 m, which are taken away when it opens: 40,000 are left."""
+    scene = silo_scene(None, None)
+    parts = [scene.index(f"[[{part}]]") for part in ("insert", "remove", "probe", "stage")]
+    gate, drain = scene.index('[[wall]]\nname = "gate"'), scene.index('[[stage]]\nname = "drain"')
+    solver = scene.index("[solver]")
+    filled = runs.run("fill-published", scene[:parts[1]] + scene[scene.index("[[wall]]"):drain].replace(
+        'until_stage = "drain"\n', "") + scene[solver:])[0]
+    state = f'[[sample]]\nkind = "state"\nfile = "{(filled / "results.h5").resolve()}"\n'
+    cut = ('[[remove]]\nname = "above"\nat = [0]\n'
+           'region = { shape = "beyond", point = [0, 0, 0.053], normal = [0, 0, 1] }\n')
+    left = '[[probe]]\nname = "left"\nregion = { shape = "beyond", point = [0, 0, 1], normal = [0, 0, -1] }\n'
+    results, seconds = runs.run("published", scene[:parts[0]] + state + cut + scene[parts[1]:gate] + left
+                                + scene[parts[2]:parts[3]] + scene[drain:], ["stage.drain.end.time=0.5"])
+    probes = rows(results / "probes.csv")
+    count = max(int(row["count"]) for row in probes if row["probe"] == "left")
+    steps = rows(results / "steps.csv")
+    found = Discharge("published", results, count, seconds, len(steps),
+                      sum(row["converged"] != "1" for row in steps), sum(int(row["iterations"]) for row in steps))
+    found.said()
+    return verdict("rate [grains/s]", found.rate, "23,200 +- 5 %", abs(found.rate - 23200) <= 0.05 * 23200)
+
+
+STUDIES = {"published": published, "orifices": orifices, "head": head, "fluid": fluid, "mesh": mesh_case, "tolerance": tolerance}
 
 
 def main():
