@@ -1,16 +1,19 @@
 #!/usr/bin/env python3
-"""Impact and drum of Dosta et al. (Comput. Phys. Commun. 296 (2024) 109066), run with Talus and compared.
+"""Impact, drum and silo of Dosta et al. (Comput. Phys. Commun. 296 (2024) 109066), run with Talus and compared.
 
     tests/bench/dosta2024.py impact DATA OUT [--talus build/release/talus] [--set KEY=VALUE ...]
     tests/bench/dosta2024.py drum   DATA OUT ...
+    tests/bench/dosta2024.py silo   DATA OUT ...
 
 DATA is a folder with the published files (impact-25k-spheres.csv, drum-spheres.csv and the references' curves). The
+silo makes its own filling, 100,000 grains that fall from a loose cloud, and opens its gate after SILO_FILL. The
 scene and its grains are written to OUT, the results to OUT/results; then the curves are compared (with --only-compare
 those of an earlier run). Exit code 1 where a number leaves its band.
 """
 
 import argparse
 import csv
+import math
 import pathlib
 import resource
 import subprocess
@@ -149,6 +152,72 @@ pictures = false
 """
 
 
+SILO_FILL = 0.32  # [s]; what is left of the kinetic energy then is a thousandth of a joule
+SILO_COUNT = 100000
+
+
+def silo_scene(data, out):
+    return f"""name = "silo-100k"
+time_step = 5e-4
+gravity = [0, 0, -9.8]
+allow_unconverged = true
+{MATERIALS}{pairs()}
+[[insert]]
+name = "filling"
+material = "M1"
+radius = 0.002
+count = {SILO_COUNT}
+stage = "fill"
+region = {{ shape = "cylinder", start = [0, 0, 0.0145778], end = [0, 0, 0.37], radius = 0.1 }}
+[[remove]]
+name = "out"
+stage = "drain"
+interval = 0.01
+region = {{ shape = "beyond", point = [0, 0, -0.1], normal = [0, 0, -1] }}
+[[wall]]
+name = "tube"
+shape = "cylinder"
+inside = true
+start = [0, 0, 0.0145778]
+end = [0, 0, 0.42]
+radius = 0.1
+material = "steel"
+[[wall]]
+name = "funnel"
+shape = "cone"
+inside = true
+start = [0, 0, -0.0554222]
+end = [0, 0, 0.0145778]
+start_radius = 0.03
+end_radius = 0.1
+material = "steel"
+[[wall]]
+name = "gate"
+side = "z-"
+position = -0.0554222
+until_stage = "drain"
+material = "steel"
+[[probe]]
+name = "orifice"
+every = 0.01
+region = {{ shape = "disc", centre = [0, 0, -0.0554222], axis = [0, 0, -1], radius = 0.0301 }}
+[[stage]]
+name = "fill"
+end = {{ time = {SILO_FILL} }}
+[[stage]]
+name = "drain"
+end = {{ time = 4.5 }}
+[solver]
+tolerance = 1e-2
+balance_tolerance = 0.2
+overlap_correction = 0.1
+[output]
+every = 10
+fields = false
+pictures = false
+"""
+
+
 def curves(path, key):
     found = {}
     for row in rows(path):
@@ -189,13 +258,39 @@ def maxima(curve):
     return [(t, v) for t, v in curve if t >= 0.3 and all(v >= w for s, w in curve if abs(s - t) <= 0.7)]
 
 
+def wall_layer(results):
+    """Mean velocity along the shell of the grains that lie on it below the bed, over the shell's; for each frame."""
+    import h5py
+    import numpy
+    found = []
+    with h5py.File(results / "results.h5") as file:
+        for name in sorted(file["frames"]):
+            frame = file["frames"][name]
+            bodies = frame["bodies"]
+            x, u, radius = bodies["x"][:], bodies["u"][:], bodies["radius"][:]
+            distance = numpy.hypot(x[:, 0], x[:, 2])
+            below = math.atan2(x[:, 2].mean(), x[:, 0].mean())
+            aside = numpy.angle(numpy.exp(1j * (numpy.arctan2(x[:, 2], x[:, 0]) - below)))
+            layer = (0.1 - radius - distance < 0.25 * radius) & (abs(aside) < math.pi / 6)
+            # omega is -2 rad/s about y, which turns z into x.
+            along = -2.0 * (x[:, 2] * u[:, 0] - x[:, 0] * u[:, 2]) / distance / (2.0 * 2.0 * 0.1)
+            found.append((float(frame.attrs["time"]), float(along[layer].mean()), int(layer.sum())))
+    return found
+
+
 def compare_drum(data, results):
     own = [(float(r["time"]), int(r["count_M1"])) for r in rows(results / "probes.csv")]
     references = curves(data / "drum-zones.csv", "z2_m1")
     print("t [s]  M1 in zone 2: Talus, " + ", ".join(references))
     for t, count in own:
         print(f"{t:5.2f}  {count:6d}  " + "  ".join(f"{at(c, t) or 0:7.0f}" for c in references.values()))
-    ok, tops = True, {code: maxima(c) for code, c in references.items()}
+    print("t [s]  grains on the shell, their velocity over the shell's")
+    layer = wall_layer(results)
+    for t, ratio, count in layer:
+        print(f"{t:5.2f}  {count:5d}  {ratio:.3f}")
+    ok = said("wall layer over the wall, mean from 0.3 s on", sum(v for t, v, _ in layer if t >= 0.3) /
+              sum(t >= 0.3 for t, _, _ in layer), ">= 0.9", all(v >= 0.9 for t, v, _ in layer if t >= 0.3))
+    tops = {code: maxima(c) for code, c in references.items()}
     for k, (t, v) in enumerate(maxima(own)[:3]):
         known = [peaks[k] for peaks in tops.values() if len(peaks) > k]
         mean = sum(p[1] for p in known) / len(known)
@@ -203,7 +298,34 @@ def compare_drum(data, results):
     return ok
 
 
-CASES = {"impact": (impact_scene, compare_impact), "drum": (drum_scene, compare_drum)}
+def line(points):
+    """Slope of the line of least squares, and how far off it the furthest point is."""
+    mt, mv = sum(t for t, _ in points) / len(points), sum(v for _, v in points) / len(points)
+    b = sum((t - mt) * (v - mv) for t, v in points) / sum((t - mt) ** 2 for t, _ in points)
+    return b, max(abs(v - mv - b * (t - mt)) for t, v in points)
+
+
+def compare_silo(data, results):
+    own = [(float(r["time"]) - SILO_FILL, SILO_COUNT - int(r["passed_count"]))
+           for r in rows(results / "probes.csv") if r["probe"] == "orifice" and float(r["time"]) > SILO_FILL]
+    references = curves(data / "silo-large-m1-count.csv", "count")
+    print("t [s]  grains above the orifice: Talus, " + ", ".join(references))
+    for t, count in own[19::20]:
+        print(f"{t:5.2f}  {count:6d}  " + "  ".join(f"{at(c, t) or 0:7.0f}" for c in references.values()))
+    slopes = {}
+    for code, curve in {"Talus": own, **references}.items():
+        # From a tenth to seven tenths of what leaves: the flow has begun, and the funnel is still full.
+        rate, off = line([(t, v) for t, v in curve if 0.3 * SILO_COUNT <= v <= 0.9 * SILO_COUNT])
+        slopes[code] = -rate
+        print(f"{code}: {-rate:.0f} grains a second, furthest off the line by {off:.0f} grains")
+    steps = [r for r in rows(results / "steps.csv") if float(r["time"]) > SILO_FILL]
+    print(f"discharge: {sum(r['converged'] != '1' for r in steps)} of {len(steps)} steps missed, "
+          f"{sum(int(r['iterations']) for r in steps) / len(steps):.0f} sweeps a step")
+    return said("rate [grains/s]", slopes["Talus"], "23,200 +- 5 %", abs(slopes["Talus"] - 23200) <= 0.05 * 23200)
+
+
+CASES = {"impact": (impact_scene, compare_impact), "drum": (drum_scene, compare_drum),
+         "silo": (silo_scene, compare_silo)}
 
 
 def main():
