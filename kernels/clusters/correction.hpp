@@ -24,8 +24,9 @@ struct CorrectionThresholds {
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
   /// With friction, where rounds do not settle, impulses stay whose first round finds next to nothing: so
-  /// many times that counts as their error, >= 1, and must be no more than what need not be known.
-  double of_first_round = 10;
+  /// many times that counts as their error, >= 1, and must be no more than what need not be known. Jammed
+  /// grains that have to slide by next to nothing have true errors of up to a hundred times what it finds.
+  double of_first_round = 100;
   /// Not where all bodies of the cluster together are so many effective masses of a contact, >> 1: heavier
   /// ones go on where the firm contacts of a round give way, and contacts feel next to nothing of it.
   double most_apart = 1e7;

@@ -42,6 +42,35 @@ TEST(BallOnTheRimOfADisc, FeelsTheDirectionFromTheRimToItsCentre) {
   EXPECT_LT((run.x() - rim - radius * out).norm(), 1e-9);
 }
 
+/// A ball, or a clump of one, at rest beyond the alert distance of a floor that it reaches within the step by
+/// its fall alone: it uses up the gap, as one does that was near from the beginning.
+TEST(BallAboveAFloor, IsStoppedAlsoWhereOnlyTheFallOfTheStepBringsItThere) {
+  const double gap = 0.5 * g_earth * h * h;
+  for (const char* floor : {"plane", "disc", "mesh"})
+    for (const bool clump : {false, true}) {
+      Scene scene(h);
+      scene.stage().gravity = {0, 0, -g_earth};
+      scene.setup.detection.alert = 0.1 * gap;
+      const std::string shape = floor;
+      if (shape == "plane") scene.wall(shape, Vec3::Zero(), Vec3::UnitZ());
+      if (shape == "disc")
+        scene.surface(shape, {{"centre", {0, 0, 0}}, {"axis", {0, 0, 1}}, {"radius", {1}}});
+      if (shape == "mesh") scene.surface(shape, {}, test::box_mesh({-1, -1, -0.1}, {1, 1, 0}, 3));
+      const Vec3 centre(0.1, 0.2, radius + gap);
+      if (clump) {
+        const Ball one[] = {{Vec3::Zero(), radius}};
+        scene.setup.clumps.push_back(make_clump(one).clump);
+        add_clump(scene.bodies, scene.setup.clumps, 1, BodyId{0},
+                  {centre, {1, 0, 0, 0}, radius, 2600, Vec3::Zero(), Vec3::Zero()});
+      } else {
+        scene.sphere(centre, radius, mass);
+      }
+      Experiment run(std::move(scene));
+      run.step();
+      EXPECT_NEAR(run.u()[2], -gap / h, 1e-9) << shape << (clump ? ", clump" : ", sphere");
+    }
+}
+
 /// A ball that rolls and slides over a floor, made of a plane or of triangles, with the velocity of every
 /// step.
 std::vector<Vec3> roll(bool of_triangles) {

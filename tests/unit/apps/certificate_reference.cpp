@@ -177,6 +177,40 @@ TEST(CertificateReference, ALightLidMeetsAGrainByItsSpeedAtTheEndOfTheStep) {
   EXPECT_NEAR(problem.contacts[0].bias, 0, 1e-12);
 }
 
+TEST(CertificateReference, AGrainMeetsAFloorThatOnlyGravityBringsItTo) {
+  // At rest beyond the alert distance: without the fall of this step the pair would not be looked at.
+  constexpr double gap = 0.5 * g * h * h;
+  Step step(g, 0);
+  step.setup.detection.alert = 0.1 * gap;
+  step.grain({0, 0, R + gap}, R);
+  step.wall(Vec3::Zero(), Vec3::UnitZ());
+  const StepProblem problem = step.problem();
+  ASSERT_EQ(problem.contacts.size(), 1U);
+  EXPECT_NEAR(solved(problem).motion.u[0][2], -gap / h, 1e-9 * g * h);
+}
+
+TEST(CertificateReference, OfAGrainThatMayBeJammedOrFallTellsWhatTheRunHasFound) {
+  // Between two parallel walls friction holds it once they press, and nothing makes them press: jammed, or in
+  // free fall, both are answers.
+  constexpr double friction = 0.5;
+  Step step(g, friction);
+  step.grain(Vec3::Zero(), R);
+  step.wall({-R, 0, 0}, Vec3::UnitX());
+  step.wall({R, 0, 0}, -Vec3::UnitX());
+  const StepProblem problem = step.problem();
+  ASSERT_EQ(problem.contacts.size(), 2U);
+  const double weight = mass_of(R) * g * h;
+  for (const double pressed : {0.0, 3.0}) {
+    std::vector<Vec3> run;
+    for (const StepContact& contact : problem.contacts)
+      run.push_back(pressed * weight * contact.normal + (pressed > 0 ? 0.5 : 0) * weight * Vec3::UnitZ());
+    const Reference answer = solve_reference(problem, run);
+    ASSERT_EQ(answer.found, Found::answer) << pressed;
+    for (std::size_t c = 0; c < run.size(); ++c) EXPECT_LT((answer.r[c] - run[c]).norm(), 1e-6 * weight);
+    EXPECT_NEAR(answer.motion.u[0][2], pressed > 0 ? 0 : -g * h, 1e-6 * g * h) << pressed;
+  }
+}
+
 /// A pile in a corner, in motion, so that some contacts open and others close.
 Step small_pile(double friction, std::uint64_t seed) {
   Step step(g, friction);

@@ -114,6 +114,27 @@ TEST(StepError, SeesContactsThatHaveToOpen) {
   EXPECT_NEAR(error.change[0][0][2], -fall, 1e-9);
 }
 
+/// A grain jammed in a wedge of steep walls, a hair's breadth above both: as it comes down, its contacts have
+/// to slide, and carry all the friction that they can. Impulses below that, which bear its weight as well,
+/// leave each contact with next to nothing wrong, and sweeps creep.
+TEST(StepError, OfAJammedGrainThatHasToSlideIsNotWhatItsContactsFindWrong) {
+  constexpr double a = 0.0412, mu = 0.5, gap = 1.3e-5 * fall, used = 0.89;  // of the friction
+  const double normal = fall / (2 * (std::sin(a) + used * mu * std::cos(a)));
+  BodyProblem problem = wedge(a, mu);
+  for (std::size_t k = 0; k < 2; ++k) {
+    ContactEquation& contact = problem.contacts[k];
+    contact.offset = gap * contact.normal;
+    const Vec3 up = (Vec3::UnitZ() - contact.normal.z() * contact.normal).normalized();
+    problem.impulse[k] = normal * (contact.normal + used * mu * up);
+  }
+  const StepError error = step_error(problem, {.enough = 1e-3});
+  // At rest but for gap / sin(a).
+  const double exact = (fall - gap / std::sin(a)) / (2 * (std::sin(a) + mu * std::cos(a)));
+  EXPECT_TRUE(error.solved);
+  EXPECT_NEAR((problem.impulse[0] + error.change[0][0]).dot(problem.contacts[0].normal), exact, 1e-3 * exact);
+  EXPECT_GT(error.contact, 0.08);
+}
+
 TEST(StepError, WithFrictionASlidingGrainIsWhereCoulombSaysItIs) {
   BodyProblem problem;
   const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0.3);

@@ -162,6 +162,7 @@ struct Approach {
   double v_n;  // [m/s]
   double restitution;
   double gravity = 0;  // downwards [m/s^2]
+  double gain = 0;     // upwards, what a load adds to the wall within the step [m/s]
 };
 constexpr double h = 0.01, alert = 0.05;
 
@@ -172,6 +173,7 @@ double bias_of(const Approach& approach, bool at_wall) {
   sample.bodies.velocity[0].u[2] = approach.v_n;
   if (at_wall) {
     sample.walls.resize(1);
+    sample.walls[0].gain = {0, 0, approach.gain};
     sample.candidates.wall_pairs = {{0, 0}};
   } else {
     add_sphere(sample.bodies, BodyId{1}, Vec3(0, 0, -1), 1, 1000);
@@ -214,6 +216,11 @@ TEST(GapTerm, ExistsBeyondTheAlertDistanceOnlyWhenTheGapClosesWithinTheStep) {
 TEST(GapTerm, AtAWallCountsWhatGravityAddsToTheApproach) {
   EXPECT_TRUE(std::isnan(bias_of({0.06, -5.9, 0, 9}, false))) << "both grains fall alike";
   EXPECT_NEAR(bias_of({0.06, -5.92, 0, 9}, true), 0.06 / h, 1e-12);
+}
+
+TEST(GapTerm, AtAPushedWallCountsWhatItsLoadAddsToTheApproach) {
+  EXPECT_TRUE(std::isnan(bias_of({0.06, -5.9, 0, 0, -0.2}, true))) << "it is drawn back";
+  EXPECT_NEAR(bias_of({0.06, -5.9, 0, 0, 0.2}, true), 0.06 / h, 1e-12);
 }
 
 TEST(Restitution, ActsOnFastPairsThatMeetWithinTheStep) {

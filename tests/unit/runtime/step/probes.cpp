@@ -163,6 +163,27 @@ TEST(Probes, APressedLatticeHasTheStressOfItsLidAndItsOwnSolidFraction) {
   });
 }
 
+/// A sphere slides along +x over a floor: the floor pushes it up with m g and back with mu m g, and the
+/// branch from the contact to the centre stands upright. Of force and branch the force is the first index.
+TEST(Probes, ASlidingSphereHasShearStressOfTheForceAcrossItsHeightAndNoneOfItsOwnTranspose) {
+  const double r = 0.01, g = 9.81, mu = 0.3;
+  talus::Setup setup = free_setup(3, {0, 0, -g});
+  setup.walls = {side("floor", {0, 0, 1}, {0, 0, 0})};
+  setup.stages[0].laws = laws_of_one_material(mu, mu, 0);
+  setup.solver.tolerance = 1e-12;
+  setup.probes = {probe("all", box(Vec3::Constant(-1), Vec3::Constant(1)))};
+  Bodies bodies;
+  add_sphere(bodies, BodyId{0}, {0, 0, r}, r, density);
+  bodies.velocity[0].u[0] = 5;
+  run(setup, bodies, [&](const Simulation& simulation) {
+    const Mat3& stress = simulation.probes()[0].contact_stress;
+    const double normal = density * ball(r) * g * r / 8;  // in a box of 8 m^3
+    EXPECT_NEAR(stress(2, 2), normal, 1e-6 * normal);
+    EXPECT_NEAR(stress(0, 2), -mu * normal, 1e-6 * normal);
+    EXPECT_NEAR(stress(2, 0), 0, 1e-6 * normal);
+  });
+}
+
 TEST(Probes, ACloudInRigidRotationRestsOnTheWholeAndHasItsTemperature) {
   talus::Setup setup = free_setup(1);
   setup.probes = {probe("cloud", box(Vec3::Constant(-1), Vec3::Constant(1))),

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""Runs that stop and go on at random, on ranks and threads drawn anew each time, against the run that was never stopped.
+
+    tests/bench/resume.py OUT [--talus build/release/talus] [--trials 100] [--stops 1,1] [--minutes 30] [--patience 300] [--seed 1]
+                          [--scene apps/scenes/demo.toml] [--subdomains 4] [--set KEY=VALUE ...]
+
+The digest of the end, and every CSV file but for its columns of wall-clock time, must be equal. `--stops 10,10`: ten
+resumptions in a row. A line a trial tells what was done. A run that writes nothing for --patience seconds is called
+hung; on cores that others use two ranks that wait for one another may take hundreds of times their processor time.
+Ends after --minutes, and says how many trials there were. Exit code 1 where one differs, fails or hangs.
+"""
+
+import argparse
+import csv
+import json
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+CLOCKS = {"wall_s", "seconds"}  # columns that are of the day
+
+
+def tables(folder):
+    """Rows of every CSV file, by name, without the columns of clocks."""
+    found = {}
+    for path in sorted(folder.glob("*.csv")):
+        with open(path, newline="") as file:
+            found[path.name] = [{k: v for k, v in row.items() if k not in CLOCKS} for row in csv.DictReader(file)]
+    return found
+
+
+def summary(folder):
+    return json.loads((folder / "run.json").read_text())["summary"]
+
+
+def written(folder):
+    """Sizes of what a run has written."""
+    return sorted((path.name, path.stat().st_size) for path in folder.glob("*.[cl][so][vg]"))
+
+
+class Runner:
+    def __init__(self, options):
+        self.options = options
+
+    def run(self, folder, ranks, threads, more):
+        command = [self.options.talus, "run", self.options.scene, "--out", folder, "--quiet", "--threads", threads]
+        command += ["--set", f"decomposition.subdomains={self.options.subdomains}"]
+        for setting in self.options.set:
+            command += ["--set", setting]
+        if ranks > 1:
+            command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", ranks] + command
+        with tempfile.TemporaryFile("w+") as said:
+            process = subprocess.Popen([str(word) for word in command + more], stdout=said, stderr=subprocess.STDOUT)
+            seen, since = None, time.monotonic()
+            while process.poll() is None:
+                time.sleep(0.05)
+                if (now := written(folder)) != seen:
+                    seen, since = now, time.monotonic()
+                if time.monotonic() - since > self.options.patience:
+                    process.terminate()
+                    process.wait()
+                    return "hung"
+            said.seek(0)
+            code = process.returncode
+            return code if code in (0, 3) else f"exit {code}: {said.read().strip()}"
+
+
+def trial(runner, folder, steps, draw):
+    """What was done, and what went wrong or None."""
+    shutil.rmtree(folder, ignore_errors=True)
+    stops = sorted(draw.sample(range(1, steps), draw.randint(*runner.options.stops)))
+    history = []
+    for stop in [*stops, None]:
+        ranks = draw.randint(1, 2)
+        threads = draw.randint(1, 2) if ranks == 1 else 1
+        history.append(f"{stop or 'end'} on {ranks}x{threads}")
+        code = runner.run(folder, ranks, threads, ["--resume"] + (["--steps", stop] if stop else []))
+        if code not in (0, 3):
+            return history, code
+    return history, None
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--talus", default="build/release/talus")
+    parser.add_argument("--scene", default="apps/scenes/demo.toml")
+    parser.add_argument("--trials", type=int, default=100)
+    parser.add_argument("--stops", type=lambda text: tuple(map(int, text.split(","))), default=(1, 1))
+    parser.add_argument("--minutes", type=float, default=30)
+    parser.add_argument("--patience", type=float, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--subdomains", type=int, default=4)
+    parser.add_argument("--set", action="append", default=[])
+    options = parser.parse_args()
+    until = time.monotonic() + 60 * options.minutes
+    options.out.mkdir(parents=True, exist_ok=True)
+    runner, draw = Runner(options), random.Random(options.seed)
+
+    straight = options.out / "straight"
+    shutil.rmtree(straight, ignore_errors=True)
+    began = time.monotonic()
+    code = runner.run(straight, 1, 1, [])
+    if code not in (0, 3):
+        sys.exit(f"resume: the uninterrupted run ended with {code}")
+    steps, expected = summary(straight)["steps"], tables(straight)
+    print(f"{steps} steps, digest {summary(straight)['digest']}, {time.monotonic() - began:.1f} s", flush=True)
+
+    done = wrong = 0
+    while done < options.trials and time.monotonic() < until:
+        folder = options.out / "parts"
+        history, failure = trial(runner, folder, steps, draw)
+        if failure is None:
+            differ = [name for name, rows in expected.items() if tables(folder).get(name) != rows]
+            if summary(folder)["digest"] != summary(straight)["digest"]:
+                differ.append("digest")
+            failure = "differs in " + ", ".join(differ) if differ else None
+        done += 1
+        wrong += failure is not None
+        print(f"{done}: {'; '.join(history)}: {failure or 'equal'}", flush=True)
+        if failure is not None:
+            folder.rename(options.out / f"wrong-{done}")
+    print(f"{done} of {options.trials} trials, {wrong} wrong")
+    return 1 if wrong or done == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

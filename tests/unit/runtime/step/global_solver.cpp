@@ -1,0 +1,54 @@
+/// What looks at all contacts of a step, on the state of a step that was made.
+
+#include "runtime/step/global_solver.hpp"
+
+#include <gtest/gtest.h>
+
+#include "runtime/graph/executor.hpp"
+#include "runtime/graph/one_rank.hpp"
+#include "runtime/step/simulation.hpp"
+#include "tests/unit/runtime/step/loose_scenes.hpp"
+
+namespace talus::global_solver_test {
+namespace {
+
+/// Of two grains on a floor one flies into the other with a hundred times the momentum that gravity adds in a
+/// step, and the floor then carries half of what it should. That is little to the pair; to the floor it is
+/// little only if something else stands on it.
+TEST(GlobalSolver, MeasuresWhatSmallClustersDoToAWallByAllThatItCarries) {
+  constexpr double r = 0.01, h = 1e-3, speed = 1;
+  talus::Setup setup = simulation_test::falling(1);
+  setup.walls.resize(1);
+  setup.solver.tolerance = 1e-9;
+  Bodies bodies;
+  add_sphere(bodies, BodyId{0}, Vec3(0, 0, r), r, 2600);
+  add_sphere(bodies, BodyId{1}, Vec3(2 * r, 0, r), r, 2600);
+  bodies.velocity[1].u[0] = -speed;
+  bodies.x[1][0] += h / 2 * speed;  // they touch in the middle of the step
+  const double weight = bodies.mass(0) * 10 * h;
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, std::move(bodies), executor);
+  simulation.step();
+  StepState state = simulation.state();
+  std::size_t at_floor = 0;
+  for (std::size_t k = 0; k < state.contacts.rn.size(); ++k)
+    if (state.contacts.second[k] < 0) {
+      EXPECT_NEAR(state.contacts.rn[k], weight, 1e-6 * weight);
+      state.contacts.rn[k] /= 2;
+      ++at_floor;
+    }
+  ASSERT_EQ(at_floor, 2u);
+  const graph::OneRank ranks;
+  const DecompositionSettings settings;
+  Gluing gluing(state, settings, ranks);
+  GlobalSolver solver(state, simulation.parameters(), settings, gluing, ranks);
+  solver.find_clusters(200);
+  ASSERT_TRUE(solver.small_clusters());
+  state.wall_states[0].impulse.setZero();
+  EXPECT_NEAR(solver.small_error(1e-6, 1).relative, 0.5, 1e-3);
+  state.wall_states[0].impulse = Vec3(0, 0, 1e4 * weight);
+  EXPECT_LT(solver.small_error(1e-6, 1).relative, 0.02);
+}
+
+}  // namespace
+}  // namespace talus::global_solver_test
