@@ -189,10 +189,6 @@ class Discharge:
                       for r in rows(results / "probes.csv") if r["probe"] == "orifice"]
         self.rate, self.furthest = slope([p for p in self.curve if p[0] >= 0.2 and p[1] <= 0.55 * count])
 
-    def rate_where(self, left_from, left_to):
-        """Grains a second while from one part of the grains to another has left."""
-        return slope([p for p in self.curve if left_from * self.count <= p[1] <= left_to * self.count])[0]
-
     def said(self):
         print(f"{self.name:28s} {self.rate:9.0f}/s, off a line by {self.furthest:5.0f} of {self.curve[-1][1]:6d}; "
               f"{self.missed} of {self.steps} steps missed, {self.sweeps / self.steps:.0f} sweeps a step, "
@@ -246,7 +242,10 @@ def head(runs):
     low.said()
     ratio = low.rate / full.rate
     ok = verdict("rate with two thirds of the grains over that with all", ratio, "1 +- 3 %", abs(ratio - 1) <= 0.03)
-    late = full.rate_where(0.35, 0.55) / full.rate_where(0.1, 0.3)
+    end = full.curve[-1][0]
+    middle = (0.2 + end) / 2
+    late = slope([p for p in full.curve if p[0] >= middle])[0] / slope(
+        [p for p in full.curve if 0.2 <= p[0] <= middle])[0]
     return verdict("late over early in one discharge", late, "1 +- 3 %", abs(late - 1) <= 0.03) and ok
 
 
@@ -267,17 +266,17 @@ def fluid(runs):
     rough.said()
     smooth.said()
     discharge = []
-    for a, b in ((0.15, 0.25), (0.3, 0.4), (0.45, 0.55)):
-        left = smooth.count * (1 - (a + b) / 2)
-        speed = math.sqrt(2 * GRAVITY * head_of(left, radius))
-        grains = math.pi * radius**2 * speed * BULK / (4 / 3 * math.pi * RADIUS**3)
-        rate = smooth.rate_where(a, b)
-        discharge.append(rate / grains)
-        print(f"{100 * a:.0f} to {100 * b:.0f} % gone: {rate:.0f}/s, head {head_of(left, radius):.3f} m, "
-              f"c = {rate / grains:.2f}; with friction {rough.rate_where(a, b):.0f}/s")
-    ok = verdict("rate without friction over that with", smooth.rate / rough.rate, ">= 1.3", smooth.rate >= 1.3 * rough.rate)
-    spread = max(discharge) / min(discharge) - 1
-    return verdict("spread of c over the heads", spread, "<= 0.1", spread <= 0.1) and ok
+    end = smooth.curve[-1][0]
+    for k in range(3):
+        window = [p for p in smooth.curve if 0.2 + k / 3 * (end - 0.2) <= p[0] <= 0.2 + (k + 1) / 3 * (end - 0.2)]
+        depth = head_of(smooth.count - sum(p[1] for p in window) / len(window), radius)
+        grains = math.pi * radius**2 * math.sqrt(2 * GRAVITY * depth) * BULK / (4 / 3 * math.pi * RADIUS**3)
+        discharge.append((depth, slope(window)[0], slope(window)[0] / grains))
+        print("head {:.4f} m: {:.0f}/s, c = {:.3f}".format(*discharge[-1]))
+    power, _ = slope([(math.log(depth), math.log(rate)) for depth, rate, _ in discharge])
+    ratio = smooth.rate / rough.rate
+    ok = verdict("rate without friction over that with", ratio, ">= 1.3", ratio >= 1.3)
+    return verdict("exponent of the head", power, "0.5 +- 0.1", abs(power - 0.5) <= 0.1) and ok
 
 
 def mesh_case(runs):
