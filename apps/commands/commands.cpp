@@ -8,6 +8,8 @@ std::vector<Command> commands() {
       run_entry(),
       status_entry(),
       report_entry(),
+      view_entry(),
+      movie_entry(),
       convert_entry(),
       plan_entry(),
       partition_entry(),

@@ -13,6 +13,8 @@ std::vector<Command> commands();
 Command run_entry();
 Command status_entry();
 Command report_entry();
+Command view_entry();
+Command movie_entry();
 Command convert_entry();
 Command plan_entry();
 Command partition_entry();

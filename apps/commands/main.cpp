@@ -11,6 +11,7 @@
 #include "apps/shared/print.hpp"
 #include "io/results/run_json.hpp"
 #include "io/results/version.hpp"
+#include "io/scene/detail/foreign_words.hpp"
 #include "io/scene/detail/spelling.hpp"
 #include "kernels/sweeps/sweep_kernels.hpp"
 #include "runtime/graph/clock.hpp"
@@ -44,6 +45,16 @@ std::pair<std::string, const CLI::App*> recognised(const CLI::App* app) {
   return {command, app};
 }
 
+/// What was meant by a word that is no option: something of another program, or one that is spelled nearly
+/// so.
+std::string option_hint(const CLI::App& app, const std::string& word) {
+  if (const std::string foreign = io::detail::foreign_hint(word); !foreign.empty()) return foreign;
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app.get_options()) known.push_back(option->get_name());
+  const std::string meant = io::detail::nearest(word, known);
+  return meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant);
+}
+
 /// What is wrong with the command line, and where to read what is right.
 std::string failure_message(const CLI::App* of, const CLI::Error& error) {
   const auto [command, app] = recognised(of);
@@ -56,6 +67,12 @@ std::string failure_message(const CLI::App* of, const CLI::Error& error) {
       what = fmt::format("'{}' is no command of {}{}", words.front(), command,
                          io::detail::hint(words.front(), known));
   }
+  if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError))
+    for (const std::string& word : app->remaining(true))
+      if (word.starts_with('-')) {
+        what = fmt::format("{} has no option {}{}", command, word, option_hint(*app, word));
+        break;
+      }
   return fmt::format("talus: error: {}; `{} --help` lists what there is\n", what, command);
 }
 

@@ -292,6 +292,14 @@ void run_steps(const PreparedRun& run, Sample sample, std::vector<GivenForce> fo
   summary.digest = simulation.digest();
 }
 
+/// Of the heaviest grains, in the strongest gravity of a stage [N/m^3].
+double grain_weight(const io::Scene& scene) {
+  double density = scene.density, gravity = 0;
+  for (const io::MaterialSpec& material : scene.materials) density = std::max(density, material.density);
+  for (const Stage& stage : scene.setup.stages) gravity = std::max(gravity, stage.gravity.norm());
+  return density * gravity;
+}
+
 }  // namespace
 
 io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces) {
@@ -304,6 +312,7 @@ io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenFor
                                                  run.ranks.ranks() > 1 ? run.ranks : graph::one_rank());
   context.contacts = run.scene.output.contacts;
   context.format = run.scene.output.format;
+  context.load.weight = grain_weight(run.scene);
   context.tables_every = run.scene.output.tables_every;
   context.provenance = run.provenance;
   io::Recorder recorder(std::move(context), run.scene.output.sinks);

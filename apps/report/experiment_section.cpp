@@ -4,30 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <filesystem>
 
 #include "apps/report/sections.hpp"
 
 namespace talus {
 
 namespace {
-
-constexpr const char* time_label = "time [s]";
-constexpr std::size_t most_curves = 8;  // hues that are told apart
-
-void add(io::Chart& chart, const std::string& name, std::span<const double> x, std::span<const double> y) {
-  const std::size_t k = chart.series.size();
-  if (k < most_curves) chart.series.push_back({name, thinned(x, y, Thinned::evenly), k});
-}
-void add_figure(io::HtmlSection& section, const io::Chart& chart, std::string caption = {}) {
-  if (!chart.series.empty()) section.figures.push_back({io::draw_chart(chart), std::move(caption)});
-}
-
-std::vector<double> scaled(std::span<const double> values, double factor) {
-  std::vector<double> result(values.begin(), values.end());
-  for (double& value : result) value *= factor;
-  return result;
-}
 
 /// Rows of the stage in which the sample was sheared: the last one.
 struct Shear {
@@ -53,7 +36,7 @@ HtmlSections triaxial(const RunFolder& run) {
                        {"time", "strain_x", "strain_y", "strain_z", "strain_volume", "stress_x", "stress_y",
                         "stress_z", "q_over_p", "solid_fraction", "coordination"},
                        "stage");
-  if (table.rows() == 0) return {};
+  if (table.rows() == 0 || std::filesystem::exists(run.directory / "cell.csv")) return {};
   const Shear shear = last_stage(table);
   const char axis = "xyz"[shear.axis];
   const auto of_stage = [&](const std::string& name) { return std::span(table[name]).subspan(shear.begin); };
@@ -64,35 +47,19 @@ HtmlSections triaxial(const RunFolder& run) {
                                       "compression.",
                                       shear.stage)};
   io::Chart ratio = small_chart("Stress ratio", strain_label, "q/p");
-  add(ratio, "", strain, of_stage("q_over_p"));
+  add_curve(ratio, "", strain, of_stage("q_over_p"));
   io::Chart volume = small_chart("Volume strain", strain_label, "volume strain [%]");
-  add(volume, "positive: the sample dilates", strain, scaled(of_stage("strain_volume"), 100));
+  add_curve(volume, "positive: the sample dilates", strain, scaled(of_stage("strain_volume"), 100));
   io::Chart stress = small_chart("Stresses of the whole run", time_label, "stress [kPa]");
   for (const char* name : {"stress_x", "stress_y", "stress_z"})
-    add(stress, std::string("along ") + name[7], table["time"], scaled(table[name], 1e-3));
+    add_curve(stress, std::string("along ") + name[7], table["time"], scaled(table[name], 1e-3));
   io::Chart fraction = small_chart("Solid fraction", time_label, "solid fraction");
-  add(fraction, "volume of grains over that of the box", table["time"], table["solid_fraction"]);
+  add_curve(fraction, "volume of grains over that of the box", table["time"], table["solid_fraction"]);
   io::Chart coordination = small_chart("Coordination", time_label, "contacts per grain");
-  add(coordination, "without rattlers", table["time"], table["coordination"]);
+  add_curve(coordination, "without rattlers", table["time"], table["coordination"]);
   for (const io::Chart* chart : {&ratio, &volume, &stress, &fraction, &coordination})
     add_figure(section, *chart);
   return {section};
-}
-
-/// Values of a table by the name that its rows carry, in the order in which names appear.
-struct ByName {
-  std::vector<std::string> names;
-  std::map<std::string, std::map<std::string, std::vector<double>>> values;  ///< by name, then column
-};
-
-ByName by_name(const io::TableColumns& table) {
-  ByName result;
-  for (std::size_t k = 0; k < table.texts.size(); ++k) {
-    auto& columns = result.values[table.texts[k]];
-    if (columns.empty()) result.names.push_back(table.texts[k]);
-    for (const auto& [name, numbers] : table.numbers) columns[name].push_back(numbers[k]);
-  }
-  return result;
 }
 
 HtmlSections walls(const RunFolder& run) {
@@ -109,14 +76,11 @@ HtmlSections walls(const RunFolder& run) {
     std::vector<double> size(of.at("time").size()), path = of.at("position");
     for (std::size_t k = 0; k < size.size(); ++k)
       size[k] = std::hypot(of.at("force_x")[k], of.at("force_y")[k], of.at("force_z")[k]);
-    add(forces, name, of.at("time"), size);
-    const auto some = [](const std::vector<double>& values) {
-      return std::any_of(values.begin(), values.end(), [](double value) { return value != 0; });
-    };
-    if (of.contains("work") && some(of.at("work"))) add(work, name, of.at("time"), of.at("work"));
+    add_curve(forces, name, of.at("time"), size);
+    if (of.contains("work") && any_value(of.at("work"))) add_curve(work, name, of.at("time"), of.at("work"));
     const double first = path.front();
     for (double& value : path) value -= first;
-    if (some(path)) add(paths, name, of.at("time"), path);
+    if (any_value(path)) add_curve(paths, name, of.at("time"), path);
   }
   if (rows.names.size() > most_curves)
     section.text =
@@ -133,8 +97,8 @@ HtmlSections grains_that_come_and_go(const RunFolder& run) {
        {std::array{"inserted.csv", "insert", "came by"}, std::array{"removed.csv", "remove", "went by"}}) {
     const ByName rows = by_name(io::read_columns(run.directory / file, {"time", "mass"}, text));
     for (const std::string& name : rows.names)
-      add(mass, fmt::format("{} '{}'", verb, name), rows.values.at(name).at("time"),
-          rows.values.at(name).at("mass"));
+      add_curve(mass, fmt::format("{} '{}'", verb, name), rows.values.at(name).at("time"),
+                rows.values.at(name).at("mass"));
   }
   io::HtmlSection section{"Grains that came and went", ""};
   add_figure(section, mass);
@@ -155,9 +119,9 @@ HtmlSections bodies(const RunFolder& run) {
       v[k] = std::hypot(of.at("vx")[k], of.at("vy")[k], of.at("vz")[k]);
       f[k] = std::hypot(of.at("force_x")[k], of.at("force_y")[k], of.at("force_z")[k]);
     }
-    add(height, name, of.at("time"), of.at("z"));
-    add(speed, name, of.at("time"), v);
-    add(force, name, of.at("time"), f);
+    add_curve(height, name, of.at("time"), of.at("z"));
+    add_curve(speed, name, of.at("time"), v);
+    add_curve(force, name, of.at("time"), f);
   }
   io::HtmlSection section{"Named bodies", ""};
   for (const io::Chart* chart : {&height, &speed, &force}) add_figure(section, *chart);
@@ -168,11 +132,11 @@ HtmlSections energy(const RunFolder& run) {
   if (run.steps.rows() == 0) return {};
   io::HtmlSection section{"Grains", ""};
   io::Chart kinetic = small_chart("Kinetic energy of the grains", time_label, "energy [J]", true);
-  add(kinetic, "translation", run.steps["time"], run.steps["kinetic_translation"]);
-  add(kinetic, "rotation", run.steps["time"], run.steps["kinetic_rotation"]);
+  add_curve(kinetic, "translation", run.steps["time"], run.steps["kinetic_translation"]);
+  add_curve(kinetic, "rotation", run.steps["time"], run.steps["kinetic_rotation"]);
   io::Chart contacts = small_chart("Contacts", time_label, "contacts");
-  add(contacts, "within the alert distance", run.steps["time"], run.steps["contacts"]);
-  add(contacts, "that carry a force", run.steps["time"], run.steps["active"]);
+  add_curve(contacts, "within the alert distance", run.steps["time"], run.steps["contacts"]);
+  add_curve(contacts, "that carry a force", run.steps["time"], run.steps["active"]);
   add_figure(section, kinetic);
   add_figure(section, contacts);
   return {section};
@@ -182,7 +146,8 @@ HtmlSections energy(const RunFolder& run) {
 
 HtmlSections experiment_sections(const RunFolder& run) {
   HtmlSections all;
-  for (const auto part : {triaxial, grains_that_come_and_go, bodies, walls, energy})
+  for (const auto part :
+       {triaxial, cell_section, probe_section, grains_that_come_and_go, bodies, walls, energy})
     for (io::HtmlSection& section : part(run)) all.push_back(std::move(section));
   return all;
 }

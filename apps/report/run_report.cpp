@@ -43,8 +43,8 @@ io::HtmlNotice notice_of(const RunFolder& run) {
 std::string run_report(const std::filesystem::path& directory) {
   const RunFolder run = read_run_folder(directory);
   HtmlSections sections;
-  for (const auto section : {scene_section, certificate_section, experiment_sections, picture_section,
-                             time_section, left_out_section, repeat_section})
+  for (const auto section : {scene_section, view_section, certificate_section, experiment_sections,
+                             picture_section, time_section, left_out_section, repeat_section})
     for (io::HtmlSection& part : section(run)) sections.push_back(std::move(part));
   const std::string name = run.scene ? run.scene->name : directory.filename().string();
   return io::html_page(name, run.scene ? run.scene->description : "", sections, notice_of(run));

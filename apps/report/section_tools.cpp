@@ -32,4 +32,34 @@ io::Chart small_chart(const std::string& title, const std::string& x_label, cons
   return chart;
 }
 
+void add_curve(io::Chart& chart, const std::string& name, std::span<const double> x,
+               std::span<const double> y) {
+  const std::size_t k = chart.series.size();
+  if (k < most_curves) chart.series.push_back({name, thinned(x, y, Thinned::evenly), k});
+}
+
+void add_figure(io::HtmlSection& section, const io::Chart& chart, std::string caption) {
+  if (!chart.series.empty()) section.figures.push_back({io::draw_chart(chart), std::move(caption)});
+}
+
+std::vector<double> scaled(std::span<const double> values, double factor) {
+  std::vector<double> result(values.begin(), values.end());
+  for (double& value : result) value *= factor;
+  return result;
+}
+
+bool any_value(std::span<const double> values) {
+  return std::ranges::any_of(values, [](double value) { return value != 0; });
+}
+
+ByName by_name(const io::TableColumns& table) {
+  ByName result;
+  for (std::size_t k = 0; k < table.texts.size(); ++k) {
+    auto& columns = result.values[table.texts[k]];
+    if (columns.empty()) result.names.push_back(table.texts[k]);
+    for (const auto& [name, numbers] : table.numbers) columns[name].push_back(numbers[k]);
+  }
+  return result;
+}
+
 }  // namespace talus

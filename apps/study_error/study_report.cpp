@@ -9,6 +9,8 @@
 #include <string_view>
 
 #include "io/files/csv_table.hpp"
+#include "io/files/output_directory.hpp"
+#include "runtime/step/methods/method.hpp"
 
 namespace talus {
 
@@ -27,16 +29,23 @@ const char* start_of(bool warm) {
   return warm ? "warm" : "cold";
 }
 
+/// The same colour for a method in all pictures.
+template <class Names>
+std::size_t hue_of(const std::string& method, const Names& names) {
+  return static_cast<std::size_t>(std::ranges::find(names, method) - names.begin());
+}
+
 /// Rows that follow one another and belong to one curve become a series: colour by method, dashes by the
 /// rest. `rest(row)` is the text of the latter, "" for nothing to say; `point(row)` the point.
 template <class Row, class Rest, class PointOf>
 std::vector<io::ChartSeries> series_of(const std::vector<Row>& rows, Rest rest, PointOf point) {
   std::vector<io::ChartSeries> all;
-  std::vector<std::string> methods, rests;
+  const std::vector<std::string> known = talus::methods().names();
+  std::vector<std::string> rests;
   for (const Row& row : rows) {
     const std::string more = rest(row), name = row.method() + (more.empty() ? "" : ", " + more);
     if (all.empty() || all.back().name != name)
-      all.push_back({name, {}, place_in(methods, row.method()), place_in(rests, more)});
+      all.push_back({name, {}, hue_of(row.method(), known), place_in(rests, more)});
     all.back().points.push_back(point(row));
   }
   return all;
@@ -288,14 +297,20 @@ void report_profile(const std::vector<ProfileRow>& rows, ReportPage& report) {
     solves_to.resize(tolerances.size());
     solves_to[place].push_back(solve);
   }
-  io::Chart chart{.name = "profile",
-                  .title = "Performance profile",
-                  .subtitle = "part of the problems solved within a multiple of the fastest method's time",
-                  .x_label = "time over that of the fastest method  [1]",
-                  .y_label = "problems solved  [1]",
-                  .log_y = false,
-                  .staircase = true,
-                  .series = {}};
+  // A picture for each tolerance: with all curves in one, none can be followed.
+  std::vector<io::Chart> charts;
+  for (const double tolerance : tolerances)
+    charts.push_back(
+        {.name = charts.empty() ? "profile" : fmt::format("profile_{}", charts.size() + 1),
+         .title = fmt::format("Performance profile, tolerance {:g}", tolerance),
+         .subtitle = "part of the problems solved within a multiple of the fastest method's time",
+         .x_label = "time over that of the fastest method  [1]",
+         .y_label = "problems solved  [1]",
+         .log_y = false,
+         .staircase = true,
+         .series = {},
+         .levels = {{1, "all"}, {0, "none"}}});
+  const std::vector<std::string> known = profile_methods();
   io::HtmlTable table{{"method", "tolerance", "solved", "problems", "geometric mean of the times [s]"}, {}};
   double slowest = 1;
   for (const std::string& method : methods)
@@ -307,8 +322,7 @@ void report_profile(const std::vector<ProfileRow>& rows, ReportPage& report) {
       // All curves are drawn as far as the longest.
       if (!points.empty() && points.back()[0] < slowest) points.push_back({slowest, points.back()[1]});
       for (const auto& [ratio, part] : points) profile.row(method, tolerances[t], ratio, part);
-      chart.series.push_back(
-          {fmt::format("{}, {:g}", method, tolerances[t]), points, place_in(methods, method), t});
+      charts[t].series.push_back({method, points, hue_of(method, known)});
       double logarithms = 0;
       int solved = 0, problems = 0;
       for (const SolveRow& r : solves_to[t]) {
@@ -322,17 +336,16 @@ void report_profile(const std::vector<ProfileRow>& rows, ReportPage& report) {
                             fmt::format("{}", problems),
                             solved > 0 ? fmt::format("{:.3g}", std::exp(logarithms / solved)) : "none"});
     }
-  // The axis begins at nothing solved and ends at all.
-  chart.levels = {{1, "all"}, {0, "none"}};
   report.tables.emplace_back("solves.csv", solves.text());
   report.tables.emplace_back("profile.csv", profile.text());
-  add_chart(
-      report, std::move(chart),
-      "For every method and tolerance the part of the problems that it solves in at most so many times the "
-      "time of the fastest one: where a curve begins says how often the method is the fastest, where it ends "
-      "how "
-      "many problems it solves at all.",
-      std::move(table));
+  for (std::size_t t = 0; t < charts.size(); ++t)
+    add_chart(report, std::move(charts[t]),
+              t > 0
+                  ? "The same to another tolerance."
+                  : "For every method the part of the problems that it solves in at most so many times the "
+                    "time of the fastest one: where a curve begins says how often the method is the fastest, "
+                    "where it ends how many problems it solves at all.",
+              t + 1 == charts.size() ? std::move(table) : io::HtmlTable{});
 }
 
 bool is_study_error_name(const std::string& name) {
@@ -342,7 +355,7 @@ bool is_study_error_name(const std::string& name) {
       "residual_seconds",   "residual_sweeps",      "velocity_seconds",
       "velocity_sweeps",    "wall_forces_seconds",  "velocity_residual",
       "run_stress_seconds", "run_position_seconds", "profile"};
-  return is_report_name(name, tables, charts);
+  return is_report_name(name, tables, charts) || io::is_numbered_name(name, "profile_", ".svg");
 }
 
 }  // namespace talus

@@ -57,6 +57,14 @@ std::string table_of(const std::vector<ScalingRow>& rows, ScalingKind kind) {
   return table.text();
 }
 
+/// Among the curves of all pictures: the same colour in each.
+std::size_t place_of_curve(const std::vector<ScalingRow>& rows, const std::string& name) {
+  std::vector<std::string> names;
+  for (const ScalingRow& row : rows)
+    if (std::ranges::find(names, curve_of(row)) == names.end()) names.push_back(curve_of(row));
+  return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+}
+
 /// The rows of a kind as curves over `x`.
 template <class X, class Y>
 void add_curves(const std::vector<ScalingRow>& rows, ScalingKind kind, X x, Y y, io::Chart& chart) {
@@ -65,7 +73,7 @@ void add_curves(const std::vector<ScalingRow>& rows, ScalingKind kind, X x, Y y,
     const std::string name = curve_of(row);
     auto found = std::ranges::find(chart.series, name, &io::ChartSeries::name);
     if (found == chart.series.end()) {
-      const std::size_t number = chart.series.size();
+      const std::size_t number = place_of_curve(rows, name);
       chart.series.push_back({name, {}, number, row.predicted() ? 1U : 0U});
       found = chart.series.end() - 1;
     }

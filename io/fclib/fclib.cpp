@@ -174,20 +174,26 @@ FclibProblem read_fclib_problem(const std::filesystem::path& path) {
 std::vector<FclibFile> fclib_files(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path)) return {{path, path.stem().string()}};
   std::vector<FclibFile> files;
-  for (const auto& entry : std::filesystem::directory_iterator(path)) {
+  constexpr auto options = std::filesystem::directory_options::skip_permission_denied;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(path, options)) {
     const auto extension = entry.path().extension();
     if (entry.is_regular_file() && (extension == ".hdf5" || extension == ".h5") &&
         !belongs_to_a_run(entry.path()))
-      files.push_back({entry.path(), entry.path().filename().string()});
+      files.push_back({entry.path(), entry.path().lexically_relative(path).string()});
   }
   if (files.empty())
     throw FileError(path.string(),
-                    "holds no FCLIB problem (.hdf5, .h5); give a problem or a folder of problems");
+                    "holds no FCLIB problem (.hdf5, .h5), nor do the folders in it; give a problem or a "
+                    "folder of problems");
   std::ranges::sort(files, {}, &FclibFile::path);
-  std::map<std::filesystem::path, int> stems;
-  for (const FclibFile& file : files) ++stems[file.path.stem()];
-  for (FclibFile& file : files)
-    if (stems[file.path.stem()] == 1) file.name = file.path.stem().string();
+  std::map<std::filesystem::path, int> stems, names;
+  for (const FclibFile& file : files) ++stems[file.path.stem()], ++names[file.path.filename()];
+  for (FclibFile& file : files) {
+    if (stems[file.path.stem()] == 1)
+      file.name = file.path.stem().string();
+    else if (names[file.path.filename()] == 1)
+      file.name = file.path.filename().string();
+  }
   return files;
 }
 

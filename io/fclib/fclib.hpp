@@ -30,11 +30,12 @@ DelassusProblem read_fclib(const std::filesystem::path& path);
 /// A problem in a folder, by the name that tables give it.
 struct FclibFile {
   std::filesystem::path path;
-  std::string name;  ///< of the file, without its ending where no other problem has the same
+  std::string name;  ///< of the file, without its ending where no other has the same; with its folders where
+                     ///< another has the same name in another folder
 };
 
-/// The .hdf5 and .h5 files of a folder, sorted, but for results and traces of runs; or the file that `path`
-/// names. Throws FileError when a folder holds none.
+/// The .hdf5 and .h5 files of a folder and those below it, sorted, but for results and traces of runs; or the
+/// file that `path` names. Throws FileError when a folder holds none.
 std::vector<FclibFile> fclib_files(const std::filesystem::path& path);
 
 /// What a file's /solution holds, in its dimension (2 or 3 values per contact).

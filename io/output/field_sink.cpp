@@ -1,4 +1,5 @@
-/// fields/ for ParaView: grains and forces of every frame, and the collections that give them their times.
+/// fields/ for ParaView: grains, forces and walls of every frame, and the collections that give them their
+/// times.
 
 #include <fmt/format.h>
 
@@ -10,16 +11,23 @@
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
 #include "io/results/vtk.hpp"
+#include "io/results/wall_triangles.hpp"
 
 namespace talus::io {
 namespace {
 
-constexpr std::array<std::string_view, 3> collections{"fields/grains.pvd", "fields/forces.pvd", "fields.pvd"};
+constexpr std::array<std::string_view, 4> collections{"fields/grains.pvd", "fields/forces.pvd", "fields.pvd",
+                                                      "fields/walls.pvd"};
 
 class FieldSink : public OutputSink {
  public:
   explicit FieldSink(const OutputContext& context)
-      : directory_(context.directory), contacts_(context.contacts), ranks_(context.ranks) {}
+      : directory_(context.directory),
+        contacts_(context.contacts),
+        walls_(context.walls),
+        ranks_(context.ranks) {
+    for (const Wall& wall : walls_) wall_materials_.push_back(wall.material);
+  }
 
   void open() override {
     if (ranks_.rank() != 0) return;
@@ -38,6 +46,7 @@ class FieldSink : public OutputSink {
     };
     std::erase_if(grain_files_, missing);
     std::erase_if(force_files_, missing);
+    std::erase_if(wall_files_, missing);
     std::error_code ignored;
     for (std::size_t later = frames_; remove_frame(later); ++later) {
     }
@@ -50,17 +59,25 @@ class FieldSink : public OutputSink {
     const bool forces = contacts_ && part.with_contacts;
     if (forces)
       write(forces_name(frames_), [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
+    if (!walls_.empty()) {
+      const Bounds grains = grain_bounds(part, ranks_);
+      if (ranks_.rank() == 0)
+        write_whole(directory_ / "fields" / walls_name(frames_),
+                    walls_vtp(part, wall_triangles(walls_, part.walls, grains), wall_materials_));
+    }
     note_frame(part.time, forces);
     write_collections();
   }
 
  private:
   static std::string grains_name(std::size_t frame) { return fmt::format("grains_{:06}.vtp", frame); }
+  static std::string walls_name(std::size_t frame) { return fmt::format("walls_{:06}.vtp", frame); }
   static std::string forces_name(std::size_t frame) { return fmt::format("forces_{:06}.vtp", frame); }
 
   void note_frame(double time, bool forces) {
     grain_files_.push_back({time, 0, grains_name(frames_)});
     if (forces) force_files_.push_back({time, 0, forces_name(frames_)});
+    if (!walls_.empty()) wall_files_.push_back({time, 0, walls_name(frames_)});
     ++frames_;
   }
   /// False where there is none of that number.
@@ -68,14 +85,17 @@ class FieldSink : public OutputSink {
     std::error_code ignored;
     const bool grains = std::filesystem::remove(directory_ / "fields" / grains_name(frame), ignored);
     const bool forces = std::filesystem::remove(directory_ / "fields" / forces_name(frame), ignored);
-    return grains || forces;
+    const bool walls = std::filesystem::remove(directory_ / "fields" / walls_name(frame), ignored);
+    return grains || forces || walls;
   }
   void write_collections() const {
     collect(collections[0], grain_files_);
     if (contacts_) collect(collections[1], force_files_);
+    if (!walls_.empty()) collect(collections[3], wall_files_);
     std::vector<FieldFile> all;
     for (const FieldFile& file : grain_files_) all.push_back({file.time, 0, "fields/" + file.path});
     for (const FieldFile& file : force_files_) all.push_back({file.time, 1, "fields/" + file.path});
+    for (const FieldFile& file : wall_files_) all.push_back({file.time, 2, "fields/" + file.path});
     collect(collections[2], all);
   }
 
@@ -92,8 +112,10 @@ class FieldSink : public OutputSink {
 
   std::filesystem::path directory_;
   bool contacts_;
+  std::vector<Wall> walls_;
+  std::vector<std::int64_t> wall_materials_;
   const graph::Communicator& ranks_;
-  std::vector<FieldFile> grain_files_, force_files_;  ///< paths relative to fields/
+  std::vector<FieldFile> grain_files_, force_files_, wall_files_;  ///< paths relative to fields/
   std::size_t frames_ = 0;
 };
 
@@ -106,7 +128,8 @@ const SinkKind field_sink{SinkUse::by_default,
                           [](const std::string& name) {
                             return std::ranges::find(collections, name) != collections.end() ||
                                    is_numbered_name(name, "fields/grains_", ".vtp") ||
-                                   is_numbered_name(name, "fields/forces_", ".vtp");
+                                   is_numbered_name(name, "fields/forces_", ".vtp") ||
+                                   is_numbered_name(name, "fields/walls_", ".vtp");
                           }};
 
 }  // namespace talus::io

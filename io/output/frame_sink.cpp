@@ -10,18 +10,22 @@ class FrameSink : public OutputSink {
  public:
   explicit FrameSink(const OutputContext& context)
       : path_(context.directory / "results.h5"), ranks_(context.ranks), format_(context.format) {
-    for (const Wall& wall : context.walls) wall_names_.push_back(wall.name);
+    for (const Wall& wall : context.walls) {
+      names_.walls.push_back(wall.name);
+      names_.wall_materials.push_back(wall.material);
+    }
+    names_.materials = context.material_names;
   }
 
-  void open() override { results_.emplace(path_, wall_names_, ranks_, format_); }
+  void open() override { results_.emplace(path_, names_, ranks_, format_); }
   void resume(const OutputMark& mark) override {
-    results_.emplace(path_, wall_names_, ranks_, format_, mark.frame_times.size());
+    results_.emplace(path_, names_, ranks_, format_, mark.frame_times.size());
   }
   void frame(const Frame& part) override { results_->append(part); }
 
  private:
   std::filesystem::path path_;
-  std::vector<std::string> wall_names_;
+  ResultsNames names_;
   const graph::Communicator& ranks_;
   FrameFormat format_;
   std::optional<ResultsWriter> results_;

@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "io/pictures/picture.hpp"
 #include "io/results/results.hpp"
 #include "io/results/run_json.hpp"
 #include "runtime/graph/communicator.hpp"
@@ -42,6 +43,7 @@ struct OutputContext {
   std::int64_t tables_every = 1;                  ///< steps between lines of walls, triaxial and cell.csv
   std::vector<Wall> walls = {};                   ///< in the order of Frame::walls
   std::vector<std::string> material_names = {};   ///< of the setup
+  GrainLoad load = {};                            ///< of the scene
   std::vector<std::string> grids = {};            ///< names of the fields of the setup
   std::map<std::string, int> axis_of_stage = {};  ///< 0, 1, 2: along which the strain of a stage is measured
   Provenance provenance = {};

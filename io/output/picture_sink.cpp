@@ -1,6 +1,10 @@
 /// forces.svg, velocities.svg and materials.svg of the newest frame, and triaxial.svg of the newest stage
 /// that has such reports.
 
+#include <algorithm>
+#include <cmath>
+#include <span>
+
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
 #include "io/output/thinned_curve.hpp"
@@ -35,12 +39,24 @@ class PictureSink : public OutputSink {
   void close() override { draw_triaxial_picture(); }
 
  private:
+  /// A box of fixed walls has stresses, but no curve.
+  static bool is_strained(std::span<const TriaxialReport> rows, const TriaxialPicture& picture) {
+    constexpr double least = 1e-6;
+    return std::ranges::any_of(rows, [&](const TriaxialReport& row) {
+      return row.stage == picture.stage &&
+             std::abs(row.strain.at(static_cast<std::size_t>(picture.axis))) > least;
+    });
+  }
+
   void draw_grain_pictures(const Frame& all) const {
     if (all.with_contacts)
-      write_whole(context_.directory / "forces.svg", draw_forces(all, context_.walls, {}));
-    write_whole(context_.directory / "velocities.svg", draw_velocities(all, {}));
+      write_whole(context_.directory / "forces.svg",
+                  draw_forces(all, context_.walls, {.load = context_.load}));
+    const GrainPicture picture{.walls = context_.walls};
+    write_whole(context_.directory / "velocities.svg", draw_velocities(all, picture));
     if (!all.material.empty())
-      write_whole(context_.directory / "materials.svg", draw_materials(all, context_.material_names, {}));
+      write_whole(context_.directory / "materials.svg",
+                  draw_materials(all, context_.material_names, picture));
   }
 
   void draw_triaxial_picture() const {
@@ -50,7 +66,8 @@ class PictureSink : public OutputSink {
     picture.stage = rows.back().stage;
     if (const auto found = context_.axis_of_stage.find(picture.stage); found != context_.axis_of_stage.end())
       picture.axis = found->second;
-    write_whole(context_.directory / "triaxial.svg", draw_triaxial(rows, picture));
+    if (is_strained(rows, picture))
+      write_whole(context_.directory / "triaxial.svg", draw_triaxial(rows, picture));
   }
 
   OutputContext context_;

@@ -1,5 +1,6 @@
 #include "io/output/recorder.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "io/output/sinks.hpp"
@@ -25,6 +26,11 @@ OutputContext output_context(const std::filesystem::path& directory, const Setup
       .directory = directory, .walls = setup.walls, .material_names = setup.material_names, .ranks = ranks};
   for (const FieldRule& field : setup.fields) context.grids.push_back(field.name);
   for (const Stage& stage : setup.stages) context.axis_of_stage.emplace(stage.name, stage.end.strain_axis);
+  for (const Wall& wall : setup.walls)
+    context.load.pressure = std::max(context.load.pressure, wall.load.pressure);
+  for (const Stage& stage : setup.stages)
+    for (const auto& [wall, load] : stage.loads)
+      context.load.pressure = std::max(context.load.pressure, load.pressure);
   return context;
 }
 

@@ -28,9 +28,8 @@ constexpr Layout wide{980, 540, 96, 650, 84, 460, 28, 48, 18, 34, 58, false};
 constexpr double legend_pitch = 18;
 
 /// Entries of a legend in one row above a plot of that width, and the rows that all of them take.
-constexpr double letter_width = 6.6;  // of 12 px, mean
 double entry_width(const ChartSeries& series) {
-  return 42 + letter_width * static_cast<double>(series.name.size());
+  return 42 + detail::text_width(series.name, 12);
 }
 std::size_t legend_rows(const Chart& chart, double width) {
   std::size_t rows = 0;
@@ -53,8 +52,15 @@ Layout layout_of(const Chart& chart) {
   return compact;
 }
 
-std::string power_of_ten(int exponent) {
-  if (exponent >= -2 && exponent <= 3) return fmt::format("{:g}", std::pow(10.0, exponent));
+/// How an axis writes its powers of ten: all in one way.
+enum class Powers { plain, raised };
+
+Powers powers_between(int least, int most) {
+  return least >= -3 && most <= 4 ? Powers::plain : Powers::raised;
+}
+
+std::string power_of_ten(int exponent, Powers powers) {
+  if (powers == Powers::plain) return fmt::format("{:g}", std::pow(10.0, exponent));
   static constexpr std::string_view digits[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
   std::string text = exponent < 0 ? "10⁻" : "10";
   for (char digit : std::to_string(std::abs(exponent))) text += digits[digit - '0'];
@@ -106,20 +112,22 @@ class Axis {
     if (high_ - low_ < 0.1) high_ = low_ + 1;
     const int decades = static_cast<int>(std::ceil(high_) - std::floor(low_));
     const int stride = std::max(1, (decades + 9) / 10);
+    const Powers powers =
+        powers_between(static_cast<int>(std::floor(low_)), static_cast<int>(std::ceil(high_)));
     for (int n = static_cast<int>(std::floor(low_)); n <= static_cast<int>(std::ceil(high_)); ++n)
       for (int digit = 1; digit < 10; ++digit) {
         const double v = n + std::log10(static_cast<double>(digit));
         if (v < low_ - 1e-9 || v > high_ + 1e-9 || (digit > 1 && decades > 6)) continue;
         std::string text;
-        if (digit == 1 && n % stride == 0) text = power_of_ten(n);
-        if (few && (digit == 2 || digit == 5)) text = small_number(digit, n);
+        if (digit == 1 && n % stride == 0) text = power_of_ten(n, powers);
+        if (few && (digit == 2 || digit == 5)) text = small_number(digit, n, powers);
         ticks_.push_back({std::pow(10.0, v), text});
       }
   }
 
-  static std::string small_number(int digit, int exponent) {
-    return exponent >= -3 && exponent <= 3 ? fmt::format("{:g}", digit * std::pow(10.0, exponent))
-                                           : fmt::format("{}·{}", digit, power_of_ten(exponent));
+  static std::string small_number(int digit, int exponent, Powers powers) {
+    return powers == Powers::plain ? fmt::format("{:g}", digit * std::pow(10.0, exponent))
+                                   : fmt::format("{}·{}", digit, power_of_ten(exponent, powers));
   }
 
   void plan_steps(double low, double high) {
@@ -184,13 +192,15 @@ class Drawing {
     for (const ChartLevel& level : chart_.levels) {
       if (!p.legend_above) continue;
       const double at = y_.place(level.y), base = at < p.top + 16 ? at + 14 : at - 5;
-      const double length = letter_width * static_cast<double>(level.name.size()) * 11 / 12;
+      const double length = detail::text_width(level.name, 11);
       svg_.rectangle(p.right - 8 - length, base - 10, length + 8, 13, "#ffffff");
       svg_.text(p.right - 4, base, level.name, {11, style::soft_ink, "end"});
     }
   }
 
-  void series(const ChartSeries& series) const {
+  /// `place` in the order of drawing, of `count`: later curves are thinner, so that what lies under them is
+  /// seen on both sides.
+  void series(const ChartSeries& series, std::size_t place, std::size_t count) const {
     const std::string_view colour = detail::hue(series.hue);
     std::vector<Point> line;
     for (const Point& p : shown(chart_, series)) {
@@ -199,8 +209,7 @@ class Drawing {
       line.push_back(at);
     }
     if (chart_.staircase && !line.empty()) line.push_back({page_.right, line.back()[1]});
-    if (!series.marks)
-      svg_.polyline(line, {colour, page_.legend_above ? 1.6 : 2, detail::dashes(series.dash)});
+    if (!series.marks) svg_.polyline(line, {colour, line_width(place, count), detail::dashes(series.dash)});
     // Marks say where something was measured; where they would touch, the line says it.
     if (series.marks || (!chart_.staircase && line.size() <= 40))
       for (const Point& at : line) svg_.circle(at[0], at[1], 3.2, colour);
@@ -217,6 +226,13 @@ class Drawing {
   }
 
  private:
+  double line_width(std::size_t place, std::size_t count) const {
+    const double last = page_.legend_above ? 1.6 : 2;
+    if (count < 2) return last;
+    const double rest = static_cast<double>(count - 1 - place) / static_cast<double>(count - 1);
+    return last + rest * std::min(2.4, 0.8 * static_cast<double>(count - 1));
+  }
+
   void legend_above() const {
     double x = page_.left, y = page_.subtitle_y - (chart_.subtitle.empty() ? 4 : -14);
     for (const ChartSeries& series : chart_.series) {
@@ -275,7 +291,7 @@ std::string draw_chart(const Chart& chart) {
   const Drawing drawing(svg, kept, page, x, y);
   drawing.frame();
   drawing.levels();
-  for (const ChartSeries& series : kept.series) drawing.series(series);
+  for (std::size_t k = 0; k < kept.series.size(); ++k) drawing.series(kept.series[k], k, kept.series.size());
   drawing.level_names();
   drawing.legend();
   return svg.finish();

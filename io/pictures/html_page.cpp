@@ -35,6 +35,9 @@ figcaption { font-size: 14px; color: var(--soft); margin: 0.3em 0 0; max-width: 
 .figures svg { width: 100%; }
 .picture { max-width: 42em; } .figures .chart { max-width: 33em; }
 .kept { background: #ffffff; border-radius: 6px; }
+.live canvas { width: 100%; display: block; touch-action: pan-y; cursor: grab; }
+.live p { color: #1f2933; font-size: 14px; margin: 0; padding: 0.3em 0.8em 0.6em; } .live select { font: inherit; }
+.live .bar { display: inline-block; width: 9em; height: 0.8em; margin: 0 0.6em; vertical-align: middle; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-size: 14px; margin: 1em 0; font-variant-numeric: tabular-nums; }
 th, td { padding: 3px 14px 3px 0; border-bottom: 1px solid var(--grid); text-align: right; vertical-align: top; }
@@ -47,7 +50,9 @@ summary { cursor: pointer; color: var(--link); }
 .notice { padding: 0.7em 1em; border-left: 5px solid; background: var(--card); border-radius: 4px; max-width: none; }
 .good { border-color: var(--good); } .warning { border-color: var(--warning); } .bad { border-color: var(--bad); }
 @media print { body { max-width: none; padding: 0; font-size: 11pt; } pre { white-space: pre-wrap; }
-               h2 { break-after: avoid; } tr { break-inside: avoid; } }
+               h2, h2 + p { break-after: avoid; } tr { break-inside: avoid; } h2 { margin-top: 1.2em; }
+               .figures { grid-template-columns: 1fr 1fr; } .picture { max-width: 11cm; grid-column: 1 / -1; }
+               .live select { border: 0; appearance: none; background: none; } .table { overflow: visible; } }
 )";
 
 /// Colours of the page in dark; those of charts follow, which name them as attributes.
@@ -101,6 +106,7 @@ std::string figures_text(const std::vector<HtmlFigure>& figures, const std::stri
     out += fmt::format("<figure class=\"{}\">\n", figure.keeps_colours ? "picture" : "chart");
     if (figure.keeps_colours) out += "<div class=\"kept\">";
     out += inline_picture(figure.svg, figure.caption.empty() ? title : figure.caption);
+    out += figure.live;
     if (figure.keeps_colours) out += "</div>";
     if (!figure.caption.empty()) out += "<figcaption>" + escaped(figure.caption) + "</figcaption>\n";
     out += "</figure>\n";

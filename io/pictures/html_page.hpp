@@ -18,6 +18,7 @@ struct HtmlFigure {
   std::string svg;             ///< a whole SVG document
   std::string caption;         ///< "" for none
   bool keeps_colours = false;  ///< in dark, too, it stays on white: colours mean something
+  std::string live = {};       ///< markup below the picture, put in as it is; "" for none
 };
 
 struct HtmlSection {

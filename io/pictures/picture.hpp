@@ -17,21 +17,28 @@ struct TriaxialPicture {
   int axis = 2;       ///< axial direction: 0, 1, 2 = x, y, z
 };
 
-/// Two diagrams over a common axis, the axial strain in per cent, positive in compression: q/p, and the
-/// volume strain (29) in per cent, positive where the sample dilates. Steps that missed their tolerance are
-/// marked, and are no peak. Rows with a value that is not finite are left out; without any row the picture
-/// says so.
+/// Stress and strain of a box or cell: two diagrams over a common axis, the axial strain in per cent,
+/// positive in compression: q/p, and the volume strain (29) in per cent, positive where the sample dilates.
+/// Steps that missed their tolerance are marked, and are no peak. Rows with a value that is not finite are
+/// left out; without any row the picture says so.
 std::string draw_triaxial(std::span<const TriaxialReport> reports, const TriaxialPicture& options);
+
+/// What a scene loads its grains with; 0 where it does not.
+struct GrainLoad {
+  double pressure = 0;  ///< [Pa] the largest on a wall, in any stage
+  double weight = 0;    ///< [N/m^3] density of the heaviest grains times gravity
+};
 
 struct ForcePicture {
   double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+  GrainLoad load = {};   ///< forces far below it are drawn thin
 };
 
 /// Grains whose centre lies in a slab about the middle of the sample, normal to y, seen along y, and the
 /// forces between them: a line between the centres (or to the contact point at a wall), as wide and as dark
-/// as its normal force is large. `walls` give the normals of frame.walls, in the same order; those parallel
-/// to y are drawn where they cut the picture. Throws std::invalid_argument when a contact names a body or
-/// wall that is not there.
+/// as its normal force is large. `walls` are those of frame.walls, in the same order;
+/// they are drawn where they cut the middle of the slab. Throws std::invalid_argument when a contact names a
+/// body or wall that is not there.
 std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options);
 
 /// Collective: what draw_forces needs of a frame of which each rank has a part, on rank 0: all bodies, but of
@@ -39,7 +46,8 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
 Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, const ForcePicture& options);
 
 struct GrainPicture {
-  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
+  double thickness = 0;              ///< [m] of the slab; 0: four mean radii
+  std::span<const Wall> walls = {};  ///< those of the frame, drawn as those of ForcePicture
 };
 
 /// Grains of such a slab coloured by their speed, from 0 to the one that nineteen of twenty of them do not

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
+#include <numbers>
 #include <stdexcept>
+#include <vector>
 
 #include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/slab.hpp"
@@ -33,13 +33,20 @@ struct Force {
 struct ForceSlab : detail::Slab {
   std::vector<Force> forces;
   double mean_force = 0;     ///< of `forces` [N]
+  double unit = 0;           ///< what widths of lines are measured by [N]: the mean force, or more
   std::size_t contacts = 0;  ///< one across a face of a periodic cell is drawn on both sides
 };
 
 constexpr double picture_side = 760, margin_left = 40, margin_right = 40, margin_top = 84, margin_bottom = 84;
 
+/// Force that the scene's load puts on a grain of this radius [N].
+double grain_force(const GrainLoad& load, double radius) {
+  return std::max(load.pressure * 4 * radius * radius,
+                  load.weight * 4 / 3 * std::numbers::pi * radius * radius * radius);
+}
+
 ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& options) {
-  ForceSlab slab{detail::cut_slab(frame, options.thickness), {}, 0, 0};
+  ForceSlab slab{detail::cut_slab(frame, options.thickness), {}, 0, 0, 0};
   std::vector<Force> others;
   const auto inside = [&](std::size_t k) { return slab.holds(frame.x[k]); };
   const detail::BodyIndex index(frame.id);
@@ -62,57 +69,13 @@ ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& opt
   slab.contacts = slab.forces.size();
   for (const Force& force : slab.forces) slab.mean_force += force.normal;
   if (!slab.forces.empty()) slab.mean_force /= static_cast<double>(slab.forces.size());
+  constexpr double least_part = 0.01;
+  slab.unit = std::max(slab.mean_force, least_part * grain_force(options.load, slab.mean_radius));
   slab.forces.insert(slab.forces.end(), others.begin(), others.end());
   // Strong chains on top; equal forces keep the order of the frame, so that the same frame gives the same
   // file.
   std::ranges::stable_sort(slab.forces, {}, &Force::normal);
   return slab;
-}
-
-struct HalfPlane {
-  double nx, nz, position;  ///< nx x + nz z >= position
-};
-
-/// The ends of the border of `line` inside all of `inside`; empty when nothing is left of it.
-std::optional<std::pair<Point, Point>> clipped(const HalfPlane& line, std::span<const HalfPlane> inside) {
-  const double square = line.nx * line.nx + line.nz * line.nz;
-  const Point origin{line.nx * line.position / square, line.nz * line.position / square};
-  const Point along{-line.nz, line.nx};
-  double begin = -std::numeric_limits<double>::infinity(), end = -begin;
-  for (const HalfPlane& plane : inside) {
-    const double slope = plane.nx * along.x + plane.nz * along.z;
-    const double room = plane.position - plane.nx * origin.x - plane.nz * origin.z;
-    if (std::abs(slope) < 1e-12) {
-      if (room > 0) return std::nullopt;
-    } else if (slope > 0) {
-      begin = std::max(begin, room / slope);
-    } else {
-      end = std::min(end, room / slope);
-    }
-  }
-  if (!(begin < end)) return std::nullopt;
-  return std::pair{Point{origin.x + begin * along.x, origin.z + begin * along.z},
-                   Point{origin.x + end * along.x, origin.z + end * along.z}};
-}
-
-void draw_walls(Svg& svg, const View& view, const Frame& frame, std::span<const Wall> walls) {
-  std::vector<HalfPlane> cut;
-  for (std::size_t k = 0; k < std::min(walls.size(), frame.walls.size()); ++k) {
-    if (walls[k].surface() == nullptr && std::abs(walls[k].normal.y()) < 1e-9) {
-      cut.push_back({walls[k].normal.x(), walls[k].normal.z(), frame.walls[k].position});
-    }
-  }
-  for (std::size_t k = 0; k < cut.size(); ++k) {
-    std::vector<HalfPlane> inside{
-        {1, 0, view.x_low}, {-1, 0, -view.x_high}, {0, 1, view.z_low}, {0, -1, -view.z_high}};
-    for (std::size_t j = 0; j < cut.size(); ++j) {
-      if (j != k) inside.push_back(cut[j]);
-    }
-    if (const auto ends = clipped(cut[k], inside)) {
-      svg.line(view.x(ends->first.x), view.y(ends->first.z), view.x(ends->second.x), view.y(ends->second.z),
-               {style::ink, 3});
-    }
-  }
 }
 
 /// The faces of a periodic cell along x and z.
@@ -126,13 +89,20 @@ void draw_cell(Svg& svg, const View& view, const Domain& domain) {
       svg.line(view.x(view.x_low), view.y(z), view.x(view.x_high), view.y(z), {style::soft_ink, 1});
 }
 
-/// Width of a line [px]: proportional to the force, five mean forces are as wide as 0.6 mean radii.
+/// Width of a line [px]: proportional to the force, five units are as wide as 0.6 mean radii, if that is not
+/// too wide for the page.
 double line_width(double normal, const ForceSlab& slab, const View& view) {
-  return std::clamp(normal / slab.mean_force, 0.0, 5.0) / 5 * 0.6 * slab.mean_radius * view.scale;
+  constexpr double widest = 14;
+  return std::clamp(normal / slab.unit, 0.0, 5.0) / 5 * std::min(0.6 * slab.mean_radius * view.scale, widest);
 }
 
-std::string_view line_colour(double normal, double mean) {
-  return normal < mean ? "#e8a27c" : normal < 2 * mean ? "#d3652f" : "#8f2d0c";
+/// Forces far below those of the scene's load are what remains where nothing presses any more, and no chains.
+bool is_unloaded(const ForceSlab& slab) {
+  return slab.unit > slab.mean_force;
+}
+
+std::string_view line_colour(double normal, double unit) {
+  return normal < unit ? "#e8a27c" : normal < 2 * unit ? "#d3652f" : "#8f2d0c";
 }
 
 /// A straight line between two points of the picture [px].
@@ -143,17 +113,18 @@ struct Segment {
 void draw_force(Svg& svg, const Segment& at, double normal, const ForceSlab& slab, const View& view) {
   const double w = line_width(normal, slab, view);
   if (w < 0.05) return;
-  svg.line(at.x1, at.y1, at.x2, at.y2, {line_colour(normal, slab.mean_force), w});
+  svg.line(at.x1, at.y1, at.x2, at.y2, {line_colour(normal, slab.unit), w});
 }
 
 void draw_legend(Svg& svg, const ForceSlab& slab, const View& view, double top) {
-  double x = margin_left + detail::draw_scale(svg, view, top + 18, 16) + 60;
-  if (!(slab.mean_force > 0)) return;
+  double x = margin_left + detail::draw_scale(svg, view, top + 18, 16) + 48;
+  if (!(slab.unit > 0)) return;
   for (const double multiple : {0.5, 1.0, 2.0, 4.0}) {
-    draw_force(svg, {x, top + 18, x + 36, top + 18}, multiple * slab.mean_force, slab, view);
-    svg.text(x, top + 38, (multiple == 1 ? "mean " : "") + detail::with_unit(multiple * slab.mean_force, "N"),
-             {12, style::ink});
-    x += 92;
+    const std::string name =
+        (multiple == 1 && !is_unloaded(slab) ? "mean " : "") + detail::with_unit(multiple * slab.unit, "N");
+    draw_force(svg, {x, top + 18, x + 36, top + 18}, multiple * slab.unit, slab, view);
+    svg.text(x, top + 38, name, {12, style::ink});
+    x += std::max(60.0, detail::text_width(name, 12) + 18);
   }
 }
 
@@ -161,7 +132,8 @@ void draw_legend(Svg& svg, const ForceSlab& slab, const View& view, double top) 
 
 std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options) {
   const ForceSlab slab = slab_of(frame, walls.size(), options);
-  const View view = detail::view_of(frame, slab, picture_side, margin_left, margin_top);
+  const std::vector<detail::Cut> cuts = detail::cut_walls(frame, walls, slab);
+  const View view = detail::view_of(frame, slab, cuts, {picture_side, margin_left, margin_top});
   const double inner_width = std::max(480.0, view.width());
   const double bottom = margin_top + view.height();
   Svg svg(margin_left + inner_width + margin_right, bottom + margin_bottom);
@@ -174,6 +146,12 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
                        detail::with_unit(2 * slab.half, "m"), detail::with_unit(slab.middle, "m"),
                        slab.grains.size(), slab.contacts),
            {13, style::soft_ink});
+  if (slab.contacts > 0 && is_unloaded(slab))
+    svg.text(margin_left, 74,
+             fmt::format("hardly loaded: the mean force is {}, the scene's load puts some {} on a grain",
+                         detail::with_unit(slab.mean_force, "N"),
+                         detail::with_unit(grain_force(options.load, slab.mean_radius), "N")),
+             {12, style::soft_ink});
   svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.7")", style::grain_edge));
   for (const std::size_t k : slab.grains) {
     svg.circle(view.x(frame.x[k].x()), view.y(frame.x[k].z()), frame.radius[k] * view.scale,
@@ -186,7 +164,7 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
                force.normal, slab, view);
   }
   svg.end_group();
-  draw_walls(svg, view, frame, walls);
+  detail::draw_walls(svg, view, cuts);
   draw_cell(svg, view, frame.domain);
   draw_legend(svg, slab, view, bottom + 16);
   return svg.finish();

@@ -44,13 +44,15 @@ std::string_view speed_colour(double speed, double usual) {
 /// A page with a title, the grains of a slab in their colours, and a legend that begins at (x, y).
 struct GrainPage {
   std::string title;
+  std::span<const Wall> walls;
   std::function<std::string_view(std::size_t)> colour;
   std::function<void(Svg&, const View&, std::size_t)> over;  ///< on a grain
   std::function<void(Svg&, double x, double y)> legend;
 };
 
 std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainPage& page) {
-  const View view = detail::view_of(frame, slab, picture_side, margin_left, margin_top);
+  const std::vector<detail::Cut> cuts = detail::cut_walls(frame, page.walls, slab);
+  const View view = detail::view_of(frame, slab, cuts, {picture_side, margin_left, margin_top});
   const double bottom = margin_top + view.height();
   Svg svg(margin_left + std::max(480.0, view.width()) + margin_right, bottom + margin_bottom);
   svg.text(margin_left, 34,
@@ -71,8 +73,9 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
     if (page.over) page.over(svg, view, k);
   }
   svg.end_group();
-  const double bar = detail::draw_scale(svg, view, bottom + 22, 8);
-  page.legend(svg, margin_left + bar + 48, bottom + 22);
+  detail::draw_walls(svg, view, cuts);
+  const double scale = detail::draw_scale(svg, view, bottom + 22, 8);
+  page.legend(svg, margin_left + scale + 48, bottom + 22);
   return svg.finish();
 }
 
@@ -91,6 +94,7 @@ std::string draw_velocities(const Frame& frame, const GrainPicture& options) {
   const double usual = usual_speed(frame, slab);
   GrainPage page;
   page.title = "Velocities";
+  page.walls = options.walls;
   page.colour = [&](std::size_t k) { return speed_colour(frame.u[k].norm(), usual); };
   page.over = [&](Svg& svg, const View& view, std::size_t k) { draw_arrow(svg, view, frame, k, usual); };
   page.legend = [&](Svg& svg, double x, double y) {
@@ -112,6 +116,7 @@ std::string draw_materials(const Frame& frame, std::span<const std::string> name
   };
   GrainPage page;
   page.title = "Materials";
+  page.walls = options.walls;
   page.colour = [&](std::size_t k) { return detail::hue(material(k)); };
   page.legend = [&](Svg& svg, double x, double y) {
     std::vector<std::size_t> count(std::max<std::size_t>(names.size(), 1), 0);
@@ -119,10 +124,10 @@ std::string draw_materials(const Frame& frame, std::span<const std::string> name
       if (material(k) < count.size()) ++count[material(k)];
     for (std::size_t m = 0; m < count.size(); ++m) {
       if (count[m] == 0) continue;
+      const std::string name = fmt::format("{} ({})", m < names.size() ? names[m] : "grains", count[m]);
       svg.circle(x + 6, y, 6, detail::hue(m));
-      svg.text(x + 18, y + 4, fmt::format("{} ({})", m < names.size() ? names[m] : "grains", count[m]),
-               {12, style::ink});
-      x += 110;
+      svg.text(x + 18, y + 4, name, {12, style::ink});
+      x += 18 + detail::text_width(name, 12) + 24;
     }
   };
   return draw_page(frame, slab, page);

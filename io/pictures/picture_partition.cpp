@@ -62,7 +62,7 @@ std::string draw_partition(const Frame& frame, std::span<const std::int32_t> sub
                                             subdomain.size(), multiplicity.size(), frame.id.size()));
   }
   const Slab slab = detail::cut_slab(frame, options.thickness);
-  const View left = detail::view_of(frame, slab, panel_side, margin, margin_top);
+  const View left = detail::view_of(frame, slab, {}, {panel_side, margin, margin_top});
   View right = left;
   right.left += std::max(left.width(), 360.0) + gap;
 
@@ -85,9 +85,7 @@ std::string draw_partition(const Frame& frame, std::span<const std::int32_t> sub
   draw_grains(svg, frame, order, left, [&](std::size_t k) { return subdomain_colour(subdomain[k]); });
   draw_grains(svg, frame, order, right, [&](std::size_t k) { return greys[grey_of(multiplicity[k])]; });
 
-  const double scale_length = detail::nice_ticks(0, left.x_high - left.x_low, 8).at(1);
-  svg.line(margin, bottom + 22, margin + scale_length * left.scale, bottom + 22, {style::ink, 3});
-  svg.text(margin, bottom + 44, detail::with_unit(scale_length, "m"));
+  detail::draw_scale(svg, left, bottom + 22, 8);
   for (std::size_t k = 0; k < greys.size(); ++k) {
     const double x = right.left + 8 + 72 * static_cast<double>(k);
     svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.7")", style::soft_ink));

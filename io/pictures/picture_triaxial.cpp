@@ -111,8 +111,8 @@ std::string draw_triaxial(std::span<const TriaxialReport> reports, const Triaxia
   const std::vector<Row> rows = rows_of(reports, options);
   Svg svg(width, height);
   svg.text(left, 32,
-           options.stage.empty() ? "Triaxial test"
-                                 : fmt::format("Triaxial test, stage \u201c{}\u201d", options.stage),
+           options.stage.empty() ? "Stress and strain"
+                                 : fmt::format("Stress and strain, stage \u201c{}\u201d", options.stage),
            {18, style::ink, "start", true});
   svg.text(left, 54, rows.empty() ? "No data yet" : findings(rows), {13, style::soft_ink});
   if (const auto missed = std::ranges::count(rows, false, &Row::converged); missed > 0)

@@ -129,14 +129,14 @@ void cut_frames(const std::string& path, std::size_t kept) {
 
 }  // namespace
 
-ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names)
-    : ResultsWriter(path, wall_names, graph::one_rank()) {}
+ResultsWriter::ResultsWriter(const std::filesystem::path& path, const ResultsNames& names)
+    : ResultsWriter(path, names, graph::one_rank()) {}
 
-ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
+ResultsWriter::ResultsWriter(const std::filesystem::path& path, const ResultsNames& names,
                              const graph::Communicator& ranks, FrameFormat format,
                              std::optional<std::size_t> kept)
     : path_(path.string()),
-      wall_names_(wall_names),
+      wall_names_(names.walls),
       ranks_(ranks),
       format_(format),
       frames_(kept.value_or(0)) {
@@ -155,6 +155,10 @@ ResultsWriter::ResultsWriter(const std::filesystem::path& path, const std::vecto
       create_group(root, "frames");
       const Hdf5Object walls = create_group(root, "walls");
       write_names({walls.id(), path_}, "name", wall_names_);
+      if (!names.materials.empty()) {
+        detail::write_array({walls.id(), path_}, "material", "1", names.wall_materials);
+        write_names({create_group(root, "materials").id(), path_}, "name", names.materials);
+      }
     }
     close_file(file, path_);
   }

@@ -2,12 +2,15 @@
 
 /// results.h5: the state at every output time, in full precision (layout: docs/formats.md).
 ///
-///   /walls/name                  names, in the order of the setup
+///   /walls/name                  names, in the order of the setup; material [w] where materials have names
+///   /materials/name              names, by number, where they have some
 ///   /frames/000000               attributes step, time, stage
 ///   /frames/000000/bodies        id [n], x [n,3], radius [n], u [n,3]; where computed omega [n,3] and
 ///                                orientation [n,4]; where materials have names, material [n]
 ///   /frames/000000/contacts      bodies [m,2], point [m,3], normal [m,3], gap [m], force [m,3]
-///   /frames/000000/walls         position [w], velocity [w], force [w,3]
+///   /frames/000000/walls         position [w], velocity [w], force [w,3], normal [w,3], present [w]; where
+///   one
+///                                has moved that is no plane rotation [w,9], translation [w,3]
 ///
 /// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain
 /// unless FrameFormat says otherwise. Rank 0 lays a frame out, and every rank writes its rows at their
@@ -19,8 +22,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runtime/graph/communicator.hpp"
@@ -41,6 +46,17 @@ struct FrameFormat {
   bool contact_geometry = true;           ///< point, normal and gap of contacts
 };
 
+/// What the file says of all frames.
+struct ResultsNames {
+  std::vector<std::string> walls;
+  std::vector<std::int64_t> wall_materials = {};  ///< numbers; empty where materials have no names
+  std::vector<std::string> materials = {};        ///< by number; empty likewise
+
+  ResultsNames() = default;
+  ResultsNames(std::vector<std::string> wall_names) : walls(std::move(wall_names)) {}
+  ResultsNames(std::initializer_list<std::string> wall_names) : walls(wall_names) {}
+};
+
 namespace detail {
 struct FrameArray;
 }
@@ -53,10 +69,10 @@ struct FrameArray;
 class ResultsWriter {
  public:
   /// Replaces a file of that name. Throws FileError. `ranks` must outlive the writer.
-  ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names);
+  ResultsWriter(const std::filesystem::path& path, const ResultsNames& names);
   /// Collective, as are the frames.
   /// With `kept` the file is there: its first frames stay, as many, the others are removed, and it goes on.
-  ResultsWriter(const std::filesystem::path& path, const std::vector<std::string>& wall_names,
+  ResultsWriter(const std::filesystem::path& path, const ResultsNames& names,
                 const graph::Communicator& ranks, FrameFormat format = {},
                 std::optional<std::size_t> kept = {});
 

@@ -43,6 +43,34 @@ std::vector<T> read_integers(hid_t file, const std::string& path, const std::str
   return read_array<T>({file, path}, name, H5T_NATIVE_INT64, numbers_in<T>);
 }
 
+/// Where walls are and how they stand; files of earlier versions do not tell.
+void read_places(Place frame, std::vector<WallReport>& walls) {
+  const auto has = [&](const char* array) { return H5Lexists(frame.group, array, H5P_DEFAULT) > 0; };
+  const auto fits = [&](std::size_t rows) {
+    if (rows != walls.size())
+      throw FileError(frame.file, "walls/normal and its like do not fit the number of names in /walls/name");
+  };
+  if (!has("walls/normal")) return;
+  const auto normal = read_doubles<Vec3>(frame.group, frame.file, "walls/normal");
+  const auto present = read_integers<std::int64_t>(frame.group, frame.file, "walls/present");
+  fits(normal.size()), fits(present.size());
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    walls[k].normal = normal[k];
+    walls[k].absent = present[k] == 0;
+  }
+  if (!has("walls/rotation")) return;
+  using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const auto rotation = read_doubles<std::array<double, 9>>(frame.group, frame.file, "walls/rotation");
+  const auto translation = read_doubles<Vec3>(frame.group, frame.file, "walls/translation");
+  fits(rotation.size()), fits(translation.size());
+  for (std::size_t k = 0; k < walls.size(); ++k) {
+    Pose& pose = walls[k].pose;
+    pose.turn = Eigen::Map<const Rows>(rotation[k].data());
+    pose.shift = translation[k];
+    pose.moved = !pose.turn.isIdentity(0) || !pose.shift.isZero(0);
+  }
+}
+
 }  // namespace
 
 std::size_t frame_count(const std::filesystem::path& path) {
@@ -94,6 +122,7 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   for (std::size_t k = 0; k < names.size(); ++k) {
     frame.walls.push_back({names[k], position[k], velocity[k], force[k]});
   }
+  read_places({h, name}, frame.walls);
   try {
     validate(frame);
   } catch (const std::invalid_argument& error) {

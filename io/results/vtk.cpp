@@ -70,15 +70,16 @@ class VtpText {
     return flag[0] > 0;
   }
 
-  void begin(double time, std::size_t points, std::size_t vertices, std::size_t lines) const {
+  void begin(double time, std::size_t points, std::size_t vertices, std::size_t lines,
+             std::size_t polygons = 0) const {
     text(fmt::format(
         R"(<?xml version="1.0"?>
 <VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
 <PolyData>
 <FieldData><DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">{}</DataArray></FieldData>
-<Piece NumberOfPoints="{}" NumberOfVerts="{}" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="0">
+<Piece NumberOfPoints="{}" NumberOfVerts="{}" NumberOfLines="{}" NumberOfStrips="0" NumberOfPolys="{}">
 )",
-        time, points, vertices, lines));
+        time, points, vertices, lines, polygons));
   }
   void end() const { text("</Piece>\n</PolyData>\n</VTKFile>\n"); }
 
@@ -263,6 +264,35 @@ std::string grains_vtp(const Frame& frame, std::span<const GrainField> fields) {
 std::string forces_vtp(const Frame& frame) {
   std::string text;
   write_forces_vtp(frame, graph::one_rank(), [&](std::string_view more) { text += more; });
+  return text;
+}
+
+std::string walls_vtp(const Frame& frame, std::span<const std::vector<Triangle>> triangles,
+                      std::span<const std::int64_t> materials) {
+  std::vector<std::int64_t> wall, material;
+  std::vector<Vec3> corners, force;
+  std::vector<double> velocity;
+  for (std::size_t w = 0; w < triangles.size(); ++w)
+    for (const Triangle& triangle : triangles[w]) {
+      wall.push_back(static_cast<std::int64_t>(w));
+      material.push_back(w < materials.size() ? materials[w] : 0);
+      velocity.push_back(frame.walls[w].velocity);
+      force.push_back(frame.walls[w].force);
+      corners.insert(corners.end(), triangle.begin(), triangle.end());
+    }
+  std::string text;
+  const WriteText out = [&](std::string_view more) { text += more; };
+  const VtpText file(graph::one_rank(), out);
+  file.begin(frame.time, corners.size(), 0, 0, wall.size());
+  file.text("<CellData Scalars=\"wall\">\n");
+  file.integers("wall", wall);
+  file.integers("material", material);
+  file.floats("velocity", 1, floats(velocity));
+  file.floats("force", 3, floats(force));
+  file.text("</CellData>\n");
+  file.points(floats(corners));
+  file.cells("Polys", wall.size(), {0, wall.size()}, 3);
+  file.end();
   return text;
 }
 

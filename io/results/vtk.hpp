@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/files/write_text.hpp"
+#include "kernels/shapes/surface.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
 
@@ -40,6 +41,12 @@ std::string forces_vtp(const Frame& frame);
 void write_grains_vtp(const Frame& part, const graph::Communicator& ranks, const WriteText& out,
                       std::span<const GrainField> fields = {});
 void write_forces_vtp(const Frame& part, const graph::Communicator& ranks, const WriteText& out);
+
+/// Text of a .vtp file with the triangles of each wall (wall_triangles.hpp); cell data wall (index), material
+/// (number), velocity along the normal of a plane [m/s] and force on the grains [N], of its whole wall each.
+/// `materials` by wall.
+std::string walls_vtp(const Frame& frame, std::span<const std::vector<Triangle>> triangles,
+                      std::span<const std::int64_t> materials);
 
 /// One file of a collection.
 struct FieldFile {

@@ -43,6 +43,12 @@ constexpr std::int64_t format_version = 5;  // 4: texts of variable length
 /// A trace file, opened and known to be one.
 Hdf5Object open_trace(const std::string& path) {
   if (!fs::exists(path)) throw FileError(path, "there is no such file");
+  if (fs::is_directory(path)) {
+    const fs::path inside = fs::path(path) / "trace.h5";
+    throw FileError(path, fs::exists(inside) ? "is a folder; its trace is " + inside.string()
+                                             : "is a folder without a trace.h5; `talus run --trace` writes "
+                                               "one");
+  }
   Hdf5Object file = detail::open_file(path);
   const std::string format = detail::read_text({file.id(), path}, "format");
   if (format != "talus-trace")

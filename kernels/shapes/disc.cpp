@@ -18,6 +18,10 @@ class Disc final : public Surface {
     const Vec3 half = radius_ * (Vec3::Ones() - axis_.cwiseAbs2()).cwiseMax(0).cwiseSqrt();
     return {centre_ - half, centre_ + half};
   }
+  void show(std::vector<Triangle>& triangles) const override {
+    detail::show_disc(centre_, detail::circle_corners(centre_, axis_, detail::any_side(axis_), radius_),
+                      triangles);
+  }
   bool turns_in_itself(const Vec3& axis, const Vec3& point) const override {
     return detail::on_axis(axis, point, axis_, centre_);
   }

@@ -25,6 +25,11 @@ class Rectangle final : public Surface {
       }
     return box;
   }
+  void show(std::vector<Triangle>& triangles) const override {
+    const Vec3 a = length_[0] * along_[0], b = length_[1] * along_[1];
+    triangles.push_back({corner_, corner_ + a, corner_ + a + b});
+    triangles.push_back({corner_, corner_ + a + b, corner_ + b});
+  }
   SurfacePoint at(const Vec3& centre, std::int32_t) const override {
     const Vec3 d = centre - corner_;
     const double i = std::clamp(d.dot(along_[0]), 0.0, length_[0]);

@@ -30,9 +30,6 @@ struct ShapeParameter {
   const char* meaning;  ///< one sentence
 };
 
-/// A corner of a triangle each, counterclockwise as seen from outside the solid [m].
-using Triangle = std::array<Vec3, 3>;
-
 /// What a scene gives of a shape's parameters: numbers by name (a truth is 0 or 1), and what stands in its
 /// file.
 struct ShapeValues {

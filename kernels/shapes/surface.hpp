@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -13,6 +14,9 @@ struct SurfacePoint {
   double distance = 0;          ///< [m] of the sphere's centre from the surface; below 0 inside a solid
   Vec3 normal = Vec3::UnitZ();  ///< unit, from the surface to the centre
 };
+
+/// A corner of a triangle each, counterclockwise as seen from outside the solid [m].
+using Triangle = std::array<Vec3, 3>;
 
 /// Axis-parallel box [m].
 struct Bounds {
@@ -33,6 +37,8 @@ class Surface {
   virtual ~Surface() = default;
 
   virtual Bounds bounds() const = 0;
+  /// Appends triangles that show it, for pictures; what is round has corners there.
+  virtual void show(std::vector<Triangle>& triangles) const = 0;
   /// Whether it stays what it is, features included, when it turns about this axis (unit) through `point`.
   virtual bool turns_in_itself(const Vec3& axis, const Vec3& point) const {
     static_cast<void>(axis), static_cast<void>(point);

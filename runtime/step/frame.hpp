@@ -10,6 +10,7 @@
 
 #include "kernels/bodies/types.hpp"
 #include "kernels/detection/domain.hpp"
+#include "kernels/shapes/prescribed_motion.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/field_grids.hpp"
 #include "runtime/step/overlap.hpp"
@@ -84,6 +85,9 @@ struct WallReport {
   Vec3 force = Vec3::Zero();   ///< of the wall on the grains, mean over the step [N]
   Vec3 torque = Vec3::Zero();  ///< likewise, about the wall's own point [N m] (Wall::torque_point)
   double work = 0;             ///< done on the grains since the run began [J]
+  Vec3 normal = Vec3::Zero();  ///< of a plane, into the grains; 0 of a surface, and of a group
+  Pose pose = {};              ///< of a surface: from where the scene has put it
+  bool absent = false;         ///< in this stage
 };
 
 /// One row of bodies.csv: a body that the scene names, at the end of a step.

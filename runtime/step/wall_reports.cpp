@@ -13,7 +13,8 @@ std::vector<WallReport> wall_reports(const StepState& state, double impulse_time
     const Wall& wall = state.walls[w];
     const WallState& of = state.wall_states[w];
     reports.push_back({wall.name, wall.normal.dot(wall.point), wall.normal.dot(wall.velocity),
-                       of.impulse / impulse_time, of.torque / impulse_time, of.work});
+                       of.impulse / impulse_time, of.torque / impulse_time, of.work,
+                       wall.surface() == nullptr ? wall.normal : Vec3(Vec3::Zero()), wall.pose, wall.absent});
   }
   return reports;
 }

@@ -24,7 +24,7 @@ TEST_P(NewScene, IsSoundAndRuns) {
       << "every run has its page";
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, NewScene, testing::Values("triaxial", "silo", "drum", "heap"),
+INSTANTIATE_TEST_SUITE_P(Kinds, NewScene, testing::Values("triaxial", "silo", "drum", "heap", "periodic"),
                          [](const auto& kind) { return std::string(kind.param); });
 
 TEST(NewCommand, ReplacesNothingAndRefusesWhatNoSceneCanBe) {
@@ -34,10 +34,53 @@ TEST(NewCommand, ReplacesNothingAndRefusesWhatNoSceneCanBe) {
   EXPECT_EQ(content(scratch / "mine.toml"), "mine");
   const Outcome unknown = run(scratch.path(), "new other --kind volcano");
   EXPECT_EQ(unknown.code, 2);
-  EXPECT_NE(unknown.messages.find("triaxial, silo, drum, heap"), std::string::npos) << unknown.messages;
+  EXPECT_NE(unknown.messages.find("triaxial, silo, drum, heap, periodic"), std::string::npos)
+      << unknown.messages;
   EXPECT_EQ(run(scratch.path(), "new 'a b' --kind silo").code, 2)
       << "a name with a space is that of no scene";
   EXPECT_FALSE(fs::exists(scratch / "other.toml") || fs::exists(scratch / "a b.toml"));
+}
+
+TEST(Help, HasNoWordsOfTheProgramsInside) {
+  const ScratchDirectory scratch;
+  for (const char* command : {"run", "status", "report", "view", "movie", "convert", "plan", "partition",
+                              "solve", "trace show", "trace export", "replay", "study error", "study scaling",
+                              "study stability", "study certificate", "new"}) {
+    const Outcome help = run(scratch.path(), std::string(command) + " --help");
+    EXPECT_EQ(help.code, 0);
+    for (const char* inside : {"->", ":{", "{auto"})
+      EXPECT_EQ(help.output.find(inside), std::string::npos) << command << ": " << help.output;
+  }
+}
+
+TEST(Options, OfOtherProgramsAreAnsweredWithWhatThereIsHere) {
+  const ScratchDirectory scratch;
+  const Outcome ranks = run(scratch.path(), "run scene.toml --ranks 2");
+  EXPECT_EQ(ranks.code, 2);
+  EXPECT_NE(ranks.messages.find("has no option --ranks; ranks are those of MPI: `mpirun -n 4"),
+            std::string::npos)
+      << ranks.messages;
+  const Outcome misspelt = run(scratch.path(), "run scene.toml --therads 2");
+  EXPECT_NE(misspelt.messages.find("did you mean '--threads'?"), std::string::npos) << misspelt.messages;
+}
+
+TEST(ViewCommand, DrawsOneFrameOrAllAndRefusesWhatThereIsNot) {
+  const ScratchDirectory scratch;
+  write(scratch / "scene.toml", pressed_box);
+  ASSERT_EQ(run(scratch.path(), "run scene.toml --out out --steps 2 --quiet --threads 1").code, 0);
+  const Outcome view = run(scratch.path(), "view out --width 200");
+  EXPECT_EQ(view.code, 0) << view.messages;
+  EXPECT_EQ(content(scratch / "out/view.png").substr(1, 3), "PNG");
+  EXPECT_EQ(run(scratch.path(), "view out --width 200").code, 2) << "nothing is replaced unless asked";
+  EXPECT_EQ(run(scratch.path(), "view out --width 200 --force").code, 0);
+  EXPECT_EQ(run(scratch.path(), "view out --force --colour taste").code, 2);
+  EXPECT_EQ(run(scratch.path(), "view out --force --frame 99").code, 2);
+  const Outcome movie = run(scratch.path(), "movie out --width 200 -o film", "env PATH=/nowhere");
+  EXPECT_EQ(movie.code, 0) << movie.messages;
+  EXPECT_NE(movie.messages.find("there is no ffmpeg"), std::string::npos) << movie.messages;
+  EXPECT_TRUE(fs::exists(scratch / "film/frame_000001.png"));
+  EXPECT_NE(content(scratch / "out/report.html").find("class=\"grains\""), std::string::npos)
+      << "small samples are turned by hand";
 }
 
 TEST(Completion, KnowsCommandsOptionsAndGroups) {

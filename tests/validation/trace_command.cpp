@@ -61,6 +61,17 @@ class TraceCommand : public testing::Test {
   fs::path folder_;
 };
 
+TEST_F(TraceCommand, AFolderIsAnsweredWithTheTraceInIt) {
+  fs::create_directories(folder_ / "bare");
+  const Outcome bare = talus("trace show bare");
+  EXPECT_EQ(bare.code, 2);
+  EXPECT_NE(bare.messages.find("is a folder without a trace.h5"), std::string::npos) << bare.messages;
+  write(folder_ / "bare/trace.h5", "");
+  const Outcome full = talus("trace show bare");
+  EXPECT_NE(full.messages.find("its trace is bare/trace.h5"), std::string::npos) << full.messages;
+  for (const Outcome* each : {&bare, &full}) EXPECT_EQ(each->messages.find("errno"), std::string::npos);
+}
+
 TEST_F(TraceCommand, RecordsShowsExportsAndReplays) {
   const std::string trace = recorded("out", 2);
   const Outcome show = talus("trace show " + trace);

@@ -21,7 +21,7 @@ void add_options(CLI::App& app, StabilityOptions& options) {
          "--method",
          [&options](const std::string& name) { options.settings.method = methods().named(name).kind; },
          "solver.method of every scene")
-      ->check(CLI::IsMember(methods().names()))
+      ->check(CLI::IsMember(methods().names()).description(""))
       ->type_name(fmt::format("{}", fmt::join(methods().names(), "|")));
   app.add_option("--tolerance", options.settings.tolerance,
                  "solver.tolerance of every scene, balance_tolerance 50 times as much [the default ones]")

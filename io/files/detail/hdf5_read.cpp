@@ -10,6 +10,7 @@
 namespace talus::io::detail {
 
 Hdf5Object open_file(const std::string& path) {
+  if (std::filesystem::is_directory(path)) throw FileError(path, "is a folder; give a file in it");
   const Hdf5Object access = hold(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path, "preparing HDF5");
   demand(H5Pset_file_locking(access.id(), false, true), path, "preparing HDF5");
   return hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening as HDF5");

@@ -2,9 +2,11 @@
 
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "io/pictures/detail/svg.hpp"
+#include "kernels/shapes/walls.hpp"
 #include "runtime/step/frame.hpp"
 
 namespace talus::io::detail {
@@ -21,6 +23,15 @@ struct Slab {
 /// `thickness` [m]; 0: four mean radii. Without grains an empty slab.
 Slab cut_slab(const Frame& frame, double thickness);
 
+/// A straight line in the plane of x and z [m].
+struct Cut {
+  double x1, z1, x2, z2;
+};
+
+/// Where walls cut the plane in the middle of the slab. `walls` are those of frame.walls, in that order;
+/// those beyond either list are not there.
+std::vector<Cut> cut_walls(const Frame& frame, std::span<const Wall> walls, const Slab& slab);
+
 /// From metres in the plane of x and z to pixels.
 struct View {
   double x_low, z_low, x_high, z_high;  ///< [m]
@@ -32,11 +43,21 @@ struct View {
   double height() const { return (z_high - z_low) * scale; }
 };
 
-/// The grains of the slab and a border of a mean radius, with `side` [px] for the longer edge.
-View view_of(const Frame& frame, const Slab& slab, double side, double left, double top);
+/// Where a view stands on its page [px].
+struct Placement {
+  double side;  ///< of the longer edge
+  double left, top;
+};
 
-/// Draws a bar of a round length, about 1/`parts` of the view's width, at its left edge and the height y
-/// [px], with the length below. Returns the length of the bar [px].
+/// The grains of the slab, the walls about them, and a border of a mean radius. Walls that go on beyond half
+/// the grains' extent are cut off.
+View view_of(const Frame& frame, const Slab& slab, std::span<const Cut> walls, const Placement& at);
+
+/// Walls within the view.
+void draw_walls(Svg& svg, const View& view, std::span<const Cut> walls);
+
+/// Draws at the left edge of the view and the height y [px] both axes with their names, and a bar of a round
+/// length, about 1/`parts` of the view's width, with the length below. Returns the width of both [px].
 double draw_scale(Svg& svg, const View& view, double y, int parts);
 
 }  // namespace talus::io::detail

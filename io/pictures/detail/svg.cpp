@@ -87,6 +87,12 @@ void Svg::text(double x, double y, std::string_view content, const Letters& lett
   fmt::format_to(std::back_inserter(text_), ">{}</text>\n", escaped(content));
 }
 
+void Svg::image(double x, double y, double width, double height, std::string_view reference) {
+  fmt::format_to(std::back_inserter(text_),
+                 "<image x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" href=\"{}\"/>\n", x, y,
+                 width, height, reference);
+}
+
 void Svg::begin_group(std::string_view attributes_of_all) {
   fmt::format_to(std::back_inserter(text_), "<g {}>\n", attributes_of_all);
 }
@@ -97,6 +103,12 @@ void Svg::end_group() {
 
 std::string Svg::finish() {
   return std::move(text_ += "</svg>\n");
+}
+
+double text_width(std::string_view text, double size) {
+  constexpr double mean_letter = 0.55;  // over the size
+  const auto letters = std::ranges::count_if(text, [](char c) { return (c & 0xc0) != 0x80; });  // of UTF-8
+  return mean_letter * size * static_cast<double>(letters);
 }
 
 std::vector<double> nice_ticks(double low, double high, int wanted) {

@@ -46,6 +46,8 @@ class Svg {
   void circle(double x, double y, double radius, std::string_view fill);
   /// `content` may hold any characters; those that mean something to XML are escaped.
   void text(double x, double y, std::string_view content, const Letters& letters = {});
+  /// `reference`: where its bytes are, as data within the reference.
+  void image(double x, double y, double width, double height, std::string_view reference);
   /// What follows up to end_group() shares these SVG attributes, e.g. `stroke="#000"`.
   void begin_group(std::string_view attributes);
   void end_group();
@@ -55,6 +57,9 @@ class Svg {
  private:
   std::string text_;
 };
+
+/// Width of a text in these pictures, estimated [px].
+double text_width(std::string_view text, double size);
 
 /// Ticks at 1, 2 or 5 x 10^n that cover [low, high], about `wanted` of them; at least two. low < high, both
 /// finite.

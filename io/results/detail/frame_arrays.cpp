@@ -145,6 +145,15 @@ WallColumns::WallColumns(const std::vector<WallReport>& walls) {
     position.push_back(wall.position);
     velocity.push_back(wall.velocity);
     force.push_back(wall.force);
+    normal.push_back(wall.normal);
+    present.push_back(wall.absent ? 0 : 1);
+  }
+  if (std::ranges::none_of(walls, [](const WallReport& wall) { return wall.pose.moved; })) return;
+  for (const WallReport& wall : walls) {
+    const Mat3& turn = wall.pose.turn;
+    rotation.push_back({turn(0, 0), turn(0, 1), turn(0, 2), turn(1, 0), turn(1, 1), turn(1, 2), turn(2, 0),
+                        turn(2, 1), turn(2, 2)});
+    translation.push_back(wall.pose.shift);
   }
 }
 
@@ -186,6 +195,12 @@ std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls
   of_walls("position", "m", walls.position);
   of_walls("velocity", "m/s", walls.velocity);
   of_walls("force", "N", walls.force);
+  of_walls("normal", "1", walls.normal);
+  of_walls("present", "1", walls.present);
+  if (!walls.rotation.empty()) {
+    of_walls("rotation", "1", walls.rotation);
+    of_walls("translation", "m", walls.translation);
+  }
   if (ranks.rank() != 0)
     for (FrameArray& array : arrays)
       if (array.group == of_walls.group) array.values = {};

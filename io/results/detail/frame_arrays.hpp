@@ -2,6 +2,7 @@
 
 /// The arrays of a frame in results.h5, and how the rows of several ranks come into them.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -34,7 +35,11 @@ struct FrameArray {
 struct WallColumns {
   explicit WallColumns(const std::vector<WallReport>& walls);
   std::vector<double> position, velocity;
-  std::vector<Vec3> force;
+  std::vector<Vec3> force, normal;
+  std::vector<std::int64_t> present;
+  // Of poses; empty unless a wall that is no plane has moved.
+  std::vector<std::array<double, 9>> rotation;  ///< row by row
+  std::vector<Vec3> translation;
 };
 
 /// The arrays of a frame, the same on all ranks but for their values. Collective. `part` and `walls` must

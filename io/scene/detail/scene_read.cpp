@@ -5,6 +5,8 @@
 #include <charconv>
 #include <system_error>
 
+#include "io/scene/detail/foreign_words.hpp"
+
 namespace talus::io::detail {
 
 namespace {
@@ -96,8 +98,10 @@ void refuse_unknown(const toml::table& table, const std::string& path,
           elsewhere.push_back(section.header.empty() ? "the top of the file" : section.header);
     });
     const std::string meant = nearest(name, known);
-    const std::string help =
-        meant.empty() && !elsewhere.empty() ? "; it belongs in " + listed(elsewhere) : hint(name, known);
+    const std::string foreign = foreign_hint(name);
+    const std::string help = !foreign.empty()                      ? foreign
+                             : meant.empty() && !elsewhere.empty() ? "; it belongs in " + listed(elsewhere)
+                                                                   : hint(name, known);
     fail_at(node, joined(path, name), "unknown key" + help);
   }
 }

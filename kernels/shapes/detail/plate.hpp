@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cmath>
+#include <numbers>
+#include <vector>
+
 #include "kernels/shapes/surface.hpp"
 
 namespace talus::detail {
@@ -19,6 +23,32 @@ inline SurfacePoint facing(const Vec3& centre, const Vec3& nearest, const Vec3& 
   const Vec3 d = centre - nearest;
   const double distance = d.norm();
   return {feature, distance, distance > 0 ? Vec3(d / distance) : side};
+}
+
+/// Corners of the polygon that stands for a circle in pictures [m]; axis and side are unit, at right angles.
+inline std::vector<Vec3> circle_corners(const Vec3& centre, const Vec3& axis, const Vec3& side,
+                                        double radius) {
+  constexpr int corners = 64;
+  std::vector<Vec3> circle;
+  for (int k = 0; k < corners; ++k) {
+    const double angle = 2 * std::numbers::pi * k / corners;
+    circle.push_back(centre + radius * (std::cos(angle) * side + std::sin(angle) * axis.cross(side)));
+  }
+  return circle;
+}
+
+/// Unit, at right angles to `axis`.
+inline Vec3 any_side(const Vec3& axis) {
+  Eigen::Index across = 0;
+  axis.cwiseAbs().minCoeff(&across);
+  return axis.cross(Vec3::Unit(across)).normalized();
+}
+
+/// Appends the triangles of a disc with these corners.
+inline void show_disc(const Vec3& centre, const std::vector<Vec3>& corners,
+                      std::vector<Triangle>& triangles) {
+  for (std::size_t k = 0; k < corners.size(); ++k)
+    triangles.push_back({centre, corners[k], corners[(k + 1) % corners.size()]});
 }
 
 }  // namespace talus::detail

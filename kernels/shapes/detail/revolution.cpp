@@ -28,9 +28,7 @@ class Revolution final : public Surface {
       : given_(given),
         length_((given.end[1] - given.end[0]).norm()),
         axis_((given.end[1] - given.end[0]) / length_) {
-    Eigen::Index across = 0;
-    axis_.cwiseAbs().minCoeff(&across);
-    side_ = axis_.cross(Vec3::Unit(across)).normalized();
+    side_ = any_side(axis_);
   }
 
   Bounds bounds() const override {
@@ -41,6 +39,18 @@ class Revolution final : public Surface {
     return box;
   }
 
+  void show(std::vector<Triangle>& triangles) const override {
+    const std::vector<Vec3> low = circle_corners(given_.end[0], axis_, side_, given_.radius[0]),
+                            high = circle_corners(given_.end[1], axis_, side_, given_.radius[1]);
+    for (std::size_t k = 0; k < low.size(); ++k) {
+      const std::size_t next = (k + 1) % low.size();
+      if (given_.radius[0] > 0) triangles.push_back({low[k], low[next], high[next]});
+      if (given_.radius[1] > 0) triangles.push_back({low[k], high[next], high[k]});
+    }
+    if (given_.shell) return;
+    if (given_.radius[0] > 0) show_disc(given_.end[0], {low.rbegin(), low.rend()}, triangles);
+    if (given_.radius[1] > 0) show_disc(given_.end[1], high, triangles);
+  }
   bool turns_in_itself(const Vec3& axis, const Vec3& point) const override {
     return on_axis(axis, point, axis_, given_.end[0]);
   }

@@ -65,6 +65,9 @@ class Mesh final : public Surface {
   }
 
   Bounds bounds() const override { return box_; }
+  void show(std::vector<Triangle>& triangles) const override {
+    triangles.insert(triangles.end(), triangles_.begin(), triangles_.end());
+  }
 
   SurfacePoint at(const Vec3& centre, std::int32_t feature) const override {
     const auto t = static_cast<std::size_t>(feature);

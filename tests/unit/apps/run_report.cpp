@@ -93,6 +93,31 @@ TEST(RunReport, IsWrittenWhileTheRunGoesOn) {
   EXPECT_TRUE(has(run_report(scratch.path()), "All 0 steps")) << "a run that has just begun";
 }
 
+TEST(RunReport, DrawsACurveOfEachProbeAndOfTheCellWhereThereAreSome) {
+  const ScratchDirectory scratch;
+  make_run(scratch, "done");
+  EXPECT_FALSE(has(run_report(scratch.path()), "Probes") || has(run_report(scratch.path()), "Periodic cell"));
+  write(
+      scratch / "probes.csv",
+      "step,time,probe,count,solid_fraction,vx,vy,vz,temperature,coordination,stress_xx,stress_yy,stress_zz,"
+      "passed_mass,mass_rate\n"
+      "1,0.1,bed,5,0.5,0,0,-1,0,4,1,1,1,0,0\n1,0.1,hole,0,0,0,0,0,0,0,0,0,0,0.5,0.1\n"
+      "2,0.2,bed,6,0.6,0,0,-1,0,4,1,1,1,0,0\n2,0.2,hole,0,0,0,0,0,0,0,0,0,0,0.6,0.2\n");
+  write(
+      scratch / "cell.csv",
+      "step,time,stage,stress_xx,stress_yy,stress_zz,stress_xy,stress_xz,stress_yz,p,q_over_p,solid_fraction,"
+      "contacts_a_grain,coordination,inertial_number\n"
+      "1,0.1,squeeze,1,1,1,0,0,0,1,0,0.5,4,5,0\n2,0.2,shear,1,1,1,0,0.4,0,1,0.7,0.6,4,5,0.1\n");
+  const std::string page = run_report(scratch.path());
+  const std::size_t probes = page.find("Probes"), flow = page.find("mass rate [kg/s]");
+  EXPECT_LT(probes, flow);
+  EXPECT_LT(flow, page.find("Grains in regions"));
+  EXPECT_EQ(page.find(">bed<", flow), page.find(">bed<", page.find("Grains in regions")))
+      << "a probe without a flow has no curve of it";
+  EXPECT_FALSE(has(page, "Granular temperature")) << "what is 0 everywhere is not drawn";
+  EXPECT_LT(page.find("Periodic cell"), page.find("Inertial number"));
+}
+
 TEST(RunReport, IsRefusedWhereNoRunWasBegun) {
   const ScratchDirectory scratch;
   EXPECT_THROW(run_report(scratch.path()), std::invalid_argument);

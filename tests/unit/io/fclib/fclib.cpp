@@ -162,6 +162,15 @@ TEST_F(Fclib, OfOneStemInAFolderHaveNamesOfTheirOwn) {
   EXPECT_EQ(fclib_files(folder / "a.h5").at(0).name, "a");
 }
 
+TEST_F(Fclib, ProblemsInFoldersBelowAreFoundToo) {
+  const fs::path folder = path("deep");
+  fs::create_directories(folder / "one/two");
+  for (const char* name : {"a.hdf5", "one/a.hdf5", "one/two/b.hdf5"}) std::ofstream(folder / name) << "x";
+  std::vector<std::string> names;
+  for (const FclibFile& file : fclib_files(folder)) names.push_back(file.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"a.hdf5", "one/a.hdf5", "b"}));
+}
+
 TEST_F(Fclib, ProblemsInTheFolderOfARunStandBesideItsOtherFiles) {
   const fs::path folder = path("run");
   fs::create_directory(folder);

@@ -68,7 +68,8 @@ TEST(Recorder, WritesWhatItWasGiven) {
   EXPECT_EQ(occurrences(content_of(scratch / "triaxial.csv"), "\n"), 1u + 3u);
   EXPECT_EQ(frame_count(scratch / "results.h5"), 2u);
   const std::string collection = content_of(scratch / "fields.pvd");
-  for (const char* name : {"fields/grains_000001.vtp", "fields/forces_000001.vtp"}) {
+  for (const char* name :
+       {"fields/grains_000001.vtp", "fields/forces_000001.vtp", "fields/walls_000001.vtp"}) {
     EXPECT_EQ(occurrences(collection, name), 1u);
     EXPECT_TRUE(fs::exists(scratch / name)) << name;
   }
@@ -103,6 +104,18 @@ TEST(Recorder, WritesNothingThatWasNotAskedFor) {
   EXPECT_TRUE(read_frame(scratch / "results.h5", 0).contact_bodies.empty());
   for (const char* name : {"fields", "fields.pvd", "forces.svg", "triaxial.svg"}) {
     EXPECT_FALSE(fs::exists(scratch / name)) << name;
+  }
+}
+
+TEST(Recorder, DrawsStressAndStrainOnlyWhereTheSampleIsStrained) {
+  for (const double strain : {0.0, -0.01}) {
+    const ScratchDirectory scratch;
+    Recorder recorder = opened(scratch.path(), default_sinks());
+    TriaxialReport row = triaxial_row(1, "shear");
+    row.strain[2] = strain;
+    recorder.record_step({.step = {.step = 1}, .walls = three_grains().walls, .triaxial = row});
+    recorder.close();
+    EXPECT_EQ(fs::exists(scratch / "triaxial.svg"), strain != 0) << "a box of fixed walls has no curve";
   }
 }
 

@@ -84,6 +84,30 @@ TEST(Chart, AStaircaseHoldsItsValueUpToTheNextPoint) {
   EXPECT_EQ(points[5][1], points[4][1]) << "the last value holds up to the edge";
 }
 
+TEST(Chart, AnAxisWritesItsPowersInOneWay) {
+  Chart chart = two_curves();
+  chart.levels.clear();
+  chart.series = {{"wide", {{1e-6, 1e-5}, {1, 1}}, 0, 0}};
+  const std::string wide = draw_chart(chart);
+  EXPECT_NE(wide.find("10⁻⁵"), std::string::npos);
+  EXPECT_EQ(wide.find(">0.01<"), std::string::npos);
+  chart.series = {{"narrow", {{1e-3, 1e-3}, {1, 1}}, 0, 0}};
+  const std::string narrow = draw_chart(chart);
+  EXPECT_NE(narrow.find(">0.001<"), std::string::npos);
+  EXPECT_EQ(narrow.find("10⁻"), std::string::npos);
+}
+
+TEST(Chart, ACurveUnderAnotherIsSeenOnBothSidesOfIt) {
+  Chart chart = two_curves();
+  chart.series[1].points = chart.series[0].points;
+  const std::string svg = draw_chart(chart);
+  std::vector<double> widths;
+  for (std::size_t at = svg.find("<polyline"); at != std::string::npos; at = svg.find("<polyline", at + 1))
+    widths.push_back(std::stod(svg.substr(svg.find("stroke-width=\"", at) + 14)));
+  ASSERT_EQ(widths.size(), 2U);
+  EXPECT_GT(widths[0], widths[1] + 0.5);
+}
+
 TEST(CsvTable, QuotesWhatItMustAndKeepsEveryDigit) {
   CsvTable table({"name", "value"});
   table.row("a,b", 0.1 + 0.2);

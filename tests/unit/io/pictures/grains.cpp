@@ -44,7 +44,7 @@ TEST(GrainPictures, TheLegendOfMaterialsCountsTheGrainsThatAreSeen) {
   const std::string svg = draw_materials(grains(), names, {});
   EXPECT_NE(svg.find("glass (20)"), std::string::npos);
   EXPECT_NE(svg.find("steel (9)"), std::string::npos);
-  EXPECT_EQ(svg.find("none"), std::string::npos);
+  EXPECT_EQ(svg.find("none ("), std::string::npos);
 }
 
 TEST(GrainPictures, OfNothingAndOfGrainsAtRestArePictures) {

@@ -51,6 +51,11 @@ void expect_same(const Frame& a, const Frame& b) {
     EXPECT_EQ(a.walls[k].position, b.walls[k].position);
     EXPECT_EQ(a.walls[k].velocity, b.walls[k].velocity);
     EXPECT_EQ(a.walls[k].force, b.walls[k].force);
+    EXPECT_EQ(a.walls[k].normal, b.walls[k].normal);
+    EXPECT_EQ(a.walls[k].absent, b.walls[k].absent);
+    EXPECT_EQ(a.walls[k].pose.moved, b.walls[k].pose.moved);
+    EXPECT_EQ(a.walls[k].pose.turn, b.walls[k].pose.turn);
+    EXPECT_EQ(a.walls[k].pose.shift, b.walls[k].pose.shift);
   }
 }
 
@@ -277,6 +282,22 @@ TEST(Vtk, AFrameWithoutAnythingIsStillAFile) {
   EXPECT_TRUE(array_of<float>(grains_vtp(Frame{}), "radius").empty());
 }
 
+TEST(Results, TellWhereWallsAreAndOfWhatMaterial) {
+  const ScratchDirectory scratch;
+  Frame frame = three_grains();
+  frame.walls[0].normal = Vec3(0, 0.6, 0.8);
+  frame.walls[0].absent = true;
+  frame.walls[1].pose = {Mat3(Eigen::AngleAxisd(0.3, Vec3(1, 2, 2) / 3)), Vec3(0.1, -0.2, 1.0 / 3), true};
+  ResultsNames names({"bottom", "left"});
+  names.wall_materials = {1, 0};
+  names.materials = {"sand", "steel"};
+  ResultsWriter writer(scratch / "results.h5", names);
+  writer.append(three_grains());
+  writer.append(frame);
+  expect_same(read_frame(scratch / "results.h5", 0), three_grains());
+  expect_same(read_frame(scratch / "results.h5", 1), frame);
+}
+
 TEST(Vtk, AContactOfAnUnknownBodyIsNamed) {
   Frame frame = three_grains();
   frame.contact_bodies[0] = {7, 99};
@@ -302,6 +323,65 @@ TEST(Picture, DrawsTheGrainsAndForcesOfTheSlabOnly) {
   EXPECT_EQ(occurrences(one, "<circle"), 1u);
   EXPECT_NE(one.find("1 grains, 0 contacts"), std::string::npos);
   EXPECT_EQ(one.find("nan"), std::string::npos);
+}
+
+/// Widths of the lines of forces in order, those of the legend last.
+std::vector<double> force_widths(const std::string& svg) {
+  std::vector<double> widths;
+  for (const std::string& line : split(svg, '\n'))
+    for (const char* colour : {"#e8a27c", "#d3652f", "#8f2d0c"})
+      if (line.starts_with("<line") && line.find(colour) != std::string::npos)
+        widths.push_back(std::stod(line.substr(line.find("stroke-width=\"") + 14)));
+  return widths;
+}
+
+TEST(Picture, ForcesFarBelowTheLoadOfTheSceneAreDrawnThinAndSaidToBeSmall) {
+  const auto setup = setup_with_two_walls();
+  const std::string loaded = draw_forces(three_grains(), setup.walls, {});
+  const std::string noise = draw_forces(three_grains(), setup.walls, {.load = {.pressure = 1e5}});
+  EXPECT_GT(force_widths(loaded).front(), 1);
+  EXPECT_LT(force_widths(noise).front(), 0.1 * force_widths(loaded).front());
+  EXPECT_NE(noise.find("hardly loaded"), std::string::npos);
+  EXPECT_EQ(loaded.find("hardly loaded"), std::string::npos);
+}
+
+TEST(Picture, NamesItsAxesAndItsLegendDoesNotCollide) {
+  Frame frame = three_grains();
+  for (Vec3& force : frame.contact_force) force *= 123456.789;
+  const std::string svg = draw_forces(frame, setup_with_two_walls().walls, {});
+  EXPECT_TRUE(well_formed(svg));
+  EXPECT_EQ(occurrences(svg, ">x</text>"), 1u);
+  EXPECT_EQ(occurrences(svg, ">z</text>"), 1u);
+  double last_end = 0;
+  for (const std::string& line : split(svg, '\n')) {
+    if (!line.starts_with("<text") || !line.ends_with("N</text>")) continue;
+    const double x = std::stod(line.substr(9));
+    const std::string text = line.substr(line.find('>') + 1, line.rfind("</") - line.find('>') - 1);
+    EXPECT_GT(x, last_end) << text;
+    last_end = x + detail::text_width(text, 12);
+  }
+  EXPECT_GT(last_end, 0);
+}
+
+TEST(Picture, ShowsTheWholeOfARoundWallAboutFewGrains) {
+  Wall shell;
+  shell.name = "shell";
+  shell.shape = {"cylinder",
+                 {.number = {{"start", {0, -1, 0}}, {"end", {0, 1, 0}}, {"radius", {1}}, {"inside", {1}}},
+                  .file = "",
+                  .triangles = {}},
+                 nullptr};
+  make_surface(shell.shape);
+  Frame frame = three_grains();
+  frame.contact_bodies.clear(), frame.contact_point.clear(), frame.contact_normal.clear();
+  frame.contact_gap.clear(), frame.contact_force.clear();
+  frame.x = {Vec3(-0.5, 0, -0.6), Vec3(0, 0, -0.7), Vec3(0.5, 0, -0.6)};
+  frame.walls = {WallReport{"shell"}};
+  const std::vector<Wall> walls{shell};
+  const std::string svg = draw_velocities(frame, {.walls = walls});
+  // A line for each flat of the shell that reaches into the view, and the scale; grains alone show none.
+  EXPECT_GT(occurrences(svg, "stroke-width=\"3.00\""), 20u);
+  EXPECT_EQ(occurrences(draw_velocities(frame, {}), "stroke-width=\"3.00\""), 1u);
 }
 
 TEST(Picture, OfAPartitionColoursGrainsBySubdomainAndByMultiplicity) {

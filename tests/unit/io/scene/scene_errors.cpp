@@ -23,6 +23,15 @@ TEST(SceneErrors, KeyInTheWrongTableIsSentToItsOwn) {
   expect_line_refused("#sample", "max_iterations = 3", "sample.max_iterations", "it belongs in [solver]");
 }
 
+TEST(SceneErrors, WordsOfOtherProgramsAreAnsweredWithWhatThereIsHere) {
+  expect_line_refused("#material", "rolling_friction = 0.1", "material.rolling_friction",
+                      "here it is `rolling_resistance`");
+  expect_line_refused("#material", "Youngs_Modulus = 1e7", "material.Youngs_Modulus", "grains are rigid");
+  expect_line_refused("#top", "mesh = \"a.stl\"", "mesh", "a [[wall]] with shape = \"mesh\"");
+  expect_line_refused("#top", "dt = 1e-3", "dt", "here it is `time_step`");
+  expect_line_refused("#top", "ranks = 2", "ranks", "mpirun -n 4 talus run SCENE");
+}
+
 TEST(SceneErrors, WrongTypeSaysWhatWasExpectedAndFound) {
   expect_line_refused("#material", "friction = \"high\"", "material.friction",
                       "expected real, got the text 'high'");

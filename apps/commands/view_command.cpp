@@ -1,0 +1,154 @@
+#include "apps/commands/view_command.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+#include "apps/report/run_folder.hpp"
+#include "apps/shared/child_process.hpp"
+#include "apps/shared/exit_codes.hpp"
+#include "apps/shared/print.hpp"
+#include "io/files/error.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/pictures/view.hpp"
+#include "io/results/results.hpp"
+#include "io/results/wall_triangles.hpp"
+
+namespace talus {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The frames of a run and how they are to be seen. Throws std::exception where options mean nothing.
+class Viewed {
+ public:
+  explicit Viewed(const ViewCommandOptions& options) : results_(fs::path(options.run) / "results.h5") {
+    const RunFolder run = read_run_folder(options.run);
+    if (run.scene) walls_ = run.scene->setup.walls;
+    const auto colour = io::grain_colour(options.colour);
+    if (!colour) {
+      std::string known;
+      for (const std::string& name : io::grain_colours()) known += (known.empty() ? "" : ", ") + name;
+      throw std::invalid_argument(
+          fmt::format("there is nothing '{}' to colour by: {}", options.colour, known));
+    }
+    view_.colour = *colour;
+    view_.camera = {options.azimuth, options.elevation};
+    view_.width = static_cast<std::size_t>(options.width);
+    if (!fs::exists(results_))
+      throw std::invalid_argument(fmt::format("{}: no results.h5 of a run there", options.run));
+    frames_ = io::frame_count(results_);
+    if (frames_ == 0) throw std::invalid_argument(fmt::format("{}: holds no frame yet", results_.string()));
+  }
+
+  std::size_t frames() const { return frames_; }
+  std::vector<std::vector<Triangle>> triangles(const Frame& frame) const {
+    return io::wall_triangles(walls_, frame.walls, io::grain_bounds(frame));
+  }
+  Frame frame(std::size_t k) const { return io::read_frame(results_, k); }
+
+  /// One scale and one place for all frames.
+  void fit() {
+    Bounds box;
+    io::ColourRange range;
+    bool first = true;
+    for (std::size_t k = 0; k < frames_; ++k) {
+      const Frame each = frame(k);
+      const std::vector<double> values = io::grain_values(each, view_.colour);
+      if (values.empty()) continue;
+      const Bounds of_frame = io::view_bounds(each, triangles(each));
+      const io::ColourRange colours = io::colour_range(values, view_.colour);
+      box = first ? of_frame : Bounds{box.low.cwiseMin(of_frame.low), box.high.cwiseMax(of_frame.high)};
+      range = first ? colours
+                    : io::ColourRange{std::min(range.low, colours.low), std::max(range.high, colours.high)};
+      first = false;
+    }
+    if (first) return;
+    view_.box = box;
+    view_.range = range;
+  }
+
+  void write(const Frame& frame, const fs::path& path) const {
+    io::write_whole(path, io::png_bytes(io::render_view(frame, walls_, triangles(frame), view_)));
+  }
+  std::string scale() const {
+    return view_.range ? fmt::format("{} from {:.3g} to {:.3g}", io::label_of(view_.colour), view_.range->low,
+                                     view_.range->high)
+                       : io::label_of(view_.colour);
+  }
+
+ private:
+  fs::path results_;
+  std::vector<Wall> walls_;
+  io::ViewOptions view_;
+  std::size_t frames_ = 0;
+};
+
+int refuse(const std::exception& error, int code) {
+  print_error("talus: error: {}\n", error.what());
+  return code;
+}
+
+std::string image_name(std::size_t frame) {
+  return fmt::format("frame_{:06}.png", frame);
+}
+
+/// Pages of a film have even edges. Says what it could not do: images are there without it.
+void join_images(const fs::path& out, const ViewCommandOptions& options) {
+  if (!program_exists("ffmpeg")) {
+    print_error("talus: there is no ffmpeg here; it would join the images to a film\n");
+    return;
+  }
+  const fs::path log = out / "ffmpeg.log";
+  const int code = run_child(
+      {"ffmpeg", "-y", "-framerate", std::to_string(options.rate), "-i", (out / "frame_%06d.png").string(),
+       "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", (out / "movie.mp4").string()},
+      log);
+  if (code == 0)
+    print_error("talus: {} written\n", (out / "movie.mp4").string());
+  else
+    print_error("talus: warning: ffmpeg ended with {}; {} says why\n", code, log.string());
+}
+
+}  // namespace
+
+int view_command(const ViewCommandOptions& options) {
+  const fs::path out = options.out.empty() ? fs::path(options.run) / "view.png" : fs::path(options.out);
+  try {
+    const Viewed viewed(options);
+    const int frames = static_cast<int>(viewed.frames());
+    const int k = options.frame < 0 ? frames + options.frame : options.frame;
+    if (k < 0 || k >= frames)
+      throw std::invalid_argument(fmt::format("--frame is {}, there are {} frames", options.frame, frames));
+    io::check_output_files({}, {out}, options.force);
+    viewed.write(viewed.frame(static_cast<std::size_t>(k)), out);
+  } catch (const std::exception& error) {
+    return refuse(error, exit_bad_input);
+  }
+  print_error("talus: {} written\n", out.string());
+  return exit_done;
+}
+
+int movie_command(const ViewCommandOptions& options) {
+  const fs::path out = options.out.empty() ? fs::path(options.run) / "movie" : fs::path(options.out);
+  try {
+    Viewed viewed(options);
+    std::vector<fs::path> images{out / "movie.mp4"};
+    for (std::size_t k = 0; k < viewed.frames(); ++k) images.push_back(out / image_name(k));
+    if (fs::exists(out)) io::check_output_files({}, images, options.force);
+    viewed.fit();
+    fs::create_directories(out);
+    for (std::size_t k = 0; k < viewed.frames(); ++k) viewed.write(viewed.frame(k), images[k + 1]);
+    print_error("talus: {} images in {}, coloured by {}\n", viewed.frames(), out.string(), viewed.scale());
+    join_images(out, options);
+  } catch (const std::exception& error) {
+    return refuse(error, exit_bad_input);
+  }
+  return exit_done;
+}
+
+}  // namespace talus

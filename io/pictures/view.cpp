@@ -1,0 +1,282 @@
+#include "io/pictures/view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <tuple>
+
+namespace talus::io {
+namespace {
+
+using Colour = std::array<double, 3>;
+
+constexpr std::size_t samples = 2;  // per pixel and direction
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Directions of the image in space: to the right, up, and towards the viewer.
+struct Axes {
+  Vec3 right, up, viewer;
+};
+
+Axes axes_of(const Camera& camera) {
+  const double a = camera.azimuth * std::numbers::pi / 180, e = camera.elevation * std::numbers::pi / 180;
+  const Vec3 viewer(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+  const Vec3 right(-std::sin(a), std::cos(a), 0);
+  return {right, viewer.cross(right), viewer};
+}
+
+/// From space to samples of the image.
+struct Projection {
+  Axes axes;
+  double scale = 1;     ///< samples a metre
+  double x = 0, y = 0;  ///< of the image's middle along right and up [m]
+  double width = 0, height = 0;
+  Vec3 of(const Vec3& p) const {
+    return {width / 2 + (p.dot(axes.right) - x) * scale, height / 2 - (p.dot(axes.up) - y) * scale,
+            p.dot(axes.viewer) * scale};
+  }
+};
+
+Projection fitted(const Bounds& box, const Axes& axes, std::size_t width) {
+  constexpr double margin = 0.04, tallest = 1.0;
+  double low[2] = {infinity, infinity}, high[2] = {-infinity, -infinity};
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 p;
+    for (int k = 0; k < 3; ++k) p[k] = (corner >> k & 1) != 0 ? box.high[k] : box.low[k];
+    const double at[2] = {p.dot(axes.right), p.dot(axes.up)};
+    for (int k = 0; k < 2; ++k) low[k] = std::min(low[k], at[k]), high[k] = std::max(high[k], at[k]);
+  }
+  const double across = high[0] - low[0], along = high[1] - low[1];
+  Projection view{axes};
+  view.width = static_cast<double>(width * samples);
+  view.height = std::ceil(view.width / samples * std::min(tallest, along / across)) * samples;
+  view.scale = (1 - 2 * margin) * std::min(view.width / across, view.height / along);
+  view.x = (low[0] + high[0]) / 2, view.y = (low[1] + high[1]) / 2;
+  return view;
+}
+
+/// Colours and depths of samples; larger depths are nearer.
+class Canvas {
+ public:
+  explicit Canvas(const Projection& view)
+      : width_(static_cast<std::size_t>(view.width)),
+        height_(static_cast<std::size_t>(view.height)),
+        colour_(width_ * height_, Colour{1, 1, 1}),
+        depth_(width_ * height_, -infinity) {}
+
+  std::size_t width() const { return width_; }
+  std::size_t height() const { return height_; }
+
+  void sphere(const Vec3& at, double radius, const Colour& colour) {
+    static const Vec3 light = Vec3(-0.42, 0.55, 0.72).normalized();
+    each(at.x() - radius, at.x() + radius, at.y() - radius, at.y() + radius,
+         [&](std::size_t x, std::size_t y) {
+           const double dx = (centre(x) - at.x()) / radius, dy = (at.y() - centre(y)) / radius;
+           const double rest = 1 - dx * dx - dy * dy;
+           if (rest < 0) return;
+           const Vec3 normal(dx, dy, std::sqrt(rest));
+           const double bright = std::max(0.0, normal.dot(light));
+           const double rim = std::min(1.0, 0.55 + normal.z());  // the edge of a grain is darker
+           const double shine = 0.18 * std::pow(std::max(0.0, 2 * bright * normal.z() - light.z()), 24);
+           put(x, y, at.z() + radius * normal.z(), shaded(colour, (0.42 + 0.6 * bright) * rim, shine));
+         });
+  }
+
+  void triangle(const std::array<Vec3, 3>& p, const Colour& colour) {
+    const auto [low_x, high_x] = std::minmax({p[0].x(), p[1].x(), p[2].x()});
+    const auto [low_y, high_y] = std::minmax({p[0].y(), p[1].y(), p[2].y()});
+    const double area = cross(p[0], p[1], p[2].x(), p[2].y());
+    if (area == 0) return;
+    each(low_x, high_x, low_y, high_y, [&](std::size_t x, std::size_t y) {
+      const double a = cross(p[1], p[2], centre(x), centre(y)) / area,
+                   b = cross(p[2], p[0], centre(x), centre(y)) / area, c = 1 - a - b;
+      if (a < 0 || b < 0 || c < 0) return;
+      put(x, y, a * p[0].z() + b * p[1].z() + c * p[2].z(), colour);
+    });
+  }
+
+  /// As wide as a pixel; what lies before it hides it.
+  void line(const Vec3& from, const Vec3& to, const Colour& colour) {
+    const double length = std::max(std::abs(to.x() - from.x()), std::abs(to.y() - from.y()));
+    const auto steps = static_cast<std::size_t>(std::ceil(length)) + 1;
+    for (std::size_t k = 0; k <= steps; ++k) {
+      const Vec3 at = from + static_cast<double>(k) / static_cast<double>(steps) * (to - from);
+      const double half = samples / 2.0;
+      each(at.x() - half, at.x() + half, at.y() - half, at.y() + half,
+           [&](std::size_t x, std::size_t y) { put(x, y, at.z() + 1, colour); });
+    }
+  }
+
+  /// Darkens grains that lie deeper than those around them within `reach` samples (after Luft, Colditz and
+  /// Deussen 2006): gaps look deep. What is drawn later is left as it is.
+  void darken_gaps(double reach) {
+    std::vector<double> around(depth_.size(), 0.0), weight(depth_.size(), 0.0);
+    for (std::size_t k = 0; k < depth_.size(); ++k)
+      if (depth_[k] > -infinity) around[k] = depth_[k], weight[k] = 1;
+    const auto radius = static_cast<std::size_t>(std::clamp(reach, 1.0, 60.0));
+    for (int pass = 0; pass < 2; ++pass)
+      for (std::vector<double>* of : {&around, &weight}) {
+        blur(*of, width_, height_, 1, width_, radius);
+        blur(*of, height_, width_, width_, 1, radius);
+      }
+    for (std::size_t k = 0; k < depth_.size(); ++k) {
+      if (depth_[k] == -infinity) continue;
+      const double deep = std::clamp((around[k] / weight[k] - depth_[k]) / (2 * reach), 0.0, 1.0);
+      for (double& c : colour_[k]) c *= 1 - 0.6 * deep;
+    }
+  }
+
+  Image image() const {
+    Image out{width_ / samples, height_ / samples, {}};
+    for (std::size_t y = 0; y < out.height; ++y)
+      for (std::size_t x = 0; x < out.width; ++x)
+        for (std::size_t c = 0; c < 3; ++c) {
+          double sum = 0;
+          for (std::size_t v = 0; v < samples; ++v)
+            for (std::size_t u = 0; u < samples; ++u)
+              sum += colour_[(y * samples + v) * width_ + x * samples + u][c];
+          out.rgb.push_back(
+              static_cast<std::uint8_t>(std::lround(255 * std::clamp(sum / (samples * samples), 0.0, 1.0))));
+        }
+    return out;
+  }
+
+ private:
+  static double centre(std::size_t k) { return static_cast<double>(k) + 0.5; }
+  static double cross(const Vec3& a, const Vec3& b, double x, double y) {
+    return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
+  }
+  static Colour shaded(const Colour& colour, double bright, double shine) {
+    return {colour[0] * bright + shine, colour[1] * bright + shine, colour[2] * bright + shine};
+  }
+  template <class Visit>
+  void each(double low_x, double high_x, double low_y, double high_y, const Visit& visit) {
+    const auto end = [](double low, double high, std::size_t size) {
+      const double most = static_cast<double>(size);
+      return std::pair{static_cast<std::size_t>(std::clamp(std::floor(low), 0.0, most)),
+                       static_cast<std::size_t>(std::clamp(std::ceil(high), 0.0, most))};
+    };
+    const auto [x0, x1] = end(low_x, high_x, width_);
+    const auto [y0, y1] = end(low_y, high_y, height_);
+    for (std::size_t y = y0; y < y1; ++y)
+      for (std::size_t x = x0; x < x1; ++x) visit(x, y);
+  }
+  void put(std::size_t x, std::size_t y, double depth, const Colour& colour) {
+    const std::size_t k = y * width_ + x;
+    if (depth <= depth_[k]) return;
+    depth_[k] = depth;
+    colour_[k] = colour;
+  }
+  /// Mean over 2 radius + 1 neighbours along lines of `length` values, `step` apart; `lines` of them.
+  static void blur(std::vector<double>& values, std::size_t length, std::size_t lines, std::size_t step,
+                   std::size_t next, std::size_t radius) {
+    std::vector<double> sum(length + 1);
+    for (std::size_t line = 0; line < lines; ++line) {
+      double* first = values.data() + line * next;
+      for (std::size_t k = 0; k < length; ++k) sum[k + 1] = sum[k] + first[k * step];
+      for (std::size_t k = 0; k < length; ++k) {
+        const std::size_t from = k < radius ? 0 : k - radius, to = std::min(length, k + radius + 1);
+        first[k * step] = (sum[to] - sum[from]) / static_cast<double>(to - from);
+      }
+    }
+  }
+
+  std::size_t width_, height_;
+  std::vector<Colour> colour_;
+  std::vector<double> depth_;
+};
+
+Vec3 centre_of(const Triangle& t) {
+  return (t[0] + t[1] + t[2]) / 3;
+}
+
+/// Whether a part of a wall about `part` stands between the viewer and the grains about `middle`. Solids
+/// among the grains hide what is behind them like grains do.
+bool stands_before(const Wall& wall, const Vec3& part, const Vec3& middle, const Vec3& viewer) {
+  if (wall.surface() != nullptr && !wall.shape.values.truth("inside")) return false;
+  return (part - middle).dot(viewer) > 0;
+}
+
+void draw_wall(Canvas& canvas, const Projection& view, const Wall& wall, const Vec3& grains,
+               std::span<const Triangle> triangles) {
+  if (triangles.empty()) return;
+  constexpr Colour edge{0.35, 0.4, 0.45};
+  Vec3 middle = Vec3::Zero();
+  for (const Triangle& triangle : triangles)
+    middle += centre_of(triangle) / static_cast<double>(triangles.size());
+  for (const Triangle& triangle : triangles) {
+    const bool before = wall.surface() == nullptr
+                            ? stands_before(wall, middle, grains, view.axes.viewer)
+                            : stands_before(wall, centre_of(triangle), middle, view.axes.viewer);
+    if (before) continue;
+    const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
+    const double bright = 0.84 + 0.12 * std::abs(normal.dot(Vec3(0.3, 0.2, 0.93)));
+    canvas.triangle({view.of(triangle[0]), view.of(triangle[1]), view.of(triangle[2])},
+                    {bright, bright, std::min(1.0, bright + 0.015)});
+  }
+  for (const auto& [a, b] : edges_of(triangles)) canvas.line(view.of(a), view.of(b), edge);
+}
+
+}  // namespace
+
+Bounds view_bounds(const Frame& frame, std::span<const std::vector<Triangle>> walls) {
+  Bounds box{Vec3::Constant(infinity), Vec3::Constant(-infinity)};
+  const auto widen = [&](const Vec3& p, double r) {
+    box.low = box.low.cwiseMin(p - Vec3::Constant(r)), box.high = box.high.cwiseMax(p + Vec3::Constant(r));
+  };
+  for (std::size_t k = 0; k < frame.id.size(); ++k) widen(frame.x[k], frame.radius[k]);
+  for (const std::vector<Triangle>& wall : walls)
+    for (const Triangle& triangle : wall)
+      for (const Vec3& corner : triangle) widen(corner, 0);
+  return box;
+}
+
+std::vector<std::array<Vec3, 2>> edges_of(std::span<const Triangle> triangles) {
+  const double flat = std::cos(std::numbers::pi / 6);
+  const auto less = [](const Vec3& a, const Vec3& b) {
+    return std::tuple(a.x(), a.y(), a.z()) < std::tuple(b.x(), b.y(), b.z());
+  };
+  const auto less_ends = [&](const std::array<Vec3, 2>& a, const std::array<Vec3, 2>& b) {
+    return less(a[0], b[0]) || (!less(b[0], a[0]) && less(a[1], b[1]));
+  };
+  std::map<std::array<Vec3, 2>, std::vector<Vec3>, decltype(less_ends)> edges(less_ends);
+  for (const Triangle& t : triangles) {
+    const Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 &a = t[k], &b = t[(k + 1) % 3];
+      edges[less(a, b) ? std::array<Vec3, 2>{a, b} : std::array<Vec3, 2>{b, a}].push_back(normal);
+    }
+  }
+  std::vector<std::array<Vec3, 2>> sharp;
+  for (const auto& [ends, normals] : edges)
+    if (normals.size() != 2 || std::abs(normals[0].dot(normals[1])) < flat) sharp.push_back(ends);
+  return sharp;
+}
+
+Image render_view(const Frame& frame, std::span<const Wall> walls,
+                  std::span<const std::vector<Triangle>> triangles, const ViewOptions& options) {
+  const Bounds box = options.box.value_or(view_bounds(frame, triangles));
+  if (!(box.high.array() >= box.low.array()).all() || (box.high - box.low).norm() == 0) {
+    const std::size_t height = options.width / 2;
+    return {options.width, height, std::vector<std::uint8_t>(3 * options.width * height, 255)};
+  }
+  const Projection view = fitted(box, axes_of(options.camera), options.width);
+  Canvas canvas(view);
+  const std::vector<double> values = grain_values(frame, options.colour);
+  const ColourRange range = options.range.value_or(colour_range(values, options.colour));
+  double radii = 0;
+  for (std::size_t k = 0; k < frame.id.size(); ++k) {
+    radii += frame.radius[k];
+    canvas.sphere(view.of(frame.x[k]), frame.radius[k] * view.scale,
+                  colour_of(values[k], range, options.colour));
+  }
+  if (!frame.id.empty()) canvas.darken_gaps(1.5 * radii / static_cast<double>(frame.id.size()) * view.scale);
+  const Vec3 middle = (box.low + box.high) / 2;
+  for (std::size_t w = 0; w < std::min(walls.size(), triangles.size()); ++w)
+    draw_wall(canvas, view, walls[w], middle, triangles[w]);
+  return canvas.image();
+}
+
+}  // namespace talus::io
