@@ -15,11 +15,13 @@ install(CODE "
 install(FILES ${PROJECT_BINARY_DIR}/talus.man DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 RENAME talus.1 COMPONENT program)
 install(FILES ${PROJECT_BINARY_DIR}/talus.completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
         RENAME talus COMPONENT program)
-install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
-install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program PATTERN history EXCLUDE)
+install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/talus COMPONENT program)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/talus COMPONENT program PATTERN history EXCLUDE)
 install(PROGRAMS apps/packages/smoke.sh DESTINATION ${CMAKE_INSTALL_DATADIR}/talus COMPONENT program)
 install(DIRECTORY apps/python/talus DESTINATION lib/python3/dist-packages COMPONENT python PATTERN __pycache__ EXCLUDE)
 
+# `install` and `cpack` take what has been built, and build no tests for that.
+set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME talus)
 set(CPACK_PACKAGE_VENDOR "the Talus authors")

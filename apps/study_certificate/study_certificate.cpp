@@ -1,6 +1,7 @@
 #include "apps/study_certificate/study_certificate.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -184,10 +185,11 @@ void add_study_certificate_options(CLI::App& app, StudyCertificateOptions& optio
       ->capture_default_str();
   std::vector<std::string> names;
   for (const SceneFamily& family : scene_families()) names.emplace_back(family.name);
-  app.add_option("--families", options.families, "families of scenes [all]")
+  app.add_option("--families", options.families,
+                 fmt::format("families of scenes, of {} [all]", fmt::join(names, ", ")))
       ->type_name("A,B")
       ->delimiter(',')
-      ->check(CLI::IsMember(names));
+      ->check(CLI::IsMember(names).description(""));
   app.add_option("--tolerances", options.tolerances,
                  "solver.tolerance and solver.balance_tolerance alike [0.001; of a file its own]")
       ->type_name("T,..")
@@ -197,7 +199,8 @@ void add_study_certificate_options(CLI::App& app, StudyCertificateOptions& optio
       ->type_name("N")
       ->check(CLI::Range(1, most_subdomains));
   app.add_option("--coupling", options.coupling, "decomposition.coupling of every scene")
-      ->check(CLI::IsMember(couplings().names()));
+      ->type_name(fmt::format("{}", fmt::join(couplings().names(), "|")))
+      ->check(CLI::IsMember(couplings().names()).description(""));
   app.add_option("--scenes-from", options.scenes_from,
                  "a scene file, or a folder of them, instead of made ones")
       ->type_name("PATH")

@@ -222,8 +222,8 @@ void add_study_error_options(CLI::App& app, StudyErrorOptions& options) {
       ->type_name("S,..")
       ->delimiter(',');
   app.add_option("--only", options.only, "step: no whole runs; run: no single step")
-      ->type_name("PART")
-      ->check(CLI::IsMember({"step", "run"}));
+      ->type_name("step|run")
+      ->check(CLI::IsMember({"step", "run"}).description(""));
   app.add_option("--at-step", options.at_step, "steps before the one that is solved in every way")
       ->type_name("N")
       ->capture_default_str()
