@@ -196,8 +196,8 @@ std::vector<BodyProblem> GlobalSolver::gather() const {
 }
 
 double GlobalSolver::sweeps_needed() const {
-  // What contacts tell one another in a cell that follows a stress goes through the cell at once, or over half
-  // of it by diffusion: nothing is handed on to any one body.
+  // What contacts tell one another in a cell that follows a stress goes through the cell at once, or over
+  // half of it by diffusion: nothing is handed on to any one body.
   if (state_.cell.loaded()) {
     const double layers = 0.5 * std::cbrt(state_.domain.edges().prod()) / state_.cell.length;
     return layers * layers;
