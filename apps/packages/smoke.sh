@@ -27,6 +27,6 @@ if command -v python3 >/dev/null && python3 -c "import talus" 2>/dev/null; then
 import talus
 run = talus.open('one')
 assert len(run.steps['step']) == 20
-print('smoke: Python reads', len(run.frame(-1).radius), 'grains')"
+print('smoke: Python reads', len(run.frame(-1).radii), 'grains')"
 fi
 echo "smoke: passed"

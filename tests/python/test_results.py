@@ -86,7 +86,7 @@ def test_every_array_of_a_frame_has_its_unit(heap_run):
     with h5py.File(heap_run.directory / "results.h5") as file:
         file.visititems(lambda name, item: units.update({name: item.attrs["units"].decode()})
                         if isinstance(item, h5py.Dataset) else None)
-    assert len(units) == 1 + 4 * 13  # the names of the walls, and the arrays of each frame
+    assert len(units) == 1 + 4 * 15  # the names of the walls, and the arrays of each frame
     assert units["frames/000003/bodies/u"] == "m/s" and units["frames/000000/contacts/force"] == "N"
 
 
