@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <ostream>
 #include <random>
 #include <utility>
 #include <vector>
@@ -228,6 +229,9 @@ struct Case {
   double mu;
   SolverMethod method;
   int subdomains = 1;
+  friend std::ostream& operator<<(std::ostream& out, const Case& c) {
+    return out << c.method.name() << ", friction " << c.mu << ", subdomains " << c.subdomains;
+  }
 };
 class RandomPackings : public testing::TestWithParam<Case> {};
 
