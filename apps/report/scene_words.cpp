@@ -125,7 +125,7 @@ std::string stage_words(const Stage& stage) {
   text += law_words("restitution", stage.laws, &PairLaw::restitution);
   text += law_words("cohesion", stage.laws, &PairLaw::cohesion, " N");
   text += law_words("rolling resistance", stage.laws, &PairLaw::rolling_resistance);
-  if (stage.flows())
+  if (!stage.strain_rates.isZero(0) || !stage.shear_rates.isZero(0))
     text += fmt::format("; the cell flows, strain rates {:g}, {:g}, {:g}, shear rates {:g}, {:g}, {:g} 1/s",
                         stage.strain_rates[0], stage.strain_rates[1], stage.strain_rates[2],
                         stage.shear_rates[0], stage.shear_rates[1], stage.shear_rates[2]);
