@@ -44,7 +44,7 @@ std::vector<T> read_integers(hid_t file, const std::string& path, const std::str
 }
 
 /// Where walls are and how they stand; files of earlier versions do not tell.
-void read_places(Place frame, std::vector<WallReport>& walls) {
+void read_places(detail::Place frame, std::vector<WallReport>& walls) {
   const auto has = [&](const char* array) { return H5Lexists(frame.group, array, H5P_DEFAULT) > 0; };
   const auto fits = [&](std::size_t rows) {
     if (rows != walls.size())

@@ -243,22 +243,22 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
   Gathered gathered = exchange_surroundings(decomposition, ranks, sample, reach);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
   /// `source`: into the own slots, then into what came.
-  struct Place {
+  struct Row {
     std::uint64_t key;
     std::size_t source;
   };
-  std::vector<Place> order(count);
+  std::vector<Row> order(count);
   // Field by field, so that at no time there are two of everything.
-  const auto pick = [&](const Place& place, const auto& of_slot, const auto& of_record) {
+  const auto pick = [&](const Row& place, const auto& of_slot, const auto& of_record) {
     return place.source < own ? of_slot(at(gathered.own[place.source]))
                               : of_record(gathered.come[place.source - own]);
   };
-  const auto id = [&](const Place& place) {
+  const auto id = [&](const Row& place) {
     return pick(
         place, [&](std::size_t s) { return bodies.id[s]; },
         [](const BodyRecord& record) { return BodyId{record.id}; });
   };
-  const auto x = [&](const Place& place) {
+  const auto x = [&](const Row& place) {
     return pick(
         place, [&](std::size_t s) { return bodies.x[s]; }, centre_of);
   };
@@ -268,14 +268,14 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
     order[k].key = morton_key(q[0], q[1], q[2]);
   }
   std::sort(order.begin(), order.end(),
-            [&](const Place& a, const Place& b) { return a.key != b.key ? a.key < b.key : id(a) < id(b); });
+            [&](const Row& a, const Row& b) { return a.key != b.key ? a.key < b.key : id(a) < id(b); });
   Surroundings around;
   const auto fill = [&](auto& field, const auto& value) {
     field.reserve(count);
-    for (const Place& place : order) field.push_back(value(place));
+    for (const Row& place : order) field.push_back(value(place));
   };
   const auto take = [&](auto& field, const auto& of_slot, const auto& of_record) {
-    fill(field, [&](const Place& place) { return pick(place, of_slot, of_record); });
+    fill(field, [&](const Row& place) { return pick(place, of_slot, of_record); });
   };
   fill(around.bodies.id, id);
   fill(around.bodies.x, x);
