@@ -1,5 +1,6 @@
 #include "io/pictures/view.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,5 +1,6 @@
 #include "io/results/wall_triangles.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <limits>
