@@ -29,14 +29,7 @@ class Viewed {
   explicit Viewed(const ViewCommandOptions& options) : results_(fs::path(options.run) / "results.h5") {
     const RunFolder run = read_run_folder(options.run);
     if (run.scene) walls_ = run.scene->setup.walls;
-    const auto colour = io::grain_colour(options.colour);
-    if (!colour) {
-      std::string known;
-      for (const std::string& name : io::grain_colours()) known += (known.empty() ? "" : ", ") + name;
-      throw std::invalid_argument(
-          fmt::format("there is nothing '{}' to colour by: {}", options.colour, known));
-    }
-    view_.colour = *colour;
+    view_.colour = io::grain_colours().named(options.colour).kind;
     view_.camera = {options.azimuth, options.elevation};
     view_.width = static_cast<std::size_t>(options.width);
     if (!fs::exists(results_))

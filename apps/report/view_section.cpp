@@ -36,15 +36,6 @@ std::optional<Frame> last_frame(const RunFolder& run) {
   }
 }
 
-std::string packed(const std::vector<std::uint8_t>& bytes) {
-  std::string text;
-  const io::WriteText out = [&](std::string_view more) { text += more; };
-  io::detail::Base64 base64(out);
-  base64.add(std::as_bytes(std::span(bytes)));
-  base64.finish();
-  return text;
-}
-
 std::array<int, 3> bytes_of(const std::array<double, 3>& colour) {
   std::array<int, 3> bytes{};
   for (std::size_t c = 0; c < 3; ++c) bytes[c] = static_cast<int>(std::lround(255 * colour[c]));
@@ -116,9 +107,12 @@ json live_data(const Frame& frame, const std::vector<std::vector<Triangle>>& wal
     }
   for (const Colouring& colour : colours) words.push_back(colour.words);
   const io::Camera camera;
-  return {{"grains", packed(bytes)},   {"size", {size.x() / longest, size.y() / longest, size.z() / longest}},
-          {"colours", words},          {"walls", lines},
-          {"azimuth", camera.azimuth}, {"elevation", camera.elevation}};
+  return {{"grains", io::detail::base64_of(std::as_bytes(std::span(bytes)))},
+          {"size", {size.x() / longest, size.y() / longest, size.z() / longest}},
+          {"colours", words},
+          {"walls", lines},
+          {"azimuth", camera.azimuth},
+          {"elevation", camera.elevation}};
 }
 
 std::string live_view(const json& data) {

@@ -11,7 +11,6 @@
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/step/cell_flow.hpp"
 #include "runtime/step/dealing.hpp"
-#include "runtime/step/simulation.hpp"
 
 namespace talus::literature {
 
@@ -69,6 +68,20 @@ Stage triaxial_stage(double friction, double rate, double strain) {
   return stage;
 }
 
+StepCount run_to_end(const Setup& setup, Sample sample, int threads,
+                     const std::function<void(const Simulation&)>& look) {
+  graph::Executor executor({.threads = threads});
+  const graph::Communicator& alone = graph::one_rank();
+  Simulation simulation(setup, deal_out(std::move(sample), setup.decomposition, alone), executor, alone);
+  StepCount count;
+  for (; !simulation.finished(); simulation.begin_next_stage()) {
+    ++count.steps;
+    if (!simulation.step().converged) ++count.missed;
+    look(simulation);
+  }
+  return count;
+}
+
 CellRun run_cell(const CellPlan& plan) {
   constexpr double radius = 0.5;
   Sample sample;
@@ -85,28 +98,29 @@ CellRun run_cell(const CellPlan& plan) {
   setup.decomposition.subdomains = 1;
   sample.x =
       scatter(sample.radius, {.high = setup.domain.edges(), .domain = setup.domain, .seed = plan.seed});
-  graph::Executor executor({.threads = plan.effort.threads});
-  const graph::Communicator& alone = graph::one_rank();
-  Simulation simulation(setup, deal_out(std::move(sample), setup.decomposition, alone), executor, alone);
   CellRun run;
   Patience patience(stderr, std::chrono::seconds(5), std::chrono::seconds(15));
   double sheared = 0;
-  for (; !simulation.finished(); sheared = simulation.begin_next_stage() ? 0 : sheared) {
-    const StepReport& report = simulation.step();
-    ++run.steps;
-    if (!report.converged) ++run.missed;
-    sheared += report.time_step * shear_rate(gradient_before(simulation.state().domain, 0));
-    const bool ends = simulation.stage_fraction() >= 1;
-    if (report.step % parameters.every == 0 || ends) {
-      run.rows.push_back(simulation.cell().value());
-      run.sheared.push_back(sheared);
-    }
-    if (ends) run.last = simulation.frame();
-    patience.tell([&] {
-      return fmt::format("  {} grains, seed {}, {} {:.0f} %", plan.grains, plan.seed, simulation.stage().name,
-                         100 * simulation.stage_fraction());
-    });
-  }
+  std::size_t stage = 0;
+  const StepCount count =
+      run_to_end(setup, std::move(sample), plan.effort.threads, [&](const Simulation& simulation) {
+        if (simulation.stage_index() != stage) sheared = 0;
+        stage = simulation.stage_index();
+        const StepReport& report = simulation.report();
+        sheared += report.time_step * shear_rate(gradient_before(simulation.state().domain, 0));
+        const bool ends = simulation.stage_fraction() >= 1;
+        if (report.step % parameters.every == 0 || ends) {
+          run.rows.push_back(simulation.cell().value());
+          run.sheared.push_back(sheared);
+        }
+        if (ends) run.last = simulation.frame();
+        patience.tell([&] {
+          return fmt::format("  {} grains, seed {}, {} {:.0f} %", plan.grains, plan.seed,
+                             simulation.stage().name, 100 * simulation.stage_fraction());
+        });
+      });
+  run.steps = count.steps;
+  run.missed = count.missed;
   return run;
 }
 

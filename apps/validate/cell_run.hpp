@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "apps/validate/validation_case.hpp"
+#include "kernels/samples/sample.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/setup.hpp"
+#include "runtime/step/simulation.hpp"
 
 namespace talus::literature {
 
@@ -32,6 +34,14 @@ Stage shear_stage(double friction, double rate, double strain);
 
 /// Squeezes at a rate along z, under 1 along x and y, by a strain of `strain`.
 Stage triaxial_stage(double friction, double rate, double strain);
+
+/// Runs a setup to its end, on one rank; `look` sees the simulation behind each step. Steps, and those over
+/// their tolerance, are counted.
+struct StepCount {
+  std::int64_t steps = 0, missed = 0;
+};
+StepCount run_to_end(const Setup& setup, Sample sample, int threads,
+                     const std::function<void(const Simulation&)>& look);
 
 struct CellRun {
   std::vector<CellReport> rows;  ///< every tenth step

@@ -5,9 +5,6 @@
 #include <cmath>
 
 #include "apps/validate/cell_run.hpp"
-#include "runtime/graph/one_rank.hpp"
-#include "runtime/step/dealing.hpp"
-#include "runtime/step/simulation.hpp"
 
 namespace talus::literature {
 
@@ -45,19 +42,15 @@ CaseResult lattice_case(const Effort& effort) {
   stage.end.steps = 5;
   for (std::size_t k = 0; k < 3; ++k) stage.stress.to[k] = stress[k];
   const Setup setup = exact_setup(Vec3::Constant(6), stage);
-  graph::Executor executor({.threads = effort.threads});
-  const graph::Communicator& alone = graph::one_rank();
-  Simulation simulation(setup, deal_out(lattice_of(6), setup.decomposition, alone), executor, alone);
   CaseResult result;
   double worst = 0;
-  while (!simulation.finished()) {
-    if (!simulation.step().converged) ++result.missed;
-    ++result.steps;
+  const StepCount count = run_to_end(setup, lattice_of(6), effort.threads, [&](const Simulation& simulation) {
     const CellReport cell = simulation.cell().value();
     for (std::size_t k = 0; k < 6; ++k)
       worst = std::max(worst, std::abs(cell.stress[k] - (k < 3 ? stress[k] : 0)) / stress[0]);
-    simulation.begin_next_stage();
-  }
+  });
+  result.steps = count.steps;
+  result.missed = count.missed;
   result.measures = {{"stress against the one asked for, worst component and step", worst, 0, 0, 1e-7,
                       "closed form: columns carry sigma d^2"}};
   return result;
@@ -75,17 +68,15 @@ CaseResult free_cell_case(const Effort& effort) {
   Sample sample = lattice_of(2);
   for (Vec3& x : sample.x) x *= 4;
   const double inertia = 100 * 8 * 3.14159265358979324 / 6;
-  graph::Executor executor({.threads = effort.threads});
-  const graph::Communicator& alone = graph::one_rank();
-  Simulation simulation(setup, deal_out(std::move(sample), setup.decomposition, alone), executor, alone);
   CaseResult result;
-  while (!simulation.finished()) {
-    if (!simulation.step().converged) ++result.missed;
-    ++result.steps;
-    simulation.begin_next_stage();
-  }
-  const Domain& domain = simulation.state().domain;
-  const double z = domain.cell.zz, speed = domain.rates.zz;
+  double z = 0, speed = 0;
+  const StepCount count =
+      run_to_end(setup, std::move(sample), effort.threads, [&](const Simulation& simulation) {
+        z = simulation.state().domain.cell.zz;
+        speed = simulation.state().domain.rates.zz;
+      });
+  result.steps = count.steps;
+  result.missed = count.missed;
   const double exact = std::sqrt(2 * edge * edge / (3 * inertia) * (edge * edge * edge - z * z * z));
   result.measures = {{"speed of the face over sqrt(2 A sigma (z_0^3 - z^3)/(3 M d^2))", -speed / exact, 0,
                       0.999, 1.001, "closed form: h'' = -(V sigma/(M d^2)) h"}};

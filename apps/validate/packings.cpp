@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "apps/validate/cell_run.hpp"
+#include "apps/validate/fits.hpp"
 
 namespace talus::literature {
 
@@ -35,19 +35,6 @@ Packings pack(std::int64_t grains, double friction, const Effort& effort, CaseRe
     coordination.push_back(last_of(run, "press").coordination);
   }
   return {mean_of(solid_fraction), mean_of(coordination)};
-}
-
-/// Where the straight line through the points, of least squares, meets x = 0.
-double at_zero(const std::vector<double>& x, const std::vector<double>& y) {
-  const auto n = static_cast<double>(x.size());
-  const double mx = std::accumulate(x.begin(), x.end(), 0.0) / n,
-               my = std::accumulate(y.begin(), y.end(), 0.0) / n;
-  double xy = 0, xx = 0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    xy += (x[k] - mx) * (y[k] - my);
-    xx += (x[k] - mx) * (x[k] - mx);
-  }
-  return my - xy / xx * mx;
 }
 
 io::Chart size_chart(const std::vector<double>& x, const std::vector<double>& y, double published) {
@@ -88,7 +75,7 @@ CaseResult frictionless_packing_case(const Effort& effort) {
     result.measures.push_back({fmt::format("solid fraction, {} grains", grains), largest.solid_fraction.value,
                                largest.solid_fraction.error});
   }
-  result.measures.push_back({"solid fraction, extrapolated in N^(-1/3)", at_zero(x, y),
+  result.measures.push_back({"solid fraction, extrapolated in N^(-1/3)", fit_line(x, y).start,
                              largest.solid_fraction.error, 0.637, 0.641, agnolin_roux});
   result.measures.push_back({"coordination without rattlers", largest.coordination.value,
                              largest.coordination.error, 5.97, 6.03, agnolin_roux});

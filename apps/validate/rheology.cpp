@@ -8,34 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "apps/validate/fits.hpp"
 #include "apps/validate/steady.hpp"
 
 namespace talus::literature {
-
-namespace {
-
-/// mu_s + (mu_2 - mu_s)/(1 + I_0/I) of least squares: I_0 by search, the others linear.
-struct RheologyFit {
-  double mu_s = 0, mu_2 = 0, I_0 = 0, residual = std::numeric_limits<double>::infinity();
-};
-RheologyFit fit_rheology(const std::vector<double>& I, const std::vector<double>& mu) {
-  RheologyFit best;
-  for (double I_0 = 0.02; I_0 < 3; I_0 *= 1.02) {
-    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-    for (std::size_t k = 0; k < I.size(); ++k) {
-      const double x = 1 / (1 + I_0 / I[k]);
-      n += 1, sx += x, sy += mu[k], sxx += x * x, sxy += x * mu[k];
-    }
-    const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx), start = (sy - slope * sx) / n;
-    double residual = 0;
-    for (std::size_t k = 0; k < I.size(); ++k)
-      residual += std::pow(start + slope / (1 + I_0 / I[k]) - mu[k], 2);
-    if (residual < best.residual) best = {start, start + slope, I_0, residual};
-  }
-  return best;
-}
-
-}  // namespace
 
 CaseResult rheology_case(const Effort& effort) {
   CaseResult result;
@@ -59,10 +35,12 @@ CaseResult rheology_case(const Effort& effort) {
   result.measures.push_back({"solid fraction likewise", phi.back() - phi.front(), 0, -0.2, -0.01,
                              "it falls: GDR MiDi, Eur. Phys. J. E 14 (2004) 341"});
   if (effort.brief) return result;
-  const RheologyFit fit = fit_rheology(I, mu);
-  result.measures.push_back({"mu_s of the fit", fit.mu_s, 0, 0.30, 0.42, jop + " have 0.383"});
-  result.measures.push_back({"mu_2 of the fit", fit.mu_2});
-  result.measures.push_back({"I_0 of the fit", fit.I_0});
+  const auto part = [](double at, double I_0) { return 1 / (1 + I_0 / at); };
+  const CurveFit fit = fit_curve(I, mu, 0.02, 3, part);
+  const double mu_s = fit.line.start, mu_2 = fit.line.start + fit.line.slope;
+  result.measures.push_back({"mu_s of the fit", mu_s, 0, 0.30, 0.42, jop + " have 0.383"});
+  result.measures.push_back({"mu_2 of the fit", mu_2});
+  result.measures.push_back({"I_0 of the fit", fit.parameter});
   io::Chart chart = chart_of("rheology", "Shear ratio against the inertial number", "I", "tau/p");
   chart.log_y = false;
   io::ChartSeries found{"Talus, friction 0.4", {}}, line{"fit", {}}, published{"Jop et al. 2006", {}};
@@ -72,7 +50,7 @@ CaseResult rheology_case(const Effort& effort) {
   published.dash = 1;
   for (std::size_t k = 0; k < I.size(); ++k) found.points.push_back({I[k], mu[k]});
   for (double x = 1e-3; x < 0.35; x *= 1.1) {
-    line.points.push_back({x, fit.mu_s + (fit.mu_2 - fit.mu_s) / (1 + fit.I_0 / x)});
+    line.points.push_back({x, mu_s + (mu_2 - mu_s) * part(x, fit.parameter)});
     published.points.push_back({x, 0.383 + 0.26 / (1 + 0.279 / x)});
   }
   chart.series = {found, line, published};

@@ -8,32 +8,12 @@
 #include <numbers>
 #include <vector>
 
+#include "apps/validate/fits.hpp"
 #include "apps/validate/steady.hpp"
 
 namespace talus::literature {
 
 namespace {
-
-/// y_0 + c x^a of least squares: a by search between 0.2 and 1, the others linear.
-struct PowerFit {
-  double start = 0, power = 0, residual = std::numeric_limits<double>::infinity();
-};
-PowerFit fit_power(const std::vector<double>& x, const std::vector<double>& y) {
-  PowerFit best;
-  for (double power = 0.2; power <= 1; power += 0.005) {
-    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-    for (std::size_t k = 0; k < x.size(); ++k) {
-      const double u = std::pow(x[k], power);
-      n += 1, sx += u, sy += y[k], sxx += u * u, sxy += u * y[k];
-    }
-    const double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx), start = (sy - slope * sx) / n;
-    double residual = 0;
-    for (std::size_t k = 0; k < x.size(); ++k)
-      residual += std::pow(start + slope * std::pow(x[k], power) - y[k], 2);
-    if (residual < best.residual) best = {start, power, residual};
-  }
-  return best;
-}
 
 double degrees(double ratio) {
   return std::atan(ratio) * 180 / std::numbers::pi;
@@ -63,10 +43,11 @@ CaseResult frictionless_shear_case(const Effort& effort) {
     result.measures.push_back({fmt::format("macroscopic angle at I = {:g} [degrees]", rate),
                                degrees(slowest.ratio.value), degrees(slowest.ratio.error)});
   }
-  const PowerFit fit = fit_power(I, ratio);
-  result.measures.push_back({"exponent of I in the fit", fit.power});
-  result.measures.push_back({"macroscopic angle of slow shear, extrapolated [degrees]", degrees(fit.start),
-                             degrees(slowest.ratio.error), 5.46, 6.06, source});
+  const CurveFit fit =
+      fit_curve(I, ratio, 0.2, 1, [](double at, double power) { return std::pow(at, power); });
+  result.measures.push_back({"exponent of I in the fit", fit.parameter});
+  result.measures.push_back({"macroscopic angle of slow shear, extrapolated [degrees]",
+                             degrees(fit.line.start), degrees(slowest.ratio.error), 5.46, 6.06, source});
   result.measures.push_back({"solid fraction at the slowest", slowest.solid_fraction.value,
                              slowest.solid_fraction.error, 0.63, 0.645,
                              "no dilatancy: that of the packing, 0.633 of 500 grains"});

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "io/files/png.hpp"
+#include "kernels/registry.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "runtime/step/frame.hpp"
 
@@ -18,9 +19,8 @@ namespace talus::io {
 /// What grains are coloured by.
 enum class GrainColour { speed, radius, force, material };
 
-/// Their names, in the order of the enumeration.
-std::span<const std::string> grain_colours();
-std::optional<GrainColour> grain_colour(const std::string& name);
+/// What they are called, what they are, and in which unit ("" for none).
+const Registry<GrainColour, const char*>& grain_colours();
 
 /// A number for each grain of a frame. `force` is the sum of the normal forces of its contacts [N].
 std::vector<double> grain_values(const Frame& frame, GrainColour colour);

@@ -36,22 +36,19 @@ std::string hex(const Colour& c) {
                      std::lround(255 * c[2]));
 }
 
-const char* unit_of(GrainColour colour) {
-  return colour == GrainColour::speed ? "m/s" : colour == GrainColour::radius ? "m" : "N";
-}
-
 void draw_legend(detail::Svg& svg, const ViewOptions& options, const ColourRange& range, double y) {
   constexpr double left = 40, width = 240, steps = 60;
   for (double k = 0; k < steps; ++k)
     svg.rectangle(
         left + k * width / steps, y, width / steps + 0.3, 12,
         hex(colour_of(range.low + (k + 0.5) / steps * (range.high - range.low), range, options.colour)));
-  svg.text(left, y + 28, range.low == 0 ? "0" : detail::with_unit(range.low, unit_of(options.colour)));
+  svg.text(left, y + 28,
+           range.low == 0 ? "0" : detail::with_unit(range.low, grain_colours().of(options.colour).make));
   svg.text(left + width, y + 28,
-           detail::with_unit(range.high, unit_of(options.colour)) +
+           detail::with_unit(range.high, grain_colours().of(options.colour).make) +
                (options.colour == GrainColour::radius ? "" : " and more"),
            {12, detail::style::ink, "middle"});
-  svg.text(left + width + 24, y + 10, std::string(grain_colours()[static_cast<std::size_t>(options.colour)]),
+  svg.text(left + width + 24, y + 10, std::string(grain_colours().of(options.colour).name),
            {12, detail::style::soft_ink});
 }
 
@@ -66,30 +63,19 @@ void draw_materials(detail::Svg& svg, std::span<const std::string> names, double
 
 }  // namespace
 
-std::span<const std::string> grain_colours() {
-  static const std::vector<std::string> names{"speed", "radius", "force", "material"};
-  return names;
-}
-
-std::optional<GrainColour> grain_colour(const std::string& name) {
-  const auto names = grain_colours();
-  const auto found = std::ranges::find(names, name);
-  if (found == names.end()) return std::nullopt;
-  return static_cast<GrainColour>(found - names.begin());
+const Registry<GrainColour, const char*>& grain_colours() {
+  static constexpr Entry<GrainColour, const char*> entries[] = {
+      {GrainColour::speed, "speed", "speed", "m/s"},
+      {GrainColour::radius, "radius", "radius", "m"},
+      {GrainColour::force, "force", "sum of normal forces", "N"},
+      {GrainColour::material, "material", "material", ""}};
+  static constexpr Registry<GrainColour, const char*> registry("way to colour grains", entries);
+  return registry;
 }
 
 std::string label_of(GrainColour colour) {
-  switch (colour) {
-    case GrainColour::speed:
-      return "speed [m/s]";
-    case GrainColour::radius:
-      return "radius [m]";
-    case GrainColour::force:
-      return "sum of normal forces [N]";
-    case GrainColour::material:
-      return "material";
-  }
-  return "";
+  const auto& [kind, name, sentence, unit] = grain_colours().of(colour);
+  return *unit == '\0' ? std::string(sentence) : fmt::format("{} [{}]", sentence, unit);
 }
 
 std::vector<double> grain_values(const Frame& frame, GrainColour colour) {
@@ -143,12 +129,7 @@ std::string draw_view(const Frame& frame, std::span<const Wall> walls, const Vie
                       std::span<const std::string> material_names) {
   const auto triangles = wall_triangles(walls, frame.walls, grain_bounds(frame));
   const Image image = render_view(frame, walls, triangles, options);
-  std::string data;
-  const WriteText out = [&](std::string_view more) { data += more; };
-  detail::Base64 base64(out);
-  const std::string bytes = png_bytes(image);
-  base64.add(std::as_bytes(std::span(bytes)));
-  base64.finish();
+  const std::string bytes = png_bytes(image), data = detail::base64_of(std::as_bytes(std::span(bytes)));
   const double width = static_cast<double>(image.width), height = static_cast<double>(image.height);
   constexpr double head = 64, foot = 56;
   detail::Svg svg(width, head + height + foot);
@@ -156,12 +137,10 @@ std::string draw_view(const Frame& frame, std::span<const Wall> walls, const Vie
            fmt::format("The sample, stage \u201c{}\u201d, t = {}", frame.stage,
                        detail::with_unit(frame.time, "s")),
            {18, detail::style::ink, "start", true});
-  svg.text(40, 54,
-           fmt::format("{} grains, coloured by {}", frame.id.size(),
-                       options.colour == GrainColour::force
-                           ? "the sum of their normal forces"
-                           : grain_colours()[static_cast<std::size_t>(options.colour)]),
-           {13, detail::style::soft_ink});
+  svg.text(
+      40, 54,
+      fmt::format("{} grains, coloured by {}", frame.id.size(), grain_colours().of(options.colour).sentence),
+      {13, detail::style::soft_ink});
   svg.image(0, head, width, height, "data:image/png;base64," + data);
   if (options.colour == GrainColour::material)
     draw_materials(svg, material_names, head + height + 12);

@@ -27,6 +27,8 @@ struct Domain {
 
   /// Edges of the brick [m]; 0 along an axis of walls.
   Vec3 edges() const { return {cell.xx, cell.yy, cell.zz}; }
+  /// Edge of a cube of its volume [m]; 0 where it does not repeat itself along all axes.
+  double mean_edge() const { return std::cbrt(cell.xx * cell.yy * cell.zz); }
 
   /// work(space): the type that inner loops need.
   template <class Work>

@@ -94,6 +94,7 @@ ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
 WallView view(WallCopy& wall) {
   return {wall.velocity, wall.inv_mass};
 }
+static_assert(cell_freedoms == 6, "CellView");
 CellView view(CellCopy& cell) {
   return {cell.velocity.data(), cell.inv_mass.data()};
 }

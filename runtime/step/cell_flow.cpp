@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "kernels/bodies/cell_velocity.hpp"
+
 namespace talus {
 
 namespace {
@@ -15,7 +17,8 @@ Mat3 invertible(Mat3 edges) {
 }
 
 EdgeRates rates_of(const Mat3& m) {
-  return {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)};
+  const auto [xx, yy, zz, xy, xz, yz] = components_of(m);
+  return {xx, yy, zz, xy, xz, yz};
 }
 
 }  // namespace
@@ -26,15 +29,16 @@ Mat3 edges_of(const Domain& domain) {
 }
 
 Mat3 matrix_of(const EdgeRates& r) {
-  Mat3 m;
-  m << r.xx, r.xy, r.xz, 0, r.yy, r.yz, 0, 0, r.zz;
-  return m;
+  return gradient_of({r.xx, r.yy, r.zz, r.xy, r.xz, r.yz}, 1);
+}
+
+Mat3 deviator(const Mat3& m) {
+  const Mat3 even = 0.5 * (m + m.transpose());
+  return even - even.trace() / 3 * Mat3::Identity();
 }
 
 double shear_rate(const Mat3& gradient) {
-  Mat3 rates = 0.5 * (gradient + gradient.transpose());
-  rates.diagonal().array() -= rates.trace() / 3;
-  return std::sqrt(2.0) * rates.norm();
+  return std::sqrt(2.0) * deviator(gradient).norm();
 }
 
 void set_edges(Domain& domain, const Mat3& h) {

@@ -31,6 +31,8 @@ struct CellFlow {
   Mat3 edges_then = Mat3::Zero();  ///< at the last broad phase [m]
 };
 
+/// The symmetric part of a matrix less a third of its trace.
+Mat3 deviator(const Mat3& m);
 /// Rate of shear of a flow of gradient G, root of 2 dev D : dev D of its symmetric part [1/s]: of a simple
 /// shear its rate.
 double shear_rate(const Mat3& gradient);

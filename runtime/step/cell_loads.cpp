@@ -53,7 +53,7 @@ CellDrive drive_cell(const Setup& setup, const StageMoment& at, const StepParame
   cell.aim = stress_aimed_at(setup, {at.stage, at.time + 0.5 * parameters.time_step});
   const Mat3 edges = edges_of(state.domain), flow = matrix_of(state.domain.rates) * edges.inverse();
   const CellVelocity kinetic = components_of(kinetic_moment(state, flow, ranks));
-  const double volume = edges.diagonal().prod();
+  const double volume = state.domain.volume(state.walls);
   for (std::size_t k = 0; k < cell_freedoms; ++k) {
     cell.push[k] =
         cell.follows[k] ? parameters.impulse_time() * (kinetic[k] - volume * cell.aim[k]) / cell.length : 0;

@@ -18,11 +18,6 @@ std::array<double, 6> symmetric(const Mat3& m) {
       m(0, 0), m(1, 1), m(2, 2), (m(0, 1) + m(1, 0)) / 2, (m(0, 2) + m(2, 0)) / 2, (m(1, 2) + m(2, 1)) / 2};
 }
 
-Mat3 deviator(const Mat3& m) {
-  const Mat3 even = 0.5 * (m + m.transpose());
-  return even - even.trace() / 3 * Mat3::Identity();
-}
-
 }  // namespace
 
 Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {

@@ -4,21 +4,12 @@
 #include <cmath>
 #include <vector>
 
+#include "kernels/detection/measures.hpp"
+#include "runtime/step/cell_flow.hpp"
+
 namespace talus {
 
 namespace {
-
-Mat3 deviator_of(const Mat3& m) {
-  const Mat3 even = 0.5 * (m + m.transpose());
-  return even - even.trace() / 3 * Mat3::Identity();
-}
-
-/// The impulse that contact k gives to its bodies, without what the law adds to it [N s].
-Vec3 impulse_of(const Contacts& c, std::size_t k, const Vec3& n) {
-  Vec3 r = c.rx.empty() ? Vec3(c.rn[k] * n) : Vec3(c.rx[k], c.ry[k], c.rz[k]);
-  if (!c.cohesion.empty()) r -= c.cohesion[k] * n;
-  return r;
-}
 
 /// Sums of matrices over the contacts that carry, subdomain by subdomain.
 struct Sums {
@@ -38,7 +29,7 @@ Sums sum_over_contacts(const StepState& state, const graph::Communicator& ranks,
     Sums& sums = rows[static_cast<std::size_t>(state.chunks.subdomain[chunk])];
     const auto begin = static_cast<std::size_t>(state.chunks.begin[chunk]);
     for (std::size_t k = begin; k < begin + static_cast<std::size_t>(c.count[chunk]); ++k) {
-      const Vec3 n(c.nx[k], c.ny[k], c.nz[k]), r = impulse_of(c, k, n);
+      const Vec3 n = contact_normal(c, k), r = contact_impulse(c, k);
       if (r == Vec3::Zero()) continue;
       sums.contacts += 1;
       visit(sums, n, r);
@@ -67,7 +58,7 @@ ForceFabric force_fabric(const StepState& state, const graph::Communicator& rank
   out.contacts = directions.contacts;
   if (out.contacts == 0) return out;
   out.fabric = Matrix(directions.first) / out.contacts;
-  out.of_contacts = 7.5 * deviator_of(out.fabric);
+  out.of_contacts = 7.5 * deviator(out.fabric);
   Sums forces = sum_over_contacts(state, ranks, [&](Sums& sums, const Vec3& n, const Vec3& r) {
     // Each direction counts alike, however many contacts point there.
     const double r_n = r.dot(n), density = 1 + n.dot(out.of_contacts * n);
@@ -77,14 +68,14 @@ ForceFabric force_fabric(const StepState& state, const graph::Communicator& rank
   });
   const double mean = Matrix(forces.first).trace();
   if (!(mean > 0)) return out;
-  out.of_normal_forces = 7.5 / mean * deviator_of(Matrix(forces.first));
-  out.of_tangential_forces = 5 / mean * deviator_of(Matrix(forces.second));
+  out.of_normal_forces = 7.5 / mean * deviator(Matrix(forces.first));
+  out.of_tangential_forces = 5 / mean * deviator(Matrix(forces.second));
   return out;
 }
 
-double along_stress(const Mat3& anisotropy, const Mat3& deviator) {
-  const double size = deviator.norm();
-  return size > 0 ? std::sqrt(1.5) * anisotropy.cwiseProduct(deviator).sum() / size : 0;
+double along_stress(const Mat3& anisotropy, const Mat3& stress_deviator) {
+  const double size = stress_deviator.norm();
+  return size > 0 ? std::sqrt(1.5) * anisotropy.cwiseProduct(stress_deviator).sum() / size : 0;
 }
 
 }  // namespace talus

@@ -22,6 +22,6 @@ ForceFabric force_fabric(const StepState& state, const graph::Communicator& rank
 
 /// The scalar of an anisotropy A beside the stress deviator s: sqrt(3/2) A : s/|s|, negative where A is
 /// opposed to the stress; with it q/p = 0.4 (a_c + a_n + 1.5 a_t) (Guo & Zhao 2013, (16)). 0 where s is.
-double along_stress(const Mat3& anisotropy, const Mat3& deviator);
+double along_stress(const Mat3& anisotropy, const Mat3& stress_deviator);
 
 }  // namespace talus

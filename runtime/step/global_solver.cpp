@@ -116,7 +116,7 @@ CellMotion motion_of(const StressedCell& cell, const Domain& domain) {
   return {cell.mass,
           {moves(0), moves(1), moves(2)},
           {moves(3), moves(4), moves(5)},
-          std::cbrt(domain.edges().prod()) / cell.length};
+          domain.mean_edge() / cell.length};
 }
 
 BodyProblemSource source_of(const StepState& state, const StepParameters& parameters,
@@ -199,7 +199,7 @@ double GlobalSolver::sweeps_needed() const {
   // What contacts tell one another in a cell that follows a stress goes through the cell at once, or over
   // half of it by diffusion: nothing is handed on to any one body.
   if (state_.cell.loaded()) {
-    const double layers = 0.5 * std::cbrt(state_.domain.edges().prod()) / state_.cell.length;
+    const double layers = 0.5 * state_.domain.mean_edge() / state_.cell.length;
     return layers * layers;
   }
   const Whole span(*this);

@@ -68,7 +68,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
   // What the faces of a cell carry, as walls would.
   if (const StressedCell& cell = state.cell; cell.loaded())
     impulse_unit = std::max(impulse_unit, Eigen::Map<const Vec3>(cell.impulse.data()).norm() * cell.length /
-                                              std::cbrt(state.domain.edges().prod()));
+                                              state.domain.mean_edge());
   // What rounding leaves of the sample's momentum, at most sqrt(2 E M), is no defect.
   const double energy = sums.motion.energy.translation + sums.motion.energy.rotation;
   impulse_unit = std::max(impulse_unit, 1e-12 * std::sqrt(2 * energy * sample.total_mass));

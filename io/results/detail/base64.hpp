@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "io/files/write_text.hpp"
 
@@ -53,5 +54,15 @@ class Base64 {
   std::uint32_t group_ = 0;
   int count_ = 0;
 };
+
+/// All of it at once.
+inline std::string base64_of(std::span<const std::byte> bytes) {
+  std::string text;
+  const WriteText out = [&](std::string_view more) { text += more; };
+  Base64 base64(out);
+  base64.add(bytes);
+  base64.finish();
+  return text;
+}
 
 }  // namespace talus::io::detail

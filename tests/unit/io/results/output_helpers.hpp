@@ -165,4 +165,24 @@ inline TriaxialReport triaxial_row(std::int64_t step, const std::string& stage) 
   return report;
 }
 
+/// Every opened element is closed in order; enough to catch what an XML parser would refuse in files we
+/// write.
+inline bool well_formed(const std::string& text) {
+  std::vector<std::string> open;
+  for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1)) {
+    const std::size_t end = text.find('>', at);
+    if (end == std::string::npos) return false;
+    const std::string tag = text.substr(at + 1, end - at - 1);
+    if (tag.starts_with('?') || tag.ends_with('/')) continue;
+    const std::string name = tag.substr(0, tag.find_first_of(" \n"));
+    if (name.starts_with('/')) {
+      if (open.empty() || "/" + open.back() != name) return false;
+      open.pop_back();
+    } else {
+      open.push_back(name);
+    }
+  }
+  return open.empty();
+}
+
 }  // namespace talus::test
