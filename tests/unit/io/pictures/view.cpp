@@ -91,11 +91,11 @@ TEST(View, ColoursAreBySpeedRadiusForceOrMaterial) {
   frame.contact_bodies = {{0, 1}, {1, -1}};
   frame.contact_normal = {Vec3(-1, 0, 0), Vec3(0, 0, 1)};
   frame.contact_force = {Vec3(-2, 9, 0), Vec3(0, 0, 5)};
-  EXPECT_EQ(grain_values(frame, *grain_colour("speed")), (std::vector<double>{0, 5}));
-  EXPECT_EQ(grain_values(frame, *grain_colour("force")), (std::vector<double>{2, 7}));
-  EXPECT_EQ(grain_values(frame, *grain_colour("radius")), (std::vector<double>{0.1, 0.1}));
-  EXPECT_EQ(grain_values(frame, *grain_colour("material")), (std::vector<double>{0, 1}));
-  EXPECT_FALSE(grain_colour("taste"));
+  EXPECT_EQ(grain_values(frame, grain_colours().named("speed").kind), (std::vector<double>{0, 5}));
+  EXPECT_EQ(grain_values(frame, grain_colours().named("force").kind), (std::vector<double>{2, 7}));
+  EXPECT_EQ(grain_values(frame, grain_colours().named("radius").kind), (std::vector<double>{0.1, 0.1}));
+  EXPECT_EQ(grain_values(frame, grain_colours().named("material").kind), (std::vector<double>{0, 1}));
+  EXPECT_THROW(grain_colours().named("taste"), std::invalid_argument);
 }
 
 std::uint32_t number_at(const std::string& bytes, std::size_t at) {
