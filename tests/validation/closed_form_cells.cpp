@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "runtime/step/runaway.hpp"
 #include "tests/validation/experiment.hpp"
 
 namespace talus::validation::closed_form_cells_test {
@@ -169,6 +170,23 @@ TEST(FreeGrains, FollowTheHomogeneousFlowOfTheCell) {
     EXPECT_LT((run.u(id) - rates * place).norm(), 1e-11);
   }
   EXPECT_NEAR((rates * edges.inverse() - run.simulation().parameters().velocity_gradient).norm(), 0, 1e-12);
+}
+
+/// A cell that is squeezed until a grain would meet two images of another.
+TEST(CellThatIsSqueezedTooFar, EndsTheRunBeforeAGrainMeetsTwoImagesOfAnother) {
+  Scene scene(h);
+  scene.setup.domain = periodic_domain({1, 1, 0.5});
+  scene.stage().strain_rates = {0, 0, -1};
+  scene.sphere({0.2, 0.2, 0.1}, radius, mass);
+  scene.sphere({0.7, 0.7, 0.1}, radius, mass);
+  Experiment run(std::move(scene));
+  try {
+    run.steps(1500);
+    FAIL() << "it went on to an edge of " << run.simulation().state().domain.cell.zz << " m";
+  } catch (const RunawayError& error) {
+    EXPECT_NE(std::string(error.what()).find("two images of another"), std::string::npos) << error.what();
+  }
+  EXPECT_GT(run.simulation().state().domain.cell.zz, 2 * 2 * radius);
 }
 
 /// Two grains that are pulled apart across a face, and pushed together, feel what they would feel inside.

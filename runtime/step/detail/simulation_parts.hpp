@@ -2,6 +2,8 @@
 
 /// What a Simulation holds, and how a step and a stage begin and end.
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -153,7 +155,17 @@ struct Simulation::Implementation {
     double largest[1] = {0};
     for (const double radius : state.bodies.radius) largest[0] = std::max(largest[0], radius);
     ranks.max(largest);
-    check_cell(setup.domain, largest[0], parameters.alert + parameters.skin);
+    largest_radius = largest[0];
+    check_cell(setup.domain, largest_radius, parameters.alert + parameters.skin);
+  }
+
+  /// The same of a cell that has been squeezed since.
+  void check_edges() const {
+    try {
+      check_cell(state.domain, largest_radius, parameters.alert + parameters.skin);
+    } catch (const std::invalid_argument& error) {
+      throw RunawayError(fmt::format("{}: {}", next_step().text(), error.what()));
+    }
   }
 
   const Stage& stage() const { return setup.stages[stage_index]; }
@@ -279,6 +291,7 @@ struct Simulation::Implementation {
   /// Loads and motions of the walls for the step: applied forces and free velocities.
   void load_walls() {
     state.time = report.time;
+    if (state.domain.flows) check_edges();
     if (state.domain.flows)
       begin_flow(
           drive_cell(setup, {stage_index, report.time - stage_begins[stage_index]}, parameters, state, ranks),
@@ -319,6 +332,7 @@ struct Simulation::Implementation {
   const graph::Communicator& ranks;
   StepState state;
   SampleSize size;
+  double largest_radius = 0;  ///< in a periodic cell [m]
   Population population;
   Probes probes;
   StepParameters parameters;
