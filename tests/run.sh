@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every test: installs what is missing, checks the format of the sources, builds preset `ci` (warnings are errors), runs ctest.
+# Every test: installs what is missing, checks the format of the sources, builds preset `release` (warnings are errors), runs ctest.
 # Further arguments go to ctest, e.g. -L unit. With CI_LONG=1 the command is built for simulated ranks as well, whose tests are
 # skipped otherwise; tests of units and of several ranks run again under the address and undefined-behaviour sanitizers, those of
 # graph, executor, communicator and step under the thread sanitizer, in a build by clang; and the benchmarks are built, which no
@@ -26,10 +26,10 @@ if [ "${CI_LONG:-0}" = 1 ]; then
   cmake --preset smpi
   cmake --build --preset smpi
 fi
-cmake --preset ci
-cmake --build --preset ci
-if [ "${CI_LONG:-0}" = 1 ]; then cmake --build --preset ci --target benches; fi
-ctest --preset ci -j2 "$@" || status=$?
+cmake --preset release
+cmake --build --preset release
+if [ "${CI_LONG:-0}" = 1 ]; then cmake --build --preset release --target benches; fi
+ctest --preset release -j2 "$@" || status=$?
 
 if [ "${CI_LONG:-0}" = 1 ]; then
   cmake --preset asan
