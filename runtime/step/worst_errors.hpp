@@ -1,6 +1,6 @@
 #pragma once
 
-/// Which contact and which body a step that was missed is furthest off at, by their names.
+/// The contact and the body with the largest errors of a step that has not converged, by their names.
 
 #include <cstdint>
 #include <span>
@@ -23,13 +23,13 @@ struct WorstErrors {
   void take(const WorstErrors& other);
 };
 
-/// How unknowns are called.
+/// Names of the unknowns of a problem.
 struct UnknownNames {
   std::vector<std::span<const BodyId>> bodies;  ///< per part: ids of the unknowns before the first wall
   std::vector<std::int32_t> walls;              ///< numbers of the others, the same in every part
 };
 
-/// Of the parts here.
+/// The worst errors among the parts of this rank.
 WorstErrors worst_errors_of(const BodyParts& parts, const Residuals& residuals, const UnknownNames& names);
 
 }  // namespace talus
