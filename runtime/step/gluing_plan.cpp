@@ -1,4 +1,4 @@
-/// Who sends what to whom in an exchange, and which copies of a body each subdomain reads when.
+/// Who sends what to whom in an exchange, and when each subdomain reads which copies of a body.
 
 #include <fmt/format.h>
 
