@@ -1,8 +1,8 @@
 #pragma once
 
-/// How the kernels of the narrow phase are called: plain pointers, and no functions, so that the translation
-/// units of instruction sets include nothing that could be kept in a version for the wrong processor.
-/// (Spaces are inlined always.)
+/// Interface of the kernels of the narrow phase: plain pointers, and no functions. The translation unit of an
+/// instruction set must include no function that the linker could keep, in that version, for all processors.
+/// (Spaces are always inlined.)
 
 #include <cstddef>
 #include <cstdint>
@@ -31,10 +31,11 @@ struct GapTarget {
   std::int64_t* contact;  ///< -1 for contacts, 0 for others
 };
 
-/// Fills `GapTarget`; true when a pair came half the smaller radius nearer on its way here, or further.
+/// Fills `GapTarget`. True when the two bodies of some pair have moved against one another by half the
+/// smaller radius or more within the last time step.
 using FindGaps = bool (*)(const PairView&, const GapRule&, const GapTarget&);
 
-/// Constants: calling a function to see what there is would run instructions that the processor may not have.
+/// Constants: a function that returns them might itself use instructions that the processor does not have.
 extern const FindGaps gap_kernels_portable;
 extern const FindGaps gap_kernels_avx2;
 extern const FindGaps gap_kernels_avx512;
