@@ -155,7 +155,8 @@ bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double rad
   return !points.empty();
 }
 
-/// At a surface: a chunk has each grain once, with one of the features that it may touch.
+/// Finds the contacts of a chunk at a surface. The chunk has each grain once, with one feature that it may
+/// touch.
 void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);

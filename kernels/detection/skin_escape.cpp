@@ -105,7 +105,7 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
     for (const Escape& escape : skin_escapes) {
       const Map at(escape.x);
       const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = escape.need + most;
-      // Of a periodic cell any of its images may be near.
+      // In a periodic cell any image of the grain may be near.
       if (margins.domain.repeats || !(d2 * (1 - rounding) >= reached * reached)) near.push_back(&escape);
     }
     for (std::size_t s = begin; s < end; ++s)

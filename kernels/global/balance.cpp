@@ -18,7 +18,7 @@ namespace {
 struct Wishes {
   std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s], in order of contact
   std::vector<ContactEquation> open;
-  std::vector<double> gap;  ///< of those: v_n, > 0 [m/s]
+  std::vector<double> gap;  ///< of the open ones: v_n, >= 0 [m/s]
   double drive = 0;         ///< fastest drive among those that carry [m/s]
   double fastest = 0;       ///< drive, gap to close or rebound [m/s]
   double pressed = 0;       ///< sum of the impulses at walls [N s]
@@ -125,9 +125,9 @@ Fit fit_of(const BodyParts& parts, const PartField& motion, std::span<const Wish
   return {sums[0], sums[1]};
 }
 
-/// What the error of the velocities of all parts is held against.
+/// What the error of the velocities of all parts is compared with.
 struct Scales {
-  double contacts = 0;  ///< of all parts
+  double contacts = 0;  ///< number, of all parts
   double mass = 0;      ///< of all bodies [kg]
   double momentum = 0;  ///< [kg m/s]; 0 where nothing moves
 

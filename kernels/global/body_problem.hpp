@@ -73,7 +73,7 @@ struct BodyProblem {
   std::vector<Twist> known;    ///< per unknown: sum over the contacts of this part of what they do to it
                                ///< besides r [N s]; empty where that is nothing
   std::size_t grains = 0;      ///< unknowns before the first wall
-  std::int32_t subdomain = 0;  ///< of all, whose part it is
+  std::int32_t subdomain = 0;  ///< its number among all
   std::vector<char> counts;    ///< per unknown: of its copies this one counts; empty: all do
   std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
 
@@ -125,7 +125,7 @@ struct BodyProblemSource {
 
 /// The slots and chunks of one subdomain among those of a step.
 struct BodyProblemPart {
-  std::int32_t subdomain = 0;      ///< of all
+  std::int32_t subdomain = 0;      ///< its number among all
   std::int32_t local = 0;          ///< the same as in Chunks
   std::size_t begin = 0, end = 0;  ///< its slots
   std::span<const char> counts;    ///< per slot of the step: of the body's copies this one counts

@@ -61,7 +61,7 @@ class BodySystem {
   std::size_t size() const { return inverse_.size(); }
 
  private:
-  static constexpr std::int32_t rough = -1, slick = -2;  ///< of spheres; slick: normal part only
+  static constexpr std::int32_t rough = -1, slick = -2;  ///< contacts of spheres; slick: normal part only
   /// What the product needs of a contact.
   struct Link {
     Vec3 normal;

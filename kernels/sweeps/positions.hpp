@@ -6,7 +6,7 @@
 ///
 /// g [m] being the gap of a contact and c the part of an overlap that goes. It is the problem of a step
 /// without friction in which bodies are at rest, with displacements for velocities, so that the sweeps of
-/// steps solve it. Velocities, impulses, and all that is judged of a step know nothing of it. Bodies are
+/// steps solve it. Velocities, impulses, and the certificate of a step do not depend on it. Bodies are
 /// shifted and do not turn. In single precision: 1e-7 of a displacement is below the rounding of positions.
 
 #include <span>

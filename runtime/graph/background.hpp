@@ -18,7 +18,7 @@ class BackgroundLane {
  public:
   /// At most `capacity` >= 1 tasks wait or run at a time.
   explicit BackgroundLane(std::size_t capacity);
-  /// Runs what is outstanding; a failure that nobody has asked for is lost, so call drain() first.
+  /// Runs what is outstanding; a failure that was not reported yet is lost, so call drain() first.
   ~BackgroundLane();
   BackgroundLane(const BackgroundLane&) = delete;
   BackgroundLane& operator=(const BackgroundLane&) = delete;

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Communication interface of the program: collective calls for what happens once a step or more rarely, and
-/// channels for what travels in every iteration. Who implements it:
+/// channels for what travels in every iteration. Implementations:
 ///
 ///   OneRank             one_rank.hpp           a rank alone: nothing is sent, MPI is not called
 ///   make_communicator   mpi_communicator.hpp   the ranks of mpirun

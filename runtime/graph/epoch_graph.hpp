@@ -1,7 +1,7 @@
 #pragma once
 
-/// The plan of a loop whose nodes conflict: who runs which node, and what a thread must see of another before
-/// it may go on.
+/// The plan of a loop whose nodes conflict: which thread runs which node, and what a thread must see of
+/// another before it may go on.
 ///
 /// Nodes have colours; no two conflicting nodes share one. In epoch e a node may start when its conflicting
 /// nodes of lower colour have finished epoch e and those of higher colour have finished epoch e - 1. So any
@@ -13,8 +13,8 @@
 /// in one counter. Since the walk is fixed, "node c of thread u has finished epoch e" means "u's counter is
 /// at least e * stride(u) + place of c + 1", and a thread needs at most one such number per other thread
 /// before a node: the largest. Numbers that an earlier node of the walk has already asked for are dropped,
-/// and a thread publishes only where somebody asks. With two threads that own halves of a grid a few percent
-/// of the nodes wait or publish:
+/// and a thread publishes only where another one waits. With two threads that own halves of a grid a few
+/// percent of the nodes wait or publish:
 ///
 ///     thread 0:  a b c |publish 3| d e ... |wait for u1 >= 4| k ...
 ///     thread 1:  p q |wait for u0 >= 3| r s |publish 4| ...

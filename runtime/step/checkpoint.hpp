@@ -222,7 +222,7 @@ void each_member(Head& head, const Visit& visit) {
 struct Checkpoint {
   CheckpointHead head;
   std::vector<std::int32_t> here;     ///< subdomains of this rank, ascending
-  std::vector<CheckpointPart> parts;  ///< of each
+  std::vector<CheckpointPart> parts;  ///< one for each of these
 };
 
 /// A load as 8 numbers: drive, velocity, pressure, force, mass, weight.

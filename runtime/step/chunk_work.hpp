@@ -30,7 +30,7 @@ class ChunkWork {
   void make_room();
 
   void run(std::size_t c, int epoch);
-  /// At a gate, after a sweep that ADMM makes obsolete: brings back the impulses of the last check.
+  /// At a gate, before a remedy that begins from the last check: brings back the impulses of that check.
   void restore();
 
   /// Whether this epoch is a sweep in single precision.

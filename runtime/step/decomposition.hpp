@@ -59,7 +59,7 @@ struct Decomposition {
   int subdomain_colour_of(SubdomainId subdomain) const {
     return subdomain_colour.empty() ? 0 : subdomain_colour[subdomain];
   }
-  /// Of a subdomain of this rank.
+  /// Place of a subdomain of this rank.
   SubdomainPlace place_of(SubdomainId subdomain) const {
     return SubdomainPlace(std::ranges::lower_bound(here, subdomain) - here.begin());
   }
@@ -98,7 +98,7 @@ struct Surroundings {
 struct RankSample {
   Bodies& bodies;
   Candidates& candidates;
-  Domain domain;  ///< that they stand in, now
+  Domain domain;  ///< in which they stand at present
 };
 
 /// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three times

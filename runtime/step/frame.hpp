@@ -86,7 +86,7 @@ struct WallReport {
   Vec3 torque = Vec3::Zero();  ///< likewise, about the wall's own point [N m] (Wall::torque_point)
   double work = 0;             ///< done on the grains since the run began [J]
   Vec3 normal = Vec3::Zero();  ///< of a plane, into the grains; 0 of a surface, and of a group
-  Pose pose = {};              ///< of a surface: from where the scene has put it
+  Pose pose = {};              ///< of a surface: its motion from where the scene has put it
   bool absent = false;         ///< the wall is absent in this stage
 };
 

@@ -66,7 +66,7 @@ class Gluing {
   /// `contacts`: number of contacts of this rank, plus one for each of its chunks.
   void plan_tree(std::uint64_t contacts);
   const graph::Tree& tree() const { return tree_; }
-  /// Collective, in every step before its sweeps: lists the copies of the walls.
+  /// Collective, in every step before its sweeps: counts and lists the copies of walls and of a cell.
   void begin();
 
   /// False when there is nothing to glue: no tasks then.

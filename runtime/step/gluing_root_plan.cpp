@@ -1,4 +1,5 @@
-/// The tree of ranks that leads to the root of the gluing: what each rank tells its parent and hears back.
+/// The tree of ranks that leads to the root of the gluing: what each rank sends to its parent and
+/// receives from it.
 
 #include <algorithm>
 #include <utility>

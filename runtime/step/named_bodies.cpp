@@ -8,7 +8,7 @@ namespace talus {
 
 namespace {
 
-/// Of one body: whether it is on this rank, and its state.
+/// State of a named body, and whether it is on this rank.
 struct NamedState {
   double there = 0, x[3]{}, u[3]{}, w[3]{}, radius = 0, mass = 0;
 };

@@ -128,7 +128,7 @@ struct SolverSettings {
   double max_tolerance = 0;
   static constexpr double most_over_rms = 100;
   double worst_allowed() const { return max_tolerance > 0 ? max_tolerance : most_over_rms * tolerance; }
-  /// On error_quantile, that a share `quantile` of the contacts does not exceed; 0: not asked.
+  /// On error_quantile, that a share `quantile` of the contacts does not exceed; 0: not checked.
   double quantile_tolerance = 0;
   double quantile = 0.99;  ///< in (0, 1]
   double balance_tolerance =

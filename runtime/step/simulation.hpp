@@ -60,7 +60,7 @@ class Simulation {
   /// passes the bodies it has, any part of all (dealing.hpp); the first step deals them out. Executor and
   /// ranks must outlive the simulation. Collective.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks);
-  /// On one rank.
+  /// The same on one rank.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
   /// Goes on from a saved state, on one rank. Walls, stages and grains are those of the simulation that was
   /// saved; solver, subdomains and threads need not be: so one step can be solved in many ways. The next step

@@ -51,7 +51,7 @@ struct WallState {
   std::int64_t copies_everywhere = 0;  ///< on all ranks
   Vec3 impulse = Vec3::Zero();         ///< of the wall on the grains [N s], from the last check
   Pose middle, end;  ///< of a wall with a prescribed motion, in the middle and at the end of the step
-  double speed = 0;  ///< of it: the largest with which a point of its surface nears a grain [m/s]
+  double speed = 0;  ///< of such a wall: the largest with which a point of its surface nears a grain [m/s]
   double material_speed = 0;  ///< the largest of any point of its material near a grain [m/s]
   double farthest = 0;        ///< of a plane that turns: distance of the farthest grain from its pivot [m]
   Vec3 own_point = Vec3::Zero();      ///< about which its torque is reported, in the middle of the step [m]
@@ -65,8 +65,8 @@ struct StepState {
   Bodies bodies;              ///< n
   std::vector<Clump> clumps;  ///< of the setup
   Domain domain;              ///< now
-  CellFlow flow;              ///< of its edges
-  StressedCell cell;          ///< what follows a stress of it
+  CellFlow flow;              ///< motion of its edges
+  StressedCell cell;          ///< its components that follow a stress
   std::vector<Wall> walls;
   std::vector<WallState> wall_states;  ///< like walls
   FreeVelocity free;                   ///< n, or empty parts

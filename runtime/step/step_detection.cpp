@@ -34,7 +34,8 @@ void StepGraph::predict_share(std::uint32_t share) {
   const double h = parameters_.time_step;
   predict(range, bodies.x, bodies.velocity, h);
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * h);
-  // The spin of a clump belongs to its axes, so these are turned before the free velocity is found.
+  // The spin w of a clump belongs to its axes and changes with them, so these are turned before the free
+  // velocity is found.
   turn_clumps(range, bodies, state_.clumps, 0.5 * h);
   find_free_velocities(range);
   left_[share].clear();

@@ -133,8 +133,8 @@ class StepGraph {
   double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at begin, before and after the loop [s]
   Surroundings around_;                       ///< several subdomains: bodies among which candidates are found
   std::int64_t all_candidates_ = 0;           ///< of all ranks
-  std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
-  double imbalance_then_ = 0;                 ///< the least since it was made
+  std::int64_t steps_ = 0, partitioned_ = 0;  ///< steps done, now and when the partition was made
+  double imbalance_then_ = 0;                 ///< least imbalance since the partition was made
   std::int64_t contacts_before_ = 0;          ///< of all ranks, in the last step
   double imbalance_before_ = 0;               ///< SolverLoop::imbalance of the last step
   CellGrid cells_;

@@ -16,8 +16,8 @@ namespace talus {
 struct WorstErrors {
   double contact_error = 0;  ///< of the contact that is furthest from its law
   BodyPair contact;          ///< its bodies; none where every contact satisfies its law
-  double body_error = 0;  ///< of the body that its contacts would change the velocity of most, by that change
-  std::int64_t body = 0;  ///< its id; wall w as -1 - w. Means nothing where body_error is 0
+  double body_error = 0;     ///< largest change that its contacts would make to the velocity of a body
+  std::int64_t body = 0;     ///< its id; wall w as -1 - w. Means nothing where body_error is 0
 
   /// Keeps the worse of both, and of equal ones that of smaller names.
   void take(const WorstErrors& other);

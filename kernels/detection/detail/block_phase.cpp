@@ -32,7 +32,7 @@ struct Meeting {
   Touch touch;
   Levers levers;
   Vec3 v = Vec3::Zero();     ///< of the first body's surface from the other's, as the step begins [m/s]
-  Vec3 fall = Vec3::Zero();  ///< what is added to it without contacts [m/s]
+  Vec3 fall = Vec3::Zero();  ///< change of v in the step without contacts [m/s]
   Slot first = 0, second = 0;
   BallNumbers balls = 0;
   bool passed = false;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t groups_open = 64;
 static_assert(longest_chunk <= groups_open * group_size);
-constexpr std::size_t few = 16;  ///< of so many contacts one may change: repairs cost less than dealing
+constexpr std::size_t few = 16;  ///< repairs pay if at most one contact in so many has changed
 
 /// Calls rule(array) for each array of places except impulses, which are read from the candidates afterwards.
 template <class Rule>

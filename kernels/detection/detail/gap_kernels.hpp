@@ -13,7 +13,7 @@ namespace talus {
 
 struct GapRule;
 
-/// Pairs of grains whose gaps are asked for.
+/// Pairs of grains whose gaps are to be found.
 struct PairView {
   const double* x;                      ///< 3 per body: its centre [m]
   const double* radius;                 ///< 1 per body [m]
@@ -25,7 +25,7 @@ struct PairView {
   const EdgeRates* rates = nullptr;     ///< null: the cell does not change
 };
 
-/// What is found, per pair.
+/// Results of the search, per pair.
 struct GapTarget {
   double *nx, *ny, *nz, *bias;
   std::int64_t* contact;  ///< -1 for contacts, 0 for others

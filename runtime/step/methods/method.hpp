@@ -29,7 +29,7 @@ class MethodView {
   virtual ~MethodView() = default;
   virtual int sweeps_since_start() const = 0;  ///< of the step, or since ADMM
   virtual int admm_calls() const = 0;          ///< in this step
-  virtual double sweeps_needed() = 0;          ///< of the present ones, about
+  virtual double sweeps_needed() = 0;          ///< about, of the present kind, in this step
   virtual bool checks_velocities() = 0;        ///< Certificate::checks_velocities
   virtual bool balanced() = 0;                 ///< Certificate::balanced
 };

@@ -14,7 +14,7 @@ enum class SweepKind {
 /// What a method wants of the next sweeps.
 struct SweepPlan {
   SweepKind kind = SweepKind::plain;
-  double most = 0;  ///< of beta, in [0, 1), with momentum; with plain sweeps that of momentum to come back to
+  double most = 0;  ///< largest beta, in [0, 1), of momentum; with plain sweeps of the momentum to resume
 };
 
 /// Sweeps with momentum (docs/decisions/0009-methods.md).
