@@ -85,7 +85,7 @@ inline void set_drift(Contacts& contacts, std::size_t k, const Vec3& drift) {
 }
 
 /// Makes room for the contacts of `chunks`, of which there are none yet. Candidates stand in their own order;
-/// those between grains have their bodies already.
+/// those between grains have their bodies already. `friction` decides which impulses exist.
 void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
 
 /// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.

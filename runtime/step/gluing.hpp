@@ -43,7 +43,6 @@ struct JumpSums {
 ///
 /// With alternating coupling subdomains have colours (partition/subdomain_colours.hpp). A subdomain of a
 /// later colour than the first begins its boundary with
-/// the first begins its boundary with
 ///
 ///   take[e]      copies of bodies that also stand in subdomains of earlier colours get the mean of the
 ///                copies of the latest of those colours
