@@ -11,21 +11,21 @@ namespace {
 
 constexpr int x_shift = 38, y_shift = 19, level_shift = 57;
 constexpr std::int32_t cells_an_axis = 1 << 19;
-/// Where the origin stands: a sample around it varies in the low bits of its coordinates only, and what does
-/// not vary takes no pass of the sort.
+/// Cell of the origin. The cells of a sample around it differ in the low bits of their coordinates only, and
+/// the sort skips digits that do not differ.
 constexpr std::int32_t middle_cell = cells_an_axis / 2 + 512;
 /// Cells are wider than the widest pair by more than the rounding of a place up to cells_an_axis, so that
 /// a pair is never two cells apart.
 constexpr double rounding_margin = 1 + 1e-9;
 
-/// Key of the cell of a point in a level. Far coordinates are clamped, which keeps neighbours neighbours, to
-/// the outermost cells but one: every cell has neighbours whose keys are near its own.
+/// Key of the cell of a point in a level. Far coordinates are clamped to the outermost cells but one, which
+/// keeps neighbours neighbours; every cell then has neighbours whose keys are near its own.
 std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, double size) {
   std::uint64_t key = std::uint64_t{level} << level_shift;
   constexpr int shift[3] = {x_shift, y_shift, 0};
   for (int axis = 0; axis < 3; ++axis) {
     const double at = (x[axis] - origin[axis]) / size + middle_cell;
-    // Above 0, where to cut off digits is to round down. A NaN goes to 1.
+    // Numbers are above 0, where cutting off digits rounds down. A NaN goes to 1.
     const double inside = std::min<double>(cells_an_axis - 2, std::max<double>(1, at));
     key |= static_cast<std::uint64_t>(static_cast<std::int32_t>(inside)) << shift[axis];
   }
@@ -35,11 +35,11 @@ std::uint64_t key_of(const double* x, const Vec3& origin, std::size_t level, dou
 /// Where bodies are.
 struct Spread {
   Vec3 middle;       ///< medians of the coordinates [m]
-  double reach = 0;  ///< within so much of it along every axis are nearly all [m]
+  double reach = 0;  ///< nearly all bodies are within this distance of it along every axis [m]
 };
 
-/// Of a thousand bodies at most. A few that fly far away must not push all others into one clamped cell, so
-/// that the farthest twentieth at either end does not count.
+/// Spread of at most a thousand of the bodies. A few that fly far away must not push all others into one
+/// clamped cell, so that the farthest twentieth at either end does not count.
 Spread spread_of(std::span<const Vec3> x) {
   const std::size_t stride = (x.size() + 999) / 1000;
   std::vector<double> values;
@@ -61,8 +61,8 @@ Spread spread_of(std::span<const Vec3> x) {
   return result;
 }
 
-/// How much wider cells of `size` [m] have to be for the bodies to have places of their own: far cells are
-/// clamped into one, in which a line of grains would be compared pair by pair.
+/// Factor by which cells of `size` [m] must be widened to give nearly all bodies cells that are not clamped:
+/// far cells are clamped into one, in which a line of grains would be compared pair by pair.
 double widening(const Spread& spread, double size) {
   constexpr double margin = 1.25;  // a twentieth was left out at either end
   constexpr double cells = cells_an_axis - 2 - middle_cell;
@@ -75,7 +75,7 @@ struct Entry {
   Slot slot;
 };
 
-/// By key, equals in the order in which they stand: by counting digits, from the lowest that varies on.
+/// Sorts by key, and keeps the order of equal keys: a radix sort that skips digits which do not vary.
 void sort_by_key(std::vector<Entry>& entries) {
   constexpr int digit = 11;
   constexpr std::size_t values = std::size_t{1} << digit;
@@ -92,7 +92,7 @@ void sort_by_key(std::vector<Entry>& entries) {
   }
 }
 
-/// Bodies side by side.
+/// Bodies that stand side by side in a grid.
 struct Others {
   std::span<const CellGrid::Member> members;
   std::span<const Slot> slots;
@@ -161,9 +161,9 @@ constexpr std::array<std::uint64_t, 4> rows_behind = {one_y, one_x - one_y, one_
 constexpr std::array<std::uint64_t, 9> rows_around = {
     0 - one_x - one_y, 0 - one_x, one_y - one_x, 0 - one_y, 0, one_y, one_x - one_y, one_x, one_x + one_y};
 
-/// Pairs of the bodies of cells [begin, end) that stand in finer levels with those of `level`. They are taken
-/// by the cell of that level in which they lie, in order, so that its neighbours are found once, by going on
-/// from those of the last one.
+/// Pairs of the bodies of cells [begin, end) that stand in finer levels with those of `level`. These bodies
+/// are sorted by the cell of `level` in which they lie, so that its neighbours are found once, by going on
+/// from those of the last cell.
 void find_larger(const CellGrid& grid, std::size_t begin, std::size_t end, std::size_t level,
                  PairList& list) {
   std::vector<Entry> below;
@@ -208,7 +208,8 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
   }
   // The coarsest level is fitted to the largest body; even samples then have one level and cells that are not
   // too large.
-  // In floating point up to the bound: a reach may be infinite in a step that ends as a runaway.
+  // The bound is applied to a floating-point number: a reach may be infinite in a step that ends as a
+  // runaway.
   const int levels = 1 + static_cast<int>(std::min(31.0, std::floor(std::log2(largest / smallest))));
   grid.cell_size.resize(static_cast<std::size_t>(levels));
   for (int level = 0; level < levels; ++level)
@@ -242,7 +243,7 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach) {
 void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs) {
   if (begin == end) return;
   PairList list(pairs);
-  // Keys ascend, and so do those of the rows: each is followed from where it was.
+  // Keys ascend, and so do those of the rows: the search for each row goes on from where it was.
   std::array<std::size_t, rows_behind.size()> cell;
   for (std::size_t r = 0; r < cell.size(); ++r)
     cell[r] = first_cell(grid, grid.cells[begin].key + rows_behind[r] - 1);

@@ -15,10 +15,11 @@ struct GrainPair {
   bool operator==(const GrainPair&) const = default;
 };
 
-/// Grid of several levels: a body stands in the level whose cell is at least its diameter of reach, so that a
-/// sample with radii 1 : 100 costs no more than an even one. A pair is found from its smaller body, in the 27
-/// cells of the larger one's level; in one level, from half of the 26 neighbours. Cells are sorted, three in
-/// a row along z side by side, so that the neighbours are a few rows of bodies and nothing is looked up.
+/// Grid of several levels: a body stands in the finest level whose cells are twice its reach or wider, so
+/// that a sample with radii 1 : 100 costs no more than an even one. A pair is found from its smaller body, in
+/// the 27 cells of the larger one's level; in one level, from half of the 26 neighbours. Cells are sorted,
+/// with three in a row along z side by side. So the neighbours of a cell are a few rows of bodies, and no
+/// table is looked up.
 struct CellGrid {
   struct Cell {
     std::uint64_t key;   ///< level, x, y, z
@@ -29,7 +30,7 @@ struct CellGrid {
     double x[3];   ///< [m]
     double reach;  ///< [m]
   };
-  Vec3 origin = Vec3::Zero();     ///< amid the centres [m]
+  Vec3 origin = Vec3::Zero();     ///< in the middle of the centres [m]
   std::vector<double> cell_size;  ///< per level [m], doubling; wider where bodies lie so far apart that
                                   ///< cells could not be counted
   std::vector<Slot> slots;        ///< all bodies, sorted by (level, cell, slot)
@@ -45,7 +46,7 @@ CellGrid build_cells(std::span<const Vec3> x, std::span<const double> reach);
 /// all cells every pair comes exactly once.
 void find_pairs(const CellGrid& grid, std::size_t begin, std::size_t end, std::vector<GrainPair>& pairs);
 
-/// Whether a sphere about x [m] of this reach [m] is nearer to any body of the grid than their reaches.
+/// Whether a sphere of this reach [m] about x [m] overlaps the reach of any body of the grid.
 bool meets_any(const CellGrid& grid, const Vec3& x, double reach);
 
 /// All pairs of `parts` in order of (first, second), by counting: the order does not depend on how cells were

@@ -61,8 +61,8 @@ void list_bodies(const Candidates& candidates, std::size_t bodies, Chunks& chunk
   }
 }
 
-/// Candidates of grains with many candidates first: left to the end they would need groups of their own. By
-/// counting, so that equals keep their order. At walls the order is that of the candidates.
+/// Puts candidates of grains with many candidates first: at the end they would need groups of their own.
+/// Sorts by counting, so that equals keep their order. At walls the order is that of the candidates.
 void order_candidates(const Candidates& candidates, Chunks& chunks) {
   constexpr std::size_t ranks = 64;
   chunks.order.resize(candidates.grain_pairs.size());
@@ -124,7 +124,7 @@ void find_conflicts(const Incidence& incidence, Chunks& chunks) {
   }
 }
 
-/// Greedily, one side above the other.
+/// Colours chunks greedily, those of each side above those of the sides before.
 void colour_chunks(Chunks& chunks) {
   const std::size_t count = chunks.wall.size();
   chunks.colour.assign(count, -1);
@@ -199,7 +199,7 @@ bool before(const GrainPair& a, const GrainPair& b) {
   return a.first != b.first ? a.first < b.first : a.second < b.second;
 }
 
-/// Pairs of bodies with those of their balls that may touch.
+/// A pair of bodies, and two of their balls that may touch.
 struct BallPair {
   GrainPair pair;
   std::uint16_t balls;
@@ -290,7 +290,7 @@ void renumber(Candidates& candidates, std::span<const Slot> place) {
   std::vector<std::size_t> order(candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto split = order.begin() + static_cast<std::ptrdiff_t>(grains);
-  // A body is first in a few pairs only: counting by the first leaves short runs.
+  // Sorts by counting the first body: few pairs share it, so that the runs left to sort are short.
   std::vector<std::size_t> begin(place.size() + 2, 0);
   for (const GrainPair& pair : candidates.grain_pairs) ++begin[at(pair.first) + 2];
   std::partial_sum(begin.begin(), begin.end(), begin.begin());

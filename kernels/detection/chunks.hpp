@@ -34,13 +34,13 @@ struct Candidates {
   std::size_t size() const { return grain_pairs.size() + wall_pairs.size(); }
 };
 
-/// When a chunk is swept, the first of these first: what it leaves at the interface can travel while others
-/// are swept, and what it waits for can come.
+/// When a chunk is swept: in this order. Messages with what a chunk leaves at the interface, and messages
+/// that a late chunk waits for, travel while other chunks are swept.
 enum class ChunkSide : std::uint8_t {
-  wall,    ///< its wall is glued
-  border,  ///< a body of each of its candidates stands in several subdomains
-  inside,  ///< no body of it stands in another subdomain
-  late,    ///< at a border that waits for others
+  wall,    ///< at a glued wall
+  border,  ///< each of its candidates has a body that stands in several subdomains
+  inside,  ///< none of its bodies stands in another subdomain
+  late,    ///< a border that is swept only when messages of other subdomains have come
 };
 
 /// Candidates [begin, end) that may share a chunk: of one subdomain, of one layer at one wall or of none, and
@@ -54,28 +54,28 @@ struct CandidateGroup {
   int target;  ///< candidates in a chunk at most; 64 to longest_chunk make good groups, < 32768 is possible
 };
 
-/// The contacts of longer chunks may not fit the groups that are open at once when they are dealt.
+/// The contacts of longer chunks may not fit the groups that are open at once while contacts are dealt to
+/// groups.
 inline constexpr int longest_chunk = 1000;
 
-/// So that 32 bits tell where the record of a body begins (record_of).
+/// Bound so that 32 bits can tell where the record of a body begins (record_of).
 inline constexpr std::size_t most_bodies_of_a_process = std::size_t{1} << 29;
 
 /// The candidates of a chunk are of several pairs of materials.
 inline constexpr std::int32_t mixed_laws = -1;
 
-/// What the candidates of a chunk are, and with it how they are swept. Spheres in a chunk of blocks are
-/// blocks, too.
+/// The kind of a chunk's candidates decides how they are swept. Spheres in a chunk of blocks are blocks, too.
 enum class ChunkKind : std::uint8_t {
   spheres,       ///< between spheres
   spheres_wall,  ///< spheres at one wall
   blocks,        ///< a clump is among the bodies (note_kinds): at one wall, or none
 };
 
-/// Chunks are runs of candidates, close in space because bodies are; a chunk never mixes groups, and so
-/// neither grains and walls nor two walls. Those of a side have colours above those of the sides before it.
-/// Two chunks conflict when they share a grain, and then differ in colour: the sweep's result depends on
-/// colours alone. Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0 begin a
-/// chunk of their own.
+/// Chunks are runs of candidates, close in space because bodies are sorted so. A chunk never mixes groups,
+/// and so neither grains and walls nor two walls. Chunks of a side have colours above those of the sides
+/// before it. Two chunks conflict when they share a grain, and then differ in colour: the sweep's result
+/// depends on colours alone. Example: candidates 0..383 are chunk 0, 384..767 chunk 1, ...; those of wall 0
+/// begin a chunk of their own.
 struct Chunks {
   std::vector<std::int32_t> begin;      ///< chunks + 1 offsets into the candidates
   std::vector<std::int32_t> wall;       ///< per chunk: index of its wall, or -1
@@ -93,27 +93,26 @@ struct Chunks {
   std::vector<std::uint16_t> order;       ///< per grain pair, from begin[c] on: candidates of chunk c, less
                                           ///< begin[c], in the order in which groups are filled
   std::vector<std::int32_t> owned_begin;  ///< chunks + 1 offsets into `owned`
-  std::vector<Slot>
-      owned;  ///< grains of which this chunk is the first to write, in colour order: it resets them
-  std::vector<Slot> untouched;               ///< grains without candidates
+  std::vector<Slot> owned;  ///< grains that this chunk is the first to write, in colour order: it resets them
+  std::vector<Slot> untouched;               ///< grains without candidates, which no chunk resets
   std::vector<std::int32_t> conflict_begin;  ///< chunks + 1 offsets into `conflicts`
   std::vector<std::uint32_t> conflicts;      ///< chunks that share a grain, ascending
 
   std::size_t size() const { return colour.size(); }
 };
 
-/// Cuts the groups into chunks, colours them greedily in order, and lists who resets which body: nobody those
-/// that are `taken` (per body, or empty), whose velocities come from elsewhere before a chunk writes them.
-/// Laws are those of a scene that names no materials, until note_laws. Throws std::runtime_error when there
-/// are more than most_bodies_of_a_process.
+/// Cuts the groups into chunks, colours them greedily in order, and lists which chunk resets which body. No
+/// chunk resets bodies that are `taken` (per body, or empty): their velocities come from elsewhere before a
+/// chunk writes them. Until note_laws, laws are those of a scene that names no materials. Throws
+/// std::runtime_error when there are more than most_bodies_of_a_process.
 Chunks cut_chunks(const Candidates& candidates, std::span<const CandidateGroup> groups, std::size_t bodies,
                   std::span<const char> taken = {});
 
 /// The same with all candidates of one subdomain and nothing glued.
 Chunks cut_chunks(const Candidates& candidates, std::size_t bodies, int target);
 
-/// The groups of candidates that are all of one subdomain, in the order of `Candidates`; the wall pairs of
-/// walls with `glued[wall]` are of that side (none when empty).
+/// The groups of candidates that are all of one subdomain, in the order of `Candidates`. Pairs at walls with
+/// `glued[wall]` get ChunkSide::wall (none when `glued` is empty).
 std::vector<CandidateGroup> groups_of_one_subdomain(const Candidates& candidates, std::span<const char> glued,
                                                     int target);
 

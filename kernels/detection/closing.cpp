@@ -16,7 +16,7 @@ Vec3 velocity_of(const Bodies& bodies, Slot slot) {
   return Eigen::Map<const Vec3>(bodies.velocity[index(slot)].u);
 }
 
-/// By what a ball of the body may move beside its centre of mass [m/s]: 0 for spheres.
+/// Largest speed of a ball of the body relative to its centre of mass [m/s]: 0 for spheres.
 double spin_of(const Bodies& bodies, Slot slot) {
   if (bodies.shape.empty() || bodies.shape[index(slot)] == 0) return 0;
   return Eigen::Map<const Vec3>(bodies.velocity[index(slot)].w).norm();

@@ -11,56 +11,58 @@
 
 namespace talus {
 
-/// Where the record of a body begins, in numbers (VelocityOf). Of most_bodies_of_a_process, which cut_chunks
-/// sees to.
+/// Where the record of a body begins, counted in numbers (VelocityOf). It fits 32 bits because cut_chunks
+/// admits at most most_bodies_of_a_process bodies.
 inline std::uint32_t record_of(Slot slot) {
   constexpr std::uint32_t numbers = sizeof(Velocity) / sizeof(double);
   static_assert(most_bodies_of_a_process * numbers <= std::size_t{1} << 32);
   return numbers * static_cast<std::uint32_t>(slot);
 }
 
-/// How the surface of each body moves at a contact of blocks: with u + lever w, of VelocityOf. The second is
-/// void at a wall.
+/// At a contact of blocks the surface of each body moves with u + lever w, of VelocityOf. The second lever
+/// means nothing at a wall.
 struct Levers {
   Mat3 first = Mat3::Zero(), second = Mat3::Zero();
 };
 
-/// Contacts of one step. Chunk c keeps the room of its candidates: its contacts stand at [chunks.begin[c],
-/// chunks.begin[c] + count[c]), in groups of at most 16, most of them full. No grain stands twice in a
-/// group, so that a group can be swept at once. Behind them, between grains, stand the candidates that are
-/// no contacts, so that the next step finds all of them where they were (kernels/detection/narrow_phase.hpp).
+/// Contacts of one step. Chunk c has a place for each of its candidates. Its contacts stand at
+/// [chunks.begin[c], chunks.begin[c] + count[c]), in groups of at most 16, most of them full. No grain stands
+/// twice in a group, so that a group can be swept at once. In chunks between grains the candidates that are
+/// no contacts stand after them, so that the next step finds all candidates where they were
+/// (kernels/detection/narrow_phase.hpp).
 struct Contacts {
   std::vector<double> nx, ny, nz;  ///< normal, unit, from the second body (or the wall) to the first
   std::vector<double> bias;        ///< b [m/s]: Signorini holds for v_n + b
   std::vector<double> rx, ry, rz;  ///< impulse on the first body [N s], as the law sees it (law_impulse);
                                    ///< empty without friction
   std::vector<double> rn;          ///< normal impulse [N s], likewise; empty with friction
-  std::vector<double> cohesion;    ///< c h [N s] (kernels/sweeps/cohesion.hpp); empty where nothing has any
+  std::vector<double> cohesion;    ///< c h [N s] (kernels/sweeps/cohesion.hpp); empty if no contact has any
   std::vector<double> mx, my, mz;  ///< moment of rolling resistance on the first body [N m s], and
   std::vector<double> arm;         ///< its bound over the normal impulse [m]; empty where nothing resists
-  std::vector<Vec3> spin;          ///< at walls that turn, where something resists rolling: of the wall's
-                                   ///< material [rad/s]; else empty
+  std::vector<Vec3> spin;  ///< at walls that turn, if any contact resists rolling: angular velocity of
+                           ///< the wall's material [rad/s]; else empty
   std::vector<double> vx, vy, vz;  ///< at walls: velocity of the wall's material at the contact beyond that
                                    ///< of the wall [m/s]; empty where no wall turns or has a surface that
                                    ///< moves alone, and no cell flows
-  bool drifts_between = false;     ///< between bodies: of the second's image beyond that of the second; void
-                                   ///< where false
+  bool drifts_between = false;     ///< between bodies, vx, vy and vz hold the velocity of the second's image
+                                   ///< beyond that of the second
   std::vector<double> reach;   ///< distance of the centres over a length (kernels/bodies/cell_velocity.hpp);
                                ///< empty where no cell follows a stress
   std::vector<double> mu;      ///< friction of each contact; empty where no chunk mixes pairs of materials
   std::vector<Levers> levers;  ///< of contacts in chunks of blocks; empty where no body is a clump
   std::vector<std::uint16_t> balls;  ///< likewise: Candidates::balls
   std::vector<Slot> first, second;   ///< second is -1 - feature at a wall: -1 at a plane
-  /// record_of the same: a sweep takes fewer instructions to an address from there; void at a wall.
+  /// record_of first and second, from where a sweep takes fewer instructions to an address. The second means
+  /// nothing at a wall.
   std::vector<std::uint32_t> first_record, second_record;
   std::vector<std::int32_t> candidate;
   std::vector<std::int32_t> count;   ///< per chunk
   std::vector<std::int32_t> passed;  ///< per chunk: pairs that went through one another on their way to x, or
-                                     ///< in by more than half the smaller radius: the time step is too long
+                                     ///< overlapped by more than half the smaller radius: too long a step
   std::vector<std::uint8_t> group;   ///< from chunks.begin[c] on: sizes of the groups of chunk c, 1..16
 };
 
-/// Contacts in the same places, as sweeps in single precision know them (single_precision.hpp).
+/// The same contacts in the same places, for sweeps in single precision (single_precision.hpp).
 struct SingleContacts {
   double unit = 1;                ///< [kg] of impulses and of bodies' mobilities, a power of two
   std::vector<float> nx, ny, nz;  ///< normal
@@ -82,20 +84,20 @@ inline void set_drift(Contacts& contacts, std::size_t k, const Vec3& drift) {
   contacts.vz[k] = drift[2];
 }
 
-/// Room for the contacts of `chunks`, of which there are none yet: the candidates stand in their order, with
-/// their bodies between grains. `friction` decides which impulses exist.
+/// Makes room for the contacts of `chunks`, of which there are none yet. Candidates stand in their own order;
+/// those between grains have their bodies already. `friction` decides which impulses exist.
 void allocate(Contacts& contacts, const Candidates& candidates, const Chunks& chunks, bool friction);
 
 /// Writes the impulses of a chunk back to its candidates; those that were no contact get 0.
 void store_impulses(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                     Candidates& candidates);
 
-/// The other way: the impulses of a chunk's contacts are those that store_impulses wrote.
+/// The inverse: gives the contacts of a chunk the impulses that store_impulses wrote.
 void restore_impulses(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
                       Contacts& contacts);
 
-/// Turns the impulses into those of `kind` when a stage brings friction or drops it: normal parts become
-/// vectors along today's normals, and vectors their normal parts, so that forces outlive the change. x [m] of
+/// Converts the impulses to `kind` when a stage brings friction or drops it, so that forces outlive the
+/// change: normal parts become vectors along the present normals, and vectors their normal parts. x [m] of
 /// all grains.
 void convert_impulses(Candidates& candidates, ImpulseKind kind, std::span<const Vec3> x,
                       std::span<const Wall> walls, const Domain& domain = {});

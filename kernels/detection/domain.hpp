@@ -16,7 +16,7 @@ namespace talus {
 /// samples ask it. Inner loops take the space as a type (with_space): between walls a difference is a
 /// subtraction there, without a branch.
 ///
-/// The cell is a brick, from `low` on: sheared edges say where its images stand, not which points are stored.
+/// Stored points lie in a brick from `low` on; sheared edges say where the images of that brick stand.
 struct Domain {
   PeriodicSpace cell;       ///< all 0 between walls
   Vec3 low = Vec3::Zero();  ///< lower corner of the brick [m]; 0 along an axis of walls
@@ -46,9 +46,9 @@ struct Domain {
   /// The image of x that is nearest to `to` [m]; x itself, to the bit, between walls.
   Vec3 image_near(const Vec3& to, const Vec3& x) const { return repeats ? Vec3(to + separation(x, to)) : x; }
 
-  /// How many edges along x, y, z that image of b which is nearest to a stands away from b.
+  /// How many edges along x, y, z the image of b that is nearest to a stands away from b.
   Vec3 edges_between(const Vec3& a, const Vec3& b) const;
-  /// Velocity of that image beyond that of b, as the step begins, and in its solution [m/s].
+  /// Velocity of that image beyond that of b [m/s]: as the step begins, and (image_drift) in its solution.
   Vec3 image_velocity(const Vec3& a, const Vec3& b) const {
     return flows ? times(rates, edges_between(a, b)) : Vec3(Vec3::Zero());
   }
@@ -57,10 +57,10 @@ struct Domain {
     return {r.xx * k[0] + r.xy * k[1] + r.xz * k[2], r.yy * k[1] + r.yz * k[2], r.zz * k[2]};
   }
 
-  /// Halfway along that way [m]: the same point for (a, b) and (b, a), bit for bit.
+  /// The middle of that shortest way [m]: the same point for (a, b) and (b, a), bit for bit.
   Vec3 midpoint(const Vec3& a, const Vec3& b) const;
 
-  /// The image of x that lies in the brick [m], but for rounding; x itself between walls.
+  /// The image of x that lies in the brick, up to rounding [m]; x itself between walls.
   Vec3 wrap(const Vec3& x) const;
 
   /// How many edges x lies beyond the brick: wrap(x) is x less so many edges.
@@ -69,8 +69,8 @@ struct Domain {
   /// Extent along x, y, z [m]; 0 along an axis that nothing bounds.
   Vec3 lengths(const std::vector<Wall>& walls) const;
 
-  /// Of the space that the grains may fill [m^3]; 0 where nothing bounds it, or where a wall that is no plane
-  /// takes room in it.
+  /// Volume of the space that the grains may fill [m^3]; 0 where nothing bounds it, or where a wall that is
+  /// no plane takes room in it.
   double volume(const std::vector<Wall>& walls) const;
 
   /// Logarithmic strain between two lengths of an axis (28); 0 where either is not bounded.

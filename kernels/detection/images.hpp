@@ -1,7 +1,7 @@
 #pragma once
 
-/// Bodies of a periodic cell with those of their images that stand beside its faces: a broad phase that knows
-/// nothing of cells finds the pairs across a face among them.
+/// Bodies of a periodic cell together with their images beside its faces. A broad phase that knows nothing of
+/// cells finds the pairs across a face among them.
 
 #include <cstddef>
 #include <span>
@@ -23,9 +23,9 @@ struct ImagedBodies {
 /// `x` [m] in the brick of the domain; sizes as in build_cells.
 ImagedBodies with_images(const Domain& domain, std::span<const Vec3> x, std::span<const double> reach);
 
-/// Turns the pairs that were found among them into pairs of bodies. Pairs of two images are pairs of bodies
-/// elsewhere, and dropped; so are bodies within reach of an image of
-/// themselves, which no cell that is large enough brings in touch (check_cell of runtime/step).
+/// Turns the pairs that were found among bodies and images into pairs of bodies. Drops pairs of two images,
+/// which are found elsewhere as pairs with a body, and pairs of a body with an image of itself, which do not
+/// touch in a cell that is large enough (check_cell of runtime/step).
 void fold_images(std::size_t bodies, std::span<const Slot> original, std::vector<GrainPair>& pairs);
 
 /// Two bodies within reach of two images of one another, as fast ones may be, are one candidate: leaves each

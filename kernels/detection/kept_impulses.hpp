@@ -16,8 +16,8 @@ enum class ImpulseKind : std::uint8_t {
   rolling = 6  ///< the same, and the moment of rolling resistance on the first body [N m s]
 };
 
-/// Impulses of candidates, which outlive the step as the next one's warm start: a row of one kind for each.
-/// Nobody else counts components.
+/// Impulses of candidates, a row of one kind for each. They outlive the step as the next one's warm start. No
+/// other code depends on the length of a row.
 class KeptImpulses {
  public:
   KeptImpulses() = default;
@@ -29,7 +29,7 @@ class KeptImpulses {
   std::span<const double> row(std::size_t k) const {
     return std::span(values_).subspan(k * length(), length());
   }
-  /// Numbers of rows [begin, end), one row behind the other.
+  /// Numbers of rows [begin, end), one row after the other.
   std::span<double> values(std::size_t begin, std::size_t end) {
     return std::span(values_).subspan(begin * length(), (end - begin) * length());
   }
@@ -44,12 +44,13 @@ class KeptImpulses {
 
   void reserve(std::size_t rows) { values_.reserve(rows * length()); }
   void assign_zeros(std::size_t rows) { values_.assign(rows * length(), 0.0); }
-  /// `of` is a row of this kind, or longer: what lies behind is not read.
+  /// `of` is a row of this kind, or a longer one, of which the rest is not read.
   void push_back(std::span<const double> of);
   void set(std::size_t k, std::span<const double> of);
-  /// All rows of others of this kind, behind these.
+  /// Appends all rows of `others`, which are of this kind.
   void append(const KeptImpulses& others);
-  /// The other body becomes the first. A normal part alone does not know which comes first, and stays.
+  /// Makes the other body the first: negates the row. A normal part alone is the same for either order, and
+  /// stays.
   void swap_bodies(std::size_t k);
   std::size_t bytes() const { return values_.capacity() * sizeof(double); }
 

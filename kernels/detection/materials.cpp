@@ -4,7 +4,7 @@ namespace talus {
 
 namespace {
 
-/// Of candidate k.
+/// Number of the law of candidate k.
 std::size_t law_of(const Candidates& candidates, const MaterialView& materials, std::size_t k) {
   const std::size_t grains = candidates.grain_pairs.size();
   return k < grains ? materials.law(candidates.grain_pairs[k])

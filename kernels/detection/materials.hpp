@@ -1,6 +1,6 @@
 #pragma once
 
-/// Of which materials candidates and contacts are.
+/// Materials, and hence laws, of candidates and contacts.
 
 #include <span>
 
@@ -11,7 +11,7 @@
 
 namespace talus {
 
-/// Materials of what meets in a scene.
+/// Materials of the bodies and walls of a scene.
 struct MaterialView {
   std::span<const Material> bodies;  ///< per slot; empty: material_of_grains
   std::span<const Wall> walls;
@@ -41,7 +41,7 @@ inline double friction_of(const PairTable& table, const Chunks& chunks, std::siz
   return law == mixed_laws ? contacts.mu[k] : table.laws()[static_cast<std::size_t>(law)].friction;
 }
 
-/// Gives the contacts of a chunk that mixes laws their friction; of others nothing is written.
+/// Gives the contacts of a chunk that mixes laws their friction; does nothing for other chunks.
 void set_friction(const Candidates& candidates, const Chunks& chunks, std::size_t chunk,
                   const MaterialView& materials, const PairTable& table, Contacts& contacts);
 

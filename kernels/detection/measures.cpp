@@ -10,7 +10,7 @@ namespace talus {
 
 namespace {
 
-/// Contacts between asking for the bodies of one and looking at it.
+/// Prefetch distance, in contacts.
 constexpr std::size_t ahead = 16;
 
 }  // namespace

@@ -25,11 +25,11 @@ struct ContactSums {
   void add(const ContactSums& other);
 };
 
-/// What a wall does through its contacts.
+/// What a wall does to the grains through its contacts.
 struct WallSums {
   static constexpr std::size_t width = 4;
   Vec3 torque = Vec3::Zero();  ///< on the grains, about a point, times the time that impulses act [N m s]
-  double drift = 0;            ///< sum of impulse . drift [J], what the wall's velocity leaves of its work
+  double drift = 0;            ///< sum of impulse . drift [J]: its work beyond that of its velocity
 
   void add_to(double* numbers) const {
     for (Eigen::Index c = 0; c < 3; ++c) numbers[c] += torque[c];
@@ -52,7 +52,7 @@ struct Poses {
 ContactSums measure_contacts(const Contacts& contacts, const Chunks& chunks, std::size_t chunk,
                              const Poses& poses);
 
-/// By what the sums of a wall go back from the end of the step to its middle, where impulses act.
+/// Data that take the sums of a wall from the end of the step back to its middle, where impulses act.
 struct WallMeasure {
   Vec3 about = Vec3::Zero();           ///< [m]
   std::span<const Velocity> velocity;  ///< of the end of the step
@@ -88,7 +88,7 @@ inline Vec3 contact_impulse(const Contacts& contacts, std::size_t k) {
   if (contacts.cohesion.empty()) return impulse;
   return impulse - contacts.cohesion[k] * contact_normal(contacts, k);
 }
-/// Whether it carries: r_n > 0, or r_n + c h > 0 with cohesion.
+/// Whether a contact carries: r_n > 0, or r_n + c h > 0 with cohesion.
 inline bool is_active(const Contacts& contacts, std::size_t k) {
   return law_impulse(contacts, k).dot(contact_normal(contacts, k)) > 0;
 }

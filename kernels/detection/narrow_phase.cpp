@@ -39,7 +39,7 @@ std::int32_t count_passed(const PairView& pairs, const Domain& domain, double ti
   return through;
 }
 
-/// The kernel that `set` means; `automatic` is the strongest that runs here.
+/// The kernel of `set`; `automatic` means the widest instruction set that runs here.
 FindGaps kernel_of(InstructionSet set) {
   if (set == InstructionSet::automatic) set = best_instruction_set();
   if (set == InstructionSet::portable) return gap_kernels_portable;
@@ -50,7 +50,7 @@ MaterialView materials_of(const NarrowPhase& in) {
   return {in.material, in.walls};
 }
 
-/// What the narrow phase of one chunk goes by.
+/// Input of the narrow phase of one chunk.
 struct ChunkPhase {
   const NarrowPhase& in;
   GapRule rule;
@@ -59,7 +59,7 @@ struct ChunkPhase {
   std::size_t chunk;
 };
 
-/// Restitution of each pair of a chunk that mixes laws, in the places of `contacts`; of others empty.
+/// Restitution of each pair of a chunk that mixes laws, in the places of `contacts`; empty for other chunks.
 std::vector<double> own_restitution(const ChunkPhase& phase, const Slot* first, const Slot* second) {
   std::vector<double> own;
   const Chunks& chunks = phase.chunks;
@@ -105,7 +105,7 @@ double restitution_at(const ChunkPhase& phase, const WallPair& pair) {
   return phase.in.laws.laws()[materials_of(phase.in).law(pair)].restitution;
 }
 
-/// What the material of the wall has beyond the velocity of the wall, where contacts have room for it.
+/// Writes the velocity of the wall's material beyond that of the wall, where contacts have room for it.
 void write_drift(const ChunkPhase& phase, const Vec3& n, std::size_t place, Contacts& contacts) {
   if (contacts.vx.empty()) return;
   const auto i = at(contacts.first[place]);
@@ -113,7 +113,7 @@ void write_drift(const ChunkPhase& phase, const Vec3& n, std::size_t place, Cont
   set_drift(contacts, place, wall.drift_at(phase.in.x[i] - phase.in.radius[i] * n, n));
 }
 
-/// At a plane.
+/// Finds the contacts of a chunk at a plane.
 void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);
@@ -144,18 +144,19 @@ void narrow_wall(const ChunkPhase& phase, Contacts& contacts) {
   detail::close_groups(chunks, chunk, place, contacts);
 }
 
-/// True when a body that has come by `way`, as the wall sees it, to `x` was deep in a surface on it: such a
-/// step is too long, and a thin surface may be behind the body by now.
+/// True when a body that has moved to `x` by `way`, relative to the wall, was deep in a surface on that way:
+/// such a step is too long, and the body may have passed a thin surface.
 bool passed_surface(const Wall& wall, const Vec3& x, const Vec3& way, double radius) {
   if (!detail::came_far(way, radius)) return false;
   std::vector<SurfacePoint> points;
-  constexpr double most = 256;  // looks: a body that came further is told by its energy
+  constexpr double most = 256;  // looks: a body that came further is found by its energy
   const double looks = std::ceil(std::min(most, 4 * way.norm() / radius));
   for (double look = 0; look < looks; ++look) collide(wall, x - look / looks * way, 0.5 * radius, points);
   return !points.empty();
 }
 
-/// At a surface: a chunk has each grain once, with one of the features that it may touch.
+/// Finds the contacts of a chunk at a surface. The chunk has each grain once, with one feature that it may
+/// touch.
 void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
   const auto& [in, rule, candidates, chunks, chunk] = phase;
   const std::size_t grains = candidates.grain_pairs.size(), begin = at(chunks.begin[chunk]);
@@ -167,7 +168,7 @@ void narrow_surface(const ChunkPhase& phase, Contacts& contacts) {
     const WallPair& pair = candidates.wall_pairs[k - grains];
     const auto [wall, body, feature] = pair;
     const std::size_t i = at(body);
-    // Of a point that lies along the normal from the centre, too, the velocity along it is that at the
+    // The point lies along the normal from the centre, so its velocity along the normal is that at the
     // centre.
     const Vec3 u = Eigen::Map<const Vec3>(in.velocity[i].u), v = u - of.velocity_at(in.x[i]),
                free = v + in.time_step * in.gravity;

@@ -11,7 +11,7 @@
 
 namespace talus {
 
-/// What the narrow phase looks at; x at the middle of the step (theta = 1/2), velocities those of its
+/// Input of the narrow phase. x is at the middle of the step (theta = 1/2), velocities are those of its
 /// beginning.
 struct NarrowPhase {
   std::span<const Vec3> x;             ///< [m]
@@ -35,11 +35,12 @@ struct NarrowPhase {
 /// and impacts follow from kernels/law/gap_law.hpp; an approach is fast above 2 h |gravity|.
 /// Coincident centres get the normal +z.
 ///
-/// A chunk whose contacts are the candidates that they were keeps their places and groups; where a few came
-/// or went these are repaired, else dealt anew (kernels/detection/detail/contact_groups.hpp). So groups
-/// follow from the steps since allocate(), the first of which deals.
+/// A chunk whose contacts are the same candidates as in the step before keeps their places and groups. If a
+/// few contacts came or went the groups are repaired, else dealt anew
+/// (kernels/detection/detail/contact_groups.hpp). So groups depend on all steps since allocate(), the first
+/// of which deals.
 ///
-/// `set` runs on this processor; which one it is changes no bit.
+/// This processor must run `set`; the choice changes no bit.
 void narrow_chunk(const NarrowPhase& in, const Candidates& candidates, const Chunks& chunks,
                   std::size_t chunk, InstructionSet set, Contacts& contacts);
 

@@ -5,7 +5,7 @@
 
 namespace talus {
 
-/// The integer nearest to a number, or to each lane of a vector; of two the even one. |v| < 2^51: adding
+/// The integer nearest to a number, or to each lane of a vector; ties go to the even one. |v| < 2^51: adding
 /// 1.5 x 2^52 leaves no digit behind the point. The nearest to -v is minus that to v, bit for bit.
 template <class T>
 [[gnu::always_inline]] inline T nearest_integer(const T& v) {
@@ -23,15 +23,15 @@ struct WalledSpace {
   [[gnu::always_inline]] static inline void meet(T&, T&, T&, T&, T&, T&) {}
 };
 
-/// What moves along an edge of a cell: of the edges themselves, how fast they change [m/s]. An image that
-/// stands (a, b, c) edges away from a body is faster by the product with these numbers.
+/// Rates of change of the edges of a cell [m/s], as a matrix like that of PeriodicSpace. An image that stands
+/// (a, b, c) edges away from a body is faster than the body by this matrix times (a, b, c).
 struct EdgeRates {
   double xx = 0, yy = 0, zz = 0;
   double xy = 0, xz = 0, yz = 0;
 };
 
 /// Space that repeats itself along the edges (xx, 0, 0), (xy, yy, 0) and (xz, yz, zz) of a cell [m]. Any cell
-/// is one of these, turned. Along an axis of walls the diagonal entry and those beside it are 0.
+/// can be turned into this form. Along an axis of walls the diagonal entry and those beside it are 0.
 struct PeriodicSpace {
   double xx = 0, yy = 0, zz = 0;
   double xy = 0, xz = 0, yz = 0;
@@ -51,7 +51,7 @@ struct PeriodicSpace {
     y = y - yy * b;
     x = x - xx * nearest_integer(per_xx * x);
   }
-  /// Of differences of positions and of velocities: the images are as fast as the bodies.
+  /// Shortens a difference of positions. That of velocities stays: images are as fast as the bodies.
   template <class T>
   [[gnu::always_inline]] inline void meet(T& x, T& y, T& z, T&, T&, T&) const {
     shorten(x, y, z);
@@ -63,7 +63,7 @@ struct FlowingSpace {
   PeriodicSpace cell;
   EdgeRates rates;
 
-  /// Likewise, where images have velocities of their own.
+  /// Likewise, but changes the difference of velocities, too: images have velocities of their own.
   template <class T>
   [[gnu::always_inline]] inline void meet(T& x, T& y, T& z, T& vx, T& vy, T& vz) const {
     const T c = nearest_integer(cell.per_zz * z);

@@ -42,7 +42,7 @@ bool compare(const NearEscapes& escapes, const Bodies& bodies, std::size_t s, co
     const double distance = std::sqrt(d2), gap = distance - escape->radius - bodies.radius[s];
     const Vec3 v = Map(bodies.velocity[s].u) - Map(escape->u);
     const double v_n = distance > 0 ? d.dot(v) / distance : 0;
-    // Rounded otherwise than in the narrow phase: a little more than it asks for.
+    // Rounds otherwise than the narrow phase, and therefore finds a little more than that.
     if (!stays_apart(gap - rounding * distance, v_n, margins.time_step, margins.alert))
       needed.push_back({std::min(id, escape->id), std::max(id, escape->id)});
   }
@@ -69,7 +69,7 @@ void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& mar
   for (std::size_t s = range.begin; s < range.end; ++s) {
     const Vec3& x = bodies.x[s];
     const double need = need_of(bodies, s, margins);
-    // Its way: no position is wrapped between two broad phases.
+    // Its way, as no position is wrapped between two broad phases.
     if (need + (x - margins.x_then[s]).norm() <= margins.reach_then[s]) continue;
     const double* u = bodies.velocity[s].u;
     skin_escapes.push_back({static_cast<std::int64_t>(bodies.id[s]),
@@ -98,14 +98,14 @@ void compare_skin_escapes(std::span<const Escape> skin_escapes, const Bodies& bo
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
-    // Who has not left needs less than the reach of then.
+    // A grain that has not left its margin needs less than its reach at the last broad phase.
     const auto reach = margins.reach_then.subspan(begin, end - begin);
     const double most = std::max(widest, *std::max_element(reach.begin(), reach.end()));
     near.clear();
     for (const Escape& escape : skin_escapes) {
       const Map at(escape.x);
       const double d2 = (at - at.cwiseMin(high).cwiseMax(low)).squaredNorm(), reached = escape.need + most;
-      // Of a periodic cell any of its images may be near.
+      // In a periodic cell any image of the grain may be near.
       if (margins.domain.repeats || !(d2 * (1 - rounding) >= reached * reached)) near.push_back(&escape);
     }
     for (std::size_t s = begin; s < end; ++s)

@@ -36,7 +36,7 @@ struct Encounter {
   auto operator<=>(const Encounter&) const = default;
 };
 
-/// What the candidates were found with, and what makes contacts of them now.
+/// Margins with which the candidates were found, and what makes contacts of candidates now.
 struct Margins {
   std::span<const Vec3> x_then;        ///< centres at the last broad phase [m]
   std::span<const double> reach_then;  ///< [m]
@@ -47,7 +47,7 @@ struct Margins {
   Domain domain = {};
 };
 
-/// Appends the grains of the range that are no longer within their reach of then.
+/// Appends the grains of the range that have left their margins (reach_then).
 void find_skin_escapes(SlotRange range, const Bodies& bodies, const Margins& margins,
                        std::vector<Escape>& skin_escapes);
 

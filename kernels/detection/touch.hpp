@@ -1,7 +1,7 @@
 #pragma once
 
-/// How two bodies, or a body and a wall, touch through given balls (kernels/shapes/clump.hpp), where no time
-/// is lost by asking each contact what it is. A sphere is its only ball.
+/// How two bodies, or a body and a wall, touch through given balls (kernels/shapes/clump.hpp); a sphere is
+/// its only ball. For code where it costs no time to ask each contact for its kind.
 
 #include <span>
 
@@ -26,13 +26,14 @@ struct Touch {
   Vec3 separation = Vec3::Zero();  ///< of the balls' centres; at a wall of the ball's from the wall [m]
 };
 
-/// Ball `numbers` of the bodies at two slots.
+/// Touch of two bodies by their balls `numbers`.
 Touch touch_bodies(const Poses& poses, Slot first, Slot second, BallNumbers numbers);
 
-/// A body at a wall. The feature of a clump is that of the surface x its balls + the ball.
+/// Touch of a body and a wall. The feature of a clump is that of the surface x its number of balls + the
+/// ball.
 Touch touch_wall(const Poses& poses, const Wall& wall, Slot body, std::int32_t feature);
 
-/// Contact k, of spheres or blocks, at `wall`, or between bodies where that is null.
+/// Touch of contact k, of spheres or blocks, at `wall`, or between bodies where that is null.
 Touch touch_of(const Poses& poses, const Contacts& contacts, std::size_t k, const Wall* wall);
 
 /// Branch vector of the same contact [m]: to the centre of the first body from that of the second, at a wall

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Which grains stand near which walls, planes or surfaces alike.
+/// Candidates of grains at walls, planes or surfaces alike.
 
 #include <cstddef>
 #include <span>
@@ -12,7 +12,7 @@
 
 namespace talus {
 
-/// The point of a wall, of one feature of its surface, for a sphere with its centre at x.
+/// The point of a wall, or of one feature of its surface, that is nearest to a sphere with its centre at x.
 inline SurfacePoint wall_point(const Wall& wall, const Vec3& x, std::int32_t feature, const Domain& domain) {
   if (wall.surface() != nullptr) return point_at(wall, x, feature);
   return {0, wall.normal.dot(domain.separation(x, wall.point)), wall.normal};
@@ -27,7 +27,7 @@ inline bool meets_wall(const Wall& wall, const Vec3& x, double radius, const Dom
   return !points.empty();
 }
 
-/// By (wall, body, feature).
+/// Order by (wall, body, feature).
 inline bool before(const WallPair& a, const WallPair& b) {
   if (a.wall != b.wall) return a.wall < b.wall;
   return a.body != b.body ? a.body < b.body : a.feature < b.feature;

@@ -13,7 +13,7 @@ namespace talus {
 
 namespace {
 
-/// What the iteration carries along, of one part: an entry per contact.
+/// State of the iteration in one part: an entry per contact.
 struct PartState {
   std::span<const double> rho;
   std::vector<Vec3> y;        ///< aim of the contact velocity, with its shift
@@ -23,7 +23,7 @@ struct PartState {
   explicit PartState(std::span<const double> weights)
       : rho(weights), y(weights.size()), shift(weights.size()) {}
 
-  /// The aims that impulses and velocities suggest.
+  /// The first aims, from impulses and velocities.
   void begin(const BodyProblem& problem, std::span<const Twist> V, std::span<Vec3> r) {
     for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
@@ -97,7 +97,7 @@ void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
     sum[k % width] += rows[k];
     if (k % width == worst) most = std::max(most, rows[k]);
   }
-  // Of all bodies: NaN, of whichever, stays NaN, and must not pass for solved.
+  // Sums over all bodies: a NaN, of any of them, stays NaN, and must not pass for solved.
   result.momentum_defect = sum[gained2] != 0 ? std::sqrt(sum[defect2] / sum[gained2]) : 0;
   // Each body counts alike: the heaviest would hide the rest.
   const double speed = std::sqrt(sum[speed2] / sum[count]);
@@ -107,7 +107,7 @@ void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
     result.balance_defect = Vec3(sum[sample], sum[sample + 1], sum[sample + 2]).norm() / sum[scale];
 }
 
-/// Whether all weights are numbers that sums and products of a few of them stay numbers of. Collective.
+/// Whether all weights are finite, and leave room in doubles for sums and products with them. Collective.
 bool weights_are_sound(const BodyParts& parts, std::span<const std::vector<double>> rho) {
   constexpr double least = 1e-250, most = 1e250;
   return parts.total(1, [&](std::size_t p, std::span<double> row) {

@@ -13,10 +13,10 @@ namespace talus {
 
 struct BodyAdmmSettings {
   double tolerance = 1e-3;          ///< on momentum_defect and contact_defect
-  double balance_tolerance = 1e-3;  ///< on balance_defect; where there are heavy bodies, this is enough
+  double balance_tolerance = 1e-3;  ///< on balance_defect; enough by itself where there are heavy bodies
   int max_iterations = 100;
   double relaxation = 1.6;         ///< in [1, 2)
-  double linear_tolerance = 0.05;  ///< of the conjugate gradients, on what is left of the residual
+  double linear_tolerance = 0.05;  ///< of the conjugate gradients: what they leave of the residual, relative
   int max_linear = 100;            ///< conjugate gradient iterations within one of ADMM
 };
 
@@ -41,9 +41,9 @@ struct BodyAdmmResult {
 ///   r' <- P_Kmu(r - rho x),   y <- x + (r' - r)/rho
 ///
 /// with the De Saxce shift of the last y (Boyd et al. 2011; Acary et al. 2018 for the shift). rho = kappa /
-/// W_nn: see `estimate_stiffness`. Masses so large, so small or so far apart that some rho has no place in a
-/// double leave the impulses as they are, not converged. The same bits and the same result wherever the parts
-/// lie.
+/// W_nn: see `estimate_stiffness`. If masses are so large, so small or so far apart that some rho does not
+/// fit a double, the impulses stay as they are, not converged. The result has the same bits wherever the
+/// parts lie.
 BodyAdmmResult solve_admm(std::span<BodyProblem> parts, const PartLink& link,
                           const BodyAdmmSettings& settings);
 /// The whole problem in one part.

@@ -13,17 +13,18 @@ namespace talus {
 
 namespace {
 
-/// What the contacts of one part that carry ask of the velocities, and those that do not carry.
+/// The changes that the carrying contacts of one part ask of the velocities, and its contacts that do not
+/// carry.
 struct Wishes {
   std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s], in order of contact
   std::vector<ContactEquation> open;
-  std::vector<double> gap;  ///< of those: v_n, > 0 [m/s]
+  std::vector<double> gap;  ///< of the open ones: v_n, >= 0 [m/s]
   double drive = 0;         ///< fastest drive among those that carry [m/s]
   double fastest = 0;       ///< drive, gap to close or rebound [m/s]
   double pressed = 0;       ///< sum of the impulses at walls [N s]
 };
 
-/// Keeps those that carry in `problem`.
+/// Finds the wishes of `problem`, which keeps only the contacts that carry.
 Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceThresholds& thresholds) {
   Wishes wishes;
   std::size_t kept = 0;
@@ -59,8 +60,8 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceTh
   return wishes;
 }
 
-/// Open contacts that `motion` closes and more join those that carry: they ask for no more than to close.
-/// Returns sum m v_n^2 of what it pushed them in [J].
+/// Open contacts that `motion` closes and more join those that carry; they ask only to be closed. Returns sum
+/// m v_n^2 of what it pushed them in [J].
 double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& wishes) {
   double pushed2 = 0;
   std::size_t kept = 0;
@@ -93,7 +94,7 @@ double momentum(const BodyParts& parts, const PartField& motion) {
   })[0];
 }
 
-/// The same of their difference.
+/// The same of the difference of two motions.
 double distance(const BodyParts& parts, const PartField& motion, const PartField& from) {
   PartField difference = motion;
   parts.each([&](std::size_t p) {
@@ -105,8 +106,8 @@ double distance(const BodyParts& parts, const PartField& motion, const PartField
   return momentum(parts, difference);
 }
 
-/// Of the motion: |d|_M^2 + sum rho |H^T d - change|^2, which it is to make small [J]; and the wishes that it
-/// does not grant, sum |H^T d - change|/W_nn [N s].
+/// How well a motion fits: |d|_M^2 + sum rho |H^T d - change|^2, which is to be small [J]; and the wishes
+/// that it misses, sum |H^T d - change|/W_nn [N s].
 struct Fit {
   double cost, missed;
 };
@@ -124,13 +125,13 @@ Fit fit_of(const BodyParts& parts, const PartField& motion, std::span<const Wish
   return {sums[0], sums[1]};
 }
 
-/// What the error of the velocities of all parts is held against.
+/// What the error of the velocities of all parts is compared with.
 struct Scales {
-  double contacts = 0;  ///< of all parts
+  double contacts = 0;  ///< number, of all parts
   double mass = 0;      ///< of all bodies [kg]
   double momentum = 0;  ///< [kg m/s]; 0 where nothing moves
 
-  /// By Cauchy and Schwarz: the most momentum in so much energy.
+  /// The largest momentum with this energy, by Cauchy and Schwarz.
   double most(double energy) const { return std::sqrt(mass * energy); }
 };
 
@@ -157,7 +158,7 @@ Scales scales_of(const BodyParts& parts, const std::vector<Wishes>& wishes, cons
   parts.each([&](std::size_t p) {
     for (std::size_t b = 0; b < free[p].size(); ++b) free[p][b] = parts[p].bodies[b].free;
   });
-  // Contacts change no more than what comes in and what drives, gaps and restitution ask for.
+  // Contacts change no more than the momentum that comes in and what drives, gaps and restitution ask for.
   const double sound = scales.most(all[incoming]) + all[mass] * all[fastest];
   scales.momentum = std::max({std::min(distance(parts, V, free), sound),
                               all[drive] > 0 ? all[mass] * all[drive] : thresholds.interest * all[pressed],
@@ -185,7 +186,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     return error;
   }
 
-  // Two motions to begin from: none; and the stop of everything, which is the answer of a sample at rest.
+  // Two motions to start from: none; and the one that stops everything, the answer of a sample at rest.
   PartField motion = parts.field(), stop = V;
   parts.each([&](std::size_t p) {
     for (Twist& v : stop[p]) v = {-v.u, -v.w};
@@ -214,8 +215,8 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
     PartField then = motion;
     left = thresholds.caution * scales.most(solver.begin(force, motion));
     found = momentum(parts, motion);
-    // The bound gives light bodies the mass of all: beside a heavy one what is left shows in how far the last
-    // half of the iterations went, and the quarter before it.
+    // The bound counts light bodies with the mass of all. Beside a heavy body the changes over the last half
+    // of the iterations and the quarter before it show better what is left.
     double before = std::numeric_limits<double>::infinity();
     for (int k = 1; k <= thresholds.most_linear && !small(left); ++k) {
       const double bound = thresholds.caution * scales.most(solver.iterate(motion));

@@ -11,30 +11,32 @@
 
 namespace talus {
 
-/// Every number that the estimates of this header depend on, besides what the caller need not know more
-/// exactly. Ratios have no unit; iterations are those of conjugate gradients.
+/// Parameters of the estimates of this header, besides the accuracy that the caller asks for. Ratios have no
+/// unit; iterations are those of conjugate gradients.
 struct BalanceThresholds {
-  /// Where changes still grow nothing has settled: so many times the last one is still to come, >= 1.
+  /// Where changes still grow nothing has settled: then so many times the last change is taken to come, >= 1.
   double unsettled = 20;
   /// A contact slides when its tangential impulse is within this part of mu r_n, in (0, 1).
   double sliding = 1e-6;
-  /// rho W_nn over estimate_stiffness, >> 1. That looks at masses and layers only: in a wedge of half angle a
-  /// the load excites an eigenvalue smaller by sin^2 a.
+  /// rho W_nn over estimate_stiffness, >> 1. That estimate looks at masses and layers only: in a wedge of
+  /// half angle a the load excites an eigenvalue smaller by sin^2 a.
   double firmness = 1e4;
-  /// The gradients' error over what they found, at which they are let be, in (0, 1).
+  /// Error of the conjugate gradients over the motion that they have found, at which they stop, in (0, 1).
   double linear_tolerance = 0.25;
   /// Iterations of a linear solve, at most, >= 1.
   int most_linear = 128;
-  /// From so many iterations on, >= 1, the way they went tells how far they have still to go.
+  /// From so many iterations on, >= 1, their last changes give an estimate of the change still to come.
   int few_linear = 16;
   /// Linear solves, at most, >= 1: before each further one, open contacts join those that carry.
   int most_rounds = 6;
-  /// Factor on the gradients' bound, >= 1: they see a preconditioned residual, which is smaller than the
-  /// error.
+  /// Factor on the bound of the conjugate gradients, >= 1: that is of a preconditioned residual, which is
+  /// smaller than the error.
   double caution = 3;
-  /// Of the impulses between walls, in (0, 1): a step that does less is measured by this part of them.
+  /// Part of the impulses at walls, in (0, 1), that an error is compared with at least where no wall is
+  /// driven.
   double interest = 1e-2;
-  /// What rounding leaves of the sample's momentum, over it, > 0: grains that fly side by side.
+  /// What rounding leaves of the sample's momentum, over it, > 0: the least scale of grains that fly side by
+  /// side.
   double rounding = 1e-12;
 };
 
@@ -66,28 +68,30 @@ struct VelocityError {
   int linear_iterations = 0;  ///< conjugate gradients
 };
 
-/// Estimate of it, from the impulses of the problem, whose contacts it uses up; `enough`: what need not be
-/// known more exactly. It is the momentum that bodies have still to gain or lose: force carried against force
-/// due, for every wall, every heavy body and through every cut of the sample. In sum m |u| + (I/R^2) |w|.
+/// Estimates this error from the impulses of the problem, whose contacts it uses up. `enough`: what need not
+/// be known more exactly. The error is the momentum that bodies have still to gain or lose: force carried
+/// against force due, for every wall, every heavy body and through every cut of the sample. It is measured as
+/// sum m |u| + (I/R^2) |w|.
 ///
-/// The contacts ask for changes of their velocities: y - v, with (r', y) the complementary pair next to (r,
-/// v), one projection away. Without friction, and with r and y complementary, any motion d of the bodies that
-/// grants the wishes of those that carry and closes the others at most, H^T d = y - v, bounds the error:
+/// Each contact asks for the change y - v of its velocity, with (r', y) the complementary pair next to (r,
+/// v), one projection away. Without friction, and with r and y complementary, a motion d of the bodies bounds
+/// the error if it gives those that carry what they ask for, H^T d = y - v, and closes the others at most:
 ///
 ///   |V(r) - V*|_M^2 = (r - r*).(v - v*) <= (r - r*).(v - y) = -d.M (V(r) - V*) <= |d|_M |V(r) - V*|_M
 ///
-/// since (r - r*).(y - v*) = -r.v* - r*.y <= 0. The smallest one is sought: min |d|_M^2 + sum rho |H^T d - (y
-/// - v)|^2 over the contacts that carry, along the normal where they slide, rho far above what the problem
-/// needs: a linear solve (body_solver.hpp), which sees through chains where sweeps do not. Open contacts that
-/// d would push in are added and it is solved again. Wishes that no motion
-/// grants, as of a grain between driven walls that close, count as they are. What is heuristic: friction,
-/// that rho and the rounds are finite, and that the momentum of d, whose kinetic norm is bounded, is taken
-/// for that of the error.
+/// since (r - r*).(y - v*) = -r.v* - r*.y <= 0. The smallest such motion is sought: min |d|_M^2 + sum rho
+/// |H^T d - (y - v)|^2 over the contacts that carry, along the normal where they slide, with rho far above
+/// what the problem needs. That is a linear solve (body_solver.hpp), which converges on chains where sweeps
+/// do not. Open contacts that d would push in are added, and the system is solved again. Changes that no
+/// motion can give, as for a grain between driven walls that close, count in full. Heuristic are friction,
+/// the finite rho and number of rounds, and that the momentum of d, of which the kinetic norm is bounded, is
+/// taken for that of the error.
 ///
-/// The scale is sum m |V(r) - V_free|, what the contacts do, as far as what comes in explains it; or the
-/// speed of driven walls times the whole mass, if that is more; where no wall is driven, at least a hundredth
-/// (BalanceThresholds::interest) of the impulses between walls, as grains pressed at rest gain nothing; never
-/// less than what rounding leaves of the sample's own momentum. Takes about as long as a hundred sweeps.
+/// The scale is the largest of three. First, sum m |V(r) - V_free|, what the contacts do, but no more than
+/// what comes in can explain. Second, the speed of driven walls times the whole mass; where no wall is
+/// driven, a hundredth (BalanceThresholds::interest) of the impulses at walls, as grains pressed at rest gain
+/// nothing. Third, what rounding leaves of the sample's own momentum. The estimate takes about as long as a
+/// hundred sweeps.
 VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough,
                              const BalanceThresholds& thresholds = {});
 /// The whole problem in one part.

@@ -11,7 +11,7 @@ namespace talus {
 
 namespace {
 
-/// Of a body over that of the copy at a slot.
+/// Mass of a body over that of its copy at a slot.
 double masses_of_slot(const BodyProblemSource& source, std::size_t slot) {
   return source.parts.empty() ? 1 : source.parts[slot];
 }
@@ -52,7 +52,7 @@ BodyUnknown unknown_of_cell(const CellMotion& cell) {
   return body;
 }
 
-/// `part` null: all of it.
+/// Slots of `part`, or of the whole problem where that is null.
 std::array<std::size_t, 2> slots_of(const BodyProblemSource& source, const BodyProblemPart* part) {
   return part ? std::array{part->begin, part->end} : std::array{std::size_t{0}, source.velocity.size()};
 }
@@ -113,7 +113,7 @@ ContactGraph graph_of(const BodyProblemSource& source, const BodyProblemPart* pa
   return graph;
 }
 
-/// What the moment of contact k does to the bodies of the last contact of `problem`.
+/// Adds what the moment of contact k does to the bodies of the last contact of `problem`.
 void add_moment(const Contacts& contacts, std::size_t k, BodyProblem& problem) {
   const ContactEquation& contact = problem.contacts.back();
   const Vec3 moment(contacts.mx[k], contacts.my[k], contacts.mz[k]);
@@ -125,7 +125,8 @@ void add_moment(const Contacts& contacts, std::size_t k, BodyProblem& problem) {
   turn(contact.second, -1);
 }
 
-/// What a flow moves two bodies against one another by, where its drift is that of an image so far away.
+/// The speed at which the flow of a cell moves two touching bodies against one another [m/s]: that of the
+/// image's drift, scaled from the distance of the image to theirs.
 double drive_of_flow(const BodyProblem& problem, const ContactEquation& contact, const Vec3& drift) {
   if (drift == Vec3::Zero()) return 0;
   const BodyUnknown &a = problem.bodies[at(contact.first)], &b = problem.bodies[at(contact.second)];

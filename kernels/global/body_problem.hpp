@@ -73,7 +73,7 @@ struct BodyProblem {
   std::vector<Twist> known;    ///< per unknown: sum over the contacts of this part of what they do to it
                                ///< besides r [N s]; empty where that is nothing
   std::size_t grains = 0;      ///< unknowns before the first wall
-  std::int32_t subdomain = 0;  ///< of all, whose part it is
+  std::int32_t subdomain = 0;  ///< its number among all
   std::vector<char> counts;    ///< per unknown: of its copies this one counts; empty: all do
   std::vector<std::int32_t> shared;  ///< unknowns with copies in other parts, ascending
 
@@ -83,7 +83,7 @@ struct BodyProblem {
   std::size_t walls() const { return bodies.size() - grains - (has_cell() ? 1 : 0); }  ///< of finite mass
 };
 
-/// Who touches whom in a problem or its part, and how heavy they are; unknowns as there.
+/// Which unknowns of a problem or its part touch, and their masses; unknowns as there.
 struct ContactGraph {
   std::vector<double> mass;                        ///< per unknown [kg]
   std::vector<std::array<std::int32_t, 2>> pairs;  ///< per contact its unknowns; second -1 at a driven wall
@@ -109,7 +109,7 @@ struct CellMotion {
   double edge = 0;                                       ///< of the cell over d
 };
 
-/// Where the problem stands in the arrays of a step.
+/// The arrays of a step from which the problem is gathered.
 struct BodyProblemSource {
   std::span<const Vec3> x;             ///< [m]
   std::span<const double> radius;      ///< [m]
@@ -125,14 +125,14 @@ struct BodyProblemSource {
 
 /// The slots and chunks of one subdomain among those of a step.
 struct BodyProblemPart {
-  std::int32_t subdomain = 0;      ///< of all
+  std::int32_t subdomain = 0;      ///< its number among all
   std::int32_t local = 0;          ///< the same as in Chunks
   std::size_t begin = 0, end = 0;  ///< its slots
   std::span<const char> counts;    ///< per slot of the step: of the body's copies this one counts
   std::span<const std::uint16_t> multiplicity;  ///< per slot of the step: in how many subdomains it stands
 };
 
-/// The graph of the problem gathered below, all of it or of one subdomain: spares what only solvers read.
+/// The graph of the problem gathered below, all of it or of one subdomain, without what only solvers read.
 ContactGraph gather_graph(const BodyProblemSource& source);
 ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart& part);
 
@@ -140,7 +140,7 @@ ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart
 /// slots, then the walls.
 BodyProblem gather_problem(const BodyProblemSource& source);
 
-/// The same for one subdomain. The walls count in the first of all.
+/// The same for one subdomain. Walls count in the first subdomain.
 BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part);
 
 /// Drops the contacts whose first body is not `taken`, an entry per unknown.
@@ -184,7 +184,7 @@ inline Mat3 cross_matrix(const Vec3& n) {
   return N;
 }
 
-/// What counts of a vector at a contact: without friction its normal part.
+/// The part of a vector that a contact constrains: without friction the normal part.
 inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
   return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
 }
@@ -210,7 +210,7 @@ void add_force_of_spheres(const Contact& c, const Vec3& r, std::span<Twist> F) {
   b.u -= r;
   b.w -= turn;
 }
-/// Its part of F += H r, before `restrict_to_freedoms`.
+/// The cell's part of F += H r, before `restrict_to_freedoms`.
 inline void add_force_on_cell(const ContactEquation& c, const Vec3& r, std::span<Twist> F) {
   CellVelocity f{};
   add_impulse(r, c.reach * c.normal, f);

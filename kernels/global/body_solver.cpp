@@ -4,7 +4,7 @@ namespace talus {
 
 namespace {
 
-/// Per part; the blocks on the diagonal are those of all contacts of a body, wherever they are.
+/// The systems of the parts. Blocks on the diagonal are those of all contacts of a body, wherever they are.
 std::vector<BodySystem> systems_of(const BodyParts& parts, std::span<const std::vector<double>> rho) {
   std::vector<BodySystem> systems;
   systems.reserve(parts.size());
@@ -33,7 +33,7 @@ std::vector<std::vector<char>> touched_bodies(std::span<const BodySystem> system
   return touched;
 }
 
-/// What the conjugate gradients ask aggregates to hold.
+/// Grains per aggregate: as asked for, or chosen from the number of grains.
 int target_of(const BodyParts& parts, int asked) {
   if (asked > 0) return asked;
   const double grains = parts.total(1, [&](std::size_t p, std::span<double> row) {

@@ -132,7 +132,8 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
 
 void BodySystem::close() {
   for (std::size_t b = 0; b < size(); ++b) {
-    // The trace tells of contacts in other parts. It is 0 or NaN where weights are too small or no numbers.
+    // A trace other than 0 shows contacts of the body in some part. It is 0 or NaN where weights are too
+    // small or are no numbers.
     if (diagonal_[b].trace() != 0) touched_[b] = 1;
     if (!problem_.counted(b)) continue;
     const BodyUnknown& body = problem_.bodies[b];

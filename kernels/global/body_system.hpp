@@ -12,17 +12,17 @@
 
 namespace talus {
 
-/// What one part adds to A. A contact between two grains that count here stands with both of them, as rows:
-/// those are what the Gauss-Seidel passes walk over. Every other contact of two bodies, at a wall of finite
-/// mass or with a grain that counts elsewhere, is a `tie`: between parts, and between grains and walls, the
-/// passes are block Jacobi. They converge for any such split: with D the blocks on the diagonal, of all
-/// contacts of a body, and T the ties, D - T = M + sum rho |H_i^T x_i - H_j^T x_j|^2 > 0.
-/// A cell that follows a stress, which all contacts push, has a block of its own, and the passes leave out
-/// what couples it to grains: no pass could walk over it, and a preconditioner may drop it, as the two-by-two
-/// split that is left has eigenvalues between 0 and 2.
-/// A product goes over the links, 48 bytes and 2 twists read and written each, about 70 flop. Passes go over
-/// the rows, in a stream of 48 bytes and a gathered twist each: indices of links instead, a third of the
-/// bytes, took 1.8 times as long. 320 bytes a body, 144 a contact.
+/// The share of one part in A. A contact between two grains that count here is stored with both of them, as
+/// rows, over which the Gauss-Seidel passes go. Every other contact of two bodies, at a wall of finite mass
+/// or with a grain that counts elsewhere, is a `tie`: between parts, and between grains and walls, the passes
+/// are block Jacobi. They converge for any such split: with D the blocks on the diagonal, of all contacts of
+/// a body, and T the ties, D - T = M + sum rho |H_i^T x_i - H_j^T x_j|^2 > 0.
+/// A cell that follows a stress, which all contacts push, has a block of its own. The passes leave out what
+/// couples it to grains, since no pass could go over all contacts for it. A preconditioner may drop that: the
+/// two-by-two split that is left has eigenvalues between 0 and 2. A product goes over the links, 48 bytes and
+/// 2 twists read and written each, about 70 flop. Passes go over the rows, in a stream of 48 bytes and a
+/// gathered twist each: indices of links instead, a third of the bytes, took 1.8 times as long. 320 bytes a
+/// body, 144 a contact.
 ///
 /// With m = +-n pointing to the body of the row, seen from there the relative velocity is
 /// v = (u_i - u_j) + m x (w_i + w_j), and the row gains rho (v, -m x v). Where a contact has no friction only
@@ -61,7 +61,7 @@ class BodySystem {
   std::size_t size() const { return inverse_.size(); }
 
  private:
-  static constexpr std::int32_t rough = -1, slick = -2;  ///< of spheres; slick: normal part only
+  static constexpr std::int32_t rough = -1, slick = -2;  ///< contacts of spheres; slick: normal part only
   /// What the product needs of a contact.
   struct Link {
     Vec3 normal;

@@ -107,8 +107,8 @@ CoarseLevel::CoarseLevel(const BodyParts& parts, std::span<const std::vector<cha
   if (size_ > 0) factorise(rho);
 }
 
-/// Aggregates grow within the parts and are numbered through all of them; each body that counts tells its
-/// copies how it moves with its own.
+/// Aggregates grow within the parts and are numbered through all of them. Each body that counts passes on to
+/// its copies how it moves with its aggregate.
 void CoarseLevel::join(std::span<const std::vector<char>> touched, int target) {
   std::vector<Aggregates> own(parts_.size());
   const std::vector<double> counts = parts_.rows(1, [&](std::size_t p, std::span<double> row) {
@@ -186,7 +186,7 @@ Eigen::Matrix3d rotation(const Vec3& r) {
 
 }  // namespace
 
-/// Of the lower triangle: rows of the higher group. A wall has one row.
+/// A block of the lower triangle: its rows are those of the higher group. A wall has one row.
 struct CoarseLevel::Block {
   std::int64_t high, low;
   Matrix6 values = Matrix6::Zero();

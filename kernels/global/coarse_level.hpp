@@ -70,7 +70,7 @@ class CoarseLevel {
   Eigen::Index size_ = 0;
   std::vector<std::vector<Member>> members_;       ///< per part and unknown
   std::vector<std::vector<std::int32_t>> groups_;  ///< per part here: aggregates it knows, ascending
-  std::vector<double> groups_of_all_;              ///< rows of the same of all parts, -1 to fill up
+  std::vector<double> groups_of_all_;              ///< the same of all parts, as rows that -1 fills up
   std::size_t most_ = 0;                           ///< length of those rows
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
 };

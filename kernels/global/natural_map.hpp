@@ -14,7 +14,7 @@ struct NaturalMap {
   double m;      ///< 1/W_nn [kg]
   double shift;  ///< mu |v_t| [m/s]
   Vec3 aim;      ///< r - m (v + (b + shift) n) [N s]
-  Vec3 carried;  ///< what is nearest to it on the cone [N s]: r where the law holds
+  Vec3 carried;  ///< the point of the cone nearest to aim [N s]: r where the law holds
 
   /// |r - carried| W_nn [m/s].
   double residual(const Vec3& r) const { return (r - carried).norm() / m; }

@@ -16,12 +16,12 @@ struct Residuals {
   /// Per part and unknown: the velocity u that all its contacts together would give it by r' - r, over
   /// `scale` [1].
   std::vector<std::vector<double>> body;
-  /// Of error_rms: root mean square over the contacts of W_nn |r|, or of |v + b n| where they carry or close,
-  /// the larger [m/s].
+  /// The scale of error_rms: the larger of the root mean squares over the contacts of W_nn |r|, and of
+  /// |v + b n| where they carry or close [m/s].
   double scale = 0;
 };
 
-/// Of the impulses of the problem and the velocities that they give. Collective.
+/// The residuals of the problem's impulses and of the velocities that these give. Collective.
 Residuals residuals_of(const BodyParts& parts);
 
 /// The residual that a share `part` in (0, 1] of all contacts does not exceed [1], rounded up by at most 10

@@ -16,7 +16,7 @@ struct Layers {
   std::vector<std::int32_t> other;               ///< neighbours, in order of contact
   std::vector<std::int32_t> depth;               ///< per unknown; -1: not reached
   std::vector<std::vector<std::int32_t>> layer;  ///< unknowns by depth
-  std::size_t begun = 0;                         ///< where in the last layer taken its new ones begin
+  std::size_t begun = 0;                         ///< where the new unknowns of the layer taken last begin
   std::vector<std::int32_t> met;                 ///< unknowns whose mark may have been set
   std::vector<double> parts, load;               ///< contacts with the layer below; what is handed on [kg]
 
@@ -60,7 +60,7 @@ struct Graph {
   void each(const std::function<void(std::size_t)>& work) const { link.each(parts.size(), work); }
 };
 
-/// Unknowns marked in any part are the layer `depth`, those that have none yet. False when there are none.
+/// Unknowns marked in any part that have no depth yet become the layer `depth`. False when there are none.
 bool take_layer(Graph& graph, PartField& mark, std::int32_t depth) {
   graph.link.sum_copies(mark);
   return total_of(graph.link, graph.parts.size(), 1, [&](std::size_t p, std::span<double> row) {
@@ -105,7 +105,7 @@ void mark_heaviest(Graph& graph, PartField& mark) {
     }
 }
 
-/// Of each cluster of one part that no walk has come to, its size and its heaviest body: visit(size, body).
+/// Calls visit(size, heaviest body) for each cluster of one part that no walk has come to.
 template <class Visit>
 void each_unreached(const Layers& here, const Visit& visit) {
   std::vector<char> seen(here.depth.size(), 0);
@@ -124,8 +124,8 @@ void each_unreached(const Layers& here, const Visit& visit) {
   }
 }
 
-/// The heaviest body of every cluster of every part that no walk has come to. A cluster that lies in several
-/// parts gets one body in each.
+/// Marks the heaviest body of every cluster of every part that no walk has come to. A cluster that lies in
+/// several parts gets one body in each.
 void mark_rest(Graph& graph, PartField& mark) {
   graph.each([&](std::size_t p) {
     each_unreached(graph.parts[p], [&](std::size_t, std::int32_t heaviest) {
@@ -135,8 +135,8 @@ void mark_rest(Graph& graph, PartField& mark) {
   });
 }
 
-/// In what no walk has come to, the heaviest body of the largest cluster that a part has. False when all of
-/// them are small.
+/// Marks the heaviest body of the largest cluster, within one part, that no walk has come to. False when all
+/// of them are small.
 bool mark_unreached(Graph& graph, PartField& mark) {
   constexpr double small = 8;
   std::vector<std::int32_t> root(graph.parts.size(), -1);
@@ -158,7 +158,7 @@ bool mark_unreached(Graph& graph, PartField& mark) {
   return true;
 }
 
-/// From the bodies of the layer `depth` on; returns the largest depth that it comes to.
+/// Walks on from the bodies of the layer `depth`; returns the largest depth that it comes to.
 std::int32_t walk(Graph& graph, PartField& mark, std::int32_t depth) {
   for (;; ++depth) {
     graph.each([&](std::size_t p) {

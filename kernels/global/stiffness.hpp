@@ -11,10 +11,10 @@ namespace talus {
 /// kappa of rho = kappa/W_nn before any impulse is known: about the inverse of the smallest eigenvalue of W
 /// that the load excites, in effective masses of a contact, sum W_nn r^2 / |M^-1/2 H r|^2. A column of N
 /// grains: 2 N^2/3; a plate of T grain masses over L layers of c contacts: T L/c. For r, the momentum that
-/// stops every body at once is passed on, layer by layer over the contacts, to the driven walls; of what
-/// hangs on none, to the heaviest body of each cluster. Also about the number of Gauss-Seidel sweeps that the
-/// problem needs. 0 without contacts. With several parts, an exchange for each layer on the way out and one
-/// on the way back.
+/// stops every body at once is passed on, layer by layer over the contacts, to the driven walls; in a cluster
+/// that touches none, to its heaviest body. Also about the number of Gauss-Seidel sweeps that the problem
+/// needs. 0 without contacts. With several parts, an exchange for each layer on the way out and one on the
+/// way back.
 double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& link);
 double estimate_stiffness(const BodyParts& parts);
 double estimate_stiffness(const BodyProblem& problem);

@@ -28,7 +28,7 @@ Vec3 relative_velocity(const Contacts& contacts, std::size_t k, std::span<const 
   return contacts.drifts_between ? Vec3(between - drift_of(contacts, k)) : between;
 }
 
-/// Adds what a body, of whose mass the record holds one of `parts`, gives to W.
+/// Adds the share of a body in W; the record holds 1/`parts` of the body's mass.
 void add_mobility(const Velocity& body, const Mat3& lever, double parts, Mat3& W) {
   W.diagonal().array() += body.inv_mass / parts;
   if (body.spin_mobility > 0) W += body.spin_mobility / parts * lever * lever.transpose();

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Kernels of chunks of blocks: contacts whose bodies turn with a tensor of inertia, one after the other. The
+/// Kernels of chunks of blocks: contacts of bodies with a tensor of inertia, solved one after the other. The
 /// local problem has a full 3x3 block,
 ///
 ///     W = (1/m_i + 1/m_j) 1 + sum over both bodies of (R^2/I) B B^T,    v = u_i - u_j + B_i w_i - B_j w_j,
@@ -22,7 +22,7 @@ namespace talus {
 void sweep_blocks(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                   ChunkFriction friction, WallCopy* wall);
 
-/// V += M^-1 H r, with what cohesion takes of r.
+/// V += M^-1 H r, where r is the impulse that bodies feel, the pull of cohesion included.
 void accumulate_blocks(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                        WallCopy* wall);
 

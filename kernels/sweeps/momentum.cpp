@@ -7,7 +7,7 @@ namespace talus {
 
 namespace {
 
-/// One number. With beta = 0 nothing of the past is read: it may be void.
+/// Carries one number on. With beta = 0 the history is not read: it may mean nothing yet.
 inline void carry_one(Carry carry, double beta, double& value, double& last, double* step) {
   if (carry == Carry::momentum) {
     const double s = value;
@@ -65,7 +65,7 @@ void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& co
     impulses.z.resize(contacts.rz.size());
     impulses.n.resize(contacts.rn.size());
   };
-  if (bodies > 0) acceleration.last_v.resize(bodies);  // else a sweep that is on its way may still read it
+  if (bodies > 0) acceleration.last_v.resize(bodies);  // else a sweep in flight may still read it
   acceleration.last_wall_v.resize(chunks);
   acceleration.last_cell_v.resize(cell_copies);
   if (carry == Carry::momentum) return like(acceleration.steps);

@@ -11,15 +11,14 @@
 
 namespace talus {
 
-/// How a sweep is carried on before the next one begins. With s = sweep(y), the impulses after a sweep that
-/// began from y:
+/// From where the next sweep begins. With s = sweep(y), the impulses after a sweep that began from y:
 ///   momentum   y+ = s + beta (s - s_before)                            (Nesterov 1983; one acceleration)
 ///   conjugate  y+ = s + beta p, p = y - y_before of the sweep before   (NNCG, Silcowitz-Hansen et al. 2010)
 /// Velocities depend linearly on impulses, and gluing is linear too, so that the same rule keeps V and r
 /// consistent, copy by copy, without a product.
 enum class Carry { momentum, conjugate };
 
-/// What the rule remembers, in the layout of Contacts and Bodies. Empty vectors where a scene has no such
+/// What the rule remembers, in the layout of Contacts and Bodies. Vectors are empty where a scene has no such
 /// quantity, or the rule has never been needed.
 struct AccelerationHistory {
   struct Impulses {
@@ -37,28 +36,28 @@ struct AccelerationHistory {
   std::vector<CellVelocity> step_cell_v;
 };
 
-/// How much there is to remember.
+/// Sizes of the history.
 struct AccelerationRoom {
-  std::size_t bodies;  ///< none where they are carried in single precision
+  std::size_t bodies;  ///< 0 where they are accelerated in single precision
   std::size_t chunks;
   std::size_t cell_copies;  ///< as many as chunks, or none
 };
 
-/// Room for the contacts, bodies and copies; what was not there is void. What only the other rule remembers
-/// stays: a sweep under it may still be on its way.
+/// Makes room for the contacts, bodies and copies; new entries mean nothing yet. What only the other rule
+/// remembers stays: a sweep under that rule may still be in flight.
 void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& contacts,
               const AccelerationRoom& room);
 
-/// Momentum of the impulses of a range begins: no step yet.
+/// Begins momentum of the impulses of a range: there is no step yet.
 void begin_steps(ContactRange range, SweepSteps& steps);
 
 /// Applies the conjugate rule to the impulses of a range; beta = 0 begins a new acceleration.
 void carry_impulses(double beta, ContactRange range, Contacts& contacts, AccelerationHistory& acceleration);
 
-/// Applies the rule to the velocities of the slots; what does not change, masses among it, stays to the bit.
+/// Applies the rule to the velocities of the slots; numbers that do not change, as masses, keep their bits.
 void carry_velocities(const SweepKernels& kernels, Carry carry, double beta, std::span<const Slot> slots,
                       std::span<Velocity> velocity, AccelerationHistory& acceleration);
-/// Momentum in single precision; with beta = 0 what is in `last` may be void.
+/// Momentum in single precision; with beta = 0 `last` is not read.
 void carry_velocities(const SweepKernels& kernels, double beta, std::span<const Slot> slots,
                       std::span<SingleVelocity> velocity, std::span<SingleVelocity> last);
 
@@ -84,13 +83,13 @@ void fasten(std::span<const Slot> slots, const std::vector<VelocityOf<Number>>& 
 /// The same with the wall copy of a chunk.
 void loosen(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration);
 void fasten(std::size_t chunk, const WallCopy& copy, AccelerationHistory& acceleration);
-/// ... and of a cell.
+/// The same with the chunk's copy of a cell.
 void loosen(std::size_t chunk, const CellCopy& copy, AccelerationHistory& acceleration);
 void fasten(std::size_t chunk, const CellCopy& copy, AccelerationHistory& acceleration);
 
-/// Sum of W_nn |s - y|^2 over a range [J]: the square of what the sweep changed, in the metric of the sweep.
-/// With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls. Of a cell that
-/// follows a stress nothing is counted: its share of W_nn is small.
+/// Sum of W_nn |s - y|^2 over a range [J]: the squared norm of the sweep's change, in the metric of the
+/// sweep. With `Carry::conjugate` only. `wall_inv_mass`: of the chunk's wall copy; read at walls. A cell that
+/// follows a stress is left out: its share of W_nn is small.
 double change_squared(ContactRange range, const Contacts& contacts, std::span<const Velocity> velocity,
                       double wall_inv_mass, const AccelerationHistory& acceleration);
 

@@ -6,7 +6,7 @@
 ///
 /// g [m] being the gap of a contact and c the part of an overlap that goes. It is the problem of a step
 /// without friction in which bodies are at rest, with displacements for velocities, so that the sweeps of
-/// steps solve it. Velocities, impulses, and all that is judged of a step know nothing of it. Bodies are
+/// steps solve it. Velocities, impulses, and the certificate of a step do not depend on it. Bodies are
 /// shifted and do not turn. In single precision: 1e-7 of a displacement is below the rounding of positions.
 
 #include <span>
@@ -19,12 +19,11 @@
 
 namespace talus {
 
-/// Room for the contacts and bodies, all of which stand where they are: displacements 0, masses those of
-/// `velocity`.
+/// Sizes the arrays for the contacts and bodies: displacements are 0, masses those of `velocity`.
 void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
                      SweepSteps& steps);
 
-/// Normals and b of a chunk from where its bodies are. `part`: c in [0, 1].
+/// Finds normals and b of a chunk from the places of its bodies. `part`: c in [0, 1].
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,
                    double part, SingleState& single);
 
@@ -37,8 +36,8 @@ void first_pushes(const Contacts& contacts, ContactRange range, std::span<const 
 void keep_pushes(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const SingleState& single,
                  std::span<float> kept);
 
-/// One sweep with momentum over a chunk of blocks, which has no groups that could be swept at once; others
-/// have SweepKernels. `wall` is null between bodies.
+/// One sweep with momentum over a chunk of blocks, which has no groups that could be swept at once;
+/// SweepKernels sweeps the others. `wall` is null between bodies.
 void sweep_displacements(const Contacts& contacts, ContactRange range, SingleState& single, WallCopy* wall,
                          const SweepMomentum& momentum);
 

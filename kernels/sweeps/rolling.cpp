@@ -11,8 +11,8 @@ namespace talus {
 
 namespace {
 
-/// A body as moments see it: a sphere of radius 1 that nothing turns stands in for a wall, whose own turning
-/// is with its contacts.
+/// Rotation of a body. A sphere of radius 1 that nothing turns stands in for a wall, whose own rotation is
+/// stored with its contacts.
 struct Turning {
   double radius = 1;          ///< [m]
   double mobility = 0;        ///< 1/I [1/(kg m^2)]

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Moments of contacts that resist rolling (kernels/law/rolling_law.hpp): swept behind the forces of their
-/// chunk, contact by contact, with the normal impulses that those have left. Nothing happens in chunks and
+/// Moments of contacts that resist rolling (kernels/law/rolling_law.hpp): swept after the forces of their
+/// chunk, contact by contact, with the normal impulses that these have now. Nothing happens in chunks and
 /// scenes without rolling resistance, whose arrays are empty.
 
 #include <span>
@@ -24,8 +24,8 @@ void sweep_moments(Contacts& contacts, ContactRange range, std::span<const doubl
 void add_moments(const Contacts& contacts, ContactRange range, std::span<const double> radius,
                  std::span<Velocity> velocity);
 
-/// Adds how far the moments of a range are from their law to the sums of its forces, as speeds at the smaller
-/// radius [m/s]. `parts` as in SweepKernels::error_grains.
+/// Adds the errors of the moments of a range to the error sums of its forces, as speeds at the smaller radius
+/// [m/s]. `parts` as in SweepKernels::error_grains.
 void add_error_of_moments(const Contacts& contacts, ContactRange range, std::span<const double> radius,
                           std::span<const Velocity> velocity, Multiplicities parts, ErrorSums& sums);
 

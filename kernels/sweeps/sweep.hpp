@@ -10,8 +10,8 @@
 namespace talus {
 
 /// A chunk's own instance of a wall. A wall of finite mass M touched by k chunks is split into k copies of
-/// mass M/k, glued after each sweep (glue_copies): gluing inside one subdomain, so that a whole face of the
-/// sample is no chain of conflicts.
+/// mass M/k, glued after each sweep (glue_copies). This is gluing inside one subdomain: without it all chunks
+/// at a face of the sample would conflict.
 struct WallCopy {
   double velocity[3]{};  ///< [m/s]
   double inv_mass{};     ///< k/M along the normal [1/kg]; 0 for a wall that is driven
@@ -23,16 +23,17 @@ struct ContactRange {
   std::size_t end;
 };
 
-/// What sweeps with momentum changed last, in the layout of Contacts: s - s_before [N s], s the impulses
-/// after a sweep. Rounded to float: of a step, not of an impulse, so that nothing is lost as steps become
-/// small.
+/// The last change of the impulses by sweeps with momentum, in the layout of Contacts: s - s_before [N s], s
+/// the impulses after a sweep. Floats suffice, since their rounding is relative to the step and becomes small
+/// with it.
 struct SweepSteps {
   std::vector<float> x, y, z;  ///< with friction
   std::vector<float> n;        ///< without
 };
 
 /// A sweep that begins from s + beta (s - s_before) instead of s (momentum.hpp), and over-relaxes the normal
-/// impulses by omega, in (0, 2): friction gains nothing by it. The velocities have gone on already.
+/// impulses by omega, in (0, 2). Friction is not over-relaxed, as it gains nothing by that. The velocities
+/// have been moved to the start of the sweep already.
 struct SweepMomentum {
   double beta = 0, omega = 1;
   SweepSteps& steps;  ///< read, and made anew
@@ -51,8 +52,8 @@ struct ErrorSums {
   void add(const ErrorSums& other);
 };
 
-/// Gives `count` vectors of three numbers, vector(k) the k-th, their mean: of copies of equal masses, whose
-/// momentum is kept so. Summed in order.
+/// Replaces `count` vectors of three numbers, vector(k) the k-th, by their mean, summed in order. Copies of
+/// equal masses keep their momentum so.
 template <class At>
 void glue_vectors(std::size_t count, const At& vector) {
   if (count == 0) return;

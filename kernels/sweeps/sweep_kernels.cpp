@@ -32,14 +32,14 @@ ImpulseView impulses(Contacts& c) {
   return {c.rx.data(), c.ry.data(), c.rz.data(), c.rn.data()};
 }
 
-/// Of the contacts between grains, whose drifts may be void, or at a wall.
+/// Where contacts are: between grains, where drifts may be unused, or at a wall.
 enum class Between { grains, wall };
 
-/// `arrays` are Contacts or SingleContacts; `contacts` lends bodies and groups.
+/// `arrays` are Contacts or SingleContacts; bodies and groups are those of `contacts`.
 template <class Number, class Arrays, class Record>
 ContactViewOf<Number> view(const Contacts& contacts, const Arrays& arrays, ContactRange range,
                            std::span<Record> velocity, Between between) {
-  constexpr std::size_t near = std::size_t{256} << 10;  // with fewer, asking costs more than it gains
+  constexpr std::size_t near = std::size_t{256} << 10;  // [bytes]: with fewer, prefetching does not pay
   const bool drifts = between == Between::wall || contacts.drifts_between;
   const auto drift = [&](const std::vector<Number>& v) { return v.empty() || !drifts ? nullptr : v.data(); };
   return {arrays.nx.data(),

@@ -16,7 +16,7 @@ struct SingleState;
 
 /// Friction of the contacts of a chunk: one coefficient, or of each contact its own (Contacts::mu).
 struct ChunkFriction {
-  double mu = 0;  ///< Coulomb's coefficient >= 0; void where `own`
+  double mu = 0;  ///< Coulomb's coefficient >= 0; unused where `own`
   bool own = false;
   ChunkFriction(double coefficient) : mu(coefficient) {}
   static ChunkFriction of_each_contact() {
@@ -69,9 +69,9 @@ class SweepKernels {
   void sweep_cell(Contacts& contacts, ContactRange range, std::span<Velocity> velocity,
                   ChunkFriction friction, CellCopy& cell, const SweepMomentum& momentum) const;
 
-  /// Sweeps with momentum in single precision, on what `narrow` has made of contacts and bodies
-  /// (single_precision.hpp); of `contacts` groups and bodies are read. The steps are in the units of
-  /// `single`.
+  /// Sweeps with momentum in single precision, on what the functions narrow_... have made of contacts and
+  /// bodies (single_precision.hpp); from `contacts` they read groups and bodies. The steps are in the units
+  /// of `single`.
   template <bool Friction>
   void sweep_grains(const Contacts& contacts, SingleState& single, ContactRange range, ChunkFriction friction,
                     const SweepMomentum& momentum) const;
@@ -79,8 +79,8 @@ class SweepKernels {
   void sweep_wall(const Contacts& contacts, SingleState& single, ContactRange range, ChunkFriction friction,
                   WallCopy& wall, const SweepMomentum& momentum) const;
 
-  /// V += M^-1 H r for the contacts of a chunk: with the resets to the free velocity before it, V afresh from
-  /// r.
+  /// V += M^-1 H r for the contacts of a chunk. After bodies were reset to their free velocities this makes V
+  /// afresh from r.
   template <bool Friction>
   void accumulate_grains(const Contacts& contacts, ContactRange range, std::span<Velocity> velocity) const;
   template <bool Friction>
@@ -101,8 +101,8 @@ class SweepKernels {
   ErrorSums error_cell(const Contacts& contacts, ContactRange range, std::span<const Velocity> velocity,
                        ChunkFriction friction, const CellCopy& cell, Multiplicities parts = {}) const;
 
-  /// Momentum of bodies: s goes on to s + beta (s - last), and `last` becomes s. Of whole records at `slots`,
-  /// whose masses, equal in both, stay to the bit.
+  /// Momentum of bodies: s becomes s + beta (s - last), and `last` becomes s. For the whole records at
+  /// `slots`; masses, equal in both, keep their bits.
   void advance(std::span<const Slot> slots, std::span<Velocity> velocity, std::span<Velocity> last,
                double beta) const;
   void advance(std::span<const Slot> slots, std::span<SingleVelocity> velocity,

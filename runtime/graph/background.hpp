@@ -18,18 +18,18 @@ class BackgroundLane {
  public:
   /// At most `capacity` >= 1 tasks wait or run at a time.
   explicit BackgroundLane(std::size_t capacity);
-  /// Runs what is outstanding; a failure that nobody has asked for is lost, so call drain() first.
+  /// Runs what is outstanding; a failure that was not reported yet is lost, so call drain() first.
   ~BackgroundLane();
   BackgroundLane(const BackgroundLane&) = delete;
   BackgroundLane& operator=(const BackgroundLane&) = delete;
 
-  /// Queues a task; blocks while `capacity` tasks are outstanding. The first call starts the thread.
-  /// Throws TaskError, and queues nothing, if an earlier task has failed since the last report. Not to be
-  /// called by a task of its own.
+  /// Queues a task; blocks while `capacity` tasks are outstanding. The first call starts the thread. Throws
+  /// TaskError, and queues nothing, if an earlier task has failed since the last report. A task of this lane
+  /// must not call it.
   void submit(std::string name, std::function<void()> work);
 
   /// Returns when no task is outstanding. Throws TaskError if one has failed since the last report; tasks
-  /// queued behind the one that failed were not begun. Not to be called by a task of its own.
+  /// queued behind the one that failed were not begun. A task of this lane must not call it.
   void drain();
 
  private:

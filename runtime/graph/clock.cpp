@@ -22,10 +22,10 @@ Clock::time_point Clock::now() noexcept {
 namespace detail {
 namespace {
 
-/// Of the host. [s]
+/// Times of the host [s].
 struct HostTime {
-  double clock = 0;      ///< as time passes: what other programs took is in it
-  double processor = 0;  ///< of this thread: reading it is in it
+  double clock = 0;      ///< wall-clock time, other programs' share included
+  double processor = 0;  ///< processor time of this thread, with that of reading it
 };
 
 HostTime host_time() {
@@ -35,15 +35,15 @@ HostTime host_time() {
           static_cast<double>(processor.tv_sec) + 1e-9 * static_cast<double>(processor.tv_nsec)};
 }
 
-/// SMPI gives every rank a copy of the program's data.
+/// Time of one rank. SMPI gives every rank a copy of the program's static data.
 struct RankTime {
-  HostTime left = host_time();  ///< MPI
+  HostTime left = host_time();  ///< when it last left MPI
   int inside = 0;
   double owed = 0;   ///< has passed on the host or was given, not yet on the simulated machine [s]
   double given = 0;  ///< of the innermost GivenTime, not yet in `owed` [s]
   int givers = 0;
 
-  /// What lies between two looks at the host's clock counts, unless a time is given.
+  /// Adds the host's time since `left` to `owed`, unless a GivenTime replaces it.
   void look() {
     if (givers > 0) return;
     // The clock is read first here and last behind the call: nothing but work lies between.

@@ -34,13 +34,13 @@ class GivenTime {
   GivenTime& operator=(const GivenTime&) = delete;
 
  private:
-  double around_ = 0;  ///< still to come of the one around this one [s]
+  double around_ = 0;  ///< time of the enclosing GivenTime that has not passed yet [s]
 };
 #else
 inline constexpr bool simulated_ranks = false;
 using Clock = std::chrono::steady_clock;
 
-/// Real ranks take the time they take.
+/// On real ranks the work takes its own time, whatever `seconds` says.
 struct GivenTime {
   explicit GivenTime(double /*seconds*/) {}
 };

@@ -1,11 +1,11 @@
 #pragma once
 
 /// Communication interface of the program: collective calls for what happens once a step or more rarely, and
-/// channels for what travels in every iteration. Who implements it:
+/// channels for what travels in every iteration. Implementations:
 ///
 ///   OneRank             one_rank.hpp           a rank alone: nothing is sent, MPI is not called
 ///   make_communicator   mpi_communicator.hpp   the ranks of mpirun
-///   PretendRanks        pretend_ranks.hpp      for tests: threads of one process in the place of ranks
+///   on_pretend_ranks    pretend_ranks.hpp      for tests: threads of one process in the place of ranks
 ///
 /// Decorators, around any of these:
 ///
@@ -31,8 +31,8 @@ class Recorder;
 
 namespace talus::graph {
 
-/// Throws std::invalid_argument where ranks have several threads and MPI lets only one of them call it: with
-/// `level`, as Communicator::thread_level gives it, below "serialized". Tasks that call it run on any thread.
+/// Throws std::invalid_argument if there are several ranks of several threads each and MPI's thread level is
+/// below "serialized", since tasks that call MPI run on any thread. `level`: Communicator::thread_level.
 void demand_thread_level(const std::string& level, int ranks, int threads);
 
 /// A message of fixed length that is sent again and again. A sender calls `start` when its buffer is full,
@@ -45,34 +45,35 @@ class Channel {
   Channel(const Channel&) = delete;
   Channel& operator=(const Channel&) = delete;
   virtual void start() = 0;
-  /// True when the message has left, or has come; true as well when none was started. A receiver on a
-  /// simulated machine (clock.hpp) is done only when it has waited.
+  /// True when the message has been sent or received, or when none was started. On a simulated machine
+  /// (clock.hpp) a receiver is done only after wait().
   virtual bool done() = 0;
-  /// Until done; ranks that share a core give way to one another. Returns what it took [s].
+  /// Polls until done, and yields the core after some polls: another rank may need it. Returns the time spent
+  /// [s].
   virtual double wait();
 };
 
-/// Messages of one round of a gather, which may have another length each time.
+/// Messages of one round of a gather. Their lengths may differ from round to round.
 class Round {
  public:
   Round() = default;
   virtual ~Round() = default;
   Round(const Round&) = delete;
   Round& operator=(const Round&) = delete;
-  /// Sends `out` to rank `to`, and takes what rank `from` sends into `in`; both must stay until end().
+  /// Starts to send `out` to rank `to` and to receive into `in` from rank `from`; both must stay until end().
   virtual void begin(int to, std::span<const double> out, int from, std::span<double> in) = 0;
-  /// Returns when both are done.
+  /// Returns when both messages have been transferred.
   virtual void end() = 0;
 };
 
-/// A barrier that this rank has come to.
+/// A barrier that this rank has entered and does not wait at.
 class Meeting {
  public:
   Meeting() = default;
   virtual ~Meeting() = default;
   Meeting(const Meeting&) = delete;
   Meeting& operator=(const Meeting&) = delete;
-  /// True when all ranks have come.
+  /// True when all ranks have entered it.
   virtual bool complete() = 0;
 };
 
@@ -83,8 +84,8 @@ struct RankProperties {
   int rank = 0, ranks = 1;
   int ranks_on_node = 1;              ///< on this machine
   std::string thread_level = "none";  ///< MPI grants "none", "single", "funneled", "serialized", "multiple"
-  bool any_thread = true;             ///< may use channels; else thread 0 only
-  int largest_tag = 32767;            ///< of a channel; MPI promises no more, Open MPI has 2^31 - 1
+  bool any_thread = true;             ///< any thread may use channels; if false, only thread 0 may
+  int largest_tag = 32767;  ///< of a channel; MPI guarantees no more than this, Open MPI has 2^31 - 1
 };
 
 class Communicator {
@@ -100,11 +101,11 @@ class Communicator {
   int largest_tag() const noexcept { return properties_.largest_tag; }
   int ranks_on_node() const noexcept { return properties_.ranks_on_node; }
   const RankProperties& properties() const noexcept { return properties_; }
-  /// From now on collective calls record spans in `trace`, which must outlive them; null ends that. Messages
-  /// of channels are recorded by their users. A rank alone records its calls, too, though they do nothing
-  /// (but not start_gather): a replay on more ranks needs their number. An exchange or a gather counts as two
-  /// calls, the first of which sends the lengths. While this records, only threads of the recorder's team may
-  /// make calls.
+  /// From now on collective calls record spans in `trace`, which must outlive them; null ends that. The users
+  /// of channels record the messages of channels. A single rank records its calls too, although they do
+  /// nothing: a replay on more ranks needs their number. There start_gather alone is not recorded. An
+  /// exchange or a gather counts as two calls, the first of which sends the lengths. While this records, only
+  /// threads of the recorder's team may make calls.
   virtual void record_to(trace::Recorder* trace) const { trace_ = trace; }
   trace::Recorder* trace() const noexcept { return trace_; }
 
@@ -118,22 +119,22 @@ class Communicator {
   virtual void max(std::span<double> values) const = 0;
   /// The parts of all ranks in order of rank.
   virtual std::vector<std::byte> gather(std::span<const std::byte> part) const = 0;
-  /// The same, begun now and read later: its first message travels while other work goes on, the other
-  /// log2(ranks) are waited for. `lengths`: how many numbers each rank brings.
+  /// Non-blocking gather(): the messages of its first round travel while other work goes on. There are
+  /// ceil(log2(ranks)) rounds; PendingGather::wait() does the others. `lengths`: how many numbers each rank
+  /// brings.
   std::unique_ptr<PendingGather> start_gather(std::vector<double> part,
                                               std::span<const std::size_t> lengths) const;
-  /// The parts of all ranks in order of rank go to rank 0, whose `take` gets them in pieces of at most
-  /// `piece` > 0 bytes, of one rank each; the others' is not called.
+  /// Sends the parts of all ranks to rank 0, in order of rank. There `take` gets them in pieces of at most
+  /// `piece` > 0 bytes, each from one rank; on other ranks `take` is not called.
   virtual void to_first(std::span<const std::byte> part, std::size_t piece,
                         const std::function<void(std::span<const std::byte>)>& take) const = 0;
 
   /// Lets messages under way advance; cheap, from any thread that may use channels.
   virtual void progress() const {}
-  /// True when all ranks have called it; false after `seconds` if some have not come, since they are dead or
-  /// wait for one that has failed. Nothing but abort() is left then.
+  /// True when all ranks have called it; false when some have not after `seconds`, since they are dead or
+  /// wait for a rank that has failed. Only abort() can end the run then.
   bool meet(double seconds) const;
-  /// Ends all ranks with exit code `code`: what is left when one of several ranks has failed and the others
-  /// wait for it.
+  /// Ends all ranks with exit code `code`. For a rank that has failed while others wait for it.
   [[noreturn]] virtual void abort(int code) const = 0;
 
   /// Sends to[r] to rank r and returns what each rank sent here. Nothing is copied on the way, and what is
@@ -142,18 +143,18 @@ class Communicator {
   std::vector<std::vector<Record>> exchange_records(std::vector<std::vector<Record>> to) const;
   template <class Record>
   std::vector<Record> gather_records(std::span<const Record> part) const;
-  /// Pieces of about 256 kB.
+  /// to_first() for records, in pieces of about 256 kB.
   template <class Record, class Take>
   void records_to_first(std::span<const Record> part, const Take& take) const;
 
-  // Messages of single ranks. Tags from first_tag on are for the channels of who calls.
+  // Messages between two ranks. Callers use tags from first_tag on for their channels.
   static constexpr int gather_tag = 1, first_tag = 2;
   /// Opens the sending and the receiving end; both ranks must name the same tag and length. `buffer` must
   /// outlive the channel.
   virtual std::unique_ptr<Channel> open_send(int to, int tag, std::span<double> buffer) const = 0;
   virtual std::unique_ptr<Channel> open_receive(int from, int tag, std::span<double> buffer) const = 0;
   virtual std::unique_ptr<Round> open_round() const = 0;
-  /// Collective, though it does not wait.
+  /// Collective, but does not block.
   virtual std::unique_ptr<Meeting> start_meeting() const = 0;
 
  protected:
@@ -161,10 +162,10 @@ class Communicator {
 
  private:
   RankProperties properties_;
-  mutable trace::Recorder* trace_ = nullptr;  ///< watches; changes nothing of what is sent
+  mutable trace::Recorder* trace_ = nullptr;  ///< observes only: recording does not change what is sent
 };
 
-/// See Communicator::start_gather. Must be waited for before it is destroyed, on every rank.
+/// See Communicator::start_gather. Every rank must call wait() before it destroys this.
 class PendingGather {
  public:
   PendingGather(const Communicator& ranks, std::vector<double> part, std::span<const std::size_t> lengths);
@@ -173,14 +174,14 @@ class PendingGather {
 
  private:
   std::size_t back(std::size_t from, std::size_t places) const { return (from + ranks_ - places) % ranks_; }
-  /// In the message of a round.
+  /// Number of parts in the message of a round.
   std::size_t parts() const { return std::min(have_, ranks_ - have_); }
   std::size_t length(std::size_t of) const { return begin_[of + 1] - begin_[of]; }
   void begin_round();
   void end_round();
 
   std::size_t rank_, ranks_;
-  std::size_t have_ = 1;            ///< parts: this rank's and those of the ranks before it, around the ring
+  std::size_t have_ = 1;  ///< parts held: of this rank and of the have_ - 1 ranks before it, cyclically
   std::vector<std::size_t> begin_;  ///< ranks + 1, in all_
   std::vector<double> all_, out_, in_;
   std::unique_ptr<Round> round_;

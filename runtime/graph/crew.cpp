@@ -10,10 +10,10 @@ void Crew::share(std::size_t count, const std::function<void(std::size_t)>& work
   if (count >> 32 != 0) throw std::invalid_argument("Crew::share takes fewer than 2^32 pieces");
   work_ = &work;
   done_.store(0, std::memory_order_relaxed);
-  // Whoever reads this word sees the work it speaks of.
+  // Release: a thread that reads this word also sees `work_`.
   next_.store(static_cast<std::uint64_t>(count) << 32, std::memory_order_release);
   help();
-  // A helper that took a piece counts it when it has left `work` alone.
+  // A helper adds its piece to done_ only after its last use of `work`.
   for (int polls = 0; done_.load(std::memory_order_acquire) < count; ++polls)
     if (polls < 256)
       pause();
@@ -27,7 +27,7 @@ bool Crew::take() noexcept {
   do {
     if ((now & 0xffffffffU) >= now >> 32) return false;
   } while (!next_.compare_exchange_weak(now, now + 1, std::memory_order_acquire));
-  // The piece is this thread's: until it is counted, share() does not return and `work_` stays.
+  // share() cannot return, and `work_` stays valid, until this thread has added its piece to done_.
   try {
     (*work_)(now & 0xffffffffU);
   } catch (...) {

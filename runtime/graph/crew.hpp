@@ -1,7 +1,7 @@
 #pragma once
 
-/// Pieces of work that one thread shares with threads that would only wait for it: at a gate of an epoch loop
-/// (epoch_loop.hpp) the thread that decides, and all others.
+/// Threads that would only wait help one thread with its work. In an epoch loop (epoch_loop.hpp) these are
+/// the threads that wait at a gate; the thread that decides there shares its work with them.
 
 #include <atomic>
 #include <cstddef>
@@ -13,17 +13,17 @@
 
 namespace talus::graph {
 
-/// One word says what is left: the number of pieces, and the next to be taken. Whoever takes a piece moves
-/// the word on by compare and exchange, so a piece is done once, and nobody has to come: a thread that is
-/// late finds nothing. Pieces of a few microseconds and more are worth it.
+/// One atomic word holds the number of pieces and the index of the next one. A thread takes a piece by a
+/// compare-and-exchange that increments the index, so each piece is done exactly once. Help is optional: a
+/// thread that comes late finds no piece left. Sharing pays for pieces of a few microseconds or more.
 class Crew {
  public:
-  /// work(k) for each k < count < 2^32, by this thread and those that help, in any order and at the same
-  /// time; returns when all are done. By one thread at a time. What a piece throws is thrown here once all
-  /// are done, of several failures any.
+  /// Calls work(k) for each k < count < 2^32, on this thread and on those that help, in any order and at the
+  /// same time; returns when all are done. Only one thread may call it at a time. If pieces throw, one of
+  /// their exceptions is rethrown here after all pieces have ended.
   void share(std::size_t count, const std::function<void(std::size_t)>& work);
 
-  /// Takes pieces while there are any; by any thread, at any time.
+  /// Takes pieces while there are any. Any thread may call it, at any time.
   void help() noexcept {
     while (take()) {
     }
@@ -36,7 +36,7 @@ class Crew {
   alignas(cache_line) std::atomic<std::size_t> done_{0};
   const std::function<void(std::size_t)>* work_ = nullptr;
   std::atomic<bool> failed_{false};
-  std::exception_ptr failure_;  ///< written by whoever raised `failed_`
+  std::exception_ptr failure_;  ///< written by the thread that set `failed_`
 };
 
 }  // namespace talus::graph

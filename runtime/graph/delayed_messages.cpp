@@ -8,7 +8,7 @@ namespace talus::graph {
 
 namespace {
 
-/// The message of a channel with room for the time of sending behind it.
+/// A channel whose message carries the time of sending behind its data.
 class Stamped : public Channel {
  protected:
   explicit Stamped(std::span<double> buffer) : buffer_(buffer), stamped_(buffer.size() + 1) {}

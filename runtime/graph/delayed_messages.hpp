@@ -7,8 +7,8 @@
 namespace talus::graph {
 
 /// Every message of a channel is held back until `delay` [s] after it was sent; collective calls are not
-/// touched. The time of sending travels behind the message, so ranks must share a clock, as those of one
-/// machine do, and messages are copied once more on either side.
+/// delayed. The time of sending travels behind the message, so ranks must share a clock, as those of one
+/// machine do. Each side copies the message once more.
 class DelayedMessages final : public detail::Decorator {
  public:
   DelayedMessages(std::shared_ptr<const Communicator> inner, double delay)

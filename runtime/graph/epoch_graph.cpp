@@ -44,9 +44,10 @@ void check_shape(const Conflicts& conflicts, std::span<const std::uint32_t> owne
              std::to_string(threads));
 }
 
-/// A one-sided conflict would let two threads write the same data at once, only now and then, so it is looked
-/// for at every build: the two directions of each pair cancel in a sum of scattered pairs, which costs far
-/// less than to search for each partner. Pairs are searched only when the sum is not 0.
+/// Refuses a conflict that only one of its two nodes lists. Such a conflict would let two threads write the
+/// same data at once, but so rarely that tests could miss it: every build checks. The check sums a hash of
+/// each pair, negative in one direction, so that a symmetric list gives 0; that costs far less than to search
+/// for each partner. Pairs are searched only when the sum is not 0.
 void check_conflicts(const Conflicts& conflicts) {
   const auto n = static_cast<std::uint32_t>(conflicts.colour.size());
   std::uint64_t sum = 0;
@@ -69,7 +70,7 @@ void check_conflicts(const Conflicts& conflicts) {
       if (const auto back = neighbours(conflicts, other);
           std::find(back.begin(), back.end(), node) == back.end())
         refuse(pair(node, other) + " conflict, but only the first knows of it");
-  // Here some pair is repeated on one side: no harm.
+  // Here a node lists some conflict twice, which does no harm.
 }
 
 }  // namespace
@@ -199,8 +200,8 @@ void EpochGraph::find_waits(const Conflicts& conflicts, std::span<const std::uin
   std::vector<std::uint32_t> asked;         // threads of which that step needs anything
   for (std::uint32_t t = 0; t < teams; ++t) {
     first_wait_.push_back(static_cast<std::uint32_t>(waits_.size()));
-    // What the last epoch has waited for still holds, one stride earlier. In epoch 0 that is before the
-    // beginning, hence true.
+    // Waits of the previous epoch still hold, with places one stride lower. In epoch 0 such a place lies
+    // before the beginning, hence is reached.
     std::fill(known.begin(), known.end(), nothing);
     const std::span<Step> walk_steps =
         std::span(steps_).subspan(first_step_[t], first_step_[t + 1] - first_step_[t]);

@@ -1,7 +1,7 @@
 #pragma once
 
-/// The plan of a loop whose nodes conflict: who runs which node, and what a thread must see of another before
-/// it may go on.
+/// The plan of a loop whose nodes conflict: which thread runs which node, and what a thread must see of
+/// another before it may go on.
 ///
 /// Nodes have colours; no two conflicting nodes share one. In epoch e a node may start when its conflicting
 /// nodes of lower colour have finished epoch e and those of higher colour have finished epoch e - 1. So any
@@ -13,8 +13,8 @@
 /// in one counter. Since the walk is fixed, "node c of thread u has finished epoch e" means "u's counter is
 /// at least e * stride(u) + place of c + 1", and a thread needs at most one such number per other thread
 /// before a node: the largest. Numbers that an earlier node of the walk has already asked for are dropped,
-/// and a thread publishes only where somebody asks. With two threads that own halves of a grid a few percent
-/// of the nodes wait or publish:
+/// and a thread publishes only where another one waits. With two threads that own halves of a grid a few
+/// percent of the nodes wait or publish:
 ///
 ///     thread 0:  a b c |publish 3| d e ... |wait for u1 >= 4| k ...
 ///     thread 1:  p q |wait for u0 >= 3| r s |publish 4| ...
@@ -42,13 +42,14 @@ struct Conflicts {
 };
 
 /// Owners of contiguous ranges of nearly equal weight, for nodes in an order in which neighbours are near
-/// (Morton order, say). weight and owner: n each; owner is non-decreasing, < threads. A node goes where its
-/// middle falls, in integers: deterministic, and no range exceeds the mean by more than the heaviest node.
-/// All weights 0 count as all 1. threads >= 1; the sum of weights times 2 * threads must fit 64 bits.
+/// (Morton order, say). weight and owner: n each; owner is non-decreasing, < threads. The middle of a node's
+/// range of weight decides its owner, in integers: the result is deterministic, and no range exceeds the mean
+/// by more than the heaviest node. If all weights are 0, all count as 1. threads >= 1; the sum of weights
+/// times 2 * threads must fit 64 bits.
 void assign_owners(std::span<const std::uint32_t> weight, int threads, std::span<std::uint32_t> owner);
 
-/// The same where consecutive nodes of one group (a subdomain; n numbers, equal ones side by side) had better
-/// stay with one thread: whole groups, if that leaves no thread a tenth above the mean.
+/// The same for nodes in groups (subdomains). group: n numbers, equal ones side by side. Whole groups go to
+/// one thread, unless that leaves some thread more than a tenth above the mean; then groups do not count.
 void assign_owners(std::span<const std::uint32_t> weight, std::span<const std::uint32_t> group, int threads,
                    std::span<std::uint32_t> owner);
 
@@ -62,15 +63,15 @@ class EpochGraph {
   EpochGraph(const EpochGraph&) = delete;
   EpochGraph& operator=(const EpochGraph&) = delete;
 
-  /// Plans the loop; what was there is replaced, its memory reused. owner: n values < threads; may be empty
+  /// Plans the loop; replaces an earlier plan and reuses its memory. owner: n values < threads; may be empty
   /// with one thread. With one thread only the order of nodes is stored: no dependencies, no counters. Cost:
   /// a few ns per conflict. Throws std::invalid_argument when sizes do not match, an index is out of range, a
-  /// node conflicts with itself or with one of its colour, or a conflict is known to one of its nodes only;
-  /// the graph is empty then.
+  /// node conflicts with itself or with one of its colour, or only one of two nodes lists their conflict; the
+  /// graph is empty then.
   void build(const Conflicts& conflicts, std::span<const std::uint32_t> owner, int threads);
 
-  /// To be called, by one thread, before the graph is used again after a run that failed. A loop that ended
-  /// by itself needs none.
+  /// Makes the graph usable again after a run that failed; called by one thread. A loop that decide() ended
+  /// does not need it.
   void reset() noexcept;
 
   int threads() const noexcept { return threads_; }
@@ -98,14 +99,14 @@ class EpochGraph {
     std::uint32_t waits : 31;     ///< how many entries of waits_, following those of the step before
     std::uint32_t published : 1;  ///< some thread waits for the end of this step
   };
-  /// What one thread writes while it walks; on lines of its own, so that a walk disturbs others only where
-  /// they asked for it.
+  /// What one thread writes while it walks. It has cache lines of its own, so that its writes cost another
+  /// thread nothing unless that thread waits for them.
   struct alignas(cache_line) Counter {
     /// Steps finished since build: epochs * stride + place. Written by the owner of the walk with release
     /// after the nodes up to there have written their data; read with acquire by threads that wait. Without
     /// the pair a neighbour could use data of the previous epoch, or overwrite data that is still being read.
     std::atomic<std::int64_t> finished{0};
-    /// Only for the owner: epochs of the loops that have ended, and whether it is inside one.
+    /// Used by the owner only: epochs of the loops that have ended, and whether it is inside one.
     std::int64_t past_epochs = 0;
     bool walking = false;
   };

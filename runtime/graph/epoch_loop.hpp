@@ -6,8 +6,8 @@
 ///       // One node; runs beside nodes that it does not conflict with.
 ///       void node(std::uint32_t chunk, int epoch);
 ///       // Does anybody decide after this epoch?
-///       bool gate(int epoch);
-///       // All nodes have finished the epoch, nothing else runs; false ends the loop.
+///       // Whether decide() is called after this epoch.
+///       // Called when all nodes have finished the epoch and nothing else runs; false ends the loop.
 ///       bool decide(int epoch);
 ///     };
 ///     graph.build(conflicts, owner, executor.threads());
@@ -68,8 +68,8 @@ class EpochPeers {
   /// Steps per epoch of a thread.
   std::int64_t stride(std::size_t thread) const { return peers_[thread].stride; }
 
-  /// Until `thread` has finished `place` steps of the epoch that is number `now` since the graph was built.
-  /// False when this thread was told to stop.
+  /// Waits until `thread` has finished `place` steps of epoch `now`, counted since the graph was built. False
+  /// if the run was stopped first.
   bool wait_for(std::size_t thread, std::int64_t now, std::int64_t place) {
     Peer& peer = peers_[thread];
     const std::int64_t needed = now * peer.stride + place;
@@ -79,8 +79,8 @@ class EpochPeers {
     });
   }
 
-  /// What program.decide(epoch) says behind the epoch `now`, which this thread has finished: thread 0 asks it
-  /// when all have come here, and the others hear of it. None when this thread was told to stop.
+  /// The result of program.decide(epoch) after epoch `now`, which this thread has finished. Thread 0 calls it
+  /// when all threads have finished the epoch; the others read the result. None if the run was stopped first.
   template <class Program>
   std::optional<bool> decide(Program& program, int epoch, std::int64_t now) {
     std::atomic<std::int64_t>& decision = graph_.decision_.value;
@@ -105,7 +105,7 @@ class EpochPeers {
   struct Peer {
     const std::atomic<std::int64_t>* finished;
     std::int64_t stride;
-    std::int64_t seen;  ///< last value read; spares a look at a line that its owner keeps writing
+    std::int64_t seen;  ///< last value read; avoids reading a cache line that its owner keeps writing
   };
   EpochGraph& graph_;
   Worker& me_;
@@ -115,11 +115,11 @@ class EpochPeers {
 /// One thread's part of the loop; to be called by all threads of the team, with the same graph and program.
 /// True when decide() ended the loop, false when the thread left because a task of the run has failed
 /// elsewhere. What the program throws passes through; whoever catches it raises the stop flag of the workers
-/// (Executor does), and every other thread leaves. decide() is always called by thread 0. Cost beside
-/// the work (bench_task_cost, Zen 4): 0.6 ns per node on one thread; 3-5 ns of both threads' time on two,
-/// because few nodes wait, though a wait for a line that the other core has just written takes 50-100 ns.
-/// Throws std::invalid_argument when the team is not the one the graph was built for, std::logic_error when
-/// the graph was left by a failure and not reset.
+/// (Executor does), and every other thread leaves. decide() is always called by thread 0. Cost beside the
+/// work (bench_task_cost, Zen 4): 0.6 ns per node on one thread; 3-5 ns of both threads' time on two. A wait
+/// for a cache line that the other core has just written takes 50-100 ns, but few nodes wait. Throws
+/// std::invalid_argument when the team is not the one the graph was built for, std::logic_error when an
+/// earlier run failed and reset() was not called.
 template <class Program>
 bool run_epochs(EpochGraph& graph, Worker& me, Program& program) {
   static_assert(EpochProgram<Program>);

@@ -24,7 +24,7 @@ std::uint32_t pop(std::vector<std::uint32_t>& heap) {
   return task;
 }
 
-/// The lock is held for a few hundred ns at most: to sleep for it would cost far more than to wait.
+/// The lock is held for a few hundred ns at most, so polling costs far less than sleeping.
 void lock_soon(std::unique_lock<std::mutex>& lock) {
   for (int attempt = 0; attempt < 200; ++attempt) {
     if (lock.try_lock()) return;
@@ -122,7 +122,8 @@ void Executor::prepare(const Graph& graph) {
   failure_ = nullptr;
   stop_.lower();
 
-  // Transpose: count, sum up to the end of each range, then fill from the back, which leaves the beginnings.
+  // Inverts the predecessor lists: count, sum up to the end of each range, then fill from the back, which
+  // leaves the beginnings.
   for (std::uint32_t i = 0; i < tasks; ++i)
     for (const TaskId before : graph.predecessors(TaskId{i}))
       ++first_successor_[static_cast<std::size_t>(before)];

@@ -3,10 +3,10 @@
 /// Runs graphs on OpenMP threads, and background tasks on a thread of their own.
 ///
 /// One run: all threads share a queue of ready tasks, guarded by one mutex; each takes the ready task that
-/// was submitted first. A team task, once it is taken, is entered by every thread as soon as its present task
-/// is done; one team is open at a time, so two teams cannot wait for each other's threads. Tasks here are
-/// coarse (tens of microseconds and more); work in pieces of a few microseconds belongs into a team that runs
-/// an epoch loop (epoch_loop.hpp).
+/// was submitted first. Once a thread has taken a team task, every other thread enters it when its current
+/// task has ended. Only one team task is open at a time, so two teams cannot wait for each other's threads.
+/// Tasks here are coarse (tens of microseconds and more); work in pieces of a few microseconds belongs in a
+/// team that runs an epoch loop (epoch_loop.hpp).
 
 #include <atomic>
 #include <condition_variable>
@@ -38,8 +38,8 @@ struct ExecutorOptions {
   std::size_t background_capacity =
       4;  ///< >= 1: background tasks that may be outstanding before submit_background blocks
   trace::Recorder* trace =
-      nullptr;  ///< takes down each task, if given; of as many threads, outlives the executor
-  trace::TaskTimes* times = nullptr;  ///< what tasks take, on simulated ranks; outlives the executor
+      nullptr;  ///< records each task, if given; made for as many threads, outlives the executor
+  trace::TaskTimes* times = nullptr;  ///< durations of tasks on simulated ranks; outlives the executor
 };
 
 class Executor {
@@ -54,15 +54,15 @@ class Executor {
   /// Runs all tasks of the graph in an order that its edges allow; returns when all have ended. With one
   /// thread they run inline, in the order of submission, without locks or atomics. When a task throws, no
   /// further task is begun, teams are asked to leave (Worker::stopped), and run throws TaskError once every
-  /// thread is back; of several failures the one submitted first. Throws std::runtime_error when OpenMP does
-  /// not grant the threads, std::logic_error when called from one of the tasks. Called by one thread at a
-  /// time.
+  /// thread is back. If several tasks have failed, it reports the one submitted first. Throws
+  /// std::runtime_error when OpenMP does not grant the threads, std::logic_error when called from one of the
+  /// tasks. Called by one thread at a time.
   void run(const Graph& graph);
 
   /// Queues work for the background thread, see BackgroundLane::submit. Its thread starts with the first
   /// call.
   void submit_background(std::string name, std::function<void()> work);
-  /// Waits for the background thread, see BackgroundLane::drain. Nothing to wait for if it was never used.
+  /// Waits for the background thread, see BackgroundLane::drain. Returns at once if it was never used.
   void drain();
 
  private:

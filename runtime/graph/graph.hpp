@@ -92,8 +92,8 @@ class Graph {
   const std::string& name(TaskId task) const { return at(task).name; }
   std::string name(Handle handle) const;
   bool is_team(TaskId task) const { return static_cast<bool>(at(task).team); }
-  /// Tasks that must have ended before `task` begins: each once, all with smaller ids, redundant ones partly
-  /// left out.
+  /// Tasks that must have ended before `task` begins: each once, all with smaller ids. Some of those that
+  /// others imply are left out.
   std::span<const TaskId> predecessors(TaskId task) const;
 
   /// Runs the work of a plain task / one thread's part of a team task; for executors.
@@ -117,7 +117,7 @@ class Graph {
   /// What a handle's next user must wait for.
   struct LastUse {
     std::uint32_t writer = none;   ///< last task that wrote
-    std::uint32_t readers = none;  ///< head of the list, in readers_, of those who read since
+    std::uint32_t readers = none;  ///< head of the list, in readers_, of tasks that have read since
   };
   struct Reader {
     std::uint32_t task;
@@ -139,7 +139,7 @@ class Graph {
   std::vector<DataName> data_names_;  ///< one per call of data(), by first handle
 };
 
-/// Throws std::logic_error when an edge does not lead from an earlier to a later task or stands twice: a
+/// Throws std::logic_error when an edge does not lead from an earlier to a later task or is stored twice: a
 /// defect of Graph, not of its user. Cost: all edges once.
 void validate(const Graph& graph);
 

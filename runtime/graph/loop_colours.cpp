@@ -17,7 +17,7 @@ enum Phase : std::uint32_t {
   last_glue
 };
 
-/// Order of what a group does within a phase.
+/// Parts of a group, in their order within a phase.
 enum Part : std::uint32_t { early, tell, inner, take, border, publish, inner_behind };
 
 /// Sort key of a node: phase, group, part, colour within the part. Nodes run in ascending order of it.
@@ -33,8 +33,8 @@ std::uint32_t rank_in(const std::vector<Position>& order, const Position& positi
   return static_cast<std::uint32_t>(std::lower_bound(order.begin(), order.end(), position) - order.begin());
 }
 
-/// Lets groups run side by side: the group leaves the key, and in each part of each group colours count from
-/// 0 without gaps.
+/// Lets groups run side by side: removes the group from the keys, and counts the colours of each part of each
+/// group from 0 without gaps.
 void go_abreast(std::vector<Position>& positions) {
   const std::vector<Position> order = sorted(positions);
   for (Position& position : positions)

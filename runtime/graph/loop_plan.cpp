@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t none = LoopPlan::none;
 
-/// Puts the nodes of a LoopPlan into it, in the order of their numbers, then what connects them.
+/// Fills a LoopPlan: its nodes, in the order of their numbers, then their conflicts and owners.
 class Planner {
  public:
   Planner(const LoopSpec& spec, const Tree& tree) : spec_(spec), colours_(loop_colours(spec, tree)) {}
@@ -26,7 +26,7 @@ class Planner {
   }
 
  private:
-  /// The nodes of a group that are no work.
+  /// The nodes of a group other than its work.
   struct GroupNodes {
     std::uint32_t publish = none, glue = none, take = none, tell = none;
   };
@@ -44,7 +44,7 @@ class Planner {
     of_group_.resize(groups);
     for (std::uint32_t e = 0; e < groups; ++e)
       if (spec_.groups[e].exchanges) of_group_[e].publish = add(LoopRole::publish, e, colours_.publish[e]);
-    if (out_.nodes.size() == spec_.work.size()) return;  // nobody exchanges anything
+    if (out_.nodes.size() == spec_.work.size()) return;  // no group exchanges anything
     if (spec_.collects) collect_ = add(LoopRole::collect, none, colours_.tree.up);
     root_ = add(LoopRole::root, none, colours_.tree.down);
     for (std::uint32_t e = 0; e < groups; ++e)
@@ -61,7 +61,8 @@ class Planner {
     if (a != none && b != none) edges_.emplace_back(a, b);
   }
 
-  /// Work whose results others read conflicts with all that reads or writes what is exchanged of its group.
+  /// Work whose results other groups read conflicts with the nodes of its group that read or write what is
+  /// exchanged.
   void connect_work() {
     for (std::uint32_t node = 0; node < spec_.work.size(); ++node) {
       const LoopWork& work = spec_.work[node];
@@ -112,7 +113,8 @@ class Planner {
     }
   }
 
-  /// Work is shared out in order of place; the exchanges of a group go to the thread of its first work.
+  /// Work is shared out in order of place. The nodes of a group's exchange go to the thread of its first
+  /// work.
   void find_owners() {
     const std::size_t count = spec_.work.size();
     std::vector<std::uint32_t> order(count), weight(count), group(count), owner(count);
@@ -138,7 +140,7 @@ class Planner {
   LoopColours colours_;
   std::vector<GroupNodes> of_group_;
   std::uint32_t collect_ = none, root_ = none;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_;  ///< that are not within the work
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_;  ///< conflicts, except within the work
   LoopPlan out_;
 };
 

@@ -28,7 +28,7 @@ bool launched() {
   return false;
 }
 
-/// What MPI counts with; throws std::runtime_error for more.
+/// Converts to int, in which MPI counts; throws std::runtime_error if that is too small.
 int byte_count(std::uint64_t bytes) {
   if (bytes > static_cast<std::uint64_t>(std::numeric_limits<int>::max()))
     throw std::runtime_error("a message of more than 2 GiB between ranks; use more ranks");
@@ -153,10 +153,10 @@ void MpiCommunicator::exchange(std::span<const std::span<const std::byte>> to,
   check(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE), "MPI_Waitall");
 }
 
-/// Of each value over all ranks, in place.
+/// Reduces each value over all ranks, in place.
 template <class Number>
 void reduce_values(std::span<Number> values, MPI_Datatype type, MPI_Op op, trace::Recorder* trace) {
-  if (values.empty()) return;  // SimGrid's calls divide by their number
+  if (values.empty()) return;  // SimGrid divides by the number of values
   const trace::Span span(trace, trace::kind_collective, static_cast<std::uint32_t>(values.size_bytes()));
   check(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), type, op, MPI_COMM_WORLD),
         "MPI_Allreduce");

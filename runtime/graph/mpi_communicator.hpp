@@ -21,17 +21,18 @@ class MpiSession {
 };
 
 struct CommunicatorOptions {
-  /// [s] of DelayedMessages; 0: none. A simulated machine has a network of its own, which is slow enough.
+  /// Delay of messages [s], see DelayedMessages; 0: none. Simulated ranks ignore it: their network is slow
+  /// anyway.
   double delay = 0;
 };
 
 /// All ranks of the session, with the decorators that the build and `options` ask for. A session that was not
-/// started, or has one rank, gives a OneRank. Throws std::runtime_error with the words of MPI where it fails.
+/// started, or has one rank, gives a OneRank. Throws std::runtime_error with MPI's message when a call fails.
 std::unique_ptr<const Communicator> make_communicator(const MpiSession& session,
                                                       CommunicatorOptions options = {});
 
-/// The same without decorators, and through MPI even of one rank, which may send messages to itself then:
-/// what a message costs can be measured so. The session must be started.
+/// The same without decorators. Even a single rank uses MPI, and may send messages to itself, which measures
+/// what a message costs. The session must be started.
 std::unique_ptr<const Communicator> plain_mpi(const MpiSession& session);
 
 }  // namespace talus::graph

@@ -27,7 +27,7 @@ class OneRank final : public Communicator {
   std::unique_ptr<Meeting> start_meeting() const override;
 
  private:
-  /// In the trace, what one of several ranks would have called.
+  /// Records the collective calls that one of several ranks would have made.
   void note_calls(int count, std::size_t bytes = 0) const;
 };
 

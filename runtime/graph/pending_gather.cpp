@@ -1,6 +1,7 @@
-/// Gathering by dissemination (Bruck et al. 1997): with parts of h ranks at hand, each rank sends them to the
-/// one h places on and takes as many from the one h places back. ceil(log2(ranks)) rounds of one message each
-/// way; MPI_Iallgatherv of Open MPI sends ranks - 1 messages from each rank at once.
+/// Gathering by dissemination (Bruck et al. 1997): a rank that holds the parts of h ranks sends them to the
+/// rank h places ahead and receives as many from the rank h places behind. That takes ceil(log2(ranks))
+/// rounds of one message each way; MPI_Iallgatherv of Open MPI sends ranks - 1 messages from each rank at
+/// once.
 
 #include <algorithm>
 #include <utility>

@@ -20,7 +20,7 @@ namespace {
 
 using Bytes = std::vector<std::byte>;
 
-/// Of messages of collective calls, and of meetings: channels have tags from 0 on.
+/// Tags of messages of collective calls, and of meetings. Channels have tags from 0 on.
 constexpr int collective_tag = -1, meeting_tag = -2;
 
 /// Messages that were sent and not yet taken.
@@ -142,7 +142,7 @@ class PretendMeeting final : public Meeting {
  private:
   Mail& mail_;
   int own_, ranks_;
-  int met_ = 0;  ///< ranks below this one have come
+  int met_ = 0;  ///< all ranks below this number have entered
 };
 
 class PretendCommunicator final : public Communicator {

@@ -45,7 +45,7 @@ class TimedRound final : public Round {
   std::unique_ptr<Round> inner_;
 };
 
-/// Time passes between calls only: each question is a call of its own.
+/// Simulated time passes between calls only, so each poll is a call of its own.
 class TimedMeeting final : public Meeting {
  public:
   explicit TimedMeeting(std::unique_ptr<Meeting> inner) : inner_(std::move(inner)) {}

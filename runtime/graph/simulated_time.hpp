@@ -6,8 +6,8 @@
 
 namespace talus::graph {
 
-/// A decorator: what the rank has computed since its last call passes on the simulated machine before each
-/// call of `inner` (detail::MpiCall). Real ranks take the time they take: theirs is `inner` as it is.
+/// A decorator: before each call of `inner` the simulated clock advances by the rank's computing time since
+/// its last call (detail::MpiCall). In a build for real ranks it returns `inner` itself.
 std::unique_ptr<const Communicator> simulated_time(std::unique_ptr<const Communicator> inner);
 
 }  // namespace talus::graph

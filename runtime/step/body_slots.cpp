@@ -10,7 +10,7 @@ namespace talus {
 
 namespace {
 
-/// Candidates of which every body stays; `place` is the new slot of each old one, -1 of those that go.
+/// Keeps the candidates whose bodies all stay; `place` is the new slot of each old one, -1 of bodies that go.
 void keep_candidates(std::span<const Slot> place, Candidates& candidates) {
   Candidates kept;
   kept.impulse = KeptImpulses(candidates.impulse.kind());
@@ -51,7 +51,7 @@ void rearrange(std::span<const Slot> order, StepState& state) {
   state.candidates_valid = false;
 }
 
-/// Where the slots of each subdomain begin, once each has so many.
+/// Sets where the slots of each subdomain begin, from the number of slots of each.
 void set_slot_begins(std::span<const std::size_t> counts, Decomposition& all) {
   for (std::size_t e = 0; e < counts.size(); ++e) all.slot_begin[e + 1] = all.slot_begin[e] + counts[e];
 }
@@ -99,7 +99,7 @@ void drop_bodies(std::span<const std::int64_t> ids, StepState& state) {
     ++counts[e];
   }
   if (order.size() == state.bodies.size()) {
-    state.candidates_valid = false;  // elsewhere some have gone, and all ranks look for candidates together
+    state.candidates_valid = false;  // other ranks have lost some, and all ranks find candidates together
     return;
   }
   rearrange(order, state);

@@ -1,7 +1,8 @@
 #pragma once
 
-/// Bodies of a rank that come and go between steps. All that is kept per slot follows, but for what a step
-/// makes anew: free velocities, which the caller resizes, and where bodies stood at the last broad phase.
+/// Adds bodies to a rank, or removes them, between steps. All data kept per slot are updated, except those
+/// that a step computes anew: free velocities, which the caller resizes, and the places at the last broad
+/// phase.
 
 #include <cstdint>
 #include <span>
@@ -14,19 +15,19 @@
 
 namespace talus {
 
-/// A sphere on its way into the bodies, the same on all ranks.
+/// A sphere to be added to the bodies; all ranks pass the same.
 struct NewGrain {
   Grain grain;
   Material material = material_of_grains;
   std::array<double, 6> velocity{};  ///< u and R omega [m/s]
 };
 
-/// Drops every copy of the bodies with these ids (ascending), and their candidates. The candidates of the
-/// others keep their impulses, and are to be found anew.
+/// Removes every copy of the bodies with these ids (ascending), and their candidates. The candidates that
+/// remain keep their impulses; the next step finds candidates anew.
 void drop_bodies(std::span<const std::int64_t> ids, StepState& state);
 
 /// Appends those of the grains that lie in subdomains of this rank, each to the slots of its subdomain. The
-/// candidates are to be found anew.
+/// next step finds candidates anew.
 void add_bodies(std::span<const NewGrain> grains, const Setup& setup, const graph::Communicator& ranks,
                 StepState& state);
 

@@ -8,7 +8,7 @@ namespace talus {
 
 namespace {
 
-/// A row as it travels, all doubles; the vectors of impulses follow.
+/// Head of a row as it is sent, all doubles; the vectors of impulses follow it.
 struct CheckRow {
   double subdomain, residual2, residual_max2, impulse2, velocity2, contacts, active, jump2, jump_velocity2;
 };

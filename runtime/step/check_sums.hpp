@@ -14,15 +14,15 @@ namespace talus {
 
 /// What a check has measured, of all subdomains.
 struct CheckSums {
-  ErrorSums error;  ///< but for its wall_impulse
+  ErrorSums error;  ///< all but its wall_impulse
   JumpSums jump;
-  /// Per wall, on the grains [N s]; behind them, of a cell that follows a stress, the two halves of what
-  /// contacts do to it.
+  /// Impulse of each wall on the grains [N s]; then, for a cell that follows a stress, the two halves of the
+  /// impulse of the contacts on it.
   std::vector<Vec3> wall_impulse;
   double imbalance = 0;  ///< contacts of the fullest subdomain over those of the mean one, less 1
 };
 
-/// How many vectors of three that is.
+/// Length of CheckSums::wall_impulse.
 std::size_t pushed_vectors(const StepState& state);
 /// Doubles in the row that a subdomain sends per check.
 std::size_t check_row_width(std::size_t vectors);
@@ -31,13 +31,13 @@ struct ChunkErrors {
   std::span<const ErrorSums> sums;
   std::span<const CellVelocity> cell = {};  ///< impulses on a cell that follows a stress [N s], or none
 };
-/// The rows of the subdomains here. `jumps`: per subdomain here, or none.
+/// The rows of the subdomains of this rank. `jumps`: per subdomain of this rank, or empty.
 std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors,
                                std::span<const JumpSums> jumps);
-/// From the rows of all subdomains, each once, in any order.
+/// Adds up the rows of all subdomains; each stands there once, in any order.
 CheckSums add_check_rows(std::span<const double> rows, std::size_t vectors, std::int32_t subdomains);
 
-/// The same of a single number per chunk, such as what a sweep changed.
+/// The same for a single number per chunk, such as the size of a sweep's change.
 std::vector<double> number_rows(const StepState& state, std::span<const double> numbers);
 double add_number_rows(std::span<const double> rows, std::int32_t subdomains);
 

@@ -1,8 +1,9 @@
 #pragma once
 
-/// A run between two steps, complete: what goes on from it gives the bits of the run that was never stopped,
-/// on any ranks and threads (docs/checkpoints.md lists every member of a simulation that outlives a step, and
-/// where it is kept). Files know names and numbers only, which the two visitors below hand out.
+/// The complete state of a run between two steps. A run that continues from it gives the same bits as one
+/// that was never stopped, on any ranks and threads (docs/checkpoints.md lists every member of a simulation
+/// that outlives a step, and where it is kept). Files know names and numbers only; the two visitors below
+/// hand these out.
 
 #include <array>
 #include <cstdint>
@@ -22,9 +23,9 @@
 
 namespace talus {
 
-/// What one subdomain holds, the same on whatever rank it is. n copies of bodies by slot, slots counted from
-/// the subdomain's first; c candidates, chunk after chunk; k chunks; s copies that other subdomains share.
-/// Columns that the scene has no use for are empty.
+/// Data of one subdomain, the same whatever rank it is on. n copies of bodies by slot, slots counted from the
+/// subdomain's first; c candidates, chunk after chunk; k chunks; s copies of bodies that stand in other
+/// subdomains, too. Columns that the scene does not need are empty.
 struct CheckpointPart {
   std::vector<std::int64_t> id;                    ///< n
   std::vector<std::array<double, 3>> x;            ///< n [m]
@@ -41,11 +42,11 @@ struct CheckpointPart {
   std::vector<std::array<std::int32_t, 2>> grain_pairs;  ///< slots
   std::vector<std::array<std::int32_t, 3>> wall_pairs;   ///< wall, slot, feature
   std::vector<std::uint16_t> balls;                      ///< per grain pair, or none
-  std::vector<std::uint8_t> acts;  ///< c: the row of impulses is kept, not all of its bits being 0
-  std::vector<double> impulses;    ///< the rows kept [N s]
+  std::vector<std::uint8_t> acts;  ///< c: its row of impulses is stored, as some bit of it is not 0
+  std::vector<double> impulses;    ///< the rows stored [N s]
   std::vector<float> pushes;       ///< c or none: PositionCorrection
   std::vector<std::uint16_t>
-      order;  ///< per grain pair, or none: candidate in this place, from the chunk's first
+      order;  ///< per grain pair, or none: which candidate of its chunk stands in this place
   std::vector<std::uint8_t> groups;  ///< of the contacts between grains, chunk after chunk, or none
   std::vector<std::array<std::int32_t, 4>> chunks;  ///< k: candidates, wall or -1, ChunkSide, contacts
 
@@ -91,7 +92,7 @@ void each_column(Part& part, const Visit& visit) {
   visit("copies", part.copies);
 }
 
-/// What all ranks know alike.
+/// Data that are the same on all ranks.
 struct CheckpointHead {
   // How space is cut: Decomposition and its Partition.
   std::int32_t subdomains = 1;
@@ -117,7 +118,7 @@ struct CheckpointHead {
   std::vector<double> wall_impulses;                            ///< 3 each
   std::vector<double> wall_torques;                             ///< 3 each
   std::vector<double> wall_applied, wall_margins, wall_work;
-  double time_then = 0;            ///< of the run, of the places that the last broad phase saw [s]
+  double time_then = 0;            ///< time of the run to which the places at the last broad phase belong [s]
   std::vector<double> wall_loads;  ///< numbers_of(load) of each, in force
 
   /// Of a cell that flows, else empty: xx, yy, zz, xy, xz, yz of its edges [m], of their rates [m/s], and of
@@ -127,7 +128,7 @@ struct CheckpointHead {
   bool candidates_valid = false;
   std::int64_t impulse_kind = 3;
   bool overlaps_given = false;
-  std::vector<std::int64_t> overlap_pairs;  ///< body, with of each
+  std::vector<std::int64_t> overlap_pairs;  ///< body and with of each pair
   std::vector<double> overlap_depths;       ///< [m]
 
   // Simulation.
@@ -221,7 +222,7 @@ void each_member(Head& head, const Visit& visit) {
 struct Checkpoint {
   CheckpointHead head;
   std::vector<std::int32_t> here;     ///< subdomains of this rank, ascending
-  std::vector<CheckpointPart> parts;  ///< of each
+  std::vector<CheckpointPart> parts;  ///< one for each of these
 };
 
 /// A load as 8 numbers: drive, velocity, pressure, force, mass, weight.
@@ -230,16 +231,16 @@ std::vector<double> numbers_of(const WallLoad& load);
 /// The state as a part of a checkpoint: all but what StepGraph keeps.
 void save_state(const StepState& state, Checkpoint& to);
 
-/// The state of a run of `setup` whose loads are those of the stage, but for its chunks and contacts, which
-/// restore_contacts fills. Throws std::invalid_argument when the ranks are more than the subdomains, or the
-/// columns do not fit one another or the setup.
+/// The state of a run of `setup` whose loads are those of the stage; restore_contacts fills in its chunks and
+/// contacts. Throws std::invalid_argument when there are more ranks than subdomains, or the columns do not
+/// fit one another or the setup.
 StepState restore_state(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks);
 
-/// The groups of candidates that give the chunks that were saved.
+/// Groups of candidates that are cut into the same chunks as were saved.
 std::vector<CandidateGroup> restored_groups(const StepState& state, const Checkpoint& from);
 
-/// Where contacts and candidates stand in their chunks, which are cut and have rooms: narrow phases repair
-/// what they find.
+/// Restores the places of contacts and candidates in their chunks, which are already cut and have their
+/// rooms. The next narrow phase starts from these places.
 void restore_contacts(const Checkpoint& from, StepState& state);
 
 }  // namespace talus

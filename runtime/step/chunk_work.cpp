@@ -90,7 +90,7 @@ void ChunkWork::work(std::size_t c, int epoch) {
     case Work::sweep:
       return sweep<Friction>(c, epoch);
     case Work::position:
-      return;  // PositionCorrection
+      return;  // PositionCorrection does this work
   }
 }
 
@@ -98,7 +98,8 @@ template <bool Friction>
 void ChunkWork::accumulate(std::size_t c, int epoch) {
   std::span<Velocity> velocity = state_.bodies.velocity;
   const ContactRange range = range_of(c);
-  // Behind sweeps; at the start of a step, and behind ADMM, the impulses are those of `contacts`.
+  // After single-precision sweeps impulses are in `single`; at the start of a step and after ADMM, in
+  // `contacts`.
   const bool from_single = schedule_.work(epoch) == EpochSchedule::Work::accumulate &&
                            !schedule_.opens_segment(epoch) && single(epoch - 1);
   if (from_single) widen_impulses(state_.single.contacts, range, state_.contacts);
@@ -202,7 +203,7 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
 
 /// Converts a chunk's contacts, and the bodies that it is the first to write, to the precision of the coming
 /// sweep. After a check velocities and impulses are in double precision. A course with momentum that goes on
-/// through the check changes precision after the first sweep behind it, and converts its history, too.
+/// through the check changes precision after the first sweep that follows it, and converts its history, too.
 void ChunkWork::change_precision(std::size_t c, int epoch) {
   const bool before = single_before(epoch);
   if (course(epoch).single)
@@ -242,8 +243,8 @@ void ChunkWork::to_double(std::size_t c, int epoch, bool before) {
   widen_steps(single.contacts.unit, range, acceleration_.steps);
 }
 
-/// The start of a sweep moves on along the acceleration: the chunk's impulses, with momentum within the sweep
-/// itself, the bodies that it is the first to write, and its wall copy.
+/// Moves the start of a sweep on along the acceleration: the bodies that this chunk is the first to write,
+/// its wall copy, and its impulses. With momentum the sweep itself moves the impulses.
 void ChunkWork::carry_on(std::size_t c, int epoch) {
   const Course& course = this->course(epoch);
   const int sweep = schedule_.sweep(epoch);

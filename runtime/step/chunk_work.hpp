@@ -11,7 +11,8 @@
 
 namespace talus {
 
-/// What an epoch does to one chunk: velocities afresh, errors, a sweep, or the certified impulses again.
+/// What an epoch does to one chunk: it makes velocities afresh, measures errors, sweeps, or restores
+/// impulses.
 /// Chunks that share no body they write may be worked on at the same time.
 class ChunkWork {
  public:
@@ -19,31 +20,31 @@ class ChunkWork {
   ChunkWork(StepState& state, const StepParameters& parameters, const SweepKernels& kernels,
             const EpochSchedule& schedule, const Courses& courses);
 
-  /// The chunks are new. `timed`: how long each is worked on is added up from now on.
+  /// To be called when the chunks are new. `timed`: from now on the time of work on each chunk is added up.
   void plan(bool timed) { busy_.assign(timed ? state_.chunks.size() : 0, 0.0); }
-  /// Before the first epoch of a step. `damped`: of what a sweep changes at the interface a part is kept
-  /// (damped Schwarz). `keep_impulses`: those of each check are stored with the candidates, as sweeps go on
-  /// before it is known how the check came out.
+  /// Before the first epoch of a step. `damped`: only a part of what a sweep changes at the interface is kept
+  /// (damped Schwarz). `keep_impulses`: the impulses of each check are stored with the candidates, as sweeps
+  /// go on before the result of the check is known.
   void begin(bool damped, bool keep_impulses);
-  /// At a gate: room for what the present course remembers.
+  /// At a gate: allocates the history that the present course of sweeps needs.
   void make_room();
 
   void run(std::size_t c, int epoch);
-  /// At a gate, behind a sweep after which ADMM takes over: the impulses of the last check.
+  /// At a gate, before a remedy that begins from the last check: brings back the impulses of that check.
   void restore();
 
-  /// Sweeps of this epoch are in single precision.
+  /// Whether this epoch is a sweep in single precision.
   bool single(int epoch) const {
     return schedule_.work(epoch) == EpochSchedule::Work::sweep && course(epoch).single;
   }
-  /// Those of the epoch before, in this step, were.
+  /// Whether the sweep before this one, in this step, was in single precision.
   bool single_before(int epoch) const { return schedule_.sweep(epoch) > 0 && course(epoch - 1).single; }
   const Course& course(int epoch) const { return courses_.of(schedule_.sweep(epoch)); }
 
   const std::vector<ErrorSums>& errors() const { return errors_; }  ///< per chunk, of the last measure
-  /// Likewise what contacts do to a cell that follows a stress [N s]; empty without one.
+  /// Likewise the impulse of the contacts on a cell that follows a stress [N s]; empty without one.
   const std::vector<CellVelocity>& cell_impulses() const { return cell_impulses_; }
-  /// Per chunk, with conjugate gradients: what the last sweep changed, squared [J].
+  /// Per chunk, with conjugate gradients: squared norm of the last sweep's change [J].
   const std::vector<double>& changes() const { return changes_; }
   /// Per subdomain here: time of its chunks since the plan [s]; zeros unless timed.
   std::vector<double> busy() const;

@@ -5,16 +5,17 @@
 
 namespace talus {
 
-/// A plan of sweeps, and since when it has been in force.
+/// A plan of sweeps (methods/sweep_plan.hpp), and the sweep from which it is in force.
 struct Course {
   SweepPlan plan;
   int from = 0;         ///< its first sweep in the step
-  int begun = 0;        ///< the sweep with which its momentum began: `from`, or one in single precision
+  int begun = 0;        ///< the sweep with which its momentum began: `from`, or an earlier single one
   bool single = false;  ///< in single precision
 };
 
-/// The present course of a step's sweeps and the one before it: a course that a check calls for begins behind
-/// the sweep that may have been made since. Sweeps are counted from 0 in each step.
+/// The present course of a step's sweeps and the one before it. With several ranks the next sweep is already
+/// in flight when a check calls for a new course; that sweep still belongs to the course before. Sweeps are
+/// counted from 0 in each step.
 class Courses {
  public:
   const Course& now() const { return now_; }
@@ -23,26 +24,26 @@ class Courses {
   void begin(const SweepPlan& plan, int from, bool single) {
     before_ = now_;
     now_ = {plan, from, from, single};
-    // A sweep that is on its way, with several ranks, belongs to the course before and keeps its beta.
+    // Other courses leave beta alone: with several ranks a sweep in flight belongs to the course before.
     if (plan.kind == SweepKind::conjugate) conjugate_ = {};
   }
-  /// The present course from this sweep on in double precision, its momentum and all.
+  /// From this sweep on the present course, with its momentum, is in double precision.
   void go_on_in_double(int from) {
     before_ = now_;
     now_.from = from;
     now_.single = false;
   }
 
-  /// How much of the acceleration the start of a sweep takes along, in [0, 1).
+  /// Factor of the acceleration at the start of a sweep, in [0, 1).
   double beta(int sweep) const {
     const Course& course = of(sweep);
     if (course.plan.kind == SweepKind::conjugate) return conjugate_.beta;
     return momentum_beta(momentum_, sweep - course.begun, course.plan.most);
   }
-  /// Over-relaxation of the normal impulses, in [1, 2). As long as beta is 0 sweeps are plain: they solve
-  /// exactly what few sweeps solve.
+  /// Over-relaxation of the normal impulses, in [1, 2). Sweeps are plain while beta is 0: over-relaxation
+  /// would miss what a few plain sweeps solve exactly.
   double omega(int sweep) const { return beta(sweep) > 0 ? momentum_.over_relaxation : 1; }
-  /// With conjugate gradients, behind each sweep: what it changed, squared [J].
+  /// After each sweep of conjugate gradients: the squared norm of its change [J].
   void turn(double change2) { conjugate_.turn(change2); }
 
  private:

@@ -13,10 +13,10 @@ namespace talus {
 
 namespace {
 
-/// Grains on the way at a time, of all receivers together: less than a megabyte.
+/// Grains sent at a time, to all receivers together: less than a megabyte.
 constexpr std::size_t dealt_at_once = 8192;
 
-/// A grain on its way.
+/// A grain as it is sent.
 struct GrainRecord {
   std::int64_t id;
   double x[3], radius, density;
@@ -35,7 +35,7 @@ GrainRecord record_of(const Sample& sample, std::size_t k) {
   return record;
 }
 
-/// What is said of a sample once.
+/// Properties of a whole sample, sent once.
 struct SampleKind {
   std::int64_t grains;
   bool materials;
@@ -121,7 +121,7 @@ SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks, s
                           const Decomposition* dealt) {
   const auto volume_of = [](double radius) { return sphere_mass(radius, 1); };
   const ClumpView shapes{own.shape, own.orientation, clumps};
-  // The largest of each is wanted first; of the smallest radius the negative. The last two are flags.
+  // First the maxima over all ranks; the smallest radius as its negative. The last two are flags.
   std::array<double, 5> most{0, -std::numeric_limits<double>::infinity(), 0,
                              own.orientation.empty() ? 0.0 : 1.0, own.material.empty() ? 0.0 : 1.0};
   std::vector<Slot> measured;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// How a sample comes to the ranks before the first step.
+/// How a sample is distributed over the ranks before the first step.
 
 #include <cstdint>
 
@@ -18,7 +18,7 @@ namespace talus {
 /// std::invalid_argument when there are more ranks than subdomains, or a centre is not finite.
 Bodies deal_out(Sample sample, const DecompositionSettings& settings, const graph::Communicator& ranks);
 
-/// Of the bodies of all ranks.
+/// Sizes of the whole sample, over the bodies of all ranks.
 struct SampleSize {
   std::int64_t bodies = 0;
   double smallest = 0;       ///< radius of a sphere, or of a ball of a clump [m]
@@ -30,7 +30,7 @@ struct SampleSize {
 };
 
 /// Collective; the same bits however the bodies are dealt to the ranks, and in whatever order they stand.
-/// `dealt`: how they are, where each rank has copies; null: each body stands once.
+/// `dealt`: the decomposition where ranks have copies of bodies; null: each body stands once.
 SampleSize measure_sample(const Bodies& own, const graph::Communicator& ranks,
                           std::span<const Clump> clumps = {}, const Decomposition* dealt = nullptr);
 

@@ -17,7 +17,7 @@ namespace talus {
 
 namespace {
 
-/// A body on its way to another rank.
+/// A body as it is sent to another rank.
 struct BodyRecord {
   std::int64_t id;
   double x[3];
@@ -63,14 +63,14 @@ std::array<double, 4> orientation_of(const BodyRecord& record) {
   return {record.orientation[0], record.orientation[1], record.orientation[2], record.orientation[3]};
 }
 
-/// Points to balance: the candidates there are; in the beginning, the bodies.
+/// Points to balance: the candidates, or the bodies as long as there are no candidates.
 PartitionPoints points_to_cut(const Decomposition& decomposition, const Bodies& bodies,
                               const Candidates& candidates, std::int64_t all_candidates,
                               const Domain& domain) {
   PartitionPoints points;
   if (all_candidates > 0) {
     points = candidate_points(bodies.x, candidates.grain_pairs, candidates.wall_pairs, domain);
-    // A weight counts in 64ths of the mean, or coarser: all together stay below 2^31.
+    // Weights are integers in 64ths of the mean, or coarser: their sum stays below 2^31.
     const double unit =
         std::clamp(std::floor(std::ldexp(1.0, 30) / static_cast<double>(all_candidates)), 1.0, 64.0);
     for (const Vec3& x : decomposition.cost.empty() ? std::vector<Vec3>() : points.x)
@@ -103,7 +103,7 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
   std::vector<std::size_t> sent(to.size(), std::numeric_limits<std::size_t>::max());
   for (std::size_t s = 0; s < bodies.size(); ++s) {
     if (!counts(decomposition, s)) continue;
-    if (to.size() == 1) {  // no search for those who want to know
+    if (to.size() == 1) {  // one rank: there is nobody to send bodies to
       gathered.own.push_back(static_cast<Slot>(s));
       continue;
     }
@@ -126,7 +126,7 @@ Gathered exchange_surroundings(const Decomposition& decomposition, const graph::
   return gathered;
 }
 
-/// 0: none are given. A double: the product may be beyond all integers.
+/// 0 if no boxes are given. A double, since the product may exceed all integers.
 double count_boxes(const DecompositionSettings& settings) {
   const auto& [x, y, z] = settings.boxes;
   return static_cast<double>(x) * static_cast<double>(y) * static_cast<double>(z);
@@ -242,13 +242,13 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
   if (partition_anew) cut_space(decomposition, settings, ranks, sample);
   Gathered gathered = exchange_surroundings(decomposition, ranks, sample, reach);
   const std::size_t own = gathered.own.size(), count = own + gathered.come.size();
-  /// `source`: into the own slots, then into what came.
+  /// `source`: index into the own slots, followed by the records received.
   struct Row {
     std::uint64_t key;
     std::size_t source;
   };
   std::vector<Row> order(count);
-  // Field by field, so that at no time there are two of everything.
+  // Field by field, so that never more than one field exists twice.
   const auto pick = [&](const Row& place, const auto& of_slot, const auto& of_record) {
     return place.source < own ? of_slot(at(gathered.own[place.source]))
                               : of_record(gathered.come[place.source - own]);

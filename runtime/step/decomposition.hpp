@@ -1,6 +1,6 @@
 #pragma once
 
-/// The sample of one rank: copies of bodies by subdomain, and how they got there.
+/// The sample of one rank: its copies of bodies, by subdomain, and how they are dealt to the ranks.
 
 #include <algorithm>
 #include <array>
@@ -20,13 +20,13 @@
 
 namespace talus {
 
-/// Place of a subdomain among those of this rank, which stand by ascending number; groups of the loop
-/// (runtime/graph/loop_plan.hpp) and Chunks::subdomain count in it.
+/// Index of a subdomain among those of this rank, which are in ascending order of their numbers. Groups of
+/// the loop (runtime/graph/loop_plan.hpp) and Chunks::subdomain use this index.
 using SubdomainPlace = Index<struct SubdomainPlaceTag>;
 
-/// How space is cut, who has which subdomain, and which copies stand here. The slots of this rank are those
-/// of its first subdomain, then those of the second, ...; within a subdomain bodies stand in Morton order,
-/// ties by id. Everything of a subdomain is the same on whatever rank it is.
+/// How space is cut, which rank has which subdomain, and which copies of bodies this rank has. The slots of
+/// this rank are those of its first subdomain, then those of the second, ...; within a subdomain bodies stand
+/// in Morton order, ties by id. All data of a subdomain are the same whatever rank it is on.
 ///
 /// Example, two subdomains on one rank, grain 7 in both: slots 0..4 are subdomain 0 with grain 7 at slot 4,
 /// slots 5..9 subdomain 1 with grain 7 at slot 5; multiplicity[4] = multiplicity[5] = 2, counts[4] = 1,
@@ -39,15 +39,15 @@ struct Decomposition {
   Per<SubdomainId, char> subdomain_colour;  ///< choose_subdomain_colours; empty unless they alternate
   std::vector<std::uint16_t> multiplicity;  ///< m_i per slot; empty with one subdomain
   std::vector<std::uint16_t> parts;         ///< per slot: the copy carries M/parts; empty likewise
-  std::vector<char> taken;   ///< per slot: a body that stands in a subdomain of an earlier subdomain colour,
-                             ///< too, and no hub; empty unless they alternate
-  std::vector<char> counts;  ///< per slot: the copy of the lowest subdomain; empty likewise
+  std::vector<char> taken;   ///< per slot: the body stands in a subdomain of an earlier subdomain colour,
+                             ///< too, and is no hub; empty unless they alternate
+  std::vector<char> counts;  ///< per slot: it is the copy of the lowest subdomain; empty likewise
   std::vector<std::array<double, 2>> whole;            ///< 1/M and R^2/I of the body [1/kg]; empty likewise
   Per<SubdomainPlace, SubdomainInterface> interfaces;  ///< bodies[k] stands in slot_begin + k. Empty likewise
-  bool orientation = false;       ///< bodies have orientations, also where there is no body
+  bool orientation = false;       ///< bodies have orientations, even if this rank has no body
   bool materials = false;         ///< likewise materials
   bool shapes = false;            ///< likewise shapes
-  std::int64_t migrants = 0;      ///< bodies that came to a subdomain where they did not stand, all ranks
+  std::int64_t migrants = 0;      ///< bodies new to a subdomain since the last distribution, all ranks
   double imbalance = 0;           ///< candidates of the fullest subdomain over the mean, less 1
   Per<SubdomainId, double> cost;  ///< of a candidate, the mean being 1; empty: all equal
   bool blind = false;             ///< space was cut when no candidate was known
@@ -59,22 +59,22 @@ struct Decomposition {
   int subdomain_colour_of(SubdomainId subdomain) const {
     return subdomain_colour.empty() ? 0 : subdomain_colour[subdomain];
   }
-  /// Of a subdomain of this rank.
+  /// Place of a subdomain of this rank.
   SubdomainPlace place_of(SubdomainId subdomain) const {
     return SubdomainPlace(std::ranges::lower_bound(here, subdomain) - here.begin());
   }
   SlotRange slots_of(SubdomainPlace e) const { return {slot_begin[e.at()], slot_begin[e.at() + 1]}; }
 };
 
-/// Of the copies of a body this one stands for it.
+/// Whether this copy counts for its body: exactly one copy of each body does.
 bool counts(const Decomposition& decomposition, std::size_t slot);
 /// Velocity of a slot with the masses of the whole body.
 Velocity whole_velocity(const Decomposition& decomposition, const Bodies& bodies, std::size_t slot);
 
-/// The same settings for `n` > 0 subdomains. Boxes per axis that make another number are left to be chosen.
+/// The same settings for `n` > 0 subdomains. Boxes per axis that give another number are replaced by zeros.
 DecompositionSettings with_subdomains(DecompositionSettings settings, int n);
 
-/// One subdomain per rank unless the settings say more, laid on the ranks by settings.mapping.
+/// One subdomain per rank unless the settings say more; settings.mapping assigns subdomains to ranks.
 /// Throws std::invalid_argument when there are more ranks than subdomains.
 Decomposition make_decomposition(const DecompositionSettings& settings, const graph::Communicator& ranks);
 
@@ -98,15 +98,14 @@ struct Surroundings {
 struct RankSample {
   Bodies& bodies;
   Candidates& candidates;
-  Domain domain;  ///< that they stand in, now
+  Domain domain;  ///< in which they stand at present
 };
 
-/// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three of
-/// the largest reaches of this rank's regions, so that each candidate whose midpoint is here, and each other
+/// Collective. Makes the partition anew if asked to, and collects the surroundings: bodies within three times
+/// the largest reach of this rank's regions, so that each candidate whose midpoint is here, and each other
 /// candidate of its bodies, is found here without further messages; in a periodic domain their images count,
-/// too, and centres are wrapped. `reach` [m]: of the slots of the sample.
-/// The state of the bodies goes over to the surroundings: ids and centres stay in the sample for
-/// `distribute`.
+/// too, and centres are wrapped. `reach` [m]: of the slots of the sample. The state of the bodies moves to
+/// the surroundings; ids and centres stay in the sample for `distribute`.
 Surroundings collect_surroundings(Decomposition& decomposition, const DecompositionSettings& settings,
                                   const graph::Communicator& ranks, const RankSample& sample,
                                   std::span<const double> reach, bool partition_anew);
@@ -115,23 +114,24 @@ Surroundings collect_surroundings(Decomposition& decomposition, const Decomposit
 struct FoundCandidates {
   Candidates candidates;        ///< between places in the surroundings; without impulses
   std::span<const char> glued;  ///< per wall: it has a finite mass
-  /// Candidates between places in the surroundings whose impulses those found begin from, in the place of
-  /// those of the sample; null: the sample's.
+  /// Candidates between places in the surroundings whose impulses the found ones start from; null: they start
+  /// from those of the sample.
   const Candidates* begun_from = nullptr;
 };
 
-/// Collective. From the candidates found to the copies, candidates with the impulses of those in `sample`,
-/// and groups of this rank. The sample is replaced; the bodies of the surroundings are gone afterwards, their
-/// reaches stay.
+/// Collective. Makes from the candidates found the copies of bodies, the candidates with the impulses of
+/// those in `sample`, and the groups of this rank. The sample is replaced; the bodies of the surroundings are
+/// gone afterwards, their reaches stay.
 std::vector<CandidateGroup> distribute(Decomposition& decomposition, const DecompositionSettings& settings,
                                        const graph::Communicator& ranks, Surroundings& around,
                                        FoundCandidates among, const RankSample& sample);
 
 std::size_t memory_used(const Decomposition& decomposition);
 
-/// Candidates in a chunk of a subdomain, from all there are and its own. Few in small samples, where colours
-/// would otherwise be too thin for threads; more in a subdomain with enough chunks for many threads, which
-/// leaves the cache: what a chunk reads comes in longer runs then (docs/decisions/0008-lanes.md).
+/// Candidates in a chunk of a subdomain, from the numbers of all candidates and of its own. Small samples get
+/// small chunks, since a colour would otherwise have too few chunks for the threads. A subdomain that has
+/// many more chunks than threads, and exceeds the cache, gets larger ones: what a chunk reads then comes in
+/// longer runs (docs/decisions/0008-lanes.md).
 int chunk_target(std::int64_t all, std::int64_t own);
 
 }  // namespace talus

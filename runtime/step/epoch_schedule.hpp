@@ -7,18 +7,19 @@ namespace talus {
 ///   epoch   s            s+1               s+2 ... s+1+n   s+2+n        s+3+n
 ///           accumulate   measure -> gate   n sweeps        accumulate   measure -> gate ...
 ///
-/// A segment is the sweeps between two checks, with the accumulate and the measure that follow them; that of
-/// a step's begin has no sweeps. `accumulate` makes velocities afresh from the impulses, so that the error is
-/// never that of velocities that have drifted from them, and the step ends on what was certified.
+/// A segment is the sweeps between two checks, with the accumulate and the measure that follow them; the
+/// first segment of a step has no sweeps. `accumulate` makes velocities afresh from the impulses: the error
+/// is thus never that of velocities that have drifted from the impulses, and the step ends with the
+/// velocities that were certified.
 ///
-/// With several ranks the sums of a check travel while the next sweep goes on. They are read behind that
-/// sweep; if they say that the step is solved, `restore` brings back the impulses that were certified.
+/// With several ranks the sums of a check travel during the next sweep and are read after it. If they say
+/// that the step is solved, `restore` brings back the impulses that were certified.
 ///
-/// Where overlaps are undone, as many epochs as positions_from() says follow, whatever the loop ended with.
+/// If overlaps are to be undone, the epochs of positions_from() follow, however the iterations have ended.
 ///
-///   behind measure, sums known:     sweep_on(epoch, n), again_from(epoch), or the loop ends
-///   behind measure, sums under way: sweep_on(epoch, n); read_sums_after_next(epoch)
-///   behind the epoch that reads:    stretch(n), again_from(epoch), or restore_after(epoch)
+///   after measure, sums known:     sweep_on(epoch, n), again_from(epoch), or the loop ends
+///   after measure, sums under way: sweep_on(epoch, n); read_sums_after_next(epoch)
+///   after the epoch that reads:    stretch(n), again_from(epoch), or restore_after(epoch)
 class EpochSchedule {
  public:
   enum class Work { accumulate, measure, sweep, restore, position };
@@ -32,7 +33,7 @@ class EpochSchedule {
   }
   /// Number of the sweep of this epoch among those of the step.
   int sweep(int epoch) const { return checked_ + epoch - first_sweep_; }
-  /// It follows an accumulate and a measure, whatever the segment before ended with.
+  /// Whether this epoch is the first of its segment, hence follows an accumulate and a measure.
   bool opens_segment(int epoch) const { return epoch == first_sweep_; }
   bool closes_segment(int epoch) const { return epoch + 1 == segment_; }
   /// Sweeps of the segment up to this epoch, with it.
@@ -41,7 +42,7 @@ class EpochSchedule {
   bool measures_at(int epoch) const { return epoch == segment_ + 1; }
   bool reads_sums_at(int epoch) const { return epoch == read_at_; }
   bool restores_at(int epoch) const { return epoch == restore_at_; }
-  /// Number, from 0, of an epoch of positions; and whether the loop ends behind it.
+  /// Number, from 0, of an epoch of positions; and whether the loop ends after it.
   int position_epoch(int epoch) const { return epoch - (position_end_ - positions_); }
   bool ends_at(int epoch) const { return epoch + 1 == position_end_; }
 
@@ -53,12 +54,12 @@ class EpochSchedule {
 
   /// The sweeps of the segment are done and measured.
   void measured() { checked_ = planned_; }
-  /// Behind the measure of this epoch `sweeps` more.
+  /// After the measure of this epoch: `sweeps` more.
   void sweep_on(int epoch, int sweeps) {
     first_sweep_ = epoch + 1;
     stretch(sweeps);
   }
-  /// The present segment gets `sweeps`, those that it has done among them.
+  /// Sets the number of sweeps of the present segment, those already done included.
   void stretch(int sweeps) {
     planned_ = checked_ + sweeps;
     segment_ = first_sweep_ + sweeps;
@@ -67,9 +68,9 @@ class EpochSchedule {
   void again_from(int epoch) { sweep_on(epoch, 0); }
   void read_sums_after_next(int epoch) { read_at_ = epoch + 1; }
   void sums_read() { read_at_ = never; }
-  /// The step ends behind the next epoch, with the impulses of the last measure.
+  /// The step ends after the next epoch, with the impulses of the last measure.
   void restore_after(int epoch) { restore_at_ = epoch + 1; }
-  /// The velocities stand: `epochs` >= 1 that undo overlaps follow, and nothing else.
+  /// The velocities are final: `epochs` >= 1 that undo overlaps follow, then the loop ends.
   void positions_from(int epoch, int epochs) {
     *this = {};
     segment_ = first_sweep_ = never - 1;
@@ -85,7 +86,7 @@ class EpochSchedule {
   int restore_at_ = never;
   int checked_ = 0;
   int planned_ = 0;
-  int position_end_ = never;  ///< epoch behind the last one of positions
+  int position_end_ = never;  ///< epoch after the last one of positions
   int positions_ = 0;
 };
 

@@ -31,13 +31,13 @@ class ErrorHistory {
   std::size_t start() const { return start_; }
   bool first_since_start() const { return checks_.size() == start_ + 1; }
 
-  /// The last check besides the newest that stands at least `apart` sweeps before it, and tells something of
-  /// sweeps that began with number `begun`; errors of neighbouring sweeps go up and down. Null: none.
+  /// The last check at least `apart` sweeps before the newest one, as errors of neighbouring sweeps go up and
+  /// down. Null if that was made before sweep number `begun`, or before the start.
   const ErrorCheck* before_last(int begun, int apart) const;
-  /// The last check that stands at or before iterations/part of the newest, or the first since the start.
+  /// Index of the last check at or before iterations/part of the newest, or of the first since the start.
   std::size_t last_in(int part) const;
-  /// The second half of the sweeps, at least `patience` of them in all, has found no error below `tolerance`,
-  /// nor one below `gain` times that of the quarter before.
+  /// Whether sweeps stagnate: there were at least `patience`, and the best error of their second half is
+  /// neither below `tolerance` nor below `gain` times the best one of the quarter before.
   bool stagnant(double tolerance, int patience, double gain) const;
 
  private:

@@ -20,7 +20,7 @@ void fetch_subdomain(const StepState& state, const AccelerationHistory& accelera
   const Decomposition& all = state.decomposition;
   const std::size_t first = all.several() ? all.slots_of(own).begin : 0,
                     last = all.several() ? all.slots_of(own).end : state.bodies.size();
-  // What single sweeps want comes last, and is nearest then.
+  // Data of single-precision sweeps are fetched last, so that they are nearest in the cache.
   fetch(first, last, state.free.u, state.free.w, state.bodies.velocity, acceleration.last_v,
         acceleration.step_v);
   for (const bool in_single : {false, true})

@@ -14,7 +14,7 @@ namespace talus {
 
 struct StepState;
 
-/// "" or what makes no sense.
+/// What is wrong with a rule; "" if nothing.
 std::string fault_of(const FieldRule& rule);
 
 struct FieldGrid {
@@ -23,9 +23,9 @@ struct FieldGrid {
   GridSums sums;  ///< on rank 0; empty on others
 };
 
-/// The fields of `rules` behind a step, with the poses and velocities of its end; forces are impulses over
-/// `impulse_time` > 0 [s]. Subdomain after subdomain: the same bits on any ranks and threads. Each rank holds
-/// one grid at a time. Collective.
+/// The fields of `rules` after a step, with the poses and velocities of its end; forces are impulses over
+/// `impulse_time` > 0 [s]. Summed subdomain after subdomain: the same bits on any ranks and threads. Each
+/// rank holds one grid at a time. Collective.
 std::vector<FieldGrid> coarse_fields(std::span<const FieldRule> rules, const StepState& state,
                                      double impulse_time, const graph::Communicator& ranks);
 

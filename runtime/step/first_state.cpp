@@ -14,7 +14,7 @@ namespace talus {
 
 namespace {
 
-/// Of the materials that bodies have.
+/// Throws when a stage has no law for a material of the bodies.
 void demand_laws(const Setup& setup, const Bodies& bodies) {
   for (const Stage& stage : setup.stages)
     for (const Material material : bodies.material)
@@ -33,7 +33,7 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
   StepState state;
   state.decomposition = make_decomposition(setup.decomposition, ranks);
   state.bodies = std::move(bodies);
-  if (state.decomposition.several())  // until the first step deals them out; shares go by subdomain
+  if (state.decomposition.several())  // the first subdomain holds all until the first step deals them out
     std::fill(state.decomposition.slot_begin.begin() + 1, state.decomposition.slot_begin.end(),
               state.bodies.size());
   else
@@ -43,7 +43,7 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
       v.spin_mobility = 0;
       std::fill(std::begin(v.w), std::end(v.w), 0.0);
     }
-  // Alike on all ranks, whoever has a clump.
+  // Alike on all ranks, even on those without a clump.
   if (!setup.clumps.empty() && state.bodies.shape.empty()) state.bodies.shape.assign(state.bodies.size(), 0);
   if ((setup.orientation || !setup.clumps.empty()) && state.bodies.orientation.empty())
     state.bodies.orientation.assign(state.bodies.size(), {1, 0, 0, 0});

@@ -17,7 +17,8 @@ struct Sums {
   double first[9] = {}, second[9] = {};
 };
 
-/// visit(sums of its subdomain, n, r) for each such contact here; then of all ranks, in order of subdomain.
+/// Calls visit(sums of its subdomain, n, r) for each such contact here. Returns the sums of all ranks, in
+/// order of subdomain.
 template <class Visit>
 Sums sum_over_contacts(const StepState& state, const graph::Communicator& ranks, const Visit& visit) {
   std::vector<Sums> rows(state.decomposition.here.size());
@@ -60,7 +61,7 @@ ForceFabric force_fabric(const StepState& state, const graph::Communicator& rank
   out.fabric = Matrix(directions.first) / out.contacts;
   out.of_contacts = 7.5 * deviator(out.fabric);
   Sums forces = sum_over_contacts(state, ranks, [&](Sums& sums, const Vec3& n, const Vec3& r) {
-    // Each direction counts alike, however many contacts point there.
+    // Dividing by the density gives each direction the same weight, however many contacts point there.
     const double r_n = r.dot(n), density = 1 + n.dot(out.of_contacts * n);
     if (!(density > 0)) return;
     Matrix(sums.first) += r_n / density * n * n.transpose();

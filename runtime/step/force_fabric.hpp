@@ -8,9 +8,9 @@
 
 namespace talus {
 
-/// Of the contacts between bodies that carry. Anisotropies are symmetric deviators: contacts point along n
-/// with the density (1 + n.A_c n)/4 pi, the mean normal force there is f_0 (1 + n.A_n n), and the tangential
-/// one f_0 (A_t n - (n.A_t n) n).
+/// Directions of the contacts between bodies that carry a force. Anisotropies are symmetric deviators:
+/// contacts point along n with the density (1 + n.A_c n)/4 pi, the mean normal force there is
+/// f_0 (1 + n.A_n n), and the tangential one f_0 (A_t n - (n.A_t n) n).
 struct ForceFabric {
   double contacts = 0;
   Mat3 fabric = Mat3::Zero();  ///< mean of n (x) n

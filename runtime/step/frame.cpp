@@ -13,7 +13,7 @@ namespace talus {
 
 namespace {
 
-/// As they travel.
+/// A body as it is sent.
 struct BodyRow {
   std::int64_t id;
   double x[3], radius, u[3], omega[3];

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What leaves the simulation: plain copies, so that files are written while the next step runs.
+/// Results that leave the simulation, as plain copies, so that files are written while the next step runs.
 
 #include <array>
 #include <cstdint>
@@ -38,14 +38,14 @@ struct StepReport {
   double kinetic_translation = 0, kinetic_rotation = 0;  ///< [J]
   double solid_fraction = 0;                             ///< 0 when the walls do not close a box
   double equilibrium =
-      0;  ///< distance from it: the largest of net forces over load and of kinetic energy over
+      0;  ///< distance from equilibrium: the larger of net forces over load and kinetic energy over
           ///< load x mean diameter (docs/theory.md, "Equilibrium"); infinite without a load
   std::int64_t migrants = 0;
   double imbalance = 1;  ///< largest over mean work of the subdomains
   double wall_s = 0;     ///< elapsed time of the step [s]
   bool converged = false;
   std::int64_t passed = 0;  ///< pairs that went through one another, or deep into one another, within the
-                            ///< step: it is too long for them, and not converged
+                            ///< step: the step is too long for them, and counts as not converged
 };
 
 /// visit(name, number) for each number of a report; names of bodies are left out.
@@ -86,8 +86,8 @@ struct WallReport {
   Vec3 torque = Vec3::Zero();  ///< likewise, about the wall's own point [N m] (Wall::torque_point)
   double work = 0;             ///< done on the grains since the run began [J]
   Vec3 normal = Vec3::Zero();  ///< of a plane, into the grains; 0 of a surface, and of a group
-  Pose pose = {};              ///< of a surface: from where the scene has put it
-  bool absent = false;         ///< in this stage
+  Pose pose = {};              ///< of a surface: its motion from where the scene has put it
+  bool absent = false;         ///< the wall is absent in this stage
 };
 
 /// One row of bodies.csv: a body that the scene names, at the end of a step.
@@ -117,8 +117,8 @@ struct RemoveReport {
   double mass = 0;  ///< [kg]
 };
 
-/// One row of probes.csv. What a probe of its kind does not have is 0: the contents where it is a disc or a
-/// plane, the passages elsewhere, what needs a volume beyond a plane.
+/// One row of probes.csv. Numbers that its kind of probe does not have are 0: contents for discs and planes,
+/// passages for other regions, numbers per volume for all beyond a plane.
 struct ProbeReport {
   /// Grains of one material.
   struct OfMaterial {
@@ -130,8 +130,8 @@ struct ProbeReport {
   double mass = 0;         ///< [kg]
   double solid_fraction = 0;
   Vec3 velocity = Vec3::Zero();        ///< of their centre of mass [m/s]
-  double temperature = 0;              ///< a third of the mean square of what is left of it [m^2/s^2]
-  double coordination = 0;             ///< active contacts of a grain, those with walls among them
+  double temperature = 0;              ///< a third of the mean square velocity relative to that [m^2/s^2]
+  double coordination = 0;             ///< active contacts per grain, including those with walls
   Mat3 contact_stress = Mat3::Zero();  ///< [Pa], positive in compression: force, then branch
   Mat3 kinetic_stress = Mat3::Zero();  ///< [Pa]
   std::int64_t passed_count = 0;       ///< along the normal less against it, since the run began
@@ -153,8 +153,8 @@ struct TriaxialReport {
   double solid_fraction = 0;
   std::array<double, 3> stress{};     ///< [Pa] diagonal of the Love-Weber stress
   double p = 0, q = 0, q_over_p = 0;  ///< p = mean stress; q = axial minus mean lateral [Pa]
-  double coordination = 0;  ///< active contacts of a grain, those of rattlers and with them left out
-  bool converged = true;    ///< of the step (StepReport)
+  double coordination = 0;            ///< active contacts per grain, without rattlers and their contacts
+  bool converged = true;              ///< of the step (StepReport)
 };
 
 /// One row of cell.csv: a periodic cell and what is in it at the end of a step. Tensors as xx, yy, zz, xy,
@@ -168,17 +168,16 @@ struct CellReport {
   std::array<double, 6> kinetic_stress{};  ///< sum of m v (x) v over the volume, v against the flow [Pa]
   double p = 0, q = 0, q_over_p = 0;  ///< of the contacts: mean stress, root of 3/2 s : s, s its deviator
   double solid_fraction = 0;
-  double contacts_a_grain = 0;       ///< active contacts of a grain, of all grains
-  double coordination = 0;           ///< likewise, those of rattlers and with them left out
+  double contacts_a_grain = 0;       ///< active contacts per grain, over all grains
+  double coordination = 0;           ///< likewise, without rattlers and their contacts
   std::array<double, 6> fabric{};    ///< mean of n (x) n over the contacts that carry, symmetric: xx, ..., yz
   double a_c = 0, a_n = 0, a_t = 0;  ///< anisotropies along the stress (runtime/step/force_fabric.hpp)
   double inertial_number = 0;        ///< rate of shear x mean diameter x root of density over p; 0 without p
   bool converged = true;             ///< of the step (StepReport)
 };
 
-/// State at an output time. Vectors named first are per body, those after `contact` per active contact; on
-/// several ranks each has a part: bodies in order of id, contacts in order of their ids, and the parts of the
-/// ranks, in order of rank, follow one another.
+/// State at an output time. The first vectors are per body, those named contact_ per active contact. On
+/// several ranks each has a part: bodies in order of id, contacts in order of their ids, and rank after rank.
 struct Frame {
   std::int64_t step = 0;
   double time = 0;
@@ -196,16 +195,16 @@ struct Frame {
   std::vector<double> contact_gap;                          ///< [m] at the end of the step
   std::vector<Vec3> contact_force;                          ///< on the first body, mean over the step [N]
   std::vector<WallReport> walls;
-  Domain domain = {};            ///< that they stand in; x and contact_point are wrapped
+  Domain domain = {};            ///< of the bodies; x and contact_point are wrapped
   std::vector<FieldGrid> grids;  ///< that the scene asks for; none before the first step
-  bool with_contacts = true;     ///< false: its contacts, of which there may be some, are left out
+  bool with_contacts = true;     ///< false: contacts are left out, though there may be some
 };
 
 struct StepState;
 
-/// Fills the bodies and contacts of `frame`: this rank's part, about as large as that of any other; a contact
-/// is where its first body is, its force its impulse over `impulse_time` [s]. Collective; rows travel in
-/// bounded pieces.
+/// Fills the bodies and contacts of `frame`: this rank's part, about as large as that of any other. A contact
+/// goes to the rank of its first body; its force is its impulse over `impulse_time` [s]. Collective; rows
+/// travel in bounded pieces.
 void fill_frame(const StepState& state, const graph::Communicator& ranks, bool rotation, bool contacts,
                 double impulse_time, Frame& frame);
 

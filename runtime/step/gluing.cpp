@@ -23,19 +23,19 @@ using detail::start;
 using detail::taken_over;
 using detail::write_velocities;
 
-/// Vectors of three numbers that go through the root whatever bodies do: of each wall of finite mass one, of
-/// a cell that follows a stress two.
+/// Number of vectors of three numbers that go through the root in any case: one for each wall of finite mass,
+/// two for a cell that follows a stress.
 std::size_t Gluing::vectors() const {
   return walls_.size() + (state_.cell.loaded() ? cell_freedoms / 3 : 0);
 }
 
-/// Of such a vector.
+/// Number of copies of vector `g`, on all ranks.
 std::int64_t Gluing::copies_everywhere(std::size_t g) const {
   return g < walls_.size() ? state_.wall_states[at(walls_[g])].copies_everywhere
                            : state_.cell.copies_everywhere;
 }
 
-/// The vector in the copy of a chunk.
+/// Vector `g` in the copy that a chunk holds.
 double* Gluing::copy_of(std::size_t g, ChunkId chunk) {
   if (g < walls_.size()) return state_.copies[chunk.at()].velocity;
   return &state_.cell.copies[chunk.at()].velocity[3 * (g - walls_.size())];
@@ -62,7 +62,7 @@ void Gluing::begin() {
       subdomains_[SubdomainPlace(state_.chunks.subdomain[c.at()])].wall_copies[g].push_back(c);
 }
 
-/// Of interfaces[e].shared[s]; none of a hub.
+/// Copies of the body interfaces[e].shared[s]; none of a hub.
 std::span<const CopySource> Gluing::copies_of(SubdomainPlace e, std::size_t s) const {
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   return std::span(interface.copies)
@@ -134,7 +134,7 @@ void Gluing::tell(SubdomainPlace e, Mode mode) {
       for (std::size_t k = 0; k < 3; ++k) sum[k] += copy_of(g, c)[k];
   }
   if (!root_->up || !root_->links.empty()) return;
-  // The last of a leaf's subdomains sends for all: its count has seen what the others wrote.
+  // The last of a leaf's subdomains sends for all: acquire on the count shows it what the others wrote.
   if (root_->published.fetch_add(1, std::memory_order_acq_rel) + 1 < subdomains_.size()) return;
   root_->published.store(0, std::memory_order_relaxed);
   send_up();
@@ -223,7 +223,7 @@ void Gluing::fetch(SubdomainPlace e) const {
   const Subdomain& mine = subdomains_[e];
   for (const Side& side : mine.sides) {
     fetch(side.slots, side.pairs, side.given, side.taken, side.link.out);
-    // As long as what goes there.
+    // The neighbour's message is as long as the one to it.
     if (side.source) fetch_lines(std::span(side.source, side.link.out.size() * sizeof(double)));
   }
   fetch(mine.shared, mine.taken, mine.corners, mine.taken_corners, mine.base, mine.partial);
@@ -249,7 +249,7 @@ void Gluing::glue_bodies(SubdomainPlace e, Mode mode, std::span<Record> velocity
   const SubdomainInterface& interface = state_.decomposition.interfaces[e];
   const bool schwarz = settings_.coupling == Coupling::schwarz;
   JumpSums jump;
-  // What all copies go on with.
+  // Gives a copy the velocity that all copies of its body continue with.
   const auto settle = [&](std::size_t s, const Own& sum, Number m, bool own_counts) {
     const std::size_t slot = at(mine.shared[s]);
     Record& v = velocity[slot];

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What subdomains tell one another in an iteration, and how copies come to agree.
+/// Exchange between subdomains in an iteration, and gluing: how the copies of a body come to agree.
 
 #include <cstdint>
 #include <memory>
@@ -16,8 +16,8 @@
 
 namespace talus {
 
-/// Messages of one iteration, all ranks: between subdomains (each as if alone on its rank), and those that
-/// leave a rank.
+/// Messages of one iteration, over all ranks: those between subdomains, as if each were alone on its rank,
+/// and those sent between ranks.
 struct MessageCount {
   std::int64_t messages = 0, bytes = 0;
   std::int64_t between_ranks = 0, bytes_between_ranks = 0;
@@ -31,73 +31,74 @@ struct JumpSums {
 
 /// Gluing of copies (Visseq et al. 2013, (12)-(15), Algorithm 1) in tasks:
 ///
-///   tell[e]      after the chunks of subdomain e at glued walls: its part for the root leaves; of one with
-///                bodies that go through the root this is done by publish
-///   publish[e]   after the border chunks of subdomain e: its interface velocities leave
-///   collect      on ranks between the top and the leaves of the tree of ranks: what came from below goes up
-///   root       once a rank: what goes through one rank (CCS; always walls of finite mass and bodies with
+///   tell[e]      after the chunks of subdomain e at glued walls: sends its part of the root's sums. If
+///                bodies of e go through the root, publish sends this part instead
+///   publish[e]   after the border chunks of subdomain e: sends its interface velocities
+///   collect      on ranks with parent and children in the tree of ranks: sends up what the children sent
+///   root       once a rank: sums that go through one rank (CCS; always walls of finite mass and bodies with
 ///                m_i >= 9, or 33 with subdomain colours, so that k copies cost O(k) messages). A cell that
 ///                follows a stress counts as two walls: its copies have 6 numbers
-///   glue[e]      when its neighbours' velocities are there: copies get the mean of all (NSCDD), or add up
+///   glue[e]      when its neighbours' velocities have arrived: copies get the mean of all (NSCDD), or add up
 ///                what all have gained (Schwarz); summed in order of subdomain
 ///
-/// Alternating, subdomains have colours (partition/subdomain_colours.hpp). One whose subdomain colour is not
-/// the first begins its boundary with
+/// With alternating coupling subdomains have colours (partition/subdomain_colours.hpp). A subdomain of a
+/// later colour than the first begins its boundary with
 ///
-///   take[e]      copies of bodies that stand in subdomains of earlier colours, too, get the mean of the
-///                latest of those
+///   take[e]      copies of bodies that also stand in subdomains of earlier colours get the mean of the
+///                copies of the latest of those colours
 ///
-/// Contacts at glued walls that it has wait for nobody (distribute.cpp). In the end all copies of a body get
-/// the mean of those of its last subdomain colour. Each message is sent once, as without subdomain colours: a
-/// take reads those of earlier subdomain colours, glue the others.
+/// Its contacts at glued walls do not wait for this (distribute.cpp). At the end of an iteration all copies
+/// of a body get the mean of those of its last subdomain colour. Each message is sent once, as without
+/// subdomain colours: take reads those of earlier subdomain colours, glue the others.
 ///
-/// Between subdomains of one rank the messages are memory. A body sends its velocity, 6 numbers or 3 without
-/// rotation.
+/// Between subdomains of one rank messages are read from memory. The message of a body is its velocity, 6
+/// numbers or 3 without rotation.
 class Gluing {
  public:
   /// Keeps references.
   Gluing(StepState& state, const DecompositionSettings& settings, const graph::Communicator& ranks);
   ~Gluing();
 
-  /// Collective, after the candidates were distributed: buffers and channels for these interfaces.
+  /// Collective, after the candidates were distributed: opens buffers and channels for these interfaces.
   void plan(bool rotation);
-  /// Collective, behind plan(), when the contacts are known: the tree of ranks, and its channels. `contacts`:
-  /// of this rank, and one for each of its chunks.
+  /// Collective, after plan(), when the contacts are known: builds the tree of ranks and opens its channels.
+  /// `contacts`: number of contacts of this rank, plus one for each of its chunks.
   void plan_tree(std::uint64_t contacts);
   const graph::Tree& tree() const { return tree_; }
-  /// Collective, in every step before its sweeps: the copies of the walls.
+  /// Collective, in every step before its sweeps: counts and lists the copies of walls and of a cell.
   void begin();
 
   /// False when there is nothing to glue: no tasks then.
   bool needed() const { return needed_; }
-  /// Subdomains here that read what e publishes; ascending, without e. They do so in
-  /// their take where reads_early() is true, else in their glue.
+  /// Subdomains of this rank that read what e publishes; ascending, without e. They read it in their take
+  /// where reads_early() is true, else in their glue.
   std::vector<SubdomainPlace> readers_here(SubdomainPlace e) const;
   bool reads_early(SubdomainPlace reader, SubdomainPlace from) const {
     return subdomain_colour(from) < subdomain_colour(reader);
   }
   int subdomain_colour(SubdomainPlace e) const;
-  /// Slots of the copies that its take writes.
+  /// Slots of the copies that the take of e writes.
   std::span<const Slot> taken(SubdomainPlace e) const;
-  /// The part of a subdomain for the root leaves with its tell; else with its publish.
+  /// Whether tell sends the part of a subdomain for the root; else publish does.
   bool tells(SubdomainPlace e) const;
-  /// This rank stands between the top and the leaves of the tree of ranks, so that collect is called.
+  /// Whether this rank has parent and children in the tree of ranks, so that collect is called.
   bool collects() const;
 
   enum class Mode {
     fresh,     ///< velocities were made afresh from the impulses
     iterate,   ///< after a sweep
     measured,  ///< after a sweep, with the jump measured
-    local,     ///< between two exchanges: only the walls' copies of each subdomain
-    sum,       ///< of sum_copies
+    local,     ///< between two exchanges: glues only the copies of walls within each subdomain
+    sum,       ///< used by sum_copies
   };
-  /// A gate's thread alone, collective: each copy of a shared body gets the sum of what `field` has for all
-  /// copies, in order of subdomain; likewise each copy of a wall of finite mass. Per subdomain here its
-  /// bodies in order of slot, then those walls; w is summed only if plan() was told of rotation.
+  /// Collective; called by one thread at a gate. Gives each copy of a shared body the sum of `field` over all
+  /// its copies, in order of subdomain; likewise each copy of a wall of finite mass. `field`: per subdomain
+  /// of this rank its bodies in order of slot, then those walls. w is summed only if plan() was told of
+  /// rotation.
   void sum_copies(std::span<std::vector<Twist>> field);
 
-  /// `single`: of the velocities that sweeps in single precision work on (StepState::single), which travel
-  /// and are added up as they are.
+  /// `single`: uses the velocities of sweeps in single precision (StepState::single), which travel and are
+  /// added up in single precision.
   void publish(SubdomainPlace e, Mode mode, bool single = false);
   void tell(SubdomainPlace e, Mode mode);
   void collect(Mode mode);
@@ -112,7 +113,8 @@ class Gluing {
   const Per<SubdomainPlace, JumpSums>& jumps() const { return jumps_; }
   void forget_jumps() { jumps_.assign(jumps_.size(), {}); }
   const MessageCount& messages() const { return messages_; }
-  /// What each subdomain here sends, and gets from the root, as if alone on its rank; of an exchange.
+  /// Messages of one exchange: what each subdomain of this rank sends, and gets from the root, as if alone on
+  /// it.
   std::vector<trace::Message> message_plan() const;
   /// Time that tasks of this rank waited for messages since begin() [s]; 0 with one rank.
   double exposed() const;
@@ -165,7 +167,7 @@ class Gluing {
   std::unique_ptr<Root> root_;
   Per<SubdomainPlace, JumpSums> jumps_;
   MessageCount messages_;
-  std::vector<Velocity> kept_;  ///< by sum_copies
+  std::vector<Velocity> kept_;  ///< what sum_copies puts back into the velocities
 };
 
 }  // namespace talus

@@ -1,4 +1,4 @@
-/// Who sends what to whom in an exchange, and which copies of a body each subdomain reads when.
+/// Who sends what to whom in an exchange, and when each subdomain reads which copies of a body.
 
 #include <fmt/format.h>
 
@@ -96,7 +96,7 @@ void Gluing::plan_sides(SubdomainPlace e) {
   }
 }
 
-/// Who reads which copies of a shared body, and when.
+/// Lists which copies of a shared body a subdomain reads, and when.
 void Gluing::plan_copies(SubdomainPlace e) {
   const Decomposition& all = state_.decomposition;
   Subdomain& mine = subdomains_[e];

@@ -1,4 +1,4 @@
-/// What goes through one rank: up the tree of ranks to the root of the gluing, and back.
+/// Exchange through one rank: up the tree of ranks to the root of the gluing, and back.
 
 #include <algorithm>
 
@@ -14,7 +14,7 @@ bool Gluing::collects() const {
   return root_ && root_->up && !root_->links.empty();
 }
 
-/// The parts of this rank's subdomains, then the messages of its children as they came.
+/// Sends up the parts of this rank's subdomains, then the messages of its children as they came.
 void Gluing::send_up() {
   Link& link = *root_->up;
   await(*link.sender, root_->waited, ranks_.trace(), link.out_name);
@@ -25,7 +25,7 @@ void Gluing::send_up() {
   start(*link.sender, ranks_.trace(), link.out_name);
 }
 
-/// The last to be told comes first: it has least below it.
+/// In reverse order: the child that is told last has the fewest ranks below it, so its message comes first.
 void Gluing::await_children() {
   for (auto link = root_->links.rbegin(); link != root_->links.rend(); ++link)
     await(*(*link)->receiver, root_->waited, ranks_.trace(), (*link)->in_name);
@@ -40,7 +40,7 @@ void Gluing::collect(Mode mode) {
 
 void Gluing::root(Mode mode) {
   Root& root = *root_;
-  // A rank whose subdomains have nothing to sum takes what its parent sends all the same, and passes it on.
+  // A rank whose subdomains have nothing to sum still receives its parent's message, and passes it on.
   if (mode == Mode::local || (root.sums.empty() && !root.up && root.links.empty())) return;
   if (root.up) {
     Link& link = *root.up;
@@ -64,7 +64,7 @@ void Gluing::root(Mode mode) {
   answer();
 }
 
-/// To each child what its branch asks for.
+/// Sends to each child the sums that its branch asks for.
 void Gluing::answer() {
   const Root& root = *root_;
   const std::size_t at_walls = 3 * vectors();

@@ -1,4 +1,5 @@
-/// The tree of ranks that leads to the root of the gluing: what each rank tells its parent and hears back.
+/// The tree of ranks that leads to the root of the gluing: what each rank sends to its parent and
+/// receives from it.
 
 #include <algorithm>
 #include <utility>
@@ -56,7 +57,7 @@ void Gluing::plan_tree(std::uint64_t contacts) {
   if (ranks_.rank() == tree_.top()) find_contributions(traffic);
 }
 
-/// Every rank learns all names: a few words per hub, none in most scenes. Collective.
+/// Gathers the names of all hubs on every rank: a few words per hub, none in most scenes. Collective.
 Gluing::RootTraffic Gluing::gather_traffic() const {
   const Decomposition& all = state_.decomposition;
   std::vector<RootTraffic::Hub> mine;
@@ -106,7 +107,8 @@ void Gluing::plan_parts(const RootTraffic& traffic) {
 void Gluing::open_links(const RootTraffic& traffic) {
   const Per<SubdomainId, std::int32_t>& rank_of = state_.decomposition.rank_of;
   const int me = ranks_.rank();
-  // A message is named after the first subdomain of the child; its parent speaks for the root.
+  // In a trace a message is named after the first subdomain of the child and the root, whose part the parent
+  // takes.
   const auto open = [&](int child, std::size_t out, std::size_t in) {
     const int other = child == me ? tree_.parent[at(me)] : child;
     auto link = std::make_unique<Link>();
@@ -131,11 +133,12 @@ void Gluing::open_links(const RootTraffic& traffic) {
   if (me != tree_.top()) root_->up = open(me, traffic.length_of(tree_.branch(me)), root_->sums.size());
 }
 
-/// On the top: where the part of each subdomain comes, in a message of a child or here, and what it adds to.
+/// On the top: finds where the part of each subdomain arrives, in a message of a child or here, and which
+/// sums it adds to.
 void Gluing::find_contributions(const RootTraffic& traffic) {
   const Decomposition& all = state_.decomposition;
   const int me = ranks_.rank();
-  // Of each rank: the message of its branch, and where in it.
+  // Of each rank: where its part begins in the message of its branch.
   std::vector<const double*> parts(at(ranks_.ranks()), nullptr);
   for (std::size_t child = 0; child < root_->links.size(); ++child) {
     const double* from = root_->links[child]->in.data();

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What a scene says of grains that come and go; population.hpp does it.
+/// Rules of a scene that insert and remove grains; population.hpp carries them out.
 
 #include <cstdint>
 #include <limits>
@@ -18,11 +18,11 @@ namespace talus {
 struct RuleTimes {
   double from = 0;                                         ///< [s]
   double until = std::numeric_limits<double>::infinity();  ///< [s]
-  std::string stage;    ///< in this stage only, from whose beginning the times count; "": of the whole run
+  std::string stage;    ///< in this stage only, times counted from its beginning; "": in the whole run
   double interval = 0;  ///< [s] between two occasions; 0: every step
 };
 
-/// Spheres that come. Without a rate all that are due come at once, when the rule begins.
+/// Spheres to insert. Without a rate all of them are due when the rule begins.
 struct InsertRule {
   std::string name;
   Region region;  ///< a box, a cylinder or a disc
@@ -35,16 +35,16 @@ struct InsertRule {
   std::optional<double> mass;            ///< no more than so much in all [kg]
   std::optional<double> rate;            ///< grains a second
   std::optional<double> mass_rate;       ///< [kg/s]
-  bool track = false;                    ///< the paths of its grains are told step by step
+  bool track = false;                    ///< the paths of its grains are reported step by step
   int attempts = 200;                    ///< places that are tried for a grain at an occasion, >= 1
   RuleTimes times;
 };
 
-/// Grains that go: those whose centre is in the region.
+/// Removes grains: those whose centre is in the region.
 struct RemoveRule {
   std::string name;
   Region region;                     ///< a box, a cylinder or all beyond a plane
-  std::optional<Material> material;  ///< of this one only
+  std::optional<Material> material;  ///< of this material only
   std::vector<double> at;            ///< [s] at these times only, ascending; empty: always
   RuleTimes times;
 };

@@ -6,8 +6,8 @@
 
 namespace talus {
 
-/// Each chunk at a wall that has contacts holds a copy of it; of a cell that follows a stress, each that has
-/// any. Collective.
+/// Gives a copy of a wall to each chunk that has contacts at it, and a copy of a cell that follows a stress
+/// to each chunk that has contacts. Collective.
 void SolverLoop::split_walls() {
   const Chunks& chunks = state_.chunks;
   for (WallState& wall : state_.wall_states) {
@@ -34,7 +34,8 @@ void SolverLoop::split_walls() {
   }
 }
 
-/// What the step has found of a cell that follows a stress, from the ranks that hold a copy. Collective.
+/// The velocity that the step has found for a cell that follows a stress, from ranks that hold a copy.
+/// Collective.
 void SolverLoop::settle_cell() {
   StressedCell& cell = state_.cell;
   cell.velocity.fill(cell.copies_everywhere == 0 ? 0 : -std::numeric_limits<double>::infinity());

@@ -6,8 +6,8 @@ namespace talus {
 
 namespace {
 
-/// Where a subdomain sends nothing to the root, its chunks at glued walls belong to the border; so do all
-/// chunks where all `push` what goes through the root.
+/// Chunks at glued walls belong to the border where the subdomain has no tell. `push`: all chunks act on what
+/// goes through the root, so those inside belong to the border, too.
 graph::LoopWork::Side side_of(ChunkSide side, bool tells, bool push) {
   using enum graph::LoopWork::Side;
   switch (side) {

@@ -8,7 +8,7 @@ namespace talus {
 
 namespace {
 
-/// Of one body: whether it is on this rank, and its state.
+/// State of a named body, and whether it is on this rank.
 struct NamedState {
   double there = 0, x[3]{}, u[3]{}, w[3]{}, radius = 0, mass = 0;
 };
@@ -30,7 +30,7 @@ std::vector<NamedState> find_named(std::span<const NamedBody> named, const StepS
     to.mass = v.inv_mass > 0 ? 1 / v.inv_mass : 0;
   }
   if (ranks.ranks() == 1) return found;
-  // Rows of all ranks: the one that has a body says so.
+  // Rows of all ranks: `there` marks the one from the rank that has the body.
   const auto rows = ranks.gather_records(std::span<const NamedState>(found));
   for (std::size_t k = 0; k < rows.size(); ++k)
     if (rows[k].there > 0) found[k % named.size()] = rows[k];

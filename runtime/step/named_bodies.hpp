@@ -13,9 +13,9 @@ namespace talus {
 /// Follows the bodies that a scene names. Costs nothing where there are none.
 class NamedBodies {
  public:
-  /// Before a step: how fast they are. Collective.
+  /// Before a step: notes the velocities of these bodies. Collective.
   void begin_step(std::span<const NamedBody> named, const StepState& state, const graph::Communicator& ranks);
-  /// Behind it: a report of each body that is still there, in the order of the setup. Collective.
+  /// After it: a report of each body that is still there, in the order of the setup. Collective.
   std::vector<BodyReport> end_step(std::span<const NamedBody> named, const StepState& state,
                                    const StepParameters& parameters, const graph::Communicator& ranks) const;
 

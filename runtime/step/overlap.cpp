@@ -12,7 +12,7 @@ namespace talus {
 
 namespace {
 
-/// Part of the tolerance below which an overlap that a sample begins with is as good as none.
+/// Part of the tolerance below which an overlap that a sample begins with is neglected.
 constexpr double negligible = 0.1;
 
 BodyPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
@@ -70,7 +70,7 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
     const Vec3 other = wall < 0 ? Vec3(velocity(second) + state.domain.image_velocity(x(first), x(second)))
                                 : state.walls[static_cast<std::size_t>(wall)].velocity_at(touch.point);
     const Vec3 way = 0.5 * parameters.time_step * (velocity(state.contacts.first[k]) - other);
-    // Where separation and normal are parallel, as in overlaps less deep than a centre.
+    // Holds where separation and normal are parallel, as in overlaps that do not reach a centre.
     const double then =
         wall < 0 ? (touch.separation - way).norm() - touch.separation.norm() : -touch.normal.dot(way);
     const double depth = -(touch.gap + then);

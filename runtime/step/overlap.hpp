@@ -1,9 +1,8 @@
 #pragma once
 
-/// Overlaps as part of what a step certifies (docs/theory.md, "Overlap"). A step answers for the positions
-/// that it ends with: no pair may be in by more than a part of the smaller radius, beyond what it had when
-/// the run began. Overlaps that a sample is given are no fault of any step; what opens of them is not given
-/// again.
+/// Overlaps as part of what a step certifies (docs/theory.md, "Overlap"). At the end of a step no pair may
+/// overlap by more than a part of the smaller radius, beyond its overlap when the run began. Overlaps that a
+/// sample begins with are allowed; as far as they open during the run, they are not allowed again.
 
 #include <compare>
 #include <cstdint>
@@ -33,7 +32,7 @@ struct GivenOverlap {
   double depth = 0;
 };
 
-/// The pair that is in deepest at the end of a step.
+/// The pair with the deepest overlap at the end of a step.
 struct DeepestOverlap {
   double depth = 0;    ///< over the smaller radius, beyond what the pair was given
   bool named = false;  ///< `pair` is known: `depth` is beyond the tolerance
@@ -42,14 +41,14 @@ struct DeepestOverlap {
 
 /// Overlaps of more than a tenth of `tolerance` x smaller radius before the first step, in order of their
 /// pairs, the same on all ranks. To be called between the narrow phase of the first step and its iterations:
-/// contacts and velocities are used with bodies and walls in mid-step, from where these are followed back;
-/// the spin of clumps in that half step is neglected. Collective.
+/// bodies and walls are then in mid-step, and are followed back to its beginning by their velocities, without
+/// the spin of clumps. Collective.
 std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParameters& parameters,
                                          double tolerance, const graph::Communicator& ranks);
 
-/// Looks at the contacts of the step that has ended. `deepest`: of all ranks, over the smaller radius
-/// (ContactSums); while that is within `tolerance` and nothing was given, no contact is looked at. What was
-/// given and has opened is taken from state.given_overlaps. Collective.
+/// The deepest overlap among the contacts of the step that has ended. `deepest`: its depth on all ranks, over
+/// the smaller radius (ContactSums); contacts are looked at only if that exceeds `tolerance` or overlaps were
+/// given. What has opened of the given overlaps is taken from state.given_overlaps. Collective.
 DeepestOverlap find_deepest_overlap(StepState& state, double deepest, double tolerance,
                                     const graph::Communicator& ranks);
 

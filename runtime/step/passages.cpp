@@ -17,7 +17,8 @@ void Passages::begin_step(const StepState& state) {
           {static_cast<std::int64_t>(bodies.id[s]), {bodies.x[s][0], bodies.x[s][1], bodies.x[s][2]}});
 }
 
-/// Of the bodies that count here now, in order of their slots: those that were elsewhere are asked for.
+/// Places before the step of the bodies that count here now, in order of their slots; other ranks are asked
+/// for those of bodies that were there.
 std::vector<Passages::Place> Passages::places_of(const StepState& state, const graph::Communicator& ranks) {
   std::ranges::sort(before_, {}, &Place::id);
   const auto find = [](const std::vector<Place>& places, std::int64_t id) {

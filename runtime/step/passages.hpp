@@ -1,6 +1,6 @@
 #pragma once
 
-/// Who goes through the discs and planes of the probes, step by step.
+/// Passages of bodies through the discs and planes of the probes, step by step.
 
 #include <cstdint>
 #include <span>
@@ -20,15 +20,15 @@ struct Passage {
   double mass;       ///< [kg]
 };
 
-/// Compares the places of bodies before and behind a step; the way between is taken for straight. Keeps
+/// Compares the places of bodies before and after a step and takes the path between for straight. Keeps
 /// nothing from step to step: bodies that come, go or are read from a checkpoint between two steps have not
 /// moved.
 class Passages {
  public:
   /// Before a step, when grains have come and gone.
   void begin_step(const StepState& state);
-  /// Behind it: passages through `probes` in order of probe and id, the same on all ranks. `dealt`: bodies
-  /// may stand in other slots, and on other ranks, than before; they are then known by their ids. Collective.
+  /// After it: passages through `probes` in order of probe and id, the same on all ranks. `dealt`: bodies may
+  /// stand in other slots, and on other ranks, than before; they are then known by their ids. Collective.
   std::vector<Passage> end_step(std::span<const ProbeRule> probes, const StepState& state, bool dealt,
                                 const graph::Communicator& ranks);
 

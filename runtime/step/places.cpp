@@ -29,11 +29,11 @@ Place place_of(const Region& region, const Seeker& seeker, const PlaceDraw& draw
   return place_in(region, seeker.radius, {a[0], a[1], b[0]});
 }
 
-/// Bodies of this rank that reach into the region, and those that came.
+/// Bodies of this rank that reach into the region, and grains inserted already.
 Spheres in_the_way(const Region& region, double largest, const StepState& state, const Spheres& taken) {
   Spheres spheres = taken;
   const Bounds bounds = bounds_of(region);
-  // Centres of those that come lie in the box, and in a disc anywhere on it: its box is flat.
+  // New centres lie in the box of the region; that of a disc is flat.
   for (std::size_t s = 0; s < state.bodies.size(); ++s)
     if (bounds.near(state.bodies.x[s], state.bodies.radius[s] + largest)) {
       spheres.x.push_back(state.bodies.x[s]);
@@ -42,7 +42,7 @@ Spheres in_the_way(const Region& region, double largest, const StepState& state,
   return spheres;
 }
 
-/// Those of which the second overlaps the first, in order of the first.
+/// Pairs of tries that overlap, in order of the first.
 std::vector<GrainPair> rivals(std::span<const Try> tries, std::span<const Seeker> seekers) {
   std::vector<Vec3> x;
   std::vector<double> radius;

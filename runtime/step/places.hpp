@@ -1,6 +1,6 @@
 #pragma once
 
-/// Room for grains that come: random places in a region in which they overlap nobody.
+/// Room for grains to be inserted: random places in a region where they overlap no body.
 
 #include <cstdint>
 #include <span>
@@ -26,7 +26,7 @@ struct FoundPlaces {
   std::int64_t rounds = 0;         ///< attempts that were made
 };
 
-/// What places depend on besides who is there.
+/// What the places depend on, besides the bodies that are there.
 struct PlaceDraw {
   std::uint64_t seed = 1;
   std::uint32_t stream = 0;  ///< of the rule
@@ -42,7 +42,7 @@ struct Spheres {
 
 /// Collective, and the same on all ranks, however bodies are dealt to them. Each seeker tries one place after
 /// the other; of two that want the same room in the same attempt the one that stands first gets it. `taken`:
-/// grains that came already, known to all ranks.
+/// grains that were already inserted, known to all ranks.
 FoundPlaces find_places(const Region& region, std::span<const Seeker> seekers, const PlaceDraw& draw,
                         const StepState& state, const Spheres& taken, const graph::Communicator& ranks);
 

@@ -14,18 +14,18 @@ namespace talus {
 
 namespace {
 
-/// Sums of many steps are not their products: a time is reached a part of this before it.
+/// A sum of many steps is not exactly their product: a time is reached this part before it.
 constexpr double rounding = 1e-9;
 /// Streams of insertions lie behind those of samples.
 constexpr std::uint32_t first_stream = 0x8000;
 constexpr std::int64_t all_at_once = std::int64_t{1} << 40, fewest_at_once = 16;
 
-/// On the clock of a rule.
+/// Time on the clock of a rule.
 double rule_time(const RuleTimes& times, const StepSpan& step, double time) {
   return times.stage.empty() ? time : time - step.stage_began;
 }
 
-/// A body that goes.
+/// A body to be removed.
 struct Leaving {
   std::int64_t id, rule, material;
   double mass;
@@ -156,8 +156,8 @@ NewGrain Population::made(std::size_t i, std::int64_t number, const Vec3& x) {
   return grain;
 }
 
-/// Those that wait look for room. Behind an occasion that had too little of it, not many more are tried than
-/// found some: full regions cost little.
+/// Looks for room for the grains that wait. After an occasion with too little room, not many more are tried
+/// than found some, so that full regions cost little.
 void Population::place_due(std::size_t i, const StepState& state, const graph::Communicator& ranks,
                            std::vector<NewGrain>& grains) {
   const InsertRule& rule = setup_.inserts[i];
@@ -190,7 +190,7 @@ void Population::place_due(std::size_t i, const StepState& state, const graph::C
   }
 }
 
-/// Ids of those that go, ascending. Collective.
+/// Ids of the bodies to remove, ascending. Collective.
 std::vector<std::int64_t> Population::leave(const StepSpan& step, const StepState& state,
                                             const graph::Communicator& ranks) {
   std::vector<std::size_t> acting;

@@ -1,14 +1,14 @@
 #pragma once
 
-/// Grains that come and go between two steps.
+/// Inserts and removes grains between two steps.
 ///
 /// Order within a step: loads of the stage, choice of the time step, removals, insertions, then detection,
-/// which finds the candidates anew if anybody came or went. A scene without rules does none of it.
+/// which finds the candidates anew if any body came or went. A scene without rules skips all this.
 ///
 /// The same on any ranks and threads: what is drawn is a function of the seed, the rule's number, the grain's
-/// number within its rule and the attempt. All ranks draw the same places; each says which of them its own
-/// bodies take up, and all then choose alike. A grain goes to the rank and subdomain in which it lies, and
-/// detection deals it out like any other. Ids go up and never come back.
+/// number within its rule and the attempt. All ranks draw the same places; each reports which of them its own
+/// bodies occupy, and all then make the same choice. A grain goes to the rank and subdomain in which it lies,
+/// and detection deals it out like any other. Ids increase and are never used again.
 ///
 /// Sizes stay as they were drawn: a grain for which there is no room waits, and is tried again, so that large
 /// grains are as frequent among those that came as in the distribution.
@@ -25,10 +25,11 @@
 
 namespace talus {
 
-/// What outlives a step, as numbers that a checkpoint can hold. Of i insertions, r removals and m materials.
+/// State that outlives a step, as numbers that a checkpoint can hold. Of i insertions, r removals and m
+/// materials.
 struct PopulationState {
   std::int64_t next_id = 0;
-  std::int64_t unsorted = 0;                ///< grains that stand out of Morton order, one subdomain
+  std::int64_t unsorted = 0;                ///< grains out of Morton order; with one subdomain only
   std::vector<std::int64_t> drawn;          ///< i: grains that were ever due
   std::vector<double> drawn_mass;           ///< i [kg]
   std::vector<std::int64_t> placed;         ///< i
@@ -38,11 +39,11 @@ struct PopulationState {
   std::vector<std::int64_t> window;         ///< i: grains that are tried at an occasion
   std::vector<double> last;                 ///< i, then r: time of the last occasion [s]
   std::vector<std::int64_t> waiting_count;  ///< i
-  std::vector<std::int64_t> waiting;        ///< numbers of grains that are due and not there, rule after rule
-  std::vector<std::int64_t> passed;         ///< r: times of RemoveRule::at that are over
+  std::vector<std::int64_t> waiting;        ///< numbers of grains due and not inserted, rule after rule
+  std::vector<std::int64_t> passed;         ///< r: times of RemoveRule::at that have passed
   std::vector<std::int64_t> removed;        ///< r x m
   std::vector<double> removed_mass;         ///< r x m [kg]
-  std::vector<std::int64_t> tracked_rule;   ///< of each grain whose path is told: its insertion
+  std::vector<std::int64_t> tracked_rule;   ///< of each grain whose path is reported: its insertion
   std::vector<std::int64_t> tracked_id;     ///< likewise
 
   /// visit(name, member) for each member of a state, which may be const.
@@ -77,20 +78,20 @@ struct StepSpan {
 
 class Population {
  public:
-  /// Keeps a reference. Collective: ids go on behind those of `bodies`, on all ranks.
+  /// Keeps a reference. Collective: new ids follow the largest id of `bodies` on all ranks.
   Population(const Setup& setup, const Bodies& bodies, const graph::Communicator& ranks);
-  /// As of a checkpoint. Throws std::invalid_argument when it is of other rules.
+  /// From a checkpoint. Throws std::invalid_argument when the checkpoint has other rules.
   Population(const Setup& setup, const PopulationState& state);
   void go_on_from(const PopulationState& state);
 
   bool has_rules() const { return !setup_.inserts.empty() || !setup_.removes.empty(); }
-  /// Removes and inserts what the step begins with. True when bodies came or went: candidates are then to be
-  /// found anew. Collective.
+  /// Removes and inserts grains at the beginning of the step. True when bodies came or went: candidates are
+  /// then to be found anew. Collective.
   bool change(const StepSpan& step, StepState& state, const graph::Communicator& ranks);
 
-  /// Whether an insertion has more to do, in the stage of the step and behind it.
+  /// Whether an insertion that acts in the stage of the step has more grains to insert after the step.
   bool expects_grains(const StepSpan& step) const;
-  /// The fastest that a grain may come in the step [m/s].
+  /// Largest speed of a grain that may be inserted in the step [m/s].
   double fastest(const StepSpan& step) const;
 
   /// Bodies that came from an insertion that is tracked, named after it: NAME, or NAME-1, NAME-2, ...
@@ -112,13 +113,13 @@ class Population {
   NewGrain made(std::size_t rule, std::int64_t number, const Vec3& x);
 
   const Setup& setup_;
-  PopulationState now_;                             ///< but for who waits:
+  PopulationState now_;                             ///< without the grains that wait:
   std::vector<std::vector<std::int64_t>> waiting_;  ///< per insertion
   std::vector<RadiusSource> radii_;                 ///< likewise
 };
 
-/// Radius [m] below which no grain ever is: of the sample, whose smallest is given (0: there is none), and of
-/// all that is inserted.
+/// Smallest radius [m] that a grain ever has: in the sample, whose smallest is given (0: there is none), or
+/// inserted.
 double smallest_ever(const Setup& setup, double smallest_of_sample);
 
 }  // namespace talus

@@ -12,19 +12,21 @@
 
 namespace talus {
 
-/// Numbers of the sweeps that undo overlaps.
+/// Parameters of the sweeps that undo overlaps.
 struct PositionCorrectionRule {
-  /// Sweeps per step, >= 1. What they leave is left to the next steps, which go on from their pushes.
+  /// Sweeps per step, >= 1. The next steps undo the overlaps that remain, and start from the pushes of this
+  /// one.
   int sweeps = 10;
-  /// As of sweeps without friction, but not over-relaxed: what so few sweeps overshoot opens gaps, into which
-  /// grains fall, and a column sank by it.
+  /// As for sweeps without friction, but without over-relaxation: so few sweeps would overshoot and open
+  /// gaps, into which grains fall; a column sank that way.
   MomentumParameters momentum{.over_relaxation = 1};
 };
 
-/// What chunks do in the epochs behind those of a step that undo overlaps (kernels/sweeps/positions.hpp).
-/// Displacements take the room of velocities in single precision, which nothing needs any more then, and
-/// those of walls' copies that of their velocities, which are kept aside. They are glued as velocities are,
-/// so that all copies of a body go the same way.
+/// Work of chunks in the epochs that undo overlaps, after the iterations of a step
+/// (kernels/sweeps/positions.hpp). Displacements of bodies use the memory of the velocities in single
+/// precision, which nothing needs any more then. Displacements of walls' copies use that of their velocities,
+/// which are saved meanwhile. Displacements are glued like velocities, so that all copies of a body move
+/// alike.
 class PositionCorrection {
  public:
   /// Keeps references.
@@ -32,32 +34,33 @@ class PositionCorrection {
                      const ChunkWork& work)
       : state_(state), settings_(settings), kernels_(kernels), work_(work) {}
 
-  /// The scene asks for it.
+  /// Whether the scene asks for it.
   bool wanted() const { return settings_.overlap_correction > 0; }
-  /// How many epochs it takes: one in which bodies move by what the last step's pushes ask, then the sweeps.
+  /// How many epochs it takes: one that moves bodies by the pushes of the last step, then the sweeps.
   int epochs() const { return 1 + rule_.sweeps; }
 
-  /// The candidates are new: no pushes are known of them.
+  /// To be called when the candidates are new: no pushes are known of them.
   void plan() { pushes_.clear(); }
-  /// Before the iterations of a step: bodies stay where they are.
+  /// Before the iterations of a step: there are no displacements yet.
   void forget() { found_ = false; }
-  /// At a gate, behind the iterations.
+  /// At a gate, after the iterations.
   void begin();
   /// What a chunk does in epoch number `epoch` of these, from 0.
   void run(std::size_t chunk, int epoch);
-  /// At a gate, behind the last sweep: the copies of walls have their velocities again.
+  /// At a gate, after the last sweep: gives the copies of walls their velocities back.
   void end();
 
-  /// Behind the loop: x += d of bodies here.
+  /// After the loop: x += d of the bodies in `range`.
   void move(SlotRange range, std::span<Vec3> x) const;
-  /// Per chunk: displacements of its wall copy [m] in the place of velocities; void unless found().
+  /// Per chunk: its wall copy, with its displacement [m] in place of the velocity; means nothing unless
+  /// found().
   const std::vector<WallCopy>& wall_copies() const { return moved_; }
-  /// Something may have moved in this step.
+  /// Whether something may have moved in this step.
   bool found() const { return found_; }
 
-  /// Per candidate, of the last step; empty where there was none since the candidates are new.
+  /// Per candidate, of the last step; empty if candidates were found anew since.
   const std::vector<float>& pushes() const { return pushes_; }
-  /// Behind plan(): goes on from such pushes.
+  /// After plan(): starts from such pushes.
   void go_on_from(std::vector<float> pushes) { pushes_ = std::move(pushes); }
 
  private:

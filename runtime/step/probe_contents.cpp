@@ -16,7 +16,7 @@ RegionSums no_sums(std::size_t materials) {
   return sums;
 }
 
-/// As numbers that travel.
+/// The sums as the numbers that are sent.
 constexpr std::size_t fixed_numbers = 1 + 1 + 3 + 9 + 1 + 1 + 9;
 std::size_t numbers_of_region(std::size_t materials) {
   return fixed_numbers + 2 * materials;

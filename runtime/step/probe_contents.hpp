@@ -1,6 +1,6 @@
 #pragma once
 
-/// What is in the regions of the probes, behind a step.
+/// Contents of the regions of the probes, after a step.
 
 #include <cstdint>
 #include <span>
@@ -17,7 +17,7 @@ namespace talus {
 struct RegionSums {
   MassMoments motion;                ///< of the bodies
   double volume = 0;                 ///< of solid in the region: parts of spheres, whole clumps [m^3]
-  std::int64_t ends = 0;             ///< of active contacts, at the bodies
+  std::int64_t ends = 0;             ///< ends of active contacts, at these bodies
   Mat3 moment = Mat3::Zero();        ///< sum of r (x) l, as far as the branch l lies in the region [N s m]
   std::vector<std::int64_t> counts;  ///< of the bodies, by material
   std::vector<double> masses;        ///< likewise [kg]

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What a scene says of probes and fields; probes.hpp and field_grids.hpp measure it.
+/// Rules of a scene for probes and fields; probes.hpp and field_grids.hpp measure them.
 
 #include <array>
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace talus {
 
-/// A part of space that is looked at. A box, a cylinder or all beyond a plane: what is in it; a disc or a
+/// A region of space to measure. For a box, a cylinder or all beyond a plane: what is in it; for a disc or a
 /// plane: what goes through it.
 struct ProbeRule {
   std::string name;
@@ -21,7 +21,7 @@ struct ProbeRule {
   std::optional<std::int64_t> every_steps;  ///< steps likewise; whichever comes first
 };
 
-/// Coarse-grained fields on a grid of cells, made with every frame behind a step.
+/// Coarse-grained fields on a grid of cells, computed with every frame after a step.
 struct FieldRule {
   std::string name;
   Vec3 low = Vec3::Zero(), high = Vec3::Zero();  ///< [m] corners of the grid

@@ -14,14 +14,14 @@
 
 namespace talus {
 
-/// What outlives a step, as numbers that a checkpoint can hold. Of p probes and m materials.
+/// State that outlives a step, as numbers that a checkpoint can hold. Of p probes and m materials.
 struct ProbeState {
   std::vector<std::int64_t> count;       ///< p x m: passages along the normal less those against it
   std::vector<double> mass;              ///< p x m [kg]
   std::vector<std::int64_t> count_told;  ///< p: sums over the materials at the last report
   std::vector<double> mass_told;         ///< p [kg]
   std::vector<double> time_told;         ///< p: of the last report [s]
-  std::vector<std::int64_t> passed;      ///< p: multiples of ProbeRule::every that are behind
+  std::vector<std::int64_t> passed;      ///< p: multiples of ProbeRule::every that have passed
 
   /// visit(name, member) for each member of a state, which may be const.
   template <class Self, class Visit>
@@ -47,15 +47,16 @@ class Probes {
  public:
   /// Keeps a reference.
   explicit Probes(const Setup& setup);
-  /// As of a checkpoint. Throws std::invalid_argument when it is of other probes.
+  /// From a checkpoint. Throws std::invalid_argument when the checkpoint has other probes.
   void go_on_from(const ProbeState& state);
   const ProbeState& state() const { return now_; }
 
   /// Before a step, when grains have come and gone.
   void begin_step(const StepState& state);
-  /// Behind it. Collective.
+  /// After it. Collective.
   void end_step(const ProbedStep& step, const StepState& state, const graph::Communicator& ranks);
-  /// Of the last step, in the order of the setup: of the probes that were due. The same on all ranks.
+  /// Reports of the probes that were due after the last step, in the order of the setup. The same on all
+  /// ranks.
   const std::vector<ProbeReport>& reports() const { return reports_; }
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Steps after which there is no sense in going on.
+/// Checks for steps after which the run cannot go on.
 
 #include <span>
 #include <stdexcept>
@@ -22,8 +22,7 @@ class RunawayError : public std::runtime_error {
 double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
-/// or the kinetic energy is far above what was supplied. `wall_energy_free`: of the walls with their free
-/// velocities [J].
+/// or the kinetic energy is far above what was supplied. `wall_energy_free`: see free_energy_of [J].
 void check_for_runaway(const StepOutcome& outcome, double wall_energy_free);
 
 /// Kinetic energy of the pushed walls with their free velocities, before a step [J].

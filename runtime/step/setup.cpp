@@ -74,7 +74,7 @@ void validate_laws(const Stage& stage) {
             fmt::format("stage '{}': rolling_resistance must be finite and >= 0, got {}", stage.name,
                         law.rolling_resistance));
   }
-  // Of all pairs: walls among themselves have no friction, and never meet.
+  // The largest of all pairs: pairs of walls have no friction, and never meet.
   const double resistance = stage.laws.largest(&PairLaw::rolling_resistance);
   require(resistance == 0 || stage.laws.largest(&PairLaw::friction) > 0,
           fmt::format("stage '{}': rolling_resistance = {} needs friction: without it nothing rolls",
@@ -110,7 +110,7 @@ bool rolls(const Setup& setup) {
       setup.stages, [](const Stage& stage) { return stage.laws.largest(&PairLaw::rolling_resistance) > 0; });
 }
 
-/// Where `what` cannot be carried on from sweep to sweep, nor damped.
+/// For contacts (`what`) whose history cannot be carried on from sweep to sweep, and which cannot be damped.
 void demand_plain_sweeps(const Setup& setup, const std::string& what) {
   require(setup.solver.method != SolverMethod::momentum && setup.solver.method != SolverMethod::nncg,
           fmt::format("solver.method = \"{}\": {} cannot be carried on. Take \"auto\" or \"nlgs\"",

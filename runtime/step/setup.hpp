@@ -25,8 +25,8 @@
 
 namespace talus {
 
-/// Steps of `time_step` in a time, both in s: the nearest number of them, and of half a step none. The sum of
-/// many steps is not their product.
+/// Number of steps of `time_step` in `time`, both in s: the nearest integer, where half a step rounds down.
+/// Rounded, because a sum of many time steps is not exactly their product.
 inline double steps_in(double time, double time_step) {
   return std::ceil(time / time_step - 0.5);
 }
@@ -92,13 +92,13 @@ inline double skin_distance(const DetectionSettings& detection, double smallest)
   return detection.skin >= 0 ? detection.skin : 0.2 * smallest;
 }
 
-/// What makes of sweeps a solver, known by its name in the registry: runtime/step/methods/ has a file for
-/// each. The constants are those that code asks for.
+/// A method of solving the contact problem by sweeps, known by its name in the registry:
+/// runtime/step/methods/ has a file for each. The constants below are the methods that code refers to.
 class SolverMethod : public NamedKind<SolverMethod> {
  public:
   using NamedKind::NamedKind;
-  /// "auto": momentum (plain sweeps for Schwarz, whose damped iteration is no descent); ADMM once sweeps
-  /// leave the forces out of balance in a problem that is too stiff for them.
+  /// "auto": momentum (plain sweeps for Schwarz, whose damped iteration is no descent); ADMM once sweeps have
+  /// left the forces out of balance in a problem that is too stiff for sweeps.
   static const SolverMethod automatic;
   static const SolverMethod nlgs;      ///< nonlinear Gauss-Seidel as it is (Jean 1999)
   static const SolverMethod momentum;  ///< "nlgs+momentum": each sweep begins beyond where the last one ended
@@ -114,9 +114,9 @@ inline constexpr SolverMethod SolverMethod::momentum("nlgs+momentum");
 inline constexpr SolverMethod SolverMethod::nncg("nncg");
 inline constexpr SolverMethod SolverMethod::admm("admm");
 
-/// Numbers of the sweeps. All that is judged and written is in double precision.
+/// Floating-point numbers of the sweeps. Everything that is checked and written is in double precision.
 enum class Precision {
-  mixed,  ///< single as long as the error is large and the problem is one that they see through
+  mixed,  ///< single while the error is large and single precision can still reduce it
           ///< (docs/decisions/0015-single-precision.md)
   full,   ///< double
 };
@@ -128,12 +128,12 @@ struct SolverSettings {
   double max_tolerance = 0;
   static constexpr double most_over_rms = 100;
   double worst_allowed() const { return max_tolerance > 0 ? max_tolerance : most_over_rms * tolerance; }
-  /// On error_quantile, that a share `quantile` of the contacts does not exceed; 0: not asked.
+  /// On error_quantile, that a share `quantile` of the contacts does not exceed; 0: not checked.
   double quantile_tolerance = 0;
   double quantile = 0.99;  ///< in (0, 1]
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
-  /// On overlap: what two bodies end a step in by, beyond what they were given, over the smaller radius.
+  /// On overlap: depth of a pair at the end of a step, beyond what it was given, over the smaller radius.
   double overlap_tolerance = 0.05;
   int max_iterations = 2000;  ///< sweeps per step, >= 1
   int check_every =
@@ -146,7 +146,7 @@ struct SolverSettings {
   InstructionSet simd = InstructionSet::automatic;  ///< of the sweeps
 };
 
-/// Messages name them by 16 bits, of which one value is the root (runtime/trace/trace.hpp).
+/// Messages in traces name them by 16 bits, of which one value is the root (runtime/trace/trace.hpp).
 inline constexpr int most_subdomains = 65535;
 
 /// How subdomains act on one another.
@@ -167,12 +167,11 @@ enum class ExchangeScheme {
   ccs,  ///< to one rank and back
 };
 
-/// What subdomains are to have equal shares of.
+/// The quantity that is to be shared out equally among subdomains.
 enum class BalanceBy {
-  work,      ///< candidates, and what it takes to glue the interface, in candidates
+  work,      ///< candidates, plus the cost of gluing the interface, in candidates
   contacts,  ///< candidates
-  time,  ///< measured time of their sweeps: for cores of unequal speed. The partition, and with it the bits
-         ///< of the results, then depends on the machine's day
+  time,      ///< measured time of their sweeps: for cores of unequal speed. Partition and bits vary with it
 };
 
 /// Which rank has which subdomain. No result depends on it.
@@ -190,14 +189,14 @@ struct DecompositionSettings {
   SubdomainMapping mapping = SubdomainMapping::block;
   int sweeps_per_exchange = 1;  ///< n_GS >= 1
   BalanceBy balance = BalanceBy::work;
-  int repartition_every = 10;  ///< steps between two partitions; one is made when candidates are found anew
+  int repartition_every = 10;  ///< least steps between partitions; made only when candidates are found anew
   double max_imbalance = 0.2;  ///< contacts of the fullest over those of the mean subdomain, less 1: beyond
                                ///< it candidates are found and space is cut anew at once
-  bool overlap = true;  ///< inner chunks while messages fly; false: after them, to see what that is worth
-  bool damping = true;  ///< schwarz: false is the paper's form, which diverges where m > 2
+  bool overlap = true;         ///< inner chunks while messages travel; false: after them, to measure the gain
+  bool damping = true;         ///< schwarz: false is the paper's form, which diverges where m > 2
 };
 
-/// A body whose path is told step by step.
+/// A body whose path is reported step by step.
 struct NamedBody {
   std::string name;
   BodyId id{-1};

@@ -198,7 +198,7 @@ Frame Simulation::frame(bool contacts) const {
              impl_->parameters.impulse_time(), frame);
   frame.walls = walls();
   frame.with_contacts = contacts;
-  // The first step deals bodies out to subdomains, whose order sums go by.
+  // Sums go in order of subdomain, and only the first step deals bodies out to subdomains.
   if (frame.step > 0)
     frame.grids =
         coarse_fields(impl_->setup.fields, impl_->state, impl_->parameters.impulse_time(), impl_->ranks);

@@ -20,8 +20,8 @@
 
 namespace talus {
 
-/// What a simulation goes on from between two steps, as one subdomain on one rank has it. Loads and
-/// velocities in force are in the walls; the impulses of the last step, if there was one, in the candidates.
+/// State from which a simulation continues between two steps, of one subdomain on one rank. Present loads and
+/// velocities of the walls are in `walls`; the impulses of the last step, if there was one, in `candidates`.
 struct SavedState {
   Bodies bodies;
   std::vector<Wall> walls;
@@ -60,23 +60,23 @@ class Simulation {
   /// passes the bodies it has, any part of all (dealing.hpp); the first step deals them out. Executor and
   /// ranks must outlive the simulation. Collective.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor, const graph::Communicator& ranks);
-  /// On one rank.
+  /// The same on one rank.
   Simulation(Setup setup, Bodies bodies, graph::Executor& executor);
   /// Goes on from a saved state, on one rank. Walls, stages and grains are those of the simulation that was
   /// saved; solver, subdomains and threads need not be: so one step can be solved in many ways. The next step
   /// finds its candidates anew.
   Simulation(Setup setup, const SavedState& from, graph::Executor& executor);
-  /// Goes on from a checkpoint to the bits of the run that wrote it, on any ranks that the subdomains
-  /// suffice. `setup` is that of the run, with the walls placed as at first; loads and ends of stages may be
-  /// others. Throws std::invalid_argument when it does not fit. Collective.
+  /// Continues from a checkpoint with the bits of the run that wrote it, on any number of ranks up to that of
+  /// subdomains. `setup` is that of the run, with the walls placed as at first; loads and ends of stages may
+  /// be others. Throws std::invalid_argument when it does not fit. Collective.
   Simulation(Setup setup, const Checkpoint& from, graph::Executor& executor,
              const graph::Communicator& ranks);
   ~Simulation();
 
-  /// Before the first step: it begins from these forces, where contacts are those of the bodies named. Each
-  /// rank passes any part of all. Collective.
+  /// To be called before the first step: contacts between the bodies named start from these forces. Each rank
+  /// passes any part of all. Collective.
   void begin_from(std::vector<GivenForce> forces);
-  /// Steps go by a recorded order, see StepGraph::follow.
+  /// Makes steps follow a recorded order, see StepGraph::follow.
   void follow(trace::Order* order);
   /// Does one time step. Collective. Throws RunawayError, or graph::TaskError when a task failed. Not to be
   /// called when finished.
@@ -89,7 +89,7 @@ class Simulation {
   /// The state after the last step and begin_next_stage(). Throws std::logic_error with several subdomains.
   SavedState save() const;
 
-  /// The whole run behind the last step and begin_next_stage(); at least one step is done. Each rank gets the
+  /// The whole run after the last step and begin_next_stage(); at least one step is done. Each rank gets the
   /// parts of its subdomains.
   Checkpoint checkpoint() const;
 
@@ -115,18 +115,18 @@ class Simulation {
 
   /// Walls after the last step: positions, velocities, forces.
   std::vector<WallReport> walls() const;
-  /// Sums over the walls of each group, behind a step: forces, torques about the group's point, work.
+  /// Sums over the walls of each group, after a step: forces, torques about the group's point, work.
   std::vector<WallReport> groups() const;
   /// Bodies that the setup names, after the last step: those that are still there.
   const std::vector<BodyReport>& named_bodies() const;
   /// What insertions and removals have done so far; empty without any.
   std::vector<InsertReport> inserted() const;
   std::vector<RemoveReport> removed() const;
-  /// Probes that were due behind the last step; empty without any.
+  /// Probes that were due after the last step; empty without any.
   const std::vector<ProbeReport>& probes() const;
   /// Strains and stresses after the last step; empty when the walls do not close a box. Collective.
   std::optional<TriaxialReport> triaxial() const;
-  /// Of a periodic cell. Collective.
+  /// Report of a periodic cell after the last step. Collective.
   std::optional<CellReport> cell() const;
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them
   /// out. Collective; each rank gets its part (frame.hpp).

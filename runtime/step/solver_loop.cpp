@@ -21,9 +21,9 @@ namespace {
 
 /// When sweeps begin in single precision (docs/decisions/0015-single-precision.md).
 struct SinglePrecisionUse {
-  /// error_rms, > 0: floats alone stall near 1e-6.
+  /// Only while error_rms is above this, > 0: floats alone stall near 1e-6.
   double least_error = 1e-5;
-  /// Of all ranks: smaller problems have no time to gain.
+  /// Fewest candidates of all ranks: smaller problems gain no time.
   double least_candidates = 1000;
 };
 constexpr SinglePrecisionUse single_use;
@@ -44,7 +44,7 @@ TaskKind kind_of_work(Work work) {
   return TaskKind::sweep;
 }
 
-/// Of what is no work of a chunk.
+/// Kind of a node that is not work of a chunk.
 TaskKind kind_of_role(graph::LoopRole role) {
   switch (role) {
     case graph::LoopRole::publish:
@@ -158,8 +158,8 @@ void SolverLoop::begin_course(const SweepPlan& plan, int from) {
   work_.make_room();
 }
 
-/// Whether sweeps in single precision make the error of this problem smaller as those in double do. Not where
-/// it is small already, or bodies are so heavy that single sweeps would not move them.
+/// Whether sweeps in single precision reduce the error of this problem as those in double do. They do not if
+/// the error is small already, or bodies are so heavy that single sweeps would not move them.
 bool SolverLoop::single_will_do(SweepKind kind) const {
   const ErrorHistory& history = certificate_.history();
   return kind == SweepKind::momentum && settings_.precision == Precision::mixed && !schwarz() &&
@@ -210,8 +210,8 @@ void SolverLoop::node(std::uint32_t node, int epoch) {
   }
 }
 
-/// Nobody but take writes a taken copy before its boundary is swept: its mass comes to where single sweeps
-/// look for it with the first of them.
+/// Before its boundary is swept a taken copy is written by take alone. So take copies its mass to the record
+/// of single precision, before the first sweep that needs it there.
 void SolverLoop::take(SubdomainPlace e, int epoch) {
   if (work_.single(epoch) && !work_.single_before(epoch))
     narrow_bodies(gluing_.taken(e), state_.bodies.velocity, state_.single);
@@ -249,7 +249,7 @@ bool SolverLoop::goes_on(int epoch) {
   return true;
 }
 
-/// Behind a measure: the sums are judged, or set out, and the next sweeps planned.
+/// After a measure: judges the sums, or starts to gather them, and plans the next sweeps.
 bool SolverLoop::measured(int epoch) {
   const bool waits = ranks_.ranks() == 1 || settles(epoch);
   schedule_.measured();
@@ -269,13 +269,13 @@ bool SolverLoop::measured(int epoch) {
       schedule_.sweep_on(epoch, sweeps_ahead());
     return true;
   }
-  // One for sure; how many more follows when it is known how this check came out.
+  // The fewest sweeps; the rest is planned when the result of this check is known.
   schedule_.sweep_on(epoch, std::min(least_sweeps, settings_.max_iterations - schedule_.checked()));
   schedule_.read_sums_after_next(epoch);
   return true;
 }
 
-/// Behind a sweep: what was set out before it is read.
+/// After a sweep: reads the sums whose gathering was started before it, if there are any.
 bool SolverLoop::swept(int epoch) {
   if (conjugate(epoch)) turn_conjugate();
   if (!schedule_.reads_sums_at(epoch)) return true;
@@ -345,7 +345,7 @@ bool SolverLoop::ask_remedy() {
   return method_->calls_admm(view);
 }
 
-/// With several ranks behind the sweep that hid the sums: what it did is dropped.
+/// With several ranks, after the sweep during which the sums travelled: the result of that sweep is dropped.
 void SolverLoop::call_remedy(int epoch) {
   if (ranks_.ranks() > 1) work_.restore();
   gluing_.forget_jumps();
@@ -356,7 +356,7 @@ void SolverLoop::call_remedy(int epoch) {
     certificate_.solved_by_admm(
         global_.improve(settings_.balance_tolerance, certificate_.result().stiff_calls));
   }
-  // What the last sweeps changed says nothing of where the impulses have gone.
+  // The changes of the last sweeps say nothing of impulses that were replaced, so acceleration begins anew.
   begin_course(method_->after_admm(courses_.now().plan), schedule_.checked());
   schedule_.again_from(epoch);
 }

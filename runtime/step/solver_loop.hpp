@@ -21,25 +21,25 @@
 
 namespace talus {
 
-/// What `automatic` means on these ranks: the strongest set that all of them run, since they shall round
-/// alike. Any other set as it is. Collective.
+/// Resolves `automatic` to the widest instruction set that all ranks support, since all must round alike.
+/// Returns any other set as it is. Collective.
 InstructionSet settled(InstructionSet set, const graph::Communicator& ranks);
 
 /// The iterations of a step as a program on the chunk graph (runtime/graph/epoch_loop.hpp): every epoch, each
-/// chunk does one thing, in the order of its colour. It puts the parts together that decide:
+/// chunk does one thing, in the order of its colour. The parts that decide:
 ///
 ///   EpochSchedule   which epoch does what            ChunkWork     what that is for a chunk
 ///   Certificate     whether the step is solved       Method        how sweeps go on, and when ADMM helps
-///   PositionCorrection  behind all that: sweeps that undo overlaps, where the scene asks for them
+///   PositionCorrection  after the iterations: sweeps that undo overlaps, where the scene asks for them
 ///
 /// At a gate one thread adds the chunks' sums in order, by subdomain, and asks certificate and method. With
-/// several ranks the sums travel while the next sweep goes on (a non-blocking reduction): they are read at a
-/// gate behind that sweep, so that results are the bits of one rank, where nothing has to be waited for.
-/// Where ADMM is called, it is by the gate's threads of all ranks, on the impulses that were certified.
+/// several ranks the sums travel while the next sweep goes on (a non-blocking reduction), and are read at a
+/// gate after that sweep. Results still have the bits of a run on one rank, which does not wait for sums.
+/// ADMM is called at a gate of all ranks, on the impulses that were checked.
 ///
-/// The nodes are those of a graph::LoopPlan whose work is the chunks and whose groups are the subdomains
-/// here; where nothing is glued (gluing.hpp) there are chunks only. The order in a subdomain is chunks at
-/// glued walls, tell, those at the border, publish, those inside, which hide the messages; in a later
+/// The nodes are those of a graph::LoopPlan whose work is the chunks and whose groups are the subdomains of
+/// this rank; where nothing is glued (gluing.hpp) there are chunks only. The order in a subdomain is chunks
+/// at glued walls, tell, those at the border, publish, those inside, which hide the messages; in a later
 /// subdomain colour the inside comes before take, the border and publish.
 class SolverLoop {
  public:
@@ -54,31 +54,31 @@ class SolverLoop {
            schedule_.ends_at(epoch) || conjugate(epoch);
   }
   bool decide(int epoch);
-  /// The decision behind this epoch waits for the sums of all ranks, however many there are.
+  /// Whether the decision after this epoch waits for the sums of all ranks, however many there are.
   bool settles(int epoch) const {
     return schedule_.measures_at(epoch) && schedule_.planned() >= settings_.max_iterations;
   }
-  /// Of threads that wait for decide(): ADMM's subdomains are shared out.
+  /// Threads that wait for decide() call this: they take shares of ADMM's subdomains.
   void assist() { global_.assist(); }
   /// What a node does in an epoch, as a trace names it; none for gluing where nothing is glued.
   std::optional<trace::Kind> kind(std::uint32_t node, int epoch) const;
 
-  /// Subdomain here that the node works on; none: the root.
+  /// Index of the subdomain that the node works on; none for collect and root.
   std::optional<std::size_t> subdomain_of(std::uint32_t node) const;
-  /// Brings all that the loop reads and writes of a subdomain here into the cache of the core that calls.
+  /// Brings all that the loop reads and writes of a subdomain into the cache of the core that calls.
   void fetch(std::size_t subdomain) const {
     fetch_subdomain(state_, work_.acceleration(), SubdomainPlace(subdomain));
     gluing_.fetch(SubdomainPlace(subdomain));
   }
 
-  /// Before the first epoch of a step: copies and sums fitted to the contacts found. Collective.
+  /// Before the first epoch of a step: sizes copies and sums by the contacts found. Collective.
   void begin();
 
   /// Collective, after the candidates were distributed.
   void plan();
-  /// Collective, behind plan() and the first narrow phase, before begin().
+  /// Collective, after plan() and the first narrow phase, before begin().
   void plan_tree();
-  /// Behind plan_tree(): the nodes, on so many threads.
+  /// After plan_tree(): plans the nodes for this number of threads.
   const graph::LoopPlan& plan_nodes(int threads);
 
   const Gluing& gluing() const { return gluing_; }
@@ -109,7 +109,7 @@ class SolverLoop {
   bool goes_on(int epoch);
   void settle_cell();
   void take(SubdomainPlace e, int epoch);
-  /// False: the velocities of the step stand.
+  /// False: the velocities of the step are final.
   bool decide_on_velocities(int epoch) {
     if (schedule_.restores_at(epoch)) return false;
     return schedule_.work(epoch) == EpochSchedule::Work::measure ? measured(epoch) : swept(epoch);

@@ -9,7 +9,7 @@
 
 namespace talus {
 
-/// Where a stage stands behind a step.
+/// Progress of a stage after a step.
 struct StageProgress {
   std::int64_t steps = 0;   ///< done
   const StageClock& clock;  ///< of a stage that chooses its time steps

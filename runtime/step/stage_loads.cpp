@@ -25,7 +25,7 @@ void put_load(Wall& wall, const std::vector<Wall>& walls, const Domain& domain) 
 
 namespace {
 
-/// What wall w is pushed with, along its normal [N].
+/// Force that wall w is pushed with, along its normal [N].
 double push_on(const StepState& state, std::size_t w, const Vec3& gravity, const StepName& step) {
   const Wall& wall = state.walls[w];
   if (wall.absent || !wall.load.pushed()) return 0;

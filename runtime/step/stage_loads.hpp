@@ -15,7 +15,7 @@ namespace talus {
 /// Walls that the stage names get its loads; others keep theirs.
 void take_loads(const Stage& stage, std::span<Wall> walls);
 
-/// The velocity that a wall has when its load comes into force. `wall` is one of `walls`. Throws
+/// Gives a wall the velocity with which its load comes into force. `wall` is one of `walls`. Throws
 /// std::invalid_argument when it is pushed with a pressure and has no face.
 void put_load(Wall& wall, const std::vector<Wall>& walls, const Domain& domain);
 
@@ -23,7 +23,7 @@ void put_load(Wall& wall, const std::vector<Wall>& walls, const Domain& domain);
 /// is named, when a pressure has lost its face.
 void apply_loads(const StepParameters& parameters, const StepName& step, StepState& state);
 
-/// `now` with gravity, laws and what follows from them; time step and distances stay.
+/// `now` with the gravity and laws of the stage, and what follows from them; time step and distances stay.
 StepParameters parameters_of(const Setup& setup, const Stage& stage, StepParameters now);
 
 }  // namespace talus

@@ -51,10 +51,10 @@ struct WallState {
   std::int64_t copies_everywhere = 0;  ///< on all ranks
   Vec3 impulse = Vec3::Zero();         ///< of the wall on the grains [N s], from the last check
   Pose middle, end;  ///< of a wall with a prescribed motion, in the middle and at the end of the step
-  double speed = 0;  ///< of it: the largest with which a point of its surface nears a grain [m/s]
+  double speed = 0;  ///< of such a wall: the largest with which a point of its surface nears a grain [m/s]
   double material_speed = 0;  ///< the largest of any point of its material near a grain [m/s]
   double farthest = 0;        ///< of a plane that turns: distance of the farthest grain from its pivot [m]
-  Vec3 own_point = Vec3::Zero();      ///< in the middle of the step, about which its torque is told [m]
+  Vec3 own_point = Vec3::Zero();      ///< about which its torque is reported, in the middle of the step [m]
   Vec3 mean_velocity = Vec3::Zero();  ///< of the step [m/s]
   Vec3 torque = Vec3::Zero();         ///< of the last step, on the grains, times its impulse time [N m s]
   double work = 0;                    ///< done on the grains since the run began [J]
@@ -65,8 +65,8 @@ struct StepState {
   Bodies bodies;              ///< n
   std::vector<Clump> clumps;  ///< of the setup
   Domain domain;              ///< now
-  CellFlow flow;              ///< of its edges
-  StressedCell cell;          ///< what follows a stress of it
+  CellFlow flow;              ///< motion of its edges
+  StressedCell cell;          ///< its components that follow a stress
   std::vector<Wall> walls;
   std::vector<WallState> wall_states;  ///< like walls
   FreeVelocity free;                   ///< n, or empty parts
@@ -74,17 +74,17 @@ struct StepState {
   std::vector<double> reach_then;      ///< n: reach at the last broad phase [m]
   std::vector<Vec3> wall_then;         ///< points of the walls at the last broad phase [m]
   double time = 0;                     ///< of the run as the step begins [s]
-  double time_then = 0;                ///< of the run, of the places that the last broad phase saw [s]
+  double time_then = 0;                ///< of the run, to which places at the last broad phase belong [s]
   Candidates candidates;               ///< c
   Chunks chunks;                       ///< k
   Decomposition decomposition;
-  Contacts contacts;              ///< c rooms
-  SingleState single;             ///< c rooms and n, or empty
+  Contacts contacts;              ///< room for c
+  SingleState single;             ///< room for c and n, or empty
   std::vector<WallCopy> copies;   ///< k; used by chunks at walls
   bool candidates_valid = false;  ///< false: the next step begins with a broad phase
   /// Overlaps that the sample began with (overlap.hpp), the same on all ranks; none before the first step.
   std::optional<std::vector<GivenOverlap>> given_overlaps;
-  /// What the first step begins from, until it has its candidates; any part of all on each rank.
+  /// Forces that the first step starts from, until it has found its candidates; any part of all on each rank.
   std::vector<GivenForce> given_forces;
   bool forces_given = false;  ///< on any rank, and not taken yet
 };

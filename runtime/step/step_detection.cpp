@@ -34,7 +34,8 @@ void StepGraph::predict_share(std::uint32_t share) {
   const double h = parameters_.time_step;
   predict(range, bodies.x, bodies.velocity, h);
   if (!bodies.orientation.empty()) rotate(range, bodies, 0.5 * h);
-  // What clumps spin with belongs to their axes, so that these come before the free velocity.
+  // The spin w of a clump belongs to its axes and changes with them, so these are turned before the free
+  // velocity is found.
   turn_clumps(range, bodies, state_.clumps, 0.5 * h);
   find_free_velocities(range);
   left_[share].clear();
@@ -67,7 +68,7 @@ void StepGraph::find_flow_escape(SlotRange range, std::uint32_t share) {
   }
 }
 
-/// What the reach of each body is made of: the speed that counts against its margin.
+/// The speed of each body that counts against its margin, and from which its reach follows.
 std::vector<double> StepGraph::speeds() const {
   const Bodies& bodies = state_.bodies;
   std::vector<double> speeds(bodies.size());
@@ -82,7 +83,7 @@ std::vector<double> StepGraph::speeds() const {
   return speeds;
 }
 
-/// Centres and velocities of images in the cell.
+/// Replaces centres and velocities of bodies by those of their images in the cell.
 void StepGraph::wrap_bodies() {
   Bodies& bodies = state_.bodies;
   if (!state_.domain.flows) {
@@ -171,7 +172,7 @@ void StepGraph::make_cells() {
   const std::vector<double> speed_of = speeds();
   std::vector<double> reach(bodies.size());
   const double half_skin = 0.5 * parameters_.skin;
-  // Grains that fly between others use up half a skin at once: they get one more, or their way
+  // Free-flying grains use up half a skin at once: they get up to one skin more, but no more than their way
   // of three steps.
   for (std::size_t s = 0; s < bodies.size(); ++s) {
     const double v = speed_of[s];
@@ -185,7 +186,8 @@ void StepGraph::make_cells() {
     state_.wall_then.push_back(state_.walls[w].point);
     wall_margin_.push_back(half_skin + margin_of(w));
   }
-  // What the last step found is in the impulses of the candidates; detection works in its room.
+  // The impulses of the candidates hold what the last step found, so detection may use the memory of
+  // contacts.
   const auto make_room = [this] {
     state_.contacts = {};
     state_.chunks = {};
@@ -278,8 +280,8 @@ void StepGraph::make_chunks() {
   planned_ = false;
 }
 
-/// What the first step begins from, between slots, or with several subdomains between places in the
-/// surroundings. Collective.
+/// Candidates with the forces given, from which the first step starts: between slots, or with several
+/// subdomains between places in the surroundings. Collective.
 Candidates StepGraph::take_given_forces() {
   const Bodies& bodies = state_.decomposition.several() ? around_.bodies : state_.bodies;
   std::vector<std::pair<std::int64_t, Slot>> by_id;
@@ -310,7 +312,7 @@ void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
   state_.contacts.spin.resize(drifts ? state_.contacts.arm.size() : 0, Vec3::Zero());
 }
 
-/// What is kept per slot follows the copies to their new places.
+/// Moves what is kept per slot to the new slots of the copies.
 void StepGraph::renew_slots() {
   const Bodies& bodies = state_.bodies;
   state_.x_then = bodies.x;

@@ -10,7 +10,7 @@
 
 namespace talus {
 
-/// Enough shares for any node to share, few enough that a task stays coarse.
+/// Enough shares for the threads of any machine, few enough that a task stays coarse.
 std::uint32_t StepGraph::shares_for(std::int64_t bodies, std::int32_t subdomains) {
   return static_cast<std::uint32_t>(std::clamp<std::int64_t>(bodies / std::max(1, subdomains) / 512, 1, 64));
 }
@@ -72,7 +72,7 @@ void StepGraph::build() {
 void StepGraph::run() {
   sums_ = {};
   ++steps_;
-  // Nothing else counts in a step whose times are given, looking them up included.
+  // In a step whose times are given nothing else counts, not even the time to look them up.
   std::optional<graph::GivenTime> none;
   trace::TaskTimes* const times = executor_.times();
   if (times) {

@@ -45,8 +45,9 @@ struct StepSums {
 /// A share is a fixed share of the bodies of a subdomain, or of this rank's cells or chunks; the number of
 /// shares of a subdomain depends on the number of all bodies and subdomains only, so that sums are the same
 /// for any number of threads and ranks. cells, pairs and chunks return at once while every grain and wall is
-/// within its margin of the last broad phase, or the few that are not meet none but their candidates;
-/// otherwise, with several subdomains, cells collects the bodies around them and chunks deals them out anew.
+/// within its margin of the last broad phase, or while the few grains that have left theirs meet none but
+/// their candidates. Otherwise candidates are found anew; with several subdomains cells then collects the
+/// bodies around them, and chunks deals bodies out anew.
 /// Each task declares what it reads and writes; the order above follows from that.
 class StepGraph {
  public:
@@ -60,13 +61,13 @@ class StepGraph {
   /// On entry the walls' free velocities and applied forces are set. Throws graph::TaskError.
   void run();
 
-  /// From now on nodes of the loop begin in the order of `order`, in the steps that it holds; null: no more.
+  /// From now on nodes of the loop begin in the order of `order`, in the steps that it holds; null ends this.
   /// Throws std::invalid_argument when it is of other ranks x threads. It must outlive the steps.
   void follow(trace::Order* order);
 
-  /// What outlives a step besides the state, into the head and the parts of `to` (save_state).
+  /// Writes what outlives a step besides the state into the head and the parts of `to` (save_state).
   void save(Checkpoint& to) const;
-  /// Goes on from there, behind restore_state: cuts the chunks of the state and fills its contacts.
+  /// Continues from a checkpoint, after restore_state: cuts the chunks of the state and fills its contacts.
   /// Collective.
   void restore(const Checkpoint& from);
 
@@ -129,11 +130,11 @@ class StepGraph {
   trace::Order* order_ = nullptr;
   bool followed_ = false;                              ///< this step goes by order_
   bool planned_ = false;                               ///< false: the chunks are new
-  double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at the seams of the step [s]
-  Surroundings around_;                       ///< several subdomains: whom the candidates are found among
+  double started_ = 0, iterating_ = 0, iterated_ = 0;  ///< clock at begin, before and after the loop [s]
+  Surroundings around_;                       ///< several subdomains: bodies among which candidates are found
   std::int64_t all_candidates_ = 0;           ///< of all ranks
-  std::int64_t steps_ = 0, partitioned_ = 0;  ///< done, and when the partition was made
-  double imbalance_then_ = 0;                 ///< the least since it was made
+  std::int64_t steps_ = 0, partitioned_ = 0;  ///< steps done, now and when the partition was made
+  double imbalance_then_ = 0;                 ///< least imbalance since the partition was made
   std::int64_t contacts_before_ = 0;          ///< of all ranks, in the last step
   double imbalance_before_ = 0;               ///< SolverLoop::imbalance of the last step
   CellGrid cells_;

@@ -65,7 +65,7 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
     from_walls += wall.impulse;
     impulse_unit = std::max(impulse_unit, wall.impulse.norm());
   }
-  // What the faces of a cell carry, as walls would.
+  // The faces of a cell carry forces as walls would.
   if (const StressedCell& cell = state.cell; cell.loaded())
     impulse_unit = std::max(impulse_unit, Eigen::Map<const Vec3>(cell.impulse.data()).norm() * cell.length /
                                               state.domain.mean_edge());

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What is said of a step that has been done.
+/// Report of a step that has been done.
 
 #include <cstdint>
 #include <optional>
@@ -17,7 +17,7 @@
 
 namespace talus {
 
-/// How messages call a step.
+/// Name of a step in messages.
 struct StepName {
   std::int64_t number;     ///< from 1
   std::string_view stage;  ///< name
@@ -35,11 +35,11 @@ struct StepOutcome {
   const IterationResult& result;
 };
 
-/// From the report of the step before to that of this one. `elapsed`: time that the step took [s].
+/// Updates the report of the step before to this step. `elapsed`: time that the step took [s].
 void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverlap& overlap, double elapsed);
 
-/// Stresses and strains of the box that the walls close, behind the step of `report`; nothing where they
-/// close none. `strain`: of its lengths, since the stage began [1]. Collective.
+/// Stresses and strains of the box that the walls close, after the step of `report`; none if they close none.
+/// `strain`: of its lengths, since the stage began [1]. Collective.
 std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const StepReport& report,
                                               const Stage& stage, const Vec3& strain,
                                               const graph::Communicator& ranks);
@@ -49,7 +49,7 @@ std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const 
 /// that is the free fall of a grain. 0 without a load.
 double fall_time(const StepOutcome& outcome);
 
-/// Contacts that hold a grain still, at least: with friction 2; without it 4, of which weight stands for one.
+/// Fewest contacts that hold a grain still: 2 with friction; 4 without, one of which weight can replace.
 std::int32_t contacts_to_hold(const StepParameters& parameters);
 
 /// Coordination number: (2 x active contacts between grains + those with walls) / grains, without rattlers

@@ -1,4 +1,4 @@
-/// What the tasks of a step do but detection (step_detection.cpp); their order stands in step_graph.cpp.
+/// Tasks of a step except detection (step_detection.cpp); step_graph.cpp puts them in order.
 
 #include <algorithm>
 #include <limits>
@@ -41,7 +41,7 @@ bool StepGraph::out_of_balance() const {
          imbalance > decomposition_.max_imbalance && imbalance > 1.25 * imbalance_then_;
 }
 
-/// Per subdomain here, in candidates: those it has, and what its interface takes besides
+/// Work of each subdomain of this rank, in candidates: its candidates, and the cost of its interface
 /// (docs/performance.md, "Scaling, predicted"). The same on any ranks.
 std::vector<double> StepGraph::work() const {
   constexpr double wall = 1,  // more than between grains
@@ -128,8 +128,8 @@ void StepGraph::finish_share(std::uint32_t share) {
   turn_clumps(range, bodies, state_.clumps, 0.5 * parameters_.time_step);
 }
 
-/// Per wall: the velocity of a copy, or its displacement in that place, from the ranks that hold one; without
-/// a copy anywhere `otherwise(wall)`. Collective.
+/// Per wall: the velocity of its copies (or the displacement kept in that place), from the ranks that hold
+/// one; `otherwise(wall)` if no rank holds a copy. Collective.
 template <class Otherwise>
 std::vector<double> StepGraph::copies_of_walls(const std::vector<WallCopy>& copies,
                                                const Otherwise& otherwise) const {
@@ -166,7 +166,7 @@ void StepGraph::finish_walls() {
     const Vec3 stays = Vec3::Zero();
     const auto moved = copies_of_walls(loop_.positions().wall_copies(),
                                        [&](const WallState&) -> const Vec3& { return stays; });
-    // A wall that is driven, too, has the displacement 0 of its copies.
+    // The copies of a driven wall have the displacement 0.
     for (std::size_t w = 0; w < state_.walls.size(); ++w)
       state_.walls[w].point += Eigen::Map<const Vec3>(&moved[3 * w]);
   }
@@ -190,7 +190,7 @@ void StepGraph::measure_share(std::uint32_t share) {
 
 namespace {
 
-/// What a subdomain adds to the report, as numbers that travel.
+/// The share of a subdomain in the report, as numbers that are sent.
 constexpr std::size_t row_width = 1 + 9 + 15;
 
 void write_row(SubdomainId subdomain, const MotionSums& motion, const ContactSums& contacts, double* row) {
@@ -236,7 +236,7 @@ void add_row(const double* row, bool here, StepSums& sums) {
 
 }  // namespace
 
-/// Torques, and the work of the step: impulses are those of the iterations, 1 / (1 + E) of all.
+/// Torques, and the work of the step. Impulses of the iterations are 1 / (1 + E) of those of the whole step.
 void StepGraph::take_wall_sums(std::span<const double> sums) {
   for (std::size_t w = 0; w < state_.walls.size(); ++w) {
     WallState& wall = state_.wall_states[w];

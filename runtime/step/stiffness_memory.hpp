@@ -8,20 +8,21 @@ namespace talus {
 
 /// When the stiffness found in an earlier step may be used for this one.
 struct StiffnessReuse {
-  /// Grains are alike when the heaviest has less than so many times the mass of the lightest, > 1: none would
-  /// change everything where it lands.
+  /// Grains are alike when the heaviest has less than so many times the mass of the lightest, > 1: no single
+  /// grain that lands then changes everything.
   double alike = 1000;
   /// Number of times that candidates are found anew after which too much has moved: the answer is dropped,
   /// >= 0.
   int most_renewals = 10;
-  /// Only a problem that was far from stiff: this multiple of its sweeps is below the number that makes a
-  /// problem stiff, >= 1.
+  /// The answer is used only for a problem that was far from stiff: this multiple of its sweeps is below the
+  /// number that makes a problem stiff, >= 1.
   double margin = 2;
-  /// The number of contacts has changed by at most one in so many, >= 1.
+  /// The answer is used only while the number of contacts changes by at most this fraction: one in so many,
+  /// >= 1.
   std::int64_t same_contacts = 20;
 };
 
-/// How many plain sweeps the problem takes. To find out takes as long as ten sweeps, and two messages for
+/// How many plain sweeps the problem takes. The estimate costs as much as ten sweeps, and two messages for
 /// each layer of grains, so the answer is kept for later steps as long as it holds.
 class StiffnessMemory {
  public:
@@ -37,9 +38,9 @@ class StiffnessMemory {
   void renew(double spread);
   /// A new step: its problem is not known yet.
   void begin_step() { now_ = unknown; }
-  /// Asked first in a step, it takes the last answer if that holds for `problem`, else that of `estimate`;
-  /// later in the step it repeats it. `stiff`: sweeps from which the problem is stiff. The same on all ranks
-  /// when what is passed is.
+  /// The first call in a step takes the last answer if that holds for `problem`, else calls `estimate`; later
+  /// calls in the step repeat the answer. `stiff`: sweeps from which the problem is stiff. The same on all
+  /// ranks when they pass the same.
   double sweeps_needed(const Problem& problem, double stiff, const std::function<double()>& estimate);
   bool grains_alike() const { return spread_ < reuse_.alike; }
 

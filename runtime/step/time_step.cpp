@@ -10,10 +10,10 @@ namespace talus {
 
 namespace {
 
-/// Beyond so many halvings nobody looks for a bound, and ticks fit 64 bits.
+/// Most halvings of the longest step: more than any bound needs, and ticks fit 64 bits.
 constexpr int most_levels = 30;
 
-/// Of an overlap that a step makes before it can see it [m].
+/// Bound on an overlap that a step makes before it can see it [m].
 double unseen_overlap(const SolverSettings& solver, double smallest, const TimeStepRule& rule) {
   return rule.part_of_tolerance * std::min(solver.overlap_tolerance, 2 * rule.longest_way) * smallest;
 }
@@ -22,7 +22,7 @@ double square(const double (&v)[3]) {
   return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-/// Of bodies here, without their spin, and of walls into the grains [m/s].
+/// Largest speed of bodies here, without their spin, and of walls into the grains [m/s].
 double fastest(const StepState& state) {
   double speed2 = 0;
   for (const Velocity& v : state.bodies.velocity) speed2 = std::max(speed2, square(v.u));
@@ -33,14 +33,14 @@ double fastest(const StepState& state) {
   return speed;
 }
 
-/// Of gravity and of walls that oscillate [m/s^2].
+/// Acceleration by gravity, plus the largest of walls that oscillate [m/s^2].
 double acceleration_of(const StepState& state, const StepParameters& parameters) {
   double walls = 0;
   for (const Wall& wall : state.walls) walls = std::max(walls, largest_acceleration(wall.motion));
   return parameters.gravity.norm() + walls;
 }
 
-/// In which a wall's oscillation is followed, infinity where none oscillates [s].
+/// Longest step that follows the oscillations of walls, infinity where none oscillates [s].
 double shortest_time(const StepState& state, const TimeStepRule& rule) {
   double period = std::numeric_limits<double>::infinity();
   for (const Wall& wall : state.walls) period = std::min(period, shortest_period(wall.motion));
@@ -61,8 +61,9 @@ TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver
 double longest_time_step(const StepState& state, const Setup& setup, const StepParameters& parameters,
                          double smallest, const graph::Communicator& ranks, const TimeStepRule& rule) {
   const double unseen = unseen_overlap(setup.solver, smallest, rule);
-  // A pair within the alert distance is a contact, and does not overlap: bodies that are struck have that gap
-  // to use up, too, and half of it where both were. But for elastic pairs (gap_law.hpp).
+  // A pair within the alert distance is a contact, which the step keeps from overlapping. So bodies that are
+  // struck have that gap to use up, too, or half of it where both were struck; elastic pairs do not
+  // (gap_law.hpp).
   const bool elastic = parameters.laws.largest(&PairLaw::restitution) >= 1;
   const double near = unseen + (elastic ? 0 : 0.5 * parameters.alert);
   const bool blind = !state.given_overlaps;  // before the first step any two may approach

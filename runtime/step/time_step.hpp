@@ -1,12 +1,13 @@
 #pragma once
 
 /// The time step, where a stage leaves it to the program (time_step = "auto"; docs/theory.md, "Choice of the
-/// time step"). Steps are the longest one halved so many times, and begin at multiples of themselves: a stage
-/// that ends by time ends exactly then, and the same steps come out of the same motion on any machine.
+/// time step"). Each step is the longest one divided by a power of two, and begins at a multiple of its
+/// length. So a stage that ends by time ends exactly then, and the same motion gives the same steps on any
+/// machine.
 ///
 ///   StageClock clock(bounds, end, begin);  at the beginning of a stage
 ///   clock.choose(longest_time_step(...));  before each step, which then takes clock.step()
-///   clock.advance();                       behind it
+///   clock.advance();                       after it
 
 #include <cstdint>
 #include <optional>
@@ -17,17 +18,17 @@
 
 namespace talus {
 
-/// What chosen time steps are measured by. Lengths are in smallest radii, ratios have no unit.
+/// Bounds on chosen time steps. Lengths are in smallest radii, ratios have no unit.
 struct TimeStepRule {
-  /// Part of the overlap tolerance that a pair may use up of which nothing is known when the step begins: a
-  /// body that is struck meets the next one at the speed that it has then. In (0, 1].
+  /// Part of the overlap tolerance for overlaps that cannot be foreseen when the step begins: a body struck
+  /// in the step meets the next one at the speed that it has then. In (0, 1].
   double part_of_tolerance = 0.5;
-  /// Way of the fastest body, or wall into the grains, in a step, in (0, 0.5]: candidates are known that far,
-  /// and two bodies that go in by more have passed one another (StepReport::passed).
+  /// Longest path of a body, or of a wall into the grains, in a step, in (0, 0.5]: candidates are known that
+  /// far, and two bodies that overlap by more have passed one another (StepReport::passed).
   double longest_way = 0.5;
   /// Steps in a period of a wall that oscillates, at least; > 2, so that it is seen at all.
   double steps_of_period = 20;
-  /// Where the scene gives no shortest time step, the longest over it, >= 1.
+  /// Ratio of the longest to the shortest time step where the scene gives no shortest one, >= 1.
   double range = 1024;
 };
 
@@ -36,14 +37,14 @@ struct TimeStepBounds {
   double longest = 0, shortest = 0;
 };
 
-/// Those of a stage that chooses its time steps; the longest is by default the time in which a grain falls by
-/// what the overlap tolerance leaves to it. `smallest`: radius [m].
+/// Bounds of a stage that chooses its time steps. By default the longest is the time in which a grain falls
+/// by what the overlap tolerance leaves to it. `smallest`: radius [m].
 TimeStepBounds time_step_bounds(const Stage& stage, const SolverSettings& solver, double smallest,
                                 const TimeStepRule& rule = {});
 
 /// The longest step that motion allows [s], infinity for a sample without motion and weight. `smallest`:
-/// radius [m]. One pass over bodies and candidates; collective, and a maximum of single bodies and pairs: the
-/// same on any ranks.
+/// radius [m]. Collective; the same on any ranks, as a maximum over single bodies and pairs. One pass over
+/// bodies and candidates.
 double longest_time_step(const StepState& state, const Setup& setup, const StepParameters& parameters,
                          double smallest, const graph::Communicator& ranks, const TimeStepRule& rule = {});
 
@@ -56,7 +57,7 @@ class StageClock {
   StageClock(const TimeStepBounds& bounds, std::optional<double> end, double begin);
 
   /// The longest step that is at most `longest` [s], begins at a multiple of itself, and is at most twice the
-  /// step before: warm impulses are those of a step of another length.
+  /// step before, from which the warm impulses come.
   void choose(double longest);
   void advance() { ticks_ += ticks_of(level_); }
 
@@ -64,8 +65,8 @@ class StageClock {
   double time() const;  ///< of the run [s]
   /// Part of the time of the stage that is done; 0 where it has no end by time.
   double fraction() const { return last_ > 0 ? static_cast<double>(ticks_) / static_cast<double>(last_) : 0; }
-  /// The stage, which has begun, gets another end by time [s] or none: steps stay as they are, and the last
-  /// one may go beyond the end.
+  /// Gives the stage, which has begun, another end by time [s] or none. Steps keep their lengths, and the
+  /// last one may go beyond the end.
   void move_end(std::optional<double> end);
 
   /// visit(name, member) for each member of a state, which may be const.
@@ -87,7 +88,7 @@ class StageClock {
   int levels_ = 0;          ///< the shortest step is the longest halved so many times
   int level_ = -1;          ///< of the step chosen last; -1: none yet
   std::int64_t ticks_ = 0;  ///< shortest steps done
-  std::int64_t last_ = 0;   ///< of the stage; 0: it does not end by time
+  std::int64_t last_ = 0;   ///< shortest steps in the stage; 0: it does not end by time
 };
 
 }  // namespace talus

@@ -22,7 +22,7 @@ void each_corner(const Surface& surface, const Visit& visit) {
                (k & 4) != 0 ? box.high[2] : box.low[2]));
 }
 
-/// Velocities of a step from `time` on whose middles are those of steps of length h.
+/// Velocities in a step from `time` on: between the middles of this step and the next one, of length h.
 void set_velocities(double time, double h, Wall& wall) {
   const RigidVelocity mean = mean_velocity(wall.motion, time + 0.5 * h, h);
   wall.velocity = mean.velocity;
@@ -31,7 +31,7 @@ void set_velocities(double time, double h, Wall& wall) {
   wall.belt = mean_surface_velocity(wall.motion, time + 0.5 * h, h, mean.pivot);
 }
 
-/// When a stage begins; never, as far as is known, before it has begun.
+/// When a stage began; infinity if it has not begun yet.
 double begin_of(const Setup& setup, const std::string& name, std::span<const double> stage_begins) {
   for (std::size_t k = 0; k < stage_begins.size(); ++k)
     if (setup.stages[k].name == name) return stage_begins[k];

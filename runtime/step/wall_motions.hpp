@@ -5,7 +5,7 @@
 ///
 /// Contacts of a step keep the gaps of its middle from closing until the middle of the next one. So the
 /// velocity of a wall in a step is the one that brings it from its place in the middle of this step to that
-/// in the middle of the next; it counts as the one before an impact, too.
+/// in the middle of the next. Laws of restitution take the same velocity as the one before an impact.
 
 #include <span>
 #include <string>
@@ -16,8 +16,8 @@
 
 namespace talus {
 
-/// Before the first step: the point about which each wall tells its torque, where the setup gives none; and a
-/// surface of revolution that turns about its own axis is one that stays, while its material moves.
+/// Before the first step: chooses the point about which each wall's torque is reported, where the setup gives
+/// none. A surface of revolution that turns about its own axis becomes one at rest whose material moves.
 void simplify_motions(std::span<Wall> walls);
 
 /// When motions begin and end, and which walls are absent, as the stage with number `stage` begins.
@@ -31,15 +31,15 @@ void set_walls(const Setup& setup, double time, double h, StepState& state);
 /// Throws RunawayError, in which `step` is named, when the table of a motion ends before the step does.
 void demand_motion(double time, double h, const std::string& step, std::span<const Wall> walls);
 
-/// Their velocities in the step, and where they are in its middle and at its end. Collective where a plane
-/// turns.
+/// Finds the velocities of the walls in the step, and where they are in its middle and at its end. Collective
+/// where a plane turns.
 void prepare_walls(double time, double h, StepState& state, const graph::Communicator& ranks);
 
-/// By how much any point of the surface of a wall near a grain has come nearer to it at most, since the time
-/// `then` [m]. `first`: the wall in its first place.
+/// Bound on how much nearer to any grain a wall's surface has come since the time `then` [m]. `first`: the
+/// wall in its first place.
 double way_since(const Wall& first, const Wall& wall, const WallState& state, double then);
 
-/// The point about which its torque is told, with the wall at `pose` if its motion is prescribed.
+/// The point about which a wall's torque is reported, with the wall at `pose` if its motion is prescribed.
 Vec3 own_point(const Wall& first, const Wall& wall, const Pose& pose);
 
 /// The same of a group, in the middle of the last step. `state`: that of the first of its walls.

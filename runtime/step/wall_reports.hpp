@@ -1,6 +1,6 @@
 #pragma once
 
-/// What is said of walls behind a step.
+/// Reports of walls after a step.
 
 #include <span>
 #include <vector>
@@ -11,11 +11,11 @@
 
 namespace talus {
 
-/// Of each wall. `impulse_time`: of the last step [s].
+/// A report of each wall. `impulse_time`: of the last step [s].
 std::vector<WallReport> wall_reports(const StepState& state, double impulse_time);
 
-/// Of each group the sum over its walls, whose reports these are: forces, torques about the group's point,
-/// work.
+/// A report of each group: sums over its walls of forces, torques about the group's point, and work. `walls`:
+/// the reports of all walls.
 std::vector<WallReport> group_reports(const Setup& setup, const StepState& state,
                                       std::span<const WallReport> walls);
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Which contact and which body a step that was missed is furthest off at, by their names.
+/// The contact and the body with the largest errors of a step that has not converged, by their names.
 
 #include <cstdint>
 #include <span>
@@ -16,20 +16,20 @@ namespace talus {
 struct WorstErrors {
   double contact_error = 0;  ///< of the contact that is furthest from its law
   BodyPair contact;          ///< its bodies; none where every contact satisfies its law
-  double body_error = 0;  ///< of the body that its contacts would change the velocity of most, by that change
-  std::int64_t body = 0;  ///< its id; wall w as -1 - w. Means nothing where body_error is 0
+  double body_error = 0;     ///< largest change that its contacts would make to the velocity of a body
+  std::int64_t body = 0;     ///< its id; wall w as -1 - w. Means nothing where body_error is 0
 
   /// Keeps the worse of both, and of equal ones that of smaller names.
   void take(const WorstErrors& other);
 };
 
-/// How unknowns are called.
+/// Names of the unknowns of a problem.
 struct UnknownNames {
   std::vector<std::span<const BodyId>> bodies;  ///< per part: ids of the unknowns before the first wall
   std::vector<std::int32_t> walls;              ///< numbers of the others, the same in every part
 };
 
-/// Of the parts here.
+/// The worst errors among the parts of this rank.
 WorstErrors worst_errors_of(const BodyParts& parts, const Residuals& residuals, const UnknownNames& names);
 
 }  // namespace talus

@@ -27,12 +27,12 @@ Vec3 velocity_at(const NarrowPhase& in, Slot slot, const Mat3& lever) {
   return Eigen::Map<const Vec3>(v.u) + lever * Eigen::Map<const Vec3>(v.w);
 }
 
-/// What is known of a candidate before its law is asked.
+/// A candidate before its law is evaluated.
 struct Meeting {
   Touch touch;
   Levers levers;
   Vec3 v = Vec3::Zero();     ///< of the first body's surface from the other's, as the step begins [m/s]
-  Vec3 fall = Vec3::Zero();  ///< what is added to it without contacts [m/s]
+  Vec3 fall = Vec3::Zero();  ///< change of v in the step without contacts [m/s]
   Slot first = 0, second = 0;
   BallNumbers balls = 0;
   bool passed = false;
@@ -42,7 +42,7 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const GrainPair& pair, B
   Meeting meeting{
       touch_bodies(poses, pair.first, pair.second, balls), {}, {}, {}, pair.first, pair.second, balls};
   const Touch& touch = meeting.touch;
-  // From one centre of mass to the same point: angular momentum is kept across a gap, too.
+  // Both arms lead to the same point, so that angular momentum is kept across a gap, too.
   const Vec3 between = in.domain.separation(in.x[at(pair.first)], in.x[at(pair.second)]);
   const Vec3 arm = touch.point - in.x[at(pair.first)];
   meeting.levers = {lever_of(in, pair.first, arm), lever_of(in, pair.second, arm + between)};
@@ -61,14 +61,14 @@ Meeting meet(const NarrowPhase& in, const Poses& poses, const WallPair& pair) {
   meeting.levers.first = lever_of(in, pair.body, touch.point - in.x[at(pair.body)]);
   meeting.v = velocity_at(in, pair.body, meeting.levers.first) - wall.velocity_at(touch.point);
   meeting.fall = in.time_step * in.gravity - wall.gain;
-  // The wall in place of a body as large as the ball, whose surface it is.
+  // The wall counts as the surface of a body as large as the ball.
   const double way = in.time_step * touch.normal.dot(meeting.v);
   meeting.passed = std::min(0.0, touch.gap - way) - touch.gap > 0.5 * touch.smaller_radius;
   return meeting;
 }
 
-/// Whether a surface has, for this ball and in this step, the feature that the candidate is of: near an edge
-/// another one counts (kernels/shapes/surface.hpp).
+/// Whether a surface has, for this ball and in this step, the feature of the candidate: near an edge another
+/// feature may count instead (kernels/shapes/surface.hpp).
 bool has_feature(const NarrowPhase& in, const WallPair& pair, const Meeting& meeting) {
   const Wall& wall = in.walls[at(pair.wall)];
   if (wall.surface() == nullptr) return true;

@@ -10,7 +10,8 @@ namespace talus::detail {
 void narrow_blocks(const NarrowPhase& in, const GapRule& rule, const Candidates& candidates,
                    const Chunks& chunks, std::size_t chunk, Contacts& contacts);
 
-/// A chunk whose contacts may share any groups has them up to `end`.
+/// Cuts the contacts of a chunk, which stand up to place `end`, into full groups and a rest. For chunks in
+/// which any contacts may share a group.
 void close_groups(const Chunks& chunks, std::size_t chunk, std::size_t end, Contacts& contacts);
 
 }  // namespace talus::detail

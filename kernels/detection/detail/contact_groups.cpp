@@ -17,9 +17,9 @@ namespace {
 
 constexpr std::size_t groups_open = 64;
 static_assert(longest_chunk <= groups_open * group_size);
-constexpr std::size_t few = 16;  ///< of so many contacts one may change: repairs cost less than dealing
+constexpr std::size_t few = 16;  ///< repairs pay if at most one contact in so many has changed
 
-/// What stands in each place, but the impulses: those are read from the candidates afterwards.
+/// Calls rule(array) for each array of places except impulses, which are read from the candidates afterwards.
 template <class Rule>
 void for_each_array(Contacts& contacts, Rule rule) {
   for (auto* values : {&contacts.nx, &contacts.ny, &contacts.nz, &contacts.bias}) rule(*values);
@@ -52,7 +52,7 @@ class Repair {
         came.erase(fit);
       }
     }
-    // From the last one on, so that no hole is left behind the one at hand.
+    // From the last one on, so that no other hole comes after the one that is closed.
     for (; !left.empty(); left.pop_back())
       if (!close(left.back())) return false;
     for (const std::size_t k : came)
@@ -127,8 +127,8 @@ void deal_groups(const ChunkPlaces& places) {
   std::vector<std::uint16_t> place(count);  // of the candidates
   for (std::size_t k = 0; k < count; ++k)
     place[at(contacts.candidate[begin + k]) - begin] = static_cast<std::uint16_t>(k);
-  // One bit per group and grain. What fits in none of the open groups (a large grain among small ones)
-  // follows, each a group of its own, and behind them the pairs that are no contacts.
+  // One bit per group and grain. Contacts that fit none of the open groups (those of a large grain among
+  // small ones) come next, each in a group of its own, then the pairs that are no contacts.
   std::vector<std::uint64_t> in_group(bodies, 0);
   std::array<std::array<std::uint16_t, group_size>, groups_open> group;
   std::array<std::size_t, groups_open> filled{};

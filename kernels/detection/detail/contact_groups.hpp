@@ -1,7 +1,7 @@
 #pragma once
 
-/// Which contacts of a chunk between grains stand in one group: dealt behind a broad phase, then kept and
-/// repaired while that can be done (docs/decisions/0008-lanes.md).
+/// Groups of the contacts of a chunk between grains. They are dealt after a broad phase, then kept and
+/// repaired in later steps as long as that works (docs/decisions/0008-lanes.md).
 
 #include <cstddef>
 #include <cstdint>
@@ -11,22 +11,23 @@
 
 namespace talus::detail {
 
-/// The candidates of one chunk as they stand in `contacts`, and what they are in this step.
+/// The candidates of one chunk as they stand in `contacts`, and which of them are contacts in this step.
 struct ChunkPlaces {
   const Chunks& chunks;
   std::size_t chunk;
   Contacts& contacts;
-  std::span<std::int64_t> contact;  ///< per place, from chunks.begin[chunk] on: 0 for what is none
+  std::span<std::int64_t> contact;  ///< per place, from chunks.begin[chunk] on: 0 if it is no contact
 };
 
-/// Deals all contacts to groups, first fit in Chunks::order: candidates of grains with many candidates come
-/// first, which is what makes groups full. Groups follow from the set of contacts alone.
+/// Deals all contacts to groups, first fit in Chunks::order. There candidates of grains with many candidates
+/// come first, which makes groups full. Groups follow from the set of contacts alone.
 void deal_groups(const ChunkPlaces& at);
 
-/// Keeps the groups but for those contacts that came or went: one that came takes the place of one that went
-/// where it shares no grain with the rest of the group; other places are filled from the last group, and what
-/// is left joins it. There is no group more than before unless the last was full. False when that does not
-/// work out, or so many changed that dealing is as cheap: then the groups must be dealt.
+/// Keeps the groups, except for candidates that have become contacts or have ceased to be. A new contact
+/// takes the place of an old one if it shares no grain with the rest of that group. Other empty places are
+/// filled from the last group, and new contacts that are left join it. The number of groups grows only if the
+/// last one is full. False when this fails, or when so many changed that dealing is as cheap: then the groups
+/// must be dealt.
 bool repair_groups(const ChunkPlaces& at);
 
 }  // namespace talus::detail

@@ -1,8 +1,8 @@
 #pragma once
 
-/// How the kernels of the narrow phase are called: plain pointers, and no functions, so that the translation
-/// units of instruction sets include nothing that could be kept in a version for the wrong processor.
-/// (Spaces are inlined always.)
+/// Interface of the kernels of the narrow phase: plain pointers, and no functions. The translation unit of an
+/// instruction set must include no function that the linker could keep, in that version, for all processors.
+/// (Spaces are always inlined.)
 
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace talus {
 
 struct GapRule;
 
-/// Pairs of grains whose gaps are asked for.
+/// Pairs of grains whose gaps are to be found.
 struct PairView {
   const double* x;                      ///< 3 per body: its centre [m]
   const double* radius;                 ///< 1 per body [m]
@@ -25,16 +25,17 @@ struct PairView {
   const EdgeRates* rates = nullptr;     ///< null: the cell does not change
 };
 
-/// What is found, per pair.
+/// Results of the search, per pair.
 struct GapTarget {
   double *nx, *ny, *nz, *bias;
   std::int64_t* contact;  ///< -1 for contacts, 0 for others
 };
 
-/// Fills `GapTarget`; true when a pair came half the smaller radius nearer on its way here, or further.
+/// Fills `GapTarget`. True when the two bodies of some pair have moved against one another by half the
+/// smaller radius or more within the last time step.
 using FindGaps = bool (*)(const PairView&, const GapRule&, const GapTarget&);
 
-/// Constants: calling a function to see what there is would run instructions that the processor may not have.
+/// Constants: a function that returns them might itself use instructions that the processor does not have.
 extern const FindGaps gap_kernels_portable;
 extern const FindGaps gap_kernels_avx2;
 extern const FindGaps gap_kernels_avx512;

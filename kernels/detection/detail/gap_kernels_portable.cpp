@@ -1,4 +1,4 @@
-/// Compiled for every processor: what the others do, to the bit.
+/// Compiled for every processor; gives the same bits as the other versions.
 
 #include "kernels/detection/detail/gap_lanes.hpp"
 

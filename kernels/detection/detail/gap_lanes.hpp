@@ -21,7 +21,7 @@ struct Pairing {
   V radius_i, radius_j;
 };
 
-/// x_i - x_j in the first three lanes; no number behind the three of a centre is read.
+/// x_i - x_j in the first three lanes; nothing beyond the three numbers of a centre is read.
 template <std::same_as<Quad> V>
 [[gnu::always_inline]] inline V apart(const PairView& pairs, std::size_t i, std::size_t j) {
   return load<V>(pairs.x + 3 * i, 0, FirstLanes{3}) - load<V>(pairs.x + 3 * j, 0, FirstLanes{3});
@@ -90,7 +90,8 @@ struct GapSearch {
   const GapRule& rule;
 };
 
-/// W pairs from `at` of `out` on; returns the lanes that came far.
+/// Writes W pairs from place `at` of `out` on; returns the lanes whose bodies came far (came_far in
+/// passing.hpp).
 template <class V, class S, class E>
 [[gnu::always_inline]] inline BitsOf<V> gap_block(const PairView& pairs, const GapSearch<S>& search,
                                                   LaneSlots slots, E restitution, const GapTarget& out,
@@ -122,7 +123,7 @@ template <int W, class S, class E>
   const PairView pairs = view;  // local ones, so that no store can change them
   const GapTarget out = target;
   BitsOf<V> far{};
-  constexpr std::size_t ahead = 24;  // what the sweeps do not touch is not in the cache
+  constexpr std::size_t ahead = 24;  // prefetch distance in pairs: sweeps do not cache these data
   std::size_t i[W], j[W];
   const auto slots = [&](std::size_t k, std::size_t lane) {
     i[lane] = static_cast<std::size_t>(static_cast<std::uint32_t>(pairs.first[k]));

@@ -8,14 +8,15 @@
 
 namespace talus::detail {
 
-/// Whether two bodies came so far on their way `way` here that they may have passed.
+/// Whether the path `way` of one body relative to another is so long that they may have passed one another.
 inline bool came_far(const Vec3& way, double small) {
   return !(way.squaredNorm() < 0.25 * small * small);
 }
 
-/// True when two bodies have gone in by more than half of `small`, the smaller radius, while the line from
-/// one centre to the other moved on by `way` to `d`; what they overlapped at its beginning does not count.
-/// From the middle of one step to that of the next it moves by h V-, V- being what the first has ended with.
+/// True when two bodies have come to overlap by more than half of `small`, the smaller radius, while the
+/// vector between their centres changed by `way` to `d`. Their overlap at the beginning does not count. From
+/// the middle of one step to that of the next the vector changes by h V-, with V- the velocity at the end of
+/// the first.
 inline bool passed(const Vec3& d, const Vec3& way, double touching, double small) {
   if (!came_far(way, small)) return false;
   const Vec3 start = d - way;

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Momentum of bodies, 4 or 8 numbers at a time (kernels/sweeps/momentum.hpp): what stands at s goes on to
-/// s + beta (s - last), and s is remembered.
+/// Momentum of bodies, 4 or 8 numbers at a time (kernels/sweeps/momentum.hpp): a value s becomes
+/// s + beta (s - last), and `last` becomes s.
 
 #include "kernels/simd/lanes.hpp"
 
@@ -15,7 +15,7 @@ template <class V, class Number>
   store(last, s);
 }
 
-/// Whole records: masses, equal in both, stay to the bit.
+/// Advances whole records: masses, equal in both, keep their bits.
 template <class V, class Number>
 void advance_bodies(Number* bodies, Number* last, const std::int32_t* slots, std::size_t count, double beta) {
   constexpr std::size_t record = 8, ahead = 8;

@@ -1,8 +1,8 @@
 #pragma once
 
-/// The error of kernels/sweeps/sweep.hpp on W = 4 or 8 contacts at a time. It reads only, so that any
-/// contacts may stand side by side. Sums are kept in 8 lanes, contact k of a range in lane k mod 8, whatever
-/// W is.
+/// The error of kernels/sweeps/sweep.hpp on W = 4 or 8 contacts at a time. It only reads, so that any
+/// contacts may be in the lanes together. Sums are kept in 8 lanes, contact k of a range in lane k mod 8,
+/// whatever W is.
 
 #include "kernels/law/contact_law.hpp"
 #include "kernels/sweeps/detail/advance_lanes.hpp"
@@ -37,7 +37,7 @@ struct ErrorRule {
   Cell cell;
 };
 
-/// As many lanes as are meant.
+/// The number of lanes in use.
 template <int W>
 [[gnu::always_inline]] inline FirstLanes lanes_of(AllLanes) {
   return {W};
@@ -47,7 +47,7 @@ template <int W>
   return lanes;
 }
 
-/// 1/M of the bodies whose copies these are, by which the error counts.
+/// 1/M of the whole bodies of these copies, as the error needs.
 template <class V, class Grains>
 [[gnu::always_inline]] inline V whole(const Grains& a, const std::uint32_t* begin, FirstLanes lanes,
                                       const std::uint16_t* parts) {
@@ -102,7 +102,7 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
     m.du = m.du - drift;
   }
   rule.cell.take(rule.contacts, at, only, m);
-  // Not approach_of: errors do not ask for w_tt, and with it the spins would be gathered, too.
+  // Not approach_of, which needs w_tt and therefore gathers the spins: errors need neither.
   const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.bias, 0, only), m.w_nn, V{}};
   if constexpr (Friction)
     add_error(
@@ -120,7 +120,7 @@ template <bool Friction, bool AtWall, int W, class Mu, class Cell = NoCell>
   const ErrorRule<Mu, Cell> rule{Mu{mu}, whole, c, cell};
   ErrorLanes<Lanes<W>> sums[8 / W];
   std::size_t k = c.begin, lanes = 0;
-  // At a wall nothing is read of b.
+  // At a wall b is not read.
   const auto second = [&](std::size_t at) {
     return AtWall ? first_of(c, at, bodies) : second_of(c, at, bodies);
   };

@@ -1,8 +1,8 @@
 #pragma once
 
-/// Where the bodies of contacts stand, and how their records become lanes and back: the phases gather and
-/// scatter of kernels/sweeps/detail/sweep_lanes.hpp. A record is {u, 1/m | w, R^2/I}, in one half what an
-/// impulse does to the velocity, in the other what it does to the spin.
+/// The records of the bodies of contacts, and how they become lanes and back: the phases gather and scatter
+/// of kernels/sweeps/detail/sweep_lanes.hpp. A record is {u, 1/m | w, R^2/I}: one half for the velocity and
+/// its mobility, the other for the spin and its mobility.
 
 #include "kernels/simd/contact_view.hpp"
 #include "kernels/simd/lanes.hpp"
@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t record = 8;  ///< numbers of a body
 
-/// Contacts in lanes of V.
+/// Number of lanes of V.
 template <class V>
 constexpr int width_of = sizeof(V) / sizeof(NumberOf<V>);
 
@@ -35,7 +35,7 @@ template <class View, class Number>
   return {bodies, c.second + k};
 }
 
-/// Grains of mass 1 that no contact knows, for the lanes that hold none. In a sweep they rest.
+/// Grains of mass 1 for the lanes that hold no contact. In a sweep they are at rest.
 template <class V>
 struct SpareGrains {
   using Number = NumberOf<V>;
@@ -49,7 +49,7 @@ struct SpareGrains {
   }
 };
 
-/// Records of a few contacts, fewer than fill the lanes: behind them are spare grains, each its own.
+/// Records of fewer contacts than there are lanes: each other lane gets a spare grain of its own.
 template <class Number, std::size_t Count>
 struct FewRecords {
   Number* address[Count];
@@ -69,8 +69,8 @@ struct FewRecords {
   }
 };
 
-/// Asks for the bodies of contacts two groups ahead: they are scattered, so that the processor does not see
-/// them coming. Where the first cache holds most of them, asking costs 2-6 % of a sweep.
+/// Prefetches the bodies of contacts two groups ahead: they are scattered in memory, so that the processor
+/// cannot foresee them. Where the first cache holds most of them, prefetching costs 2-6 % of a sweep.
 template <class View, class Number>
 [[gnu::always_inline]] inline void prefetch_group(const View& c, std::size_t k, Number* bodies) {
   const std::size_t ahead = k + 2 * group_size;

@@ -91,7 +91,7 @@ struct PlainStart {
   [[gnu::always_inline]] void end(const V&, const V&, std::size_t, Only) const {}
 };
 
-/// Steps of the contacts from some place on.
+/// Momentum, with the steps of the contacts from some place on.
 struct MomentumStart {
   float *x, *y, *z, *n;
   double beta, omega;
@@ -124,7 +124,7 @@ template <class V, class Only>
   return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
 }
 
-/// Bodies are as fast as they say ...
+/// Without drift, velocities of bodies are those of their records.
 struct NoDrift {
   NoDrift from(std::size_t) const { return {}; }
   template <class V, class Only>
@@ -132,7 +132,7 @@ struct NoDrift {
   template <class V, class Only>
   [[gnu::always_inline]] void give(const Slice<NumberOf<V>>&, const Space<V>&, std::size_t, Only) const {}
 };
-/// ... or the second one of each contact stands for an image that drifts.
+/// With drift, the second body of each contact stands for an image that moves against it.
 template <class Number>
 struct PairDrift {
   const Number *x, *y, *z;
@@ -145,8 +145,9 @@ struct PairDrift {
   [[gnu::always_inline]] void give(const Slice<Number>&, const Space<V>&, std::size_t, Only) const {}
 };
 
-/// How the contacts of a chunk are swept: their friction, where they start, and what moves their bodies
-/// besides themselves, which takes a part of what they see and is given what they do.
+/// How the contacts of a chunk are swept: their friction, where they start, and their drift, which is what
+/// moves their bodies besides the records. It changes the velocities that contacts see (take) and is given
+/// their impulses.
 template <class Mu, class Start, class Drift = NoDrift>
 struct SweepRule {
   Mu friction;
@@ -157,7 +158,7 @@ struct SweepRule {
   }
 };
 
-/// Contacts in lanes as their law sees them, from what their bodies do.
+/// The input of the law for contacts in lanes, from the motion of their bodies.
 template <bool Friction, class V, class Only>
 [[gnu::always_inline]] inline Approach<V> approach_of(const Slice<NumberOf<V>>& c, std::size_t at, Only only,
                                                       const Meeting<V>& m) {
@@ -168,7 +169,7 @@ template <bool Friction, class V, class Only>
 }
 
 /// Solves the law of the contacts from `at` on: stores the new impulse and returns it less the one that the
-/// velocities know. Without friction only the component along the normal exists.
+/// velocities contain. Without friction only the component along the normal exists.
 template <bool Friction, class V, class Rule, class Only>
 [[gnu::always_inline]] inline Space<V> renew_impulse(const Slice<NumberOf<V>>& c,
                                                      const Target<NumberOf<V>>& out, std::size_t at,

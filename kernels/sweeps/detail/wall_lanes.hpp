@@ -56,7 +56,7 @@ struct WallPart {
   std::size_t k;
 };
 
-/// What the material of a wall has beyond the velocity of the wall, in the lanes of contacts from `k` on;
+/// Adds the velocity of a wall's material beyond that of the wall, in the lanes of contacts from `k` on; does
 /// nothing where no wall has any.
 template <class V, class Only>
 [[gnu::always_inline]] inline void add_drift(const ContactViewOf<NumberOf<V>>& c, std::size_t k, Only only,

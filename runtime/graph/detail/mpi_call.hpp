@@ -6,20 +6,20 @@ namespace talus::graph::detail {
 inline constexpr double host_flops = 1e9;
 
 #ifdef TALUS_SMPI
-/// Around calls of MPI on simulated ranks: what the rank has computed since it left the last one passes on
-/// the simulated machine, by a clock that is read in 20 ns, or by the thread's processor time where that is
-/// less: the host was busy elsewhere. SMPI would do that by processor time alone, 0.6 us a reading, which is
-/// as much as the chunks between two messages; so the platform tells it not to (io::smpi_platform). May be
-/// nested; the outermost counts.
+/// Encloses calls of MPI on simulated ranks: advances the simulated clock by the rank's computing time since
+/// it left the last such call. That time is taken from a clock that is read in 20 ns, or from the thread's
+/// processor time if that is less, since then the host was busy elsewhere. SMPI itself would use processor
+/// time alone, whose reading takes 0.6 us, as long as the chunks between two messages; so the platform
+/// switches that off (io::smpi_platform). May be nested; the outermost counts.
 class MpiCall {
  public:
-  /// `takes`: takes a message and sends none, so that a time that is given (graph::GivenTime) is still to
-  /// come.
+  /// `takes`: the call receives a message and sends none, so a time that is given (graph::GivenTime) does not
+  /// pass in it.
   explicit MpiCall(bool takes = false);
   ~MpiCall();
   MpiCall(const MpiCall&) = delete;
   MpiCall& operator=(const MpiCall&) = delete;
-  /// What came before counts for nothing: the rank starts here.
+  /// Starts the rank's time: computing before this call does not count.
   static void begin_rank();
 };
 #else

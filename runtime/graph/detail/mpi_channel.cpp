@@ -8,7 +8,7 @@ namespace talus::graph::detail {
 
 namespace {
 
-/// A persistent request; opened by who makes one.
+/// A persistent request. The functions below create it.
 class MpiChannel final : public Channel {
  public:
   ~MpiChannel() override {

@@ -1,6 +1,6 @@
-/// Channels of simulated ranks. SMPI 3.32 loses a persistent message that is sent again before the first was
-/// taken, and crashes in MPI_Cancel, so these are plain messages: sent at once into a buffer of SMPI's, as
-/// the platform says (io::smpi_platform), and taken when somebody waits for them.
+/// Channels of simulated ranks, by plain messages: SMPI 3.32 loses a persistent message that is sent again
+/// before the first was received, and crashes in MPI_Cancel. A message is sent at once into a buffer of
+/// SMPI's, as the platform says (io::smpi_platform), and received in wait().
 
 #include "runtime/graph/detail/mpi_channel.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What MPI answers, as an exception. For the sources that call MPI.
+/// Turns error codes of MPI into exceptions. For the sources that call MPI.
 
 // The C interface only: the C++ bindings of old are not linked.
 #define OMPI_SKIP_MPICXX

@@ -19,7 +19,7 @@ std::vector<To> converted(const From& from) {
   return to;
 }
 
-/// Entries of a range of slots behind those of `to`; nothing of a column that the scene has not.
+/// Appends the entries of a range of slots to `to`; none of a column that the scene does not have.
 template <class T, class U>
 void copy_run(const std::vector<T>& from, SlotRange range, std::vector<U>& to) {
   if (from.empty()) return;
@@ -33,7 +33,7 @@ void copy_run(const std::vector<T>& from, SlotRange range, std::vector<U>& to) {
   }
 }
 
-/// The other way.
+/// Appends a column of a checkpoint to an array of the rank.
 template <class U, class T>
 void append_run(const std::vector<U>& from, std::vector<T>& to) {
   for (const U& value : from) {

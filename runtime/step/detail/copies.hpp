@@ -15,13 +15,13 @@ namespace talus::detail {
 std::int32_t hubs_from(const DecompositionSettings& settings);
 
 /// From the interfaces, which hold the bodies of the surroundings: multiplicities of the copies, their parts
-/// of the mass, who counts, and where each subdomain's slots begin. `id`: of the surroundings; `hubs`: see
-/// hubs_from. Throws std::runtime_error when a body stands in more than 65535 subdomains.
+/// of the mass, which copy counts, and where each subdomain's slots begin. `id`: of the surroundings; `hubs`:
+/// see hubs_from. Throws std::runtime_error when a body stands in more than 65535 subdomains.
 void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& standings,
                  std::span<const BodyId> id, std::int32_t hubs);
 
-/// Copies of the bodies of the interfaces, behind list_copies. Field by field: each field of the surroundings
-/// goes when it has been copied.
+/// Copies of the bodies of the interfaces, after list_copies. Goes field by field, and frees each field of
+/// the surroundings when it has been copied.
 Bodies make_copies(Decomposition& decomposition, Bodies& around);
 
 /// Bodies of the surroundings that stand in a subdomain of this rank now and did not before, each counted per

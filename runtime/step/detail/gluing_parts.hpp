@@ -17,7 +17,7 @@ namespace talus::detail {
 
 using graph::Channel;
 
-/// Adds the time it took to `waited`.
+/// Waits for a message and adds the time to `waited`.
 inline void await(Channel& channel, double& waited, trace::Recorder* trace, std::uint32_t message) {
   if (channel.done()) return;
   const trace::Span span(trace, trace::kind_receive, message);
@@ -36,7 +36,7 @@ struct Link {
   std::uint32_t out_name = 0, in_name = 0;  ///< of the messages, in a trace
 };
 
-/// Messages hold numbers of the precision that sweeps work in, which may be half as long.
+/// Messages hold numbers in the precision of the sweeps, which may be single; buffers have room for doubles.
 inline const std::byte* bytes_of(const std::vector<double>& buffer) {
   return std::as_bytes(std::span(buffer)).data();
 }
@@ -54,7 +54,7 @@ struct Pair {
 inline constexpr int behind_all = 1000, any_colour = behind_all + 1;
 
 inline constexpr int root_tag = graph::Communicator::first_tag;
-/// The largest is subdomains^2 + root_tag.
+/// The largest tag is subdomains^2 + root_tag.
 inline int tag_of(SubdomainId from, SubdomainId to, std::int32_t subdomains) {
   return root_tag + 1 + from.value() * subdomains + to.value();
 }
@@ -63,14 +63,14 @@ inline int tag_of(SubdomainId from, SubdomainId to, std::int32_t subdomains) {
 
 namespace talus {
 
-/// Towards one neighbour.
+/// Exchange of a subdomain with one neighbour.
 struct Gluing::Side {
   std::vector<Slot> slots;  ///< of the bodies in the message, in its order
   std::vector<detail::Pair>
-      pairs;  ///< those in it of which these two copies alone are of the last subdomain colour
-  std::vector<detail::Pair> given;  ///< where only the neighbour's copy is
+      pairs;  ///< bodies of which only these two copies are of the last subdomain colour
+  std::vector<detail::Pair> given;  ///< bodies of which only the neighbour's copy is
   std::vector<detail::Pair>
-      taken;          ///< where only the neighbour's copy is of the subdomain colour before this one's
+      taken;          ///< bodies of which only the neighbour's copy is of the colour before this one's
   detail::Link link;  ///< `in` and the channels: of neighbours on other ranks only
   const std::byte* source = nullptr;  ///< the neighbour's message to this subdomain
   int subdomain_colour = 0;           ///< of the neighbour
@@ -80,11 +80,11 @@ struct Gluing::Side {
 struct Gluing::Subdomain {
   std::vector<Side> sides;
   std::vector<Slot> shared;  ///< slots of `interface.shared`
-  std::vector<Slot> taken;   ///< those of `shared` that are
+  std::vector<Slot> taken;   ///< slots of `shared` that take writes
   int subdomain_colour = 0;
-  bool tells = false;  ///< before it publishes
+  bool tells = false;  ///< it has a tell
   std::vector<std::int32_t>
-      corners;  ///< indices into `shared`, without hubs: of the last subdomain colour are more copies
+      corners;  ///< indices into `shared`, no hubs: bodies with more copies of the last subdomain colour
   std::vector<std::int32_t> taken_corners;  ///< likewise of the subdomain colour before this one's
   std::vector<double> base;                 ///< Schwarz: velocities after the last gluing, per shared body
   std::vector<std::vector<ChunkId>> wall_copies;  ///< per glued wall: chunks here that hold a copy

@@ -1,7 +1,7 @@
 #pragma once
 
 /// A body's velocity as it travels between subdomains: numbers of the record that sweeps work on, 6, or 3
-/// without rotation, one body behind the other.
+/// without rotation, one body after the other.
 
 #include <algorithm>
 #include <array>
@@ -32,7 +32,8 @@ void assign(const Numbers<Width, Record>& numbers, Record& v) {
   if constexpr (Width == 6) std::copy_n(numbers.data() + 3, 3, v.w);
 }
 
-/// Number `k` of those that begin at `from`. One by one: what is copied as a whole goes over the stack.
+/// Number `k` of those that begin at `from`. Read one by one: copied as an array, they would go over the
+/// stack.
 template <class Number>
 Number number_at(const std::byte* from, std::size_t k) {
   Number number;
@@ -51,7 +52,7 @@ void write_velocities(std::span<const Record> velocity, std::span<const Slot> sl
   }
 }
 
-/// Each copy of the pairs goes on with rule(own, the neighbour's), number by number.
+/// Replaces each number of a pair's own copy by rule(own, the neighbour's).
 template <std::size_t Width, class Record, class Rule>
 void settle_pairs(std::span<Record> velocity, std::span<const Pair> pairs, const std::byte* message,
                   const Rule& rule) {

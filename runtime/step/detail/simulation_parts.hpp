@@ -25,8 +25,8 @@
 
 namespace talus {
 
-/// Of a run that begins: no grain that will come is smaller than it says, and there are materials and
-/// orientations where some may come with one.
+/// Size of the sample as a run begins, with the grains to be inserted in mind: none is smaller than
+/// `smallest`, and there are materials and orientations if some of them may have one.
 inline SampleSize first_size(const Setup& setup, SampleSize size) {
   size.smallest = smallest_ever(setup, size.bodies > 0 ? size.smallest : 0);
   size.orientation = size.orientation || setup.orientation || !setup.clumps.empty();
@@ -62,7 +62,7 @@ struct Simulation::Implementation {
   }
 
   void go_on_from(const SavedState& from) {
-    // As they were saved: the candidates name slots.
+    // The bodies exactly as they were saved: the candidates name slots.
     state.bodies = from.bodies;
     state.walls = from.walls;
     stage_index = from.stage_index;
@@ -143,8 +143,8 @@ struct Simulation::Implementation {
     return to;
   }
 
-  /// Alert distance, skin, and how far from one another two may turn, in smallest radii: no body is in
-  /// between.
+  /// Chooses alert distance, skin, and how far from one another two bodies may turn (GapRule::turning), in
+  /// smallest radii: no body fits in between.
   void choose_distances() {
     constexpr double farthest_turning = 0.5;
     const double unit = smallest_radius();
@@ -159,7 +159,7 @@ struct Simulation::Implementation {
     check_cell(setup.domain, largest_radius, parameters.alert + parameters.skin);
   }
 
-  /// The same of a cell that has been squeezed since.
+  /// The same check, for a cell that has been squeezed since.
   void check_edges() const {
     try {
       check_cell(state.domain, largest_radius, parameters.alert + parameters.skin);
@@ -170,7 +170,7 @@ struct Simulation::Implementation {
 
   const Stage& stage() const { return setup.stages[stage_index]; }
 
-  /// The next step's. Forces outlive the change, so impulses go with the time step.
+  /// Sets the next step's time step. Forces stay the same, so impulses scale with the time step.
   void take_time_step(double h) {
     if (parameters.time_step > 0 && h != parameters.time_step)
       for (double& value : state.candidates.impulse.values()) value *= h / parameters.time_step;
@@ -190,7 +190,7 @@ struct Simulation::Implementation {
 
   double smallest_radius() const { return std::isfinite(size.smallest) ? size.smallest : 1; }
 
-  /// What the stage prescribes, but for its loads and its time step.
+  /// What the stage prescribes, except its loads and its time step.
   void prescribe() {
     parameters = parameters_of(setup, stage(), parameters);
     prescribe_cell(setup, stage(), size, state.cell);
@@ -216,7 +216,7 @@ struct Simulation::Implementation {
       renumber(state.candidates, place);
     }
     if (state.candidates_valid) {
-      // Forces outlive the change of law.
+      // Forces stay the same when the law changes.
       for (double& value : state.candidates.impulse.values())
         value *= (1 + last_reflection) / (1 + parameters.reflection);
       convert_impulses(state.candidates, parameters.impulses(), state.bodies.x, state.walls, state.domain);
@@ -228,7 +228,7 @@ struct Simulation::Implementation {
   }
 
   StepName next_step() const { return {report.step + 1, setup.stages[stage_index].name}; }
-  /// Of the step that the graph has run last.
+  /// Outcome of the step that the graph has run last.
   StepOutcome outcome() const {
     return {next_step(), setup, size, parameters, state, graph.sums(), graph.loop().result()};
   }
@@ -238,7 +238,7 @@ struct Simulation::Implementation {
     if (!stage().chooses_time_step) return;
     prepare_walls(report.time, parameters.time_step, state, ranks);
     double longest = longest_time_step(state, setup, parameters, smallest_radius(), ranks);
-    // Grains that come are not there yet.
+    // Grains to be inserted in the step are not among the bodies yet.
     if (const double speed = population.fastest(span()); speed > 0)
       longest = std::min(longest, TimeStepRule{}.longest_way * smallest_radius() / speed);
     clock.choose(longest);
@@ -250,7 +250,7 @@ struct Simulation::Implementation {
     return {report.time, report.time + parameters.time_step, &stage(), stage_begins[stage_index]};
   }
 
-  /// Bodies whose paths are told: of the setup, then those that came.
+  /// Bodies whose paths are reported: of the setup, then inserted ones.
   std::vector<NamedBody> named_now() const {
     std::vector<NamedBody> bodies = setup.named;
     for (NamedBody& body : population.tracked()) bodies.push_back(std::move(body));
@@ -269,7 +269,7 @@ struct Simulation::Implementation {
     size.volume = now.volume;
   }
 
-  /// Behind a step: time and steps of the stage.
+  /// After a step: counts time and steps of the stage.
   void count_step() {
     ++stage_steps;
     if (stage().chooses_time_step) {
@@ -305,7 +305,7 @@ struct Simulation::Implementation {
     return Domain::strain(state.domain.lengths(state.walls)[axis], lengths_at_start[axis]);
   }
 
-  /// Of the cell.
+  /// Rate of shear of the cell [1/s].
   double shear_rate_now() const {
     if (!state.domain.flows) return 0;
     return shear_rate(gradient_before(state.domain, 0));

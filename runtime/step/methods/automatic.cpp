@@ -4,9 +4,9 @@ namespace talus {
 
 namespace {
 
-/// Besides those of the methods that it takes its plans from.
+/// Parameters besides those of the methods whose plans it uses.
 struct AutomaticParameters {
-  /// With a smaller largest beta, in (0, 1), conjugate gradients are faster than momentum.
+  /// If the largest beta falls below this, in (0, 1), conjugate gradients are faster than momentum.
   double least_momentum = 0.85;
   /// A problem that needs fewer plain sweeps is not stiff, > 0: sweeps alone solve it, and ADMM is not called
   /// before as many were done.
@@ -48,8 +48,8 @@ class Automatic : public Method {
     return SweepPlan{};
   }
 
-  /// Plain ones first: ADMM leaves light bodies behind, and momentum throws them at the heavy ones that it
-  /// has settled.
+  /// Plain sweeps first: ADMM leaves errors at light bodies, and momentum would throw these at the heavy ones
+  /// that ADMM has settled.
   SweepPlan after_admm(const SweepPlan& now) const override {
     return {now.kind == SweepKind::momentum ? SweepKind::plain : now.kind, now.most};
   }

@@ -29,7 +29,7 @@ class MethodView {
   virtual ~MethodView() = default;
   virtual int sweeps_since_start() const = 0;  ///< of the step, or since ADMM
   virtual int admm_calls() const = 0;          ///< in this step
-  virtual double sweeps_needed() = 0;          ///< of the present ones, about
+  virtual double sweeps_needed() = 0;          ///< about, of the present kind, in this step
   virtual bool checks_velocities() = 0;        ///< Certificate::checks_velocities
   virtual bool balanced() = 0;                 ///< Certificate::balanced
 };
@@ -37,9 +37,9 @@ class MethodView {
 /// Calls of a step, all at gates of the loop:
 ///
 ///   begin()                 before the first sweep
-///   after_check(), calls_admm()   behind each check that has not ended the step, in this order
-///   after_admm()            where that was called, or a Newton step taken: before the next sweep
-///   after_stagnation()      behind a check that found stagnation, instead of after_check()
+///   after_check(), calls_admm()   after each check that has not ended the step, in this order
+///   after_admm()            after ADMM, or after a Newton step: before the next sweep
+///   after_stagnation()      after a check that found stagnation, instead of after_check()
 ///
 /// Methods keep nothing between calls: what is in force comes in as the plan.
 class Method {
@@ -47,13 +47,14 @@ class Method {
   virtual ~Method() = default;
 
   virtual SweepPlan begin() const = 0;
-  /// `growth`: of the error since the check before. A plan begins anew with the next sweep; none: go on.
+  /// A new plan, which begins with the next sweep; none: go on. `growth`: the error over that of
+  /// the check before.
   virtual std::optional<SweepPlan> after_check(const SweepPlan& now, double growth) const;
-  /// Another way, where the method has one.
+  /// Another plan, where the method has one.
   virtual std::optional<SweepPlan> after_stagnation(const SweepPlan& now) const;
   virtual SweepPlan after_admm(const SweepPlan& now) const { return now; }
   virtual bool calls_admm(MethodView& view) const;
-  /// Takes the Newton step with which a check has found small clusters of contacts in error.
+  /// Whether the Newton step with which a check has found small clusters of contacts in error is taken.
   virtual bool corrects() const { return false; }
 };
 
@@ -71,7 +72,7 @@ inline bool Method::calls_admm(MethodView&) const {
 struct AdmmCalls {
   /// Sweeps done before the first call, >= 0; four times as many before each further one.
   int chance = 50;
-  /// Calls in a step, at most, >= 1. Whatever ADMM leaves undone it is asked for again.
+  /// Calls in a step, at most, >= 1: ADMM is called again for a problem that it has not solved.
   int most = 3;
 };
 /// Enough sweeps were done since the last call of ADMM, and another call is allowed in this step.

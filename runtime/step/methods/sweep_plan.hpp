@@ -1,12 +1,12 @@
 #pragma once
 
-/// What sweeps do besides plain Gauss-Seidel, and the numbers of it.
+/// How sweeps are accelerated beyond plain Gauss-Seidel, and the parameters of it.
 
 namespace talus {
 
 /// How the start of a sweep goes on from the end of the last one (kernels/sweeps/momentum.hpp).
 enum class SweepKind {
-  plain,      ///< it does not: nonlinear Gauss-Seidel
+  plain,      ///< it starts where the last one ended: nonlinear Gauss-Seidel
   momentum,   ///< along the last step of the impulses
   conjugate,  ///< along the last direction of conjugate gradients
 };
@@ -14,7 +14,7 @@ enum class SweepKind {
 /// What a method wants of the next sweeps.
 struct SweepPlan {
   SweepKind kind = SweepKind::plain;
-  double most = 0;  ///< of beta, in [0, 1), with momentum; with plain sweeps that of momentum to come back to
+  double most = 0;  ///< largest beta, in [0, 1), of momentum; with plain sweeps of the momentum to resume
 };
 
 /// Sweeps with momentum (docs/decisions/0009-methods.md).
@@ -22,8 +22,8 @@ struct MomentumParameters {
   /// Factor of the change of the normal impulses, in [1, 2). 1.2 takes 4-16 % fewer sweeps than 1, and 1.3
   /// saves no more; at 1.4 packings begin to swing.
   double over_relaxation = 1.2;
-  /// Without momentum, >= 0: what a few sweeps solve, a grain on the ground, is left to them, as they add no
-  /// force that nothing asks for.
+  /// First sweeps without momentum, >= 0: a few of them solve simple problems, such as a grain on the ground,
+  /// and add no force that nothing requires.
   int plain_sweeps = 3;
   /// beta of sweep k is k/(k + ramp), > 0, until it is `most` (Nesterov 1983).
   double ramp = 3;
@@ -59,15 +59,15 @@ struct ConjugateGradient {
   double beta = 0;     ///< of the next sweep, in [0, 1]; 0: a new start
   double change2 = 0;  ///< of the last sweep [J]
 
-  /// From what a sweep changed and the sweep before it.
+  /// The next beta, from the squared change of a sweep and that of the sweep before.
   void turn(double changed2) {
     beta = change2 > 0 && changed2 <= change2 ? changed2 / change2 : 0;
     change2 = changed2;
   }
 };
 
-/// How many plain sweeps one sweep of the plan is worth, as the number of sweeps that a stiff problem takes
-/// falls: (1 + beta)/(1 - beta) with momentum.
+/// How many plain sweeps one sweep of the plan is worth in a stiff problem: (1 + beta)/(1 - beta) with
+/// momentum.
 double speed_of(const SweepPlan& plan, const ConjugateParameters& conjugate = {});
 
 }  // namespace talus
