@@ -34,7 +34,8 @@ ctest --preset release -j2 "$@" || status=$?
 if [ "${CI_LONG:-0}" = 1 ]; then
   cmake --preset asan
   cmake --build --preset asan
-  ctest --preset asan -j2 -L 'unit|mpi' || status=$?
+  # HDF5 asks for the lengths that a damaged file claims, and reports what it does not get.
+  ASAN_OPTIONS=allocator_may_return_null=1 ctest --preset asan -j2 -L 'unit|mpi' || status=$?
   if command -v clang++-14 >/dev/null; then
     cmake --preset tsan
     cmake --build --preset tsan
