@@ -106,11 +106,6 @@ ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
   return active;
 }
 
-/// What may be left of a momentum [N s].
-double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
-  return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
-}
-
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
 class Round {
  public:
@@ -199,6 +194,10 @@ Correction unchanged(const BodyProblem& problem, double at_first) {
 }
 
 }  // namespace
+
+double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
+  return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
+}
 
 double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion) {
   double sum = 0;

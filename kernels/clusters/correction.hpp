@@ -80,6 +80,9 @@ struct Correction {
 Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
 
+/// What may be left of a correction that has found so much momentum [N s].
+double goal_of(double found, double enough, const CorrectionThresholds& thresholds);
+
 /// Sum m |u| + (I/R^2) |w| over the unknowns [N s].
 double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion);
 

@@ -38,6 +38,7 @@ struct StepError {
 /// How exactly an error is asked for.
 struct ErrorGoal {
   double enough = 0;  ///< relative error that is not told apart from less
+  int sweeps = 0;     ///< that the step has had: what answers may cost grows with them
   double still =
       0;  ///< [m/s]: velocities that rounding of positions makes in gaps; slower bodies are at rest
   double walls =

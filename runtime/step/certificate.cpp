@@ -153,10 +153,15 @@ bool Certificate::balanced(WholeProblem& whole) {
 
 double Certificate::small_unbalance(WholeProblem& whole) {
   const bool last = result_.iterations >= settings_.max_iterations;
-  if (doubts_ >= thresholds_.most_doubts && !last) return std::numeric_limits<double>::infinity();
+  if (doubts_ >= thresholds_.most_doubts && !last &&
+      result_.iterations < thresholds_.doubt_growth * doubted_at_)
+    return std::numeric_limits<double>::infinity();
   return repeated(small_check_, settings_.balance_tolerance, [&](double enough) {
-    const SmallError error = whole.small_error(enough);
-    if (!error.solved) ++doubts_;
+    const SmallError error = whole.small_error(enough, result_.iterations);
+    if (!error.solved) {
+      ++doubts_;
+      doubted_at_ = result_.iterations;
+    }
     return error.relative;
   });
 }

@@ -27,7 +27,7 @@ class KnownProblem : public WholeProblem {
   double speed() const override { return 1; }
   bool small_clusters() override { return !small_errors_.empty(); }
   bool large_clusters() override { return true; }
-  SmallError small_error(double enough) override {
+  SmallError small_error(double enough, int) override {
     const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
     return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error)};
   }
