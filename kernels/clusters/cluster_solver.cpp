@@ -84,12 +84,12 @@ ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const C
   return answer;
 }
 
-/// By the solvers that keep W, and rounds from where they get. `answer`: of rounds alone, in; the best, out.
-void solve_by_matrix(const BodyProblem& problem, const ClusterGoal& asked,
+/// By the solvers that keep W, for as much work as so many sweeps, and rounds from where they get. `answer`:
+/// so far, in; the best, out.
+void solve_by_matrix(const BodyProblem& problem, double enough, double sweeps,
                      const ClusterThresholds& thresholds, ClusterAnswer& answer) {
   ContactMatrix matrix = matrix_of(problem);
-  double left =
-      (thresholds.least_budget + thresholds.budget_per_sweep * asked.sweeps) * sweep_cost(matrix.problem);
+  double left = sweeps * sweep_cost(matrix.problem);
   for (const ClusterThresholds::Turn& turn : thresholds.turns) {
     if (left <= 0) break;
     const DelassusGoal goal{.tolerance = turn.residual,
@@ -102,7 +102,7 @@ void solve_by_matrix(const BodyProblem& problem, const ClusterGoal& asked,
     if (report.iterations == 0 && !last) continue;
     BodyProblem now = problem;
     now.impulse = matrix.impulses();
-    ClusterAnswer other = answer_of(problem, now, correction_of(now, asked.enough, thresholds.correction));
+    ClusterAnswer other = answer_of(problem, now, correction_of(now, enough, thresholds.correction));
     // Of answers that are none the nearest says most.
     if (other.solved || other.error < answer.error) answer = std::move(other);
     if (answer.solved) break;
@@ -124,13 +124,18 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
   answer = answer_of(problem, problem, correction_of(problem, goal.enough, thresholds.correction));
   const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
                                     [](const ContactEquation& c) { return c.mu > 0; });
-  if (!answer.solved && !friction) {
-    ClusterAnswer other =
-        answer_of(problem, problem,
-                  proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal));
+  if (!answer.solved) {
+    const double budget = thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps;
+    const int most = static_cast<int>(thresholds.proximal_share * budget / thresholds.factorisation);
+    int left = most;
+    ClusterAnswer other = answer_of(
+        problem, problem,
+        proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
     if (other.solved || other.error < answer.error) answer = std::move(other);
+    if (!answer.solved)
+      solve_by_matrix(problem, goal.enough, budget - thresholds.factorisation * (most - left), thresholds,
+                      answer);
   }
-  if (!answer.solved) solve_by_matrix(problem, goal, thresholds, answer);
   admit(problem, friction, answer);
   return answer;
 }

@@ -18,8 +18,12 @@ struct ClusterThresholds {
   CorrectionThresholds correction;
   ProximalThresholds proximal;
   /// Budget of an answer that rounds do not find, in sweeps over the cluster's stored matrix: so many, >= 0,
-  /// and so many for each sweep that the step has had, >= 0. What is beyond it is left without an answer.
-  double least_budget = 500, budget_per_sweep = 2;
+  /// and so many for each sweep that the step has had, >= 0. Beyond it the cluster is left without an answer.
+  double least_budget = 1500, budget_per_sweep = 4;
+  /// A factorisation of proximal steps counts so many sweeps, > 0 (as measured, 50 to 100 grains).
+  double factorisation = 10;
+  /// Their part of the budget, in (0, 1).
+  double proximal_share = 0.7;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.
   struct Turn {
@@ -46,11 +50,11 @@ struct ClusterGoal {
   int sweeps = 0;     ///< that the step has had: its budget (ClusterThresholds) grows with them
 };
 
-/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, without friction
-/// proximal steps (proximal_newton.hpp), with friction the solvers that keep W
-/// (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there. All by
-/// counted work, so the same bits come out every time. The changed impulses lie on the cones. Values that are
-/// not finite come back as an error that is not.
+/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, proximal steps
+/// (proximal_newton.hpp); and where these do not either, with what is left of the budget the solvers that
+/// keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there.
+/// All by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values
+/// that are not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

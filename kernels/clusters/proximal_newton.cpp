@@ -9,6 +9,7 @@
 #include "kernels/clusters/firm_contacts.hpp"
 #include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
+#include "kernels/law/friction_cone.hpp"
 
 namespace talus {
 
@@ -39,38 +40,40 @@ double size_of(const std::vector<Twist>& force) {
 /// The convex problem of one step, and where its solution stands.
 class ProximalStep {
  public:
-  ProximalStep(const BodyProblem& problem, double firmness) : firmness(firmness), problem_(problem) {
+  ProximalStep(const BodyProblem& problem, double firmness)
+      : firmness(firmness), centre(problem.impulse), motion(problem.bodies.size()), problem_(problem) {
     const std::vector<Twist> V = velocities_of(problem, problem.impulse);
-    for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-      const ContactEquation& c = problem.contacts[k];
-      velocity_.push_back(c.normal.dot(relative_velocity(c, V) + c.offset));
+    for (const ContactEquation& c : problem.contacts) {
+      velocity_.push_back(constrained(c, relative_velocity(c, V) + c.offset));
       mass_.push_back(effective_mass(problem, c));
-      centre.push_back(std::max(0.0, c.normal.dot(problem.impulse[k])));
+      shift.push_back(c.mu * tangential(c, velocity_.back()).norm());
     }
-    motion.resize(problem.bodies.size());
   }
 
-  double firmness;             ///< rho W_nn
-  std::vector<double> centre;  ///< t [N s]
-  std::vector<Twist> motion;   ///< d [m/s]
+  double firmness;            ///< rho W_nn
+  std::vector<Vec3> centre;   ///< t [N s]
+  std::vector<double> shift;  ///< s [m/s]
+  std::vector<Twist> motion;  ///< d [m/s]
 
-  /// v_n + b [m/s].
-  double velocity(std::size_t k, std::span<const Twist> d) const {
+  /// v + b n [m/s].
+  Vec3 velocity(std::size_t k, std::span<const Twist> d) const {
     const ContactEquation& c = problem_.contacts[k];
-    return velocity_[k] + c.normal.dot(relative_velocity(c, d));
+    return velocity_[k] + constrained(c, relative_velocity(c, d));
   }
-  /// max(0, t - rho (v_n + b)) [N s].
-  double carried(std::size_t k, std::span<const Twist> d) const {
-    return std::max(0.0, centre[k] - firmness * mass_[k] * velocity(k, d));
+  /// What is projected on the cone, and its projection [N s].
+  Vec3 aim(std::size_t k, std::span<const Twist> d) const {
+    return centre[k] - rho(k) * (velocity(k, d) + shift[k] * problem_.contacts[k].normal);
+  }
+  Vec3 carried(std::size_t k, std::span<const Twist> d) const {
+    const ContactEquation& c = problem_.contacts[k];
+    return project_on_cone(aim(k, d), c.normal, c.mu);
   }
 
   /// Minus the gradient: what contacts ask for beyond what bodies have [N s].
   std::vector<Twist> force(std::span<const Twist> d) const {
     std::vector<Twist> force(problem_.bodies.size());
-    for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
-      const ContactEquation& c = problem_.contacts[k];
-      add_force(c, carried(k, d) * c.normal - problem_.impulse[k], force);
-    }
+    for (std::size_t k = 0; k < problem_.contacts.size(); ++k)
+      add_force(problem_.contacts[k], Vec3(carried(k, d) - problem_.impulse[k]), force);
     for (std::size_t b = 0; b < force.size(); ++b) {
       restrict_to_freedoms(problem_.bodies[b], force[b]);
       force[b].u -= problem_.bodies[b].mass * d[b].u;
@@ -82,15 +85,33 @@ class ProximalStep {
   /// Newton's step from `motion`, where it leaves `force`.
   std::vector<Twist> way(const std::vector<Twist>& force) const {
     std::vector<ContactSpring> springs;
-    for (std::size_t k = 0; k < problem_.contacts.size(); ++k)
-      if (carried(k, motion) > 0) springs.push_back({k, problem_.contacts[k].normal, firmness * mass_[k]});
+    for (std::size_t k = 0; k < problem_.contacts.size(); ++k) add_springs(k, springs);
     return FirmContacts(problem_, springs).solve(force).motion;
   }
 
  private:
+  double rho(std::size_t k) const { return firmness * mass_[k]; }
+
+  /// rho times the derivative of the projection, which is symmetric.
+  void add_springs(std::size_t k, std::vector<ContactSpring>& springs) const {
+    const ContactEquation& c = problem_.contacts[k];
+    const Vec3 z = aim(k, motion), on = project_on_cone(z, c.normal, c.mu);
+    if (on == Vec3::Zero()) return;
+    if (c.mu == 0) {
+      springs.push_back({k, c.normal, rho(k)});
+    } else if (on == z) {
+      for (int axis = 0; axis < 3; ++axis) springs.push_back({k, Vec3(Vec3::Unit(axis)), rho(k)});
+    } else {
+      const Vec3 sideways = tangential(c, z);
+      springs.push_back({k, on.normalized(), rho(k)});
+      springs.push_back(
+          {k, c.normal.cross(sideways).normalized(), rho(k) * tangential(c, on).norm() / sideways.norm()});
+    }
+  }
+
   const BodyProblem& problem_;
-  std::vector<double> velocity_;  ///< v_n + b at the impulses of the problem [m/s]
-  std::vector<double> mass_;      ///< 1/W_nn [kg]
+  std::vector<Vec3> velocity_;  ///< v + b n at the impulses of the problem [m/s]
+  std::vector<double> mass_;    ///< 1/W_nn [kg]
 };
 
 /// Takes the part of Newton's `way` at which the function is least along it. `force` at its beginning, in; at
@@ -114,58 +135,84 @@ void go_along(const std::vector<Twist>& way, const ProximalThresholds& proximal,
   step.motion = std::move(there);
 }
 
-/// The minimum of a step, until momentum is off by no more than `enough` or by what rounding leaves [N s],
-/// which is returned. `factorisations`: that may be used, in; that are left, out.
-double minimise(double enough, const ProximalThresholds& proximal, ProximalStep& step, int& factorisations) {
+/// The minimum of a step, until momentum is off by no more than its part of `goal`, or by what rounding
+/// leaves [N s], which is returned. `factorisations`: that may be used, in; that are left, out.
+double minimise(double goal, const ProximalThresholds& proximal, ProximalStep& step, int& factorisations) {
   std::vector<Twist> force = step.force(step.motion);
-  double least = size_of(force);
-  for (int since = 0; size_of(force) > enough && since < proximal.patience && factorisations > 0; ++since) {
+  double off = size_of(force), least = off;
+  for (int since = 0; off > proximal.inner * goal && factorisations > 0; ++since) {
+    if (since >= (off <= goal ? proximal.patience_at_goal : proximal.patience)) break;
     --factorisations;
     const std::vector<Twist> way = step.way(force);
     go_along(way, proximal, step, force);
-    if (size_of(force) <= 0.5 * least) {
-      least = size_of(force);
+    off = size_of(force);
+    if (off <= 0.5 * least) {
+      least = off;
       since = -1;
     }
   }
-  return size_of(force);
+  return off;
 }
 
 /// What a step has come to: its projections are the next centre.
 Correction take_step(const BodyProblem& problem, ProximalStep& step) {
   Correction now;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    const ContactEquation& c = problem.contacts[k];
-    step.centre[k] = step.carried(k, step.motion);
-    const Vec3 r = step.centre[k] * c.normal;
-    now.open += (r - natural_map_of(problem, c, r, step.velocity(k, step.motion) * c.normal).carried).norm();
+    const Vec3 r = step.carried(k, step.motion);
+    const NaturalMap map = natural_map_of(problem, problem.contacts[k], r, step.velocity(k, step.motion));
+    now.open += (r - map.carried).norm();
     now.impulse.push_back(r - problem.impulse[k]);
+    step.centre[k] = r;
+    step.shift[k] = map.shift;
   }
   now.motion = step.motion;
   now.found = momentum_of(problem, step.motion);
   return now;
 }
 
+/// What is still to come of steps that change by `now` and have changed by `before`: a geometric series.
+double rest_of(double before, double now) {
+  return now < before ? now * now / (before - now) : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
 
 Correction proximal_correction(const BodyProblem& problem, double enough,
-                               const CorrectionThresholds& thresholds, const ProximalThresholds& proximal) {
-  ProximalStep step(problem, proximal.first_firmness);
+                               const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
+                               int& factorisations) {
+  ProximalStep step(problem, std::min(proximal.first_firmness, thresholds.firmness));
   Correction best;
   best.impulse.assign(problem.contacts.size(), Vec3::Zero());
   best.motion.resize(problem.bodies.size());
   best.open = std::numeric_limits<double>::infinity();
-  int factorisations = proximal.most_factorisations;
-  for (int k = 1; k <= proximal.most_steps && factorisations > 0 && !best.settled; ++k) {
-    const double wanted = proximal.inner * goal_of(momentum_of(problem, step.motion), enough, thresholds);
-    const double left = minimise(wanted, proximal, step, factorisations);
+  double most = thresholds.firmness, firmness = 0, moved = 0;
+  for (int k = 1; factorisations > 0 && !best.settled; ++k) {
+    const double goal = goal_of(momentum_of(problem, step.motion), enough, thresholds);
+    const int own = std::min(proximal.most, factorisations);
+    int unused = own;
+    const std::vector<Twist> before = step.motion;
+    const double left = minimise(goal, proximal, step, unused);
+    factorisations -= std::max(1, own - unused);
+    if (!(left <= goal)) {
+      if (step.firmness <= proximal.first_firmness) break;
+      step.motion = before;
+      most = step.firmness /= proximal.growth;
+      if (most < proximal.firm_enough) break;
+      continue;
+    }
     Correction now = take_step(problem, step);
-    now.left = left;
     now.rounds = k;
-    const double goal = goal_of(now.found, enough, thresholds);
-    now.settled = now.open <= goal && now.left <= goal;
+    now.left = left;
+    now.moved = momentum_of(problem, sum(step.motion, -1, before));
+    const bool small = now.open <= goal && now.moved <= goal;
+    // Behind a firmer step a softer one changes less, which says nothing.
+    now.missed = small && step.firmness >= firmness ? rest_of(moved, now.moved) : now.moved;
+    moved = now.moved;
+    now.settled = small && step.firmness >= std::max(firmness, proximal.firm_enough) &&
+                  now.missed <= proximal.rest * goal;
+    firmness = step.firmness;
     if (now.settled || now.error() < best.error()) best = std::move(now);
-    step.firmness = std::min(proximal.growth * step.firmness, thresholds.firmness);
+    if (own - unused <= proximal.easy) step.firmness = std::min(proximal.growth * step.firmness, most);
   }
   return best;
 }

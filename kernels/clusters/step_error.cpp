@@ -137,6 +137,7 @@ class Answers {
 
   double velocity_error(std::size_t c) const {
     const double momentum = answers_[c].error;
+    if (!answers_[c].solved) return larger(thresholds_.unknown, scales_[c] > 0 ? momentum / scales_[c] : 0);
     if (momentum == 0) return 0;
     // Where nothing moves overlaps may still ask for it.
     return scales_[c] > 0 ? momentum / scales_[c] : std::numeric_limits<double>::infinity();

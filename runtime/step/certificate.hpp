@@ -68,8 +68,8 @@ struct CertificateThresholds {
   int most_corrections = 10;
   /// So often small clusters may be found to have no answer, >= 1: from then on they are asked again when the
   /// sweeps done have grown by the second factor, > 1.
-  int most_doubts = 3;
-  double doubt_growth = 2;
+  int most_doubts = 1;
+  double doubt_growth = 4;
   /// Without sweeps in between only where the error has fallen to this part, in (0, 1).
   double correction_gain = 0.5;
   /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0,
