@@ -246,9 +246,6 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     }
     if (best.settled) break;
   }
-  if (const double error = thresholds.of_first_round * at_first;
-      friction && !best.settled && apart <= thresholds.most_apart && error <= enough)
-    return unchanged(problem, error);
   best.rounds = rounds;
   best.at_first = at_first;
   return best;

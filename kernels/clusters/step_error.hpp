@@ -20,8 +20,8 @@ struct StepErrorThresholds {
   double interest = 1e-2;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = 1e-12;
-  /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says nothing
-  /// of what they have not.
+  /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
+  /// nothing of what they have not.
   double unknown = 1;
 };
 
