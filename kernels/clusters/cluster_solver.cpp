@@ -84,21 +84,19 @@ ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const C
   return answer;
 }
 
-/// By the solvers that keep W, for as much work as so many sweeps, and rounds from where they get. `answer`:
-/// so far, in; the best, out.
-void solve_by_matrix(const BodyProblem& problem, double enough, double sweeps,
+/// By the solvers that keep W, for so much work (DelassusGoal::most_work), and rounds from where they get.
+/// `answer`: so far, in; the best, out.
+void solve_by_matrix(const BodyProblem& problem, double enough, ContactMatrix matrix, double work,
                      const ClusterThresholds& thresholds, ClusterAnswer& answer) {
-  ContactMatrix matrix = matrix_of(problem);
-  double left = sweeps * sweep_cost(matrix.problem);
   for (const ClusterThresholds::Turn& turn : thresholds.turns) {
-    if (left <= 0) break;
+    if (work <= 0) break;
     const DelassusGoal goal{.tolerance = turn.residual,
                             .measure = ErrorMeasure::scaled,
                             .max_iterations = turn.most_iterations,
-                            .most_work = left};
+                            .most_work = work};
     const bool last = &turn == &thresholds.turns.back();
     const DelassusReport report = solve_auto(matrix.problem, goal, {}, matrix.r);
-    left -= report.work;
+    work -= report.work;
     if (report.iterations == 0 && !last) continue;
     BodyProblem now = problem;
     now.impulse = matrix.impulses();
@@ -125,16 +123,16 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
   const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
                                     [](const ContactEquation& c) { return c.mu > 0; });
   if (!answer.solved) {
-    const double budget = thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps;
-    const int most = static_cast<int>(thresholds.proximal_share * budget / thresholds.factorisation);
-    int left = most;
-    ClusterAnswer other = answer_of(
-        problem, problem,
-        proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
+    ContactMatrix matrix = matrix_of(problem);
+    const double budget =
+        (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) * sweep_cost(matrix.problem);
+    double left = thresholds.proximal_share * budget;
+    const Correction proximal =
+        proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left);
+    ClusterAnswer other = answer_of(problem, problem, proximal);
     if (other.solved || other.error < answer.error) answer = std::move(other);
-    if (!answer.solved)
-      solve_by_matrix(problem, goal.enough, budget - thresholds.factorisation * (most - left), thresholds,
-                      answer);
+    left += (1 - thresholds.proximal_share) * budget;
+    if (!answer.solved) solve_by_matrix(problem, goal.enough, std::move(matrix), left, thresholds, answer);
   }
   admit(problem, friction, answer);
   return answer;

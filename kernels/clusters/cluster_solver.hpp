@@ -17,12 +17,11 @@ namespace talus {
 struct ClusterThresholds {
   CorrectionThresholds correction;
   ProximalThresholds proximal;
-  /// Budget of an answer that rounds do not find, in sweeps over the cluster's stored matrix: so many, >= 0,
-  /// and so many for each sweep that the step has had, >= 0. Beyond it the cluster is left without an answer.
+  /// Budget of an answer that rounds do not find, in multiplications, those of sweeps over the cluster's
+  /// stored matrix (sweep_cost): so many, >= 0, and so many for each sweep that the step has had, >= 0.
+  /// Beyond it the cluster is left without an answer.
   double least_budget = 1500, budget_per_sweep = 4;
-  /// A factorisation of proximal steps counts so many sweeps, > 0 (as measured, 50 to 100 grains).
-  double factorisation = 10;
-  /// Their part of the budget, in (0, 1).
+  /// Part of it that proximal steps may take, in (0, 1).
   double proximal_share = 0.7;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.

@@ -30,6 +30,9 @@ class FirmContacts {
 
   double rho(std::size_t contact) const { return rho_[contact]; }  ///< [kg], of the first kind
 
+  /// Multiplications that it has taken, about: of the factor, and of what it is put together from.
+  double work() const { return work_; }
+
   struct Solution {
     std::vector<Twist> motion;  ///< per unknown [m/s]
     std::vector<Twist> last;    ///< by which the last refinement has changed it: about its error
@@ -47,6 +50,7 @@ class FirmContacts {
   std::vector<Eigen::Index> begin_;  ///< per unknown, its first freedom; and the number of all
   Eigen::SparseMatrix<double> matrix_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+  double work_ = 0;
 };
 
 }  // namespace talus

@@ -82,11 +82,13 @@ class ProximalStep {
     return force;
   }
 
-  /// Newton's step from `motion`, where it leaves `force`.
-  std::vector<Twist> way(const std::vector<Twist>& force) const {
+  /// Newton's step from `motion`, where it leaves `force`; its work is taken off.
+  std::vector<Twist> way(const std::vector<Twist>& force, double& work) const {
     std::vector<ContactSpring> springs;
     for (std::size_t k = 0; k < problem_.contacts.size(); ++k) add_springs(k, springs);
-    return FirmContacts(problem_, springs).solve(force).motion;
+    const FirmContacts firm(problem_, springs);
+    work -= firm.work();
+    return firm.solve(force).motion;
   }
 
  private:
@@ -135,23 +137,31 @@ void go_along(const std::vector<Twist>& way, const ProximalThresholds& proximal,
   step.motion = std::move(there);
 }
 
+/// How a step has come to its minimum.
+struct Minimised {
+  double off = 0;          ///< what momentum is off by [N s]
+  int factorisations = 0;  ///< that it took
+};
+
 /// The minimum of a step, until momentum is off by no more than its part of `goal`, or by what rounding
-/// leaves [N s], which is returned. `factorisations`: that may be used, in; that are left, out.
-double minimise(double goal, const ProximalThresholds& proximal, ProximalStep& step, int& factorisations) {
+/// leaves.
+Minimised minimise(double goal, const ProximalThresholds& proximal, ProximalStep& step, double& work) {
   std::vector<Twist> force = step.force(step.motion);
-  double off = size_of(force), least = off;
-  for (int since = 0; off > proximal.inner * goal && factorisations > 0; ++since) {
-    if (since >= (off <= goal ? proximal.patience_at_goal : proximal.patience)) break;
-    --factorisations;
-    const std::vector<Twist> way = step.way(force);
+  Minimised result{size_of(force), 0};
+  double least = result.off;
+  for (int since = 0; result.off > proximal.inner * goal; ++since) {
+    const int patience = result.off <= goal ? proximal.patience_at_goal : proximal.patience;
+    if (since >= patience || result.factorisations >= proximal.most || work <= 0) break;
+    ++result.factorisations;
+    const std::vector<Twist> way = step.way(force, work);
     go_along(way, proximal, step, force);
-    off = size_of(force);
-    if (off <= 0.5 * least) {
-      least = off;
+    result.off = size_of(force);
+    if (result.off <= 0.5 * least) {
+      least = result.off;
       since = -1;
     }
   }
-  return off;
+  return result;
 }
 
 /// What a step has come to: its projections are the next centre.
@@ -179,21 +189,18 @@ double rest_of(double before, double now) {
 
 Correction proximal_correction(const BodyProblem& problem, double enough,
                                const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
-                               int& factorisations) {
+                               double& work) {
   ProximalStep step(problem, std::min(proximal.first_firmness, thresholds.firmness));
   Correction best;
   best.impulse.assign(problem.contacts.size(), Vec3::Zero());
   best.motion.resize(problem.bodies.size());
   best.open = std::numeric_limits<double>::infinity();
   double most = thresholds.firmness, firmness = 0, moved = 0;
-  for (int k = 1; factorisations > 0 && !best.settled; ++k) {
+  for (int k = 1; k <= proximal.most_steps && work > 0 && !best.settled; ++k) {
     const double goal = goal_of(momentum_of(problem, step.motion), enough, thresholds);
-    const int own = std::min(proximal.most, factorisations);
-    int unused = own;
     const std::vector<Twist> before = step.motion;
-    const double left = minimise(goal, proximal, step, unused);
-    factorisations -= std::max(1, own - unused);
-    if (!(left <= goal)) {
+    const Minimised minimum = minimise(goal, proximal, step, work);
+    if (!(minimum.off <= goal)) {
       if (step.firmness <= proximal.first_firmness) break;
       step.motion = before;
       most = step.firmness /= proximal.growth;
@@ -202,17 +209,20 @@ Correction proximal_correction(const BodyProblem& problem, double enough,
     }
     Correction now = take_step(problem, step);
     now.rounds = k;
-    now.left = left;
+    now.left = minimum.off;
     now.moved = momentum_of(problem, sum(step.motion, -1, before));
     const bool small = now.open <= goal && now.moved <= goal;
     // Behind a firmer step a softer one changes less, which says nothing.
     now.missed = small && step.firmness >= firmness ? rest_of(moved, now.moved) : now.moved;
+    // What the minima leave tells nothing of the ratio.
+    if (now.moved <= proximal.inner * goal) now.missed = now.moved;
     moved = now.moved;
     now.settled = small && step.firmness >= std::max(firmness, proximal.firm_enough) &&
                   now.missed <= proximal.rest * goal;
     firmness = step.firmness;
     if (now.settled || now.error() < best.error()) best = std::move(now);
-    if (own - unused <= proximal.easy) step.firmness = std::min(proximal.growth * step.firmness, most);
+    if (minimum.factorisations <= proximal.easy)
+      step.firmness = std::min(proximal.growth * step.firmness, most);
   }
   return best;
 }

@@ -25,14 +25,16 @@ struct ProximalThresholds {
   /// Factorisations that have not halved what momentum is off by, after which a step ends; and where it is
   /// within the goal: nothing but rounding is left.
   int patience = 15, patience_at_goal = 3;
+  int most_steps = 200;  ///< >= 1
   /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
   double firm_enough = 1e6;
   /// What further steps would change, by how the last two did, may be so many goals, >= 1.
   double rest = 10;
 };
 
-/// What would set all contacts right, as correction_of, by at most so many factorisations, which are counted
-/// down. `enough`, the goal and `open` are the same; settled: further steps would change next to nothing.
+/// What would set all contacts right, as correction_of. `work`: multiplications after which no more
+/// factorisations begin, in; what is left of them, out. `enough`, the goal and `open` are the same; settled:
+/// further steps would change next to nothing.
 ///
 /// A step from impulses t, with the shift s = mu |v_t| of the last velocities (none without friction), finds
 /// the change d of the velocities that makes
@@ -44,6 +46,6 @@ struct ProximalThresholds {
 /// several (Rockafellar 1976). s follows the velocities (Cadoux 2009); with friction it need not settle.
 Correction proximal_correction(const BodyProblem& problem, double enough,
                                const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
-                               int& factorisations);
+                               double& work);
 
 }  // namespace talus

@@ -15,8 +15,9 @@ using namespace cluster_makers;
 
 constexpr double enough = 1e-4 * fall;
 
-Correction corrected(const BodyProblem& problem, int factorisations = 1000) {
-  return proximal_correction(problem, enough, {}, {}, factorisations);
+Correction corrected(const BodyProblem& problem) {
+  double work = 1e9;
+  return proximal_correction(problem, enough, {}, {}, work);
 }
 
 Vec3 impulse_of(const BodyProblem& problem, const Correction& correction, std::size_t k) {
@@ -78,15 +79,16 @@ TEST(ProximalSteps, WithFrictionAGrainSlidesOrSticksAsCoulombSays) {
   }
 }
 
-TEST(ProximalSteps, KeepToTheirFactorisationsAndSaySo) {
+TEST(ProximalSteps, KeepToTheirWorkAndSaySo) {
   const BodyProblem problem = wedge(1e-3, 0);
-  int factorisations = 1;
-  EXPECT_FALSE(proximal_correction(problem, enough, {}, {}, factorisations).settled);
-  EXPECT_EQ(factorisations, 0);
-  factorisations = 1000;
-  EXPECT_TRUE(proximal_correction(problem, enough, {}, {}, factorisations).settled);
-  EXPECT_LT(factorisations, 1000);
-  EXPECT_GT(factorisations, 900);
+  double work = 1;
+  EXPECT_FALSE(proximal_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_LE(work, 0);
+  EXPECT_GT(work, -1e4) << "one factorisation of one grain";
+  work = 1e9;
+  EXPECT_TRUE(proximal_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_LT(work, 1e9);
+  EXPECT_GT(work, 0.9e9);
 }
 
 }  // namespace

@@ -106,7 +106,7 @@ TEST(StepError, OfAJammedGrainThatHasToSlideIsNotWhatItsContactsFindWrong) {
 TEST(StepError, OfAClusterWithoutAnAnswerIsNotWhatItHappenedToFind) {
   BodyProblem problem = wedge(0.0412, 0.5);
   const double normal = fall / (2 * std::sin(0.0412));
-  for (std::size_t k = 0; k < 2; ++k) problem.impulse[k] = normal * problem.contacts[k].normal;
+  for (std::size_t k = 0; k < 2; ++k) problem.impulse[k] = 0.5 * normal * problem.contacts[k].normal;
   StepErrorThresholds thresholds;
   thresholds.cluster.correction.most_rounds = 1;
   thresholds.cluster.least_budget = thresholds.cluster.budget_per_sweep = 0;
