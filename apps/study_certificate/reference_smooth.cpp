@@ -22,6 +22,8 @@ using Rows = std::vector<Eigen::Index>;
 /// misses shrinks by shift/(shift + l). It falls until the law is met, and no further, so that redundant
 /// contacts between fixed walls, whose gaps rounding has made, are not pumped up.
 constexpr Real first_shift = 1e-5L, least_shift = 1e-13L;
+/// Where one next to the run's is looked for: the larger it is, the nearer it stays.
+constexpr Real nearest_shift = 10;
 
 /// The law is met to this part of the residual that is enough: it comes at no cost.
 constexpr Real sharpness = 1e-4L;
@@ -200,7 +202,7 @@ Vector next_to(const Dual& dual, const ReferenceLimits& limits, Real unit, const
                       std::max(kinetic2(answer),
                                floor_of_exchange * floor_of_exchange * answer.maxCoeff() * answer.maxCoeff());
   Vector next;
-  for (Real shift = first_shift; shift >= least_shift; shift /= 10) {
+  for (Real shift = nearest_shift; shift >= least_shift; shift /= 10) {
     if (!Pivots(dual.W, dual.q - shift * start, shift, limits.pivots).solve(carry, next)) return answer;
     next = next.cwiseMax(Real{0}).eval();
     if (met_by(dual, next).residual <= limits.forces * unit && kinetic2(next - answer) <= apart2) return next;

@@ -112,6 +112,19 @@ Problem column_and_landing_grain(int count) {
   return made;
 }
 
+/// A column among grains that each lie on the floor by themselves: what is wrong in it is little of all.
+Problem column_among(int count, int singles) {
+  Problem made = column(even(count), 0);
+  const double mass = sphere_mass(radius);
+  std::vector<std::vector<double>> columns{std::vector<double>(static_cast<std::size_t>(count), mass)};
+  for (int k = 1; k <= singles; ++k) {
+    add_grain(made, {3 * radius * k, 0, radius}, radius, mass);
+    columns.push_back({mass});
+  }
+  made.truth = stacked_forces(std::move(columns));
+  return made;
+}
+
 /// Ten grains, the uppermost or all but it `ratio` times as heavy.
 std::vector<Grain> heavy_at(bool top, double ratio) {
   std::vector<Grain> grains = even(10);
@@ -136,6 +149,8 @@ void add_columns(std::vector<Scene>& table) {
                      made.setup.decomposition.subdomains = 8;
                      return made;
                    }});
+  table.push_back({"column-100-among-2000", "a smooth column among 2000 single grains: each contact",
+                   [] { return column_among(100, 2000); }});
   table.push_back({"column-60-landing", "a grain lands beside a column of 60: all forces",
                    [] { return column_and_landing_grain(60); }});
   for (double ratio : {1e2, 1e4, 1e6, 1e8})

@@ -100,19 +100,21 @@ Truth all_stop(const Problem& of, std::size_t flying) {
   return {wrong, TruthFrom::any_state, "the others begin with what is left of the impact"};
 }
 
-/// The halves of a row of touching grains run into one another, in free fall; with `lying`, a metre above one
+/// The halves of rows of touching grains run into one another, in free fall; with `lying`, a metre above one
 /// grain at rest on a floor, which is all that the floor's force tells of.
-Problem row_in_flight(std::size_t count, bool lying) {
+Problem rows_in_flight(std::size_t rows, std::size_t count, bool lying) {
   Problem made = problem(natural_dt, {0, 0, -earth}, 0);
-  for (std::size_t k = 0; k < count; ++k)
-    push(add_grain(made, {2 * radius * static_cast<double>(k), 0, 1}, radius, sphere_mass(radius)),
-         {2 * k < count ? 1.0 : -1.0, 0, 0});
+  for (std::size_t row = 0; row < rows; ++row)
+    for (std::size_t k = 0; k < count; ++k)
+      push(add_grain(made, {2 * radius * static_cast<double>(k), 3 * radius * static_cast<double>(row), 1},
+                     radius, sphere_mass(radius)),
+           {2 * k < count ? 1.0 : -1.0, 0, 0});
   if (lying) {
     add_wall(made, "floor", Vec3::Zero(), Vec3::UnitZ());
     add_grain(made, {0, 0, radius}, radius, sphere_mass(radius));
   }
   made.steps = 1;
-  made.truth = all_stop(made, count);
+  made.truth = all_stop(made, rows * count);
   return made;
 }
 
@@ -268,7 +270,9 @@ void add_motion(std::vector<Scene>& table) {
     table.push_back({lying ? "row-1000-above-a-grain" : "row-1000",
                      lying ? "the same, above a grain on a floor that feels nothing of it"
                            : "the halves of a row in free fall run into one another: all stop",
-                     [lying] { return row_in_flight(1000, lying); }});
+                     [lying] { return rows_in_flight(1, 1000, lying); }});
+  table.push_back(
+      {"rows-100x50", "a hundred such rows side by side", [] { return rows_in_flight(100, 50, false); }});
   for (const bool floor : {true, false})
     table.push_back({floor ? "boulders-pebble-floor" : "boulders-pebble-rattler",
                      floor ? "boulders run into a pebble between them, far from one that lies: all stop"

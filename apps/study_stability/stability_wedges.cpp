@@ -101,11 +101,12 @@ Problem funnel(int count) {
 }
 
 /// Grains along their own line of thrust between two walls at right angles to it: thrust T_k = (H, 0, V_k)
-/// from grain k - 1 to grain k, V falling by a weight per grain.
-Problem arch(int count, double mu) {
+/// from grain k - 1 to grain k, V falling by a weight per grain. It springs at `angle` [rad]: a small one
+/// makes a nearly straight chain.
+Problem arch(int count, double mu, double angle = 1.0471975511965977) {
   Problem made = problem(natural_dt, {0, 0, -earth}, mu);
   const double weight = earth * sphere_mass(radius), half = 0.5 * count * weight;
-  const double horizontal = half / 1.7320508075688772;  // it springs at 60 degrees
+  const double horizontal = half / std::tan(angle);
   const auto thrust = [&](int k) { return Vec3(horizontal, 0, half - k * weight); };
   Vec3 x = Vec3::Zero();
   std::map<std::pair<std::int64_t, std::int64_t>, double> exact;  // by bodies in order
@@ -133,6 +134,15 @@ Problem arch(int count, double mu) {
     return error / largest;
   };
   made.truth = {thrusts, TruthFrom::rest};
+  return made;
+}
+
+/// A grain on four floors in one place: how they share its weight nothing tells.
+Problem floors() {
+  Problem made = problem(natural_dt, {0, 0, -earth}, 0);
+  for (int k = 0; k < 4; ++k) add_wall(made, fmt::format("floor-{}", k), Vec3::Zero(), Vec3::UnitZ());
+  add_grain(made, {0, 0, radius}, radius, sphere_mass(radius));
+  made.truth = walls_carry(earth * sphere_mass(radius));
   return made;
 }
 
@@ -165,7 +175,7 @@ Problem walls_cross() {
 }  // namespace
 
 void add_wedges_and_arches(std::vector<Scene>& table) {
-  for (double angle : {0.3, 0.1, 0.01})
+  for (double angle : {0.3, 0.1, 0.01, 0.001})
     table.push_back({fmt::format("wedge-{}", angle),
                      "a smooth grain in a wedge of that half angle [rad]: both wall forces",
                      [angle] { return wedge(angle, 0); }});
@@ -189,6 +199,11 @@ void add_wedges_and_arches(std::vector<Scene>& table) {
   for (int count : {9, 40})
     table.push_back({fmt::format("arch-{}", count), "a smooth arch along its line of thrust: each thrust",
                      [count] { return arch(count, 0); }});
+  for (double angle : {0.1, 0.01})
+    table.push_back({fmt::format("chain-20-{}", angle),
+                     "an arch that springs at so small an angle [rad], a nearly straight chain: each thrust",
+                     [angle] { return arch(20, 0, angle); }});
+  table.push_back({"floors-4", "a grain on four floors in one place: their sum", floors});
   table.push_back({"arch-40-hyperstatic", "the same with friction 0.5: the sum of the wall forces",
                    [] { return arch(40, 0.5); }});
 }

@@ -7,6 +7,7 @@
 
 #include "kernels/clusters/contact_matrix.hpp"
 #include "kernels/delassus/delassus_auto.hpp"
+#include "kernels/delassus/delassus_sweeps.hpp"
 #include "kernels/global/natural_map.hpp"
 #include "kernels/law/friction_cone.hpp"
 
@@ -52,6 +53,7 @@ void admit(const BodyProblem& problem, bool friction, ClusterAnswer& answer) {
     const ContactEquation& c = problem.contacts[k];
     changed[k] = project_on_cone(changed[k] + answer.impulse[k], c.normal, c.mu);
     answer.impulse[k] = changed[k] - problem.impulse[k];
+    if (answer.solved) answer.found[k] = answer.impulse[k];
   }
   const LawDefect then = law_defect(problem, problem.impulse), now = law_defect(problem, changed);
   // Comparisons are false for NaN.
@@ -66,7 +68,8 @@ ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const C
   const std::vector<Twist> then = velocities_of(from, from.impulse), since = velocities_of(now, now.impulse);
   for (std::size_t k = 0; k < from.contacts.size(); ++k) {
     const Vec3 change = now.impulse[k] - from.impulse[k];
-    answer.impulse.push_back(answer.solved ? Vec3(change + correction.impulse[k]) : change);
+    answer.found.push_back(change + correction.impulse[k]);
+    answer.impulse.push_back(answer.solved ? answer.found.back() : change);
   }
   for (std::size_t b = 0; b < then.size(); ++b) {
     Twist motion{since[b].u - then[b].u, since[b].w - then[b].w};
@@ -81,29 +84,19 @@ ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const C
   return answer;
 }
 
-}  // namespace
-
-ClusterAnswer solve_cluster(const BodyProblem& problem, double enough, const ClusterThresholds& thresholds) {
-  ClusterAnswer answer;
-  if (!finite(problem)) {
-    answer.impulse.assign(problem.contacts.size(), Vec3::Zero());
-    answer.motion.resize(problem.bodies.size());
-    answer.error = std::numeric_limits<double>::quiet_NaN();
-    return answer;
-  }
-  answer = answer_of(problem, problem, correction_of(problem, enough, thresholds.correction));
-  const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
-                                    [](const ContactEquation& c) { return c.mu > 0; });
-  if (answer.solved) {
-    admit(problem, friction, answer);
-    return answer;
-  }
-  ContactMatrix matrix = matrix_of(problem);
+/// By the solvers that keep W, for so much work (DelassusGoal::most_work), and rounds from where they get.
+/// `answer`: so far, in; the best, out.
+void solve_by_matrix(const BodyProblem& problem, double enough, ContactMatrix matrix, double work,
+                     const ClusterThresholds& thresholds, ClusterAnswer& answer) {
   for (const ClusterThresholds::Turn& turn : thresholds.turns) {
-    const DelassusGoal goal{
-        .tolerance = turn.residual, .measure = ErrorMeasure::scaled, .max_iterations = turn.most_iterations};
+    if (work <= 0) break;
+    const DelassusGoal goal{.tolerance = turn.residual,
+                            .measure = ErrorMeasure::scaled,
+                            .max_iterations = turn.most_iterations,
+                            .most_work = work};
     const bool last = &turn == &thresholds.turns.back();
     const DelassusReport report = solve_auto(matrix.problem, goal, {}, matrix.r);
+    work -= report.work;
     if (report.iterations == 0 && !last) continue;
     BodyProblem now = problem;
     now.impulse = matrix.impulses();
@@ -111,6 +104,35 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, double enough, const Clu
     // Of answers that are none the nearest says most.
     if (other.solved || other.error < answer.error) answer = std::move(other);
     if (answer.solved) break;
+  }
+}
+
+}  // namespace
+
+ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
+                            const ClusterThresholds& thresholds) {
+  ClusterAnswer answer;
+  if (!finite(problem)) {
+    answer.impulse.assign(problem.contacts.size(), Vec3::Zero());
+    answer.found = answer.impulse;
+    answer.motion.resize(problem.bodies.size());
+    answer.error = std::numeric_limits<double>::quiet_NaN();
+    return answer;
+  }
+  answer = answer_of(problem, problem, correction_of(problem, goal.enough, thresholds.correction));
+  const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
+                                    [](const ContactEquation& c) { return c.mu > 0; });
+  if (!answer.solved) {
+    ContactMatrix matrix = matrix_of(problem);
+    const double budget =
+        (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) * sweep_cost(matrix.problem);
+    double left = thresholds.proximal_share * budget;
+    const Correction proximal =
+        proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left);
+    ClusterAnswer other = answer_of(problem, problem, proximal);
+    if (other.solved || other.error < answer.error) answer = std::move(other);
+    left += (1 - thresholds.proximal_share) * budget;
+    if (!answer.solved) solve_by_matrix(problem, goal.enough, std::move(matrix), left, thresholds, answer);
   }
   admit(problem, friction, answer);
   return answer;

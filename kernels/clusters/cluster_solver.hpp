@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/clusters/correction.hpp"
+#include "kernels/clusters/proximal_newton.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus {
@@ -15,6 +16,13 @@ namespace talus {
 /// Every number that an answer depends on. Ratios have no unit.
 struct ClusterThresholds {
   CorrectionThresholds correction;
+  ProximalThresholds proximal;
+  /// Budget of an answer that rounds do not find, in multiplications, those of sweeps over the cluster's
+  /// stored matrix (sweep_cost): so many, >= 0, and so many for each sweep that the step has had, >= 0.
+  /// Beyond it the cluster is left without an answer.
+  double least_budget = 1500, budget_per_sweep = 4;
+  /// Part of it that proximal steps may take, in (0, 1).
+  double proximal_share = 0.7;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.
   struct Turn {
@@ -28,17 +36,25 @@ struct ClusterThresholds {
 struct ClusterAnswer {
   std::vector<Vec3> impulse;  ///< per contact: change of r [N s]
   std::vector<Twist> motion;  ///< per unknown: change of V [m/s]
+  std::vector<Vec3> found;    ///< per contact: `impulse` where solved; else what the best of the rounds would
+                              ///< change, an estimate of what r is off by [N s]
   double error = 0;           ///< momentum of the motion, and what is not known of it [N s]
   bool solved = false;        ///< impulses and velocities satisfy the law but for what is small
   bool helps = false;         ///< with the change they are nearer to it than before
 };
 
-/// Rounds of Newton's method over the bodies (correction.hpp); with friction, where these do not settle, the
-/// solvers that keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again
-/// from there. `enough`: momentum [N s] that need not be told apart. All by counted work, so the same bits
-/// come out every time. The changed impulses lie on the cones. Values that are not finite come back as an
-/// error that is not.
-ClusterAnswer solve_cluster(const BodyProblem& problem, double enough,
+/// What is asked of an answer.
+struct ClusterGoal {
+  double enough = 0;  ///< momentum that need not be told apart [N s]
+  int sweeps = 0;     ///< that the step has had: its budget (ClusterThresholds) grows with them
+};
+
+/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, proximal steps
+/// (proximal_newton.hpp); and where these do not either, with what is left of the budget the solvers that
+/// keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there.
+/// All by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values
+/// that are not finite come back as an error that is not.
+ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 
 }  // namespace talus

@@ -106,11 +106,6 @@ ActiveProblem active_part(const BodyProblem& all, const ActiveSet& set) {
   return active;
 }
 
-/// What may be left of a momentum [N s].
-double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
-  return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
-}
-
 /// One round: the linear system of the present states, solved by augmented Lagrangians.
 class Round {
  public:
@@ -200,6 +195,10 @@ Correction unchanged(const BodyProblem& problem, double at_first) {
 
 }  // namespace
 
+double goal_of(double found, double enough, const CorrectionThresholds& thresholds) {
+  return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
+}
+
 double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion) {
   double sum = 0;
   for (std::size_t b = 0; b < motion.size(); ++b)
@@ -247,9 +246,6 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     }
     if (best.settled) break;
   }
-  if (const double error = thresholds.of_first_round * at_first;
-      friction && !best.settled && apart <= thresholds.most_apart && error <= enough)
-    return unchanged(problem, error);
   best.rounds = rounds;
   best.at_first = at_first;
   return best;

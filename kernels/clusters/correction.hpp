@@ -23,10 +23,6 @@ struct CorrectionThresholds {
   /// Impulses that leave less than this part of what need not be known, in (0, 1], are exact: what
   /// multipliers still say of them is rounding, firmness times as large.
   double exact = 1e-6;
-  /// With friction, where rounds do not settle, impulses stay whose first round finds next to nothing: so
-  /// many times that counts as their error, >= 1, and must be no more than what need not be known. Jammed
-  /// grains that have to slide by next to nothing have true errors of up to a hundred times what it finds.
-  double of_first_round = 100;
   /// Not where all bodies of the cluster together are so many effective masses of a contact, >> 1: heavier
   /// ones go on where the firm contacts of a round give way, and contacts feel next to nothing of it.
   double most_apart = 1e7;
@@ -75,10 +71,12 @@ struct Correction {
 /// contact changes any more, and without friction, V + d is the exact solution of the step, since it and r +
 /// change satisfy all its conditions. With friction the direction of sliding is that of the last velocities:
 /// there it has settled when two rounds, one after the other, agree besides; where contacts carry more than
-/// they must, as in a jammed wedge, they may never do, and impulses stay whose first round finds next to
-/// nothing.
+/// they must, as in a jammed wedge, they may never do.
 Correction correction_of(const BodyProblem& problem, double enough,
                          const CorrectionThresholds& thresholds = {});
+
+/// What may be left of a correction that has found so much momentum [N s].
+double goal_of(double found, double enough, const CorrectionThresholds& thresholds);
 
 /// Sum m |u| + (I/R^2) |w| over the unknowns [N s].
 double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion);

@@ -13,6 +13,9 @@ namespace {
 /// Each takes off what rounding has left, a millionth part of the step or less.
 constexpr int refinements = 2;
 
+/// Multiplications that take as long as it takes to put an entry into its place and to order it.
+constexpr double work_of_entry = 30;
+
 Eigen::Index freedoms_of_body(const BodyUnknown& body) {
   return body.wall ? 1 : body.spin_mass > 0 ? 6 : 3;
 }
@@ -39,39 +42,59 @@ Freedoms freedoms(const BodyUnknown& body, Eigen::Index begin, const Twist& of) 
 }  // namespace
 
 FirmContacts::FirmContacts(const BodyProblem& problem, double firmness) : problem_(problem) {
+  std::vector<ContactSpring> springs;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const ContactEquation& c = problem.contacts[k];
+    rho_.push_back(firmness * effective_mass(problem, c));
+    for (int axis = 0; axis < (c.mu > 0 ? 3 : 1); ++axis)
+      springs.push_back({k, c.mu > 0 ? Vec3(Vec3::Unit(axis)) : c.normal, rho_.back()});
+  }
+  factorise(springs);
+}
+
+FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs)
+    : problem_(problem) {
+  factorise(springs);
+}
+
+void FirmContacts::factorise(std::span<const ContactSpring> springs) {
   begin_.push_back(0);
-  for (const BodyUnknown& body : problem.bodies) begin_.push_back(begin_.back() + freedoms_of_body(body));
+  for (const BodyUnknown& body : problem_.bodies) begin_.push_back(begin_.back() + freedoms_of_body(body));
   std::vector<Eigen::Triplet<double>> entries;
-  for (std::size_t b = 0; b < problem.bodies.size(); ++b)
+  for (std::size_t b = 0; b < problem_.bodies.size(); ++b)
     for (Eigen::Index k = begin_[b]; k < begin_[b + 1]; ++k) {
-      const BodyUnknown& body = problem.bodies[b];
+      const BodyUnknown& body = problem_.bodies[b];
       entries.emplace_back(k, k, k - begin_[b] < 3 ? body.mass : body.spin_mass);
     }
-  for (const ContactEquation& c : problem.contacts) {
-    rho_.push_back(firmness * effective_mass(problem, c));
-    for (int axis = 0; axis < (c.mu > 0 ? 3 : 1); ++axis) {
-      const Vec3 direction = c.mu > 0 ? Vec3(Vec3::Unit(axis)) : c.normal;
-      // The contact as if its bodies were 0 and 1.
-      ContactEquation alone = c;
-      alone.first = 0;
-      alone.second = c.second < 0 ? -1 : 1;
-      std::array<Twist, 2> force{};
-      add_force(alone, direction, force);
-      std::array<Freedoms, 2> column{};
-      std::size_t bodies = 0;
-      for (const std::int32_t b : {c.first, c.second})
-        if (b >= 0) column[bodies] = freedoms(problem.bodies[at(b)], begin_[at(b)], force[bodies]), ++bodies;
-      for (std::size_t i = 0; i < bodies; ++i)
-        for (std::size_t j = 0; j < bodies; ++j)
-          for (Eigen::Index k = 0; k < column[i].count; ++k)
-            for (Eigen::Index l = 0; l < column[j].count; ++l)
-              entries.emplace_back(column[i].begin + k, column[j].begin + l,
-                                   rho_.back() * column[i].value[at(k)] * column[j].value[at(l)]);
-    }
+  for (const ContactSpring& spring : springs) {
+    const ContactEquation& c = problem_.contacts[spring.contact];
+    // The contact as if its bodies were 0 and 1.
+    ContactEquation alone = c;
+    alone.first = 0;
+    alone.second = c.second < 0 ? -1 : 1;
+    std::array<Twist, 2> force{};
+    add_force(alone, spring.direction, force);
+    std::array<Freedoms, 2> column{};
+    std::size_t bodies = 0;
+    for (const std::int32_t b : {c.first, c.second})
+      if (b >= 0) column[bodies] = freedoms(problem_.bodies[at(b)], begin_[at(b)], force[bodies]), ++bodies;
+    for (std::size_t i = 0; i < bodies; ++i)
+      for (std::size_t j = 0; j < bodies; ++j)
+        for (Eigen::Index k = 0; k < column[i].count; ++k)
+          for (Eigen::Index l = 0; l < column[j].count; ++l)
+            entries.emplace_back(column[i].begin + k, column[j].begin + l,
+                                 spring.stiffness * column[i].value[at(k)] * column[j].value[at(l)]);
   }
   matrix_.resize(begin_.back(), begin_.back());
   matrix_.setFromTriplets(entries.begin(), entries.end());
   factor_.compute(matrix_);
+  work_ = work_of_entry * static_cast<double>(entries.size());
+  if (factor_.info() != Eigen::Success) return;
+  const auto& L = factor_.matrixL().nestedExpression();
+  for (Eigen::Index k = 0; k < L.outerSize(); ++k) {
+    const auto rows = static_cast<double>(L.outerIndexPtr()[k + 1] - L.outerIndexPtr()[k]);
+    work_ += rows * rows;
+  }
 }
 
 Eigen::VectorXd FirmContacts::freedoms_of(std::span<const Twist> of) const {

@@ -11,15 +11,27 @@
 
 namespace talus {
 
-/// A = M + H rho H^T over the freedoms of the bodies (3 of a grain, 6 where it turns, 1 of a wall),
-/// factorised directly. rho is `firmness` effective masses of each contact; H is that of the normals, with mu
-/// > 0 of all directions.
+/// A spring of a contact: it resists relative velocities along a direction.
+struct ContactSpring {
+  std::size_t contact = 0;
+  Vec3 direction = Vec3::Zero();  ///< unit
+  double stiffness = 0;           ///< impulse per velocity [kg], > 0
+};
+
+/// A = M + sum of H e k e^T H^T, springs of direction e and stiffness k, over the freedoms of the bodies (3
+/// of a grain, 6 where it turns, 1 of a wall), factorised directly.
 class FirmContacts {
  public:
-  /// Costs a sparse Cholesky factorisation.
+  /// Each contact with the stiffness rho of `firmness` effective masses: along its normal, with mu > 0 in all
+  /// directions. Costs a sparse Cholesky factorisation.
   FirmContacts(const BodyProblem& problem, double firmness);
+  /// With these springs. The same cost.
+  FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs);
 
-  double rho(std::size_t contact) const { return rho_[contact]; }  ///< [kg]
+  double rho(std::size_t contact) const { return rho_[contact]; }  ///< [kg], of the first kind
+
+  /// Multiplications that it has taken, about: of the factor, and of what it is put together from.
+  double work() const { return work_; }
 
   struct Solution {
     std::vector<Twist> motion;  ///< per unknown [m/s]
@@ -29,6 +41,7 @@ class FirmContacts {
   Solution solve(std::span<const Twist> force) const;
 
  private:
+  void factorise(std::span<const ContactSpring> springs);
   Eigen::VectorXd freedoms_of(std::span<const Twist> of) const;
   std::vector<Twist> twists_of(const Eigen::VectorXd& x) const;
 
@@ -37,6 +50,7 @@ class FirmContacts {
   std::vector<Eigen::Index> begin_;  ///< per unknown, its first freedom; and the number of all
   Eigen::SparseMatrix<double> matrix_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
+  double work_ = 0;
 };
 
 }  // namespace talus

@@ -82,7 +82,8 @@ class Answers {
           rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
       scales_[c] =
           std::max({scale_of(rows[c], thresholds_), thresholds_.interest * everywhere * share, still});
-      answers_[c] = solve_cluster(clusters_[c].problem, goal.enough * scales_[c], thresholds_.cluster);
+      answers_[c] =
+          solve_cluster(clusters_[c].problem, {goal.enough * scales_[c], goal.sweeps}, thresholds_.cluster);
     });
   }
 
@@ -136,21 +137,22 @@ class Answers {
 
   double velocity_error(std::size_t c) const {
     const double momentum = answers_[c].error;
+    if (!answers_[c].solved) return larger(thresholds_.unknown, scales_[c] > 0 ? momentum / scales_[c] : 0);
     if (momentum == 0) return 0;
     // Where nothing moves overlaps may still ask for it.
     return scales_[c] > 0 ? momentum / scales_[c] : std::numeric_limits<double>::infinity();
   }
   double largest_impulse(std::size_t c) const {
     double most = 0;
-    for (std::size_t k = 0; k < answers_[c].impulse.size(); ++k)
-      most = larger(most, (clusters_[c].problem.impulse[k] + answers_[c].impulse[k]).norm());
+    for (std::size_t k = 0; k < answers_[c].found.size(); ++k)
+      most = larger(most, (clusters_[c].problem.impulse[k] + answers_[c].found[k]).norm());
     return most;
   }
   /// The largest change of a contact's impulse, over the largest impulse of its cluster, or `interest` times
   /// that of all, or of what the cluster's bodies exchange.
   double contact_error(std::size_t c, double most) const {
     double change = 0;
-    for (const Vec3& by : answers_[c].impulse) change = larger(change, by.norm());
+    for (const Vec3& by : answers_[c].found) change = larger(change, by.norm());
     if (change == 0) return 0;
     const double interest = thresholds_.interest;
     return change / std::max({largest_impulse(c), interest * most, interest * scales_[c]});
@@ -166,10 +168,10 @@ class Answers {
     if (n == 0) return 0;
     const std::vector<double> sum = parts_.total(6 * n, [&](std::size_t p, std::span<double> row) {
       for (const std::size_t c : own_[p])
-        for (std::size_t k = 0; k < answers_[c].impulse.size(); ++k) {
+        for (std::size_t k = 0; k < answers_[c].found.size(); ++k) {
           const std::int32_t wall = clusters_[c].problem.contacts[k].wall;
           if (wall < 0) continue;
-          const Vec3& change = answers_[c].impulse[k];
+          const Vec3& change = answers_[c].found[k];
           Eigen::Map<Vec3>(&row[6 * at(wall)]) += clusters_[c].problem.impulse[k] + change;
           Eigen::Map<Vec3>(&row[6 * at(wall) + 3]) += change;
         }

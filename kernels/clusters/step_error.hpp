@@ -20,6 +20,9 @@ struct StepErrorThresholds {
   double interest = 1e-2;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
   double rounding = 1e-12;
+  /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
+  /// nothing of what they have not.
+  double unknown = 1;
 };
 
 /// Distance of what the impulses of a step give from a solution of it, relative.
@@ -38,6 +41,7 @@ struct StepError {
 /// How exactly an error is asked for.
 struct ErrorGoal {
   double enough = 0;  ///< relative error that is not told apart from less
+  int sweeps = 0;     ///< that the step has had: what answers may cost grows with them
   double still =
       0;  ///< [m/s]: velocities that rounding of positions makes in gaps; slower bodies are at rest
   double walls =
@@ -47,7 +51,7 @@ struct ErrorGoal {
 /// The distance to an answer of every cluster (cluster_solver.hpp), all of which must be small. Without
 /// friction velocities are unique, and this is their error but for rounding. With friction they may not be:
 /// there it is the distance to one of the solutions, and that to the nearest is no larger. Where no answer is
-/// found, what is uncertain counts as error. Collective.
+/// found the error is not known, and at least StepErrorThresholds::unknown. Collective.
 ///
 /// The scale of a cluster is sum m |V(r) - V_free|, what its contacts do, as far as what comes in explains
 /// it; or the speed of driven walls times its mass, if that is more; where no wall is driven, at least a

@@ -38,7 +38,7 @@ class Portfolio {
   }
 
   void run() {
-    while (!answer_.over()) {
+    while (!answer_.over() && work(momentum) + work_of_others() < answer_.goal().most_work) {
       const Method next = choose();
       Runner& runner = runner_[next];
       if (!runner.own) begin(next);

@@ -25,8 +25,8 @@ void Certificate::begin(Scales scales) {
 void Certificate::measure(const CheckSums& sums) {
   const ErrorSums& error = sums.error;
   const auto count = static_cast<double>(error.contacts);
-  // Forces that fade away leave velocities that rounding makes.
-  const double rounding = scales_.rounding_velocity;
+  // Forces that fade away leave velocities that rounding makes: they must pass whatever is asked.
+  const double rounding = scales_.rounding_velocity / settings_.tolerance;
   residual2_ = error.residual2;
   scale2_ = larger(larger(error.impulse2, error.velocity2), count * rounding * rounding);
   result_.error_rms = scale2_ != 0 ? std::sqrt(error.residual2 / scale2_) : 0;
@@ -153,10 +153,15 @@ bool Certificate::balanced(WholeProblem& whole) {
 
 double Certificate::small_unbalance(WholeProblem& whole) {
   const bool last = result_.iterations >= settings_.max_iterations;
-  if (doubts_ >= thresholds_.most_doubts && !last) return std::numeric_limits<double>::infinity();
+  if (doubts_ >= thresholds_.most_doubts && !last &&
+      result_.iterations < thresholds_.doubt_growth * doubted_at_)
+    return std::numeric_limits<double>::infinity();
   return repeated(small_check_, settings_.balance_tolerance, [&](double enough) {
-    const SmallError error = whole.small_error(enough);
-    if (!error.solved) ++doubts_;
+    const SmallError error = whole.small_error(enough, result_.iterations);
+    if (!error.solved) {
+      ++doubts_;
+      doubted_at_ = result_.iterations;
+    }
     return error.relative;
   });
 }

@@ -66,8 +66,10 @@ struct CertificateThresholds {
   /// Small clusters are put right so often in a step, at most, >= 0: sweeps for others may carry them off
   /// again.
   int most_corrections = 10;
-  /// So often small clusters may be found to have no answer, >= 1: from then on only the last check asks.
-  int most_doubts = 3;
+  /// So often small clusters may be found to have no answer, >= 1: from then on they are asked again when the
+  /// sweeps done have grown by the second factor, > 1.
+  int most_doubts = 1;
+  double doubt_growth = 4;
   /// Without sweeps in between only where the error has fallen to this part, in (0, 1).
   double correction_gain = 0.5;
   /// A check of the whole problem tells nothing apart below this part of the tolerance on the balance, in (0,
@@ -99,7 +101,8 @@ class WholeProblem {
   /// Relative error of what the impulses of the last check give; what is below `enough` is not told apart. Of
   /// the worst small cluster, in velocities and forces (kernels/clusters/step_error.hpp); of the large ones,
   /// in velocities (balance.hpp).
-  virtual SmallError small_error(double enough) = 0;
+  /// What small clusters may cost grows with `sweeps`, done in this step.
+  virtual SmallError small_error(double enough, int sweeps) = 0;
   virtual double large_error(double enough) = 0;
   /// The residual that a share `part` of all contacts does not exceed (kernels/global/residuals.hpp).
   virtual double quantile_error(double part) = 0;
@@ -210,6 +213,7 @@ class Certificate {
   double corrected_from_ = 0;  ///< error before small clusters were last put right in this step
   int corrected_at_ = -1;      ///< sweeps done then
   int doubts_ = 0;             ///< times in this step that no answer was found
+  int doubted_at_ = 0;         ///< sweeps done when that was so last
 };
 
 /// Whether a step whose iterations ended so is to be believed. `momentum_defect`: what the sample gained

@@ -249,13 +249,14 @@ std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
   return problems;
 }
 
-SmallError GlobalSolver::small_error(double enough, double farthest) {
+SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest) {
   const Whole span(*this);
   problems_ = checked(true);
   const double still = std::numeric_limits<double>::epsilon() * farthest / parameters_.time_step;
   double walls = 0;
   for (const WallState& wall : state_.wall_states) walls = std::max(walls, wall.impulse.norm());
-  StepError error = step_error(problems_, *link_, {enough, still, walls});
+  StepError error =
+      step_error(problems_, *link_, {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls});
   change_ = std::move(error.change);
   mends_ = error.mends;
   return {error.relative(), error.solved};

@@ -42,10 +42,11 @@ class GlobalSolver {
   bool large_clusters() const { return large_; }
 
   /// Relative error of what the impulses of the last check give, with several ranks those that the candidates
-  /// keep; what is below `enough` is not told apart. `farthest`: largest coordinate [m], which rounding goes
-  /// by. In small clusters of velocities and forces (kernels/clusters/step_error.hpp); what would mend them
-  /// is kept for `correct`. In large ones of velocities (balance.hpp).
-  SmallError small_error(double enough, double farthest);
+  /// keep; what is below `enough` is not told apart. `sweeps`: done in this step. `farthest`: largest
+  /// coordinate [m], which rounding goes by. In small clusters of velocities and forces
+  /// (kernels/clusters/step_error.hpp); what would mend them is kept for `correct`. In large ones of
+  /// velocities (balance.hpp).
+  SmallError small_error(double enough, int sweeps, double farthest);
   double large_error(double enough) const;
   /// Of the same impulses: the residual that a share `part` of all contacts does not exceed, and what is
   /// furthest from its law (kernels/global/residuals.hpp).

@@ -33,7 +33,9 @@ class PresentProblem final : public WholeProblem {
     find_clusters();
     return global_.large_clusters();
   }
-  SmallError small_error(double enough) override { return global_.small_error(enough, farthest_); }
+  SmallError small_error(double enough, int sweeps) override {
+    return global_.small_error(enough, sweeps, farthest_);
+  }
   double large_error(double enough) override { return global_.large_error(enough); }
   double quantile_error(double part) override { return global_.quantile_error(part); }
   WorstErrors worst_errors() override { return global_.worst_errors(); }

@@ -136,7 +136,7 @@ void SolverLoop::begin() {
   began_ = graph::seconds_now();
   Certificate::Scales scales;
   scales.rounding_velocity =
-      std::numeric_limits<double>::epsilon() * parameters_.alert / parameters_.time_step;
+      std::numeric_limits<double>::epsilon() * problem_.farthest() / parameters_.time_step;
   for (const WallState& wall : state_.wall_states)
     scales.wall_pushes.push_back(parameters_.impulse_time() * wall.applied);
   if (state_.cell.loaded())

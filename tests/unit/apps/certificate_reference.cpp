@@ -146,7 +146,7 @@ TEST(CertificateReference, AsksRedundantContactsForTheirShareOnlyWhereGapsTellIt
   // Two floors, the second lower by a part of g h^2: the first carries all. A run that has shared the weight
   // is wrong, unless it takes a change of the gaps to find out that no step before has kept to.
   for (const double friction : {0.0, 0.3})
-    for (const double lower : {1e-8, 1e-3}) {
+    for (const double lower : {1e-8, 1e-6, 1e-3}) {
       Step step(g, friction);
       step.grain({0, 0, R}, R);
       step.wall(Vec3::Zero(), Vec3::UnitZ());
@@ -350,6 +350,25 @@ TEST(CertificateErrors, OfAnAnswerAreNoneAndOfHalfTheForcesAHalf) {
   EXPECT_NEAR(some.wall_force, 0.5, 1e-9);
   EXPECT_NEAR(some.contact_force, 0.5, 1e-9);
   EXPECT_NEAR(some.cluster, 0.5, 1e-9);
+}
+
+TEST(CertificateErrors, OfAContactInARowAreNotWhatRoundingMakesOfItsGrains) {
+  Step step(0, 0);
+  constexpr int grains = 10;
+  for (int k = 0; k < grains; ++k) step.grain({2 * R * k, 0, 0}, R, {0, 0.1, 0});
+  StepProblem problem = step.problem();
+  problem.rounding_speed = 1e-12;
+  Reference answer = solved(problem);
+  // Impulses of the size of rounding: the middle contact passes on what is between both halves.
+  std::vector<Vec3> r = answer.r;
+  for (std::size_t c = 0; c < r.size(); ++c) {
+    answer.r[c] = 20 * mass_of(R) * problem.rounding_speed * problem.contacts[c].normal;
+    r[c] = 0.7 * answer.r[c];
+  }
+  const StepEnd end{ended(problem, step, answer.exact), r};
+  EXPECT_EQ(true_errors(problem, answer, end).contact_force, 0);
+  r.assign(r.size(), Vec3::Zero());
+  EXPECT_GT(true_errors(problem, answer, {ended(problem, step, answer.exact), r}).contact_force, 0.1);
 }
 
 TEST(CertificateErrors, OfOneClusterDoNotHideAmongOthers) {

@@ -6,45 +6,12 @@
 
 #include <cmath>
 
+#include "tests/unit/kernels/clusters/cluster_makers.hpp"
+
 namespace talus::step_error_test {
 namespace {
 
-constexpr double fall = 9.81e-3;  ///< g h [m/s]
-
-std::int32_t add_grain(BodyProblem& problem, const Vec3& x, double mu) {
-  BodyUnknown body;
-  body.mass = 1;
-  body.spin_mass = mu > 0 ? 0.4 : 0;
-  body.radius = 0.01;
-  body.x = x;
-  body.free.u = Vec3(0, 0, -fall);
-  problem.bodies.push_back(body);
-  problem.grains = problem.bodies.size();
-  return static_cast<std::int32_t>(problem.grains) - 1;
-}
-
-/// `wall`: its number, where `second` is -1.
-void add_contact(BodyProblem& problem, std::int32_t first, std::int32_t second, const Vec3& normal, double mu,
-                 std::int32_t wall = -1) {
-  ContactEquation contact;
-  contact.normal = normal;
-  contact.offset = Vec3::Zero();
-  contact.mu = mu;
-  contact.first = first;
-  contact.second = second;
-  contact.wall = wall;
-  problem.contacts.push_back(contact);
-  problem.impulse.push_back(Vec3::Zero());
-}
-
-/// A grain in a V of half angle `a`: each wall carries m g h/(2 sin a).
-BodyProblem wedge(double a, double mu) {
-  BodyProblem problem;
-  const std::int32_t grain = add_grain(problem, Vec3::Zero(), mu);
-  add_contact(problem, grain, -1, Vec3(std::cos(a), 0, std::sin(a)), mu, 0);
-  add_contact(problem, grain, -1, Vec3(-std::cos(a), 0, std::sin(a)), mu, 1);
-  return problem;
-}
+using namespace cluster_makers;
 
 /// One grain on the other on a floor, wall 0; impulses `part` of what they carry at rest.
 void add_column(BodyProblem& problem, int grains, double x, double part) {
@@ -133,6 +100,23 @@ TEST(StepError, OfAJammedGrainThatHasToSlideIsNotWhatItsContactsFindWrong) {
   EXPECT_TRUE(error.solved);
   EXPECT_NEAR((problem.impulse[0] + error.change[0][0]).dot(problem.contacts[0].normal), exact, 1e-3 * exact);
   EXPECT_GT(error.contact, 0.08);
+}
+
+/// Its first round alone does not say whether the contacts stick: no answer, so nothing is known.
+TEST(StepError, OfAClusterWithoutAnAnswerIsNotWhatItHappenedToFind) {
+  BodyProblem problem = wedge(0.0412, 0.5);
+  const double normal = fall / (2 * std::sin(0.0412));
+  for (std::size_t k = 0; k < 2; ++k) problem.impulse[k] = 0.5 * normal * problem.contacts[k].normal;
+  StepErrorThresholds thresholds;
+  thresholds.cluster.correction.most_rounds = 1;
+  thresholds.cluster.least_budget = thresholds.cluster.budget_per_sweep = 0;
+  const StepError error = step_error(problem, {.enough = 1e-3}, thresholds);
+  EXPECT_FALSE(error.solved);
+  EXPECT_GE(error.relative(), thresholds.unknown);
+  // Sweeps of the step pay for an answer.
+  thresholds.cluster.budget_per_sweep = 10;
+  EXPECT_FALSE(step_error(problem, {.enough = 1e-3, .sweeps = 0}, thresholds).solved);
+  EXPECT_TRUE(step_error(problem, {.enough = 1e-3, .sweeps = 1000}, thresholds).solved);
 }
 
 TEST(StepError, WithFrictionASlidingGrainIsWhereCoulombSaysItIs) {

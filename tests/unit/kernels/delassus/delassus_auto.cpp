@@ -88,6 +88,16 @@ TEST(Auto, GoesOnUntilItIsStoppedWhereNothingIsToBeFound) {
   EXPECT_EQ(report.iterations, 30'000);
 }
 
+TEST(Auto, BeginsNoTurnBeyondItsWork) {
+  const bench::NamedProblem named = bench::disturbed(bench::step_of_scene(1, 4), 3);
+  std::vector<double> r(3 * named.problem.contacts(), 0.0), whole(r);
+  const double needed = solve_auto(named.problem, {.tolerance = 1e-8}, {}, whole).work;
+  const auto report = solve_auto(named.problem, {.tolerance = 1e-8, .most_work = 0.3 * needed}, {}, r);
+  EXPECT_FALSE(report.converged);
+  EXPECT_GE(report.work, 0.3 * needed);
+  EXPECT_LT(report.work, 0.6 * needed);
+}
+
 TEST(Auto, GivesTheSameBitsAndWorkTwice) {
   const bench::NamedProblem named = bench::disturbed(bench::step_of_scene(1, 4), 3);
   std::vector<double> first(3 * named.problem.contacts(), 0.0), second(first);

@@ -1,0 +1,51 @@
+#pragma once
+
+/// The answer of a cluster by proximal steps, each of which Newton's method with a line search cannot fail to
+/// solve: where rounds of an active set (correction.hpp) go in circles, as contacts carry more than they must
+/// (docs/decisions/0024-certificate.md).
+
+#include "kernels/clusters/correction.hpp"
+#include "kernels/global/body_problem.hpp"
+
+namespace talus {
+
+/// Every number that proximal steps depend on. Ratios have no unit.
+struct ProximalThresholds {
+  /// rho W_nn of the first step; that of the next one is `growth`, > 1, times as large where a step has taken
+  /// at most `easy` factorisations, up to CorrectionThresholds::firmness. A step of `most` factorisations
+  /// that has not come to its minimum is taken back, and none is so firm again. Soft contacts find out who
+  /// carries; firm ones leave little to mend.
+  double first_firmness = 1e2, growth = 5;
+  int easy = 5, most = 40;
+  /// Momentum may be off by this part of the goal behind a step, in (0, 1).
+  double inner = 1e-2;
+  /// A step of Newton's method may go beyond the minimum along its way until the slope is this part of the
+  /// first one, in (0, 1); and how well the minimum is found where it goes further, likewise.
+  double slope = 0.1, line = 0.1;
+  /// Factorisations that have not halved what momentum is off by, after which a step ends; and where it is
+  /// within the goal: nothing but rounding is left.
+  int patience = 15, patience_at_goal = 3;
+  int most_steps = 200;  ///< >= 1
+  /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
+  double firm_enough = 1e6;
+  /// What further steps would change, by how the last two did, may be so many goals, >= 1.
+  double rest = 10;
+};
+
+/// What would set all contacts right, as correction_of. `work`: multiplications after which no more
+/// factorisations begin, in; what is left of them, out. `enough`, the goal and `open` are the same; settled:
+/// further steps would change next to nothing.
+///
+/// A step from impulses t, with the shift s = mu |v_t| of the last velocities (none without friction), finds
+/// the change d of the velocities that makes
+///
+///   1/2 |d|_M^2 + r.H^T d + sum 1/(2 rho) |P_Kmu(t - rho (v + H^T d + s n))|^2
+///
+/// least, which is strictly convex and smooth; its projections are the next t. For given s they come as near
+/// as need be to an answer of that convex problem, one near the first t where redundant contacts leave
+/// several (Rockafellar 1976). s follows the velocities (Cadoux 2009); with friction it need not settle.
+Correction proximal_correction(const BodyProblem& problem, double enough,
+                               const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
+                               double& work);
+
+}  // namespace talus

@@ -1,0 +1,95 @@
+// Proximal steps to the answer of a cluster, against closed forms.
+
+#include "kernels/clusters/proximal_newton.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/unit/kernels/clusters/cluster_makers.hpp"
+
+namespace talus::proximal_newton_test {
+namespace {
+
+using namespace cluster_makers;
+
+constexpr double enough = 1e-4 * fall;
+
+Correction corrected(const BodyProblem& problem) {
+  double work = 1e9;
+  return proximal_correction(problem, enough, {}, {}, work);
+}
+
+Vec3 impulse_of(const BodyProblem& problem, const Correction& correction, std::size_t k) {
+  return problem.impulse[k] + correction.impulse[k];
+}
+
+TEST(ProximalSteps, FindTheForcesInAWedgeHoweverSharpItIs) {
+  for (const double a : {0.5, 1e-2, 1e-3}) {
+    const BodyProblem problem = wedge(a, 0);
+    const Correction answer = corrected(problem);
+    ASSERT_TRUE(answer.settled) << a;
+    const double exact = fall / (2 * std::sin(a));
+    for (std::size_t k = 0; k < 2; ++k)
+      EXPECT_NEAR(impulse_of(problem, answer, k).norm(), exact, 1e-3 * exact) << a;
+    EXPECT_NEAR(answer.motion[0].u.z(), fall, enough) << "at rest";
+  }
+}
+
+/// Two floors, the second lower by what is nothing to the grain: the law would have the first carry all, and
+/// gaps that differ so little leave the shares as they are.
+TEST(ProximalSteps, LeaveRedundantContactsTheSharesThatTheyHave) {
+  for (const double share : {0.3, 0.5, 0.8}) {
+    BodyProblem problem;
+    const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0);
+    for (int wall = 0; wall < 2; ++wall) add_contact(problem, grain, -1, Vec3::UnitZ(), 0, wall);
+    problem.contacts[1].offset = 1e-12 * fall * Vec3::UnitZ();
+    problem.impulse = {share * fall * Vec3::UnitZ(), (0.9 - share) * fall * Vec3::UnitZ()};
+    const Correction answer = corrected(problem);
+    ASSERT_TRUE(answer.settled);
+    // A tenth of the weight is missing, and both take half of it.
+    EXPECT_NEAR(impulse_of(problem, answer, 0).z(), (share + 0.05) * fall, 1e-3 * fall) << share;
+    EXPECT_NEAR(impulse_of(problem, answer, 1).z(), (0.95 - share) * fall, 1e-3 * fall) << share;
+  }
+}
+
+TEST(ProximalSteps, LetGoOfContactsThatWouldPull) {
+  BodyProblem problem;
+  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0);
+  add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
+  problem.bodies[0].free.u = Vec3(0, 0, fall);  // it leaves
+  problem.impulse[0] = 0.5 * fall * Vec3::UnitZ();
+  const Correction answer = corrected(problem);
+  EXPECT_TRUE(answer.settled);
+  EXPECT_NEAR(impulse_of(problem, answer, 0).norm(), 0, enough);
+}
+
+TEST(ProximalSteps, WithFrictionAGrainSlidesOrSticksAsCoulombSays) {
+  constexpr double mu = 0.3, down = 0.1;
+  for (const double along : {1e-2, 1.0}) {
+    BodyProblem problem;
+    const std::int32_t grain = add_grain(problem, Vec3::Zero(), mu);
+    problem.bodies[0].free.u = Vec3(along, 0, -down);
+    add_contact(problem, grain, -1, Vec3::UnitZ(), mu, 0);
+    const Correction answer = corrected(problem);
+    ASSERT_TRUE(answer.settled) << along;
+    const bool slides = along > 3.5 * mu * down;  // a solid sphere keeps 5/7 of its speed where it sticks
+    EXPECT_NEAR(impulse_of(problem, answer, 0).z(), down, 1e-4);
+    EXPECT_NEAR(impulse_of(problem, answer, 0).x(), slides ? -mu * down : -2.0 / 7 * along, 1e-4) << along;
+  }
+}
+
+TEST(ProximalSteps, KeepToTheirWorkAndSaySo) {
+  const BodyProblem problem = wedge(1e-3, 0);
+  double work = 1;
+  EXPECT_FALSE(proximal_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_LE(work, 0);
+  EXPECT_GT(work, -1e4) << "one factorisation of one grain";
+  work = 1e9;
+  EXPECT_TRUE(proximal_correction(problem, enough, {}, {}, work).settled);
+  EXPECT_LT(work, 1e9);
+  EXPECT_GT(work, 0.9e9);
+}
+
+}  // namespace
+}  // namespace talus::proximal_newton_test
