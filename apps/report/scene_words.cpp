@@ -83,6 +83,10 @@ std::string end_words(const StageEnd& end) {
     ends.push_back(fmt::format("a strain of {:g} along {}", *end.strain, "xyz"[end.strain_axis]));
   if (end.shear_strain) ends.push_back(fmt::format("a shear of {:g}", *end.shear_strain));
   if (end.equilibrium) ends.push_back(fmt::format("equilibrium within {:g}", *end.equilibrium));
+  if (end.stress_ratio) ends.push_back(fmt::format("a stress ratio of {:g}", *end.stress_ratio));
+  if (end.inertial_below) ends.push_back(fmt::format("an inertial number below {:g}", *end.inertial_below));
+  if (end.inertial_above) ends.push_back(fmt::format("an inertial number above {:g}", *end.inertial_above));
+  if (end.steady) ends.push_back(fmt::format("a drift within {:g}", *end.steady));
   return "until " + joined(ends, " or ");
 }
 

@@ -99,12 +99,14 @@ json live_data(const Frame& frame, const std::vector<std::vector<Triangle>>& wal
   const Vec3 middle = (box.low + box.high) / 2;
   json lines = json::array(), words = json::array();
   const auto rounded = [&](double length) { return std::round(1e5 * length / longest) / 1e5; };
+  const auto add = [&](const Vec3& a, const Vec3& b) {
+    const Vec3 from = a - middle, to = b - middle;
+    lines.push_back({rounded(from.x()), rounded(from.y()), rounded(from.z()), rounded(to.x()),
+                     rounded(to.y()), rounded(to.z())});
+  };
   for (const std::vector<Triangle>& wall : walls)
-    for (const auto& [a, b] : io::edges_of(wall)) {
-      const Vec3 from = a - middle, to = b - middle;
-      lines.push_back({rounded(from.x()), rounded(from.y()), rounded(from.z()), rounded(to.x()),
-                       rounded(to.y()), rounded(to.z())});
-    }
+    for (const auto& [a, b] : io::edges_of(wall)) add(a, b);
+  for (const io::CellLine& line : io::lines_of_cell(frame)) add(line.ends[0], line.ends[1]);
   for (const Colouring& colour : colours) words.push_back(colour.words);
   const io::Camera camera;
   return {{"grains", io::detail::base64_of(std::as_bytes(std::span(bytes)))},

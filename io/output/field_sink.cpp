@@ -1,5 +1,5 @@
-/// fields/ for ParaView: grains, forces and walls of every frame, and the collections that give them their
-/// times.
+/// fields/ for ParaView: grains, forces, walls and the periodic cell of every frame, and the collections that
+/// give them their times.
 
 #include <fmt/format.h>
 
@@ -16,8 +16,8 @@
 namespace talus::io {
 namespace {
 
-constexpr std::array<std::string_view, 4> collections{"fields/grains.pvd", "fields/forces.pvd", "fields.pvd",
-                                                      "fields/walls.pvd"};
+constexpr std::array<std::string_view, 5> collections{"fields/grains.pvd", "fields/forces.pvd", "fields.pvd",
+                                                      "fields/walls.pvd", "fields/cell.pvd"};
 
 class FieldSink : public OutputSink {
  public:
@@ -25,6 +25,7 @@ class FieldSink : public OutputSink {
       : directory_(context.directory),
         contacts_(context.contacts),
         walls_(context.walls),
+        periodic_(context.periodic),
         ranks_(context.ranks) {
     for (const Wall& wall : walls_) wall_materials_.push_back(wall.material);
   }
@@ -47,6 +48,7 @@ class FieldSink : public OutputSink {
     std::erase_if(grain_files_, missing);
     std::erase_if(force_files_, missing);
     std::erase_if(wall_files_, missing);
+    std::erase_if(cell_files_, missing);
     std::error_code ignored;
     for (std::size_t later = frames_; remove_frame(later); ++later) {
     }
@@ -59,12 +61,7 @@ class FieldSink : public OutputSink {
     const bool forces = contacts_ && part.with_contacts;
     if (forces)
       write(forces_name(frames_), [&](const WriteText& out) { write_forces_vtp(part, ranks_, out); });
-    if (!walls_.empty()) {
-      const Bounds grains = grain_bounds(part, ranks_);
-      if (ranks_.rank() == 0)
-        write_whole(directory_ / "fields" / walls_name(frames_),
-                    walls_vtp(part, wall_triangles(walls_, part.walls, grains), wall_materials_));
-    }
+    if (!walls_.empty() || periodic_) write_surroundings(part, grain_bounds(part, ranks_));
     note_frame(part.time, forces);
     write_collections();
   }
@@ -72,12 +69,14 @@ class FieldSink : public OutputSink {
  private:
   static std::string grains_name(std::size_t frame) { return fmt::format("grains_{:06}.vtp", frame); }
   static std::string walls_name(std::size_t frame) { return fmt::format("walls_{:06}.vtp", frame); }
+  static std::string cell_name(std::size_t frame) { return fmt::format("cell_{:06}.vtp", frame); }
   static std::string forces_name(std::size_t frame) { return fmt::format("forces_{:06}.vtp", frame); }
 
   void note_frame(double time, bool forces) {
     grain_files_.push_back({time, 0, grains_name(frames_)});
     if (forces) force_files_.push_back({time, 0, forces_name(frames_)});
     if (!walls_.empty()) wall_files_.push_back({time, 0, walls_name(frames_)});
+    if (periodic_) cell_files_.push_back({time, 0, cell_name(frames_)});
     ++frames_;
   }
   /// False where there is none of that number.
@@ -86,19 +85,30 @@ class FieldSink : public OutputSink {
     const bool grains = std::filesystem::remove(directory_ / "fields" / grains_name(frame), ignored);
     const bool forces = std::filesystem::remove(directory_ / "fields" / forces_name(frame), ignored);
     const bool walls = std::filesystem::remove(directory_ / "fields" / walls_name(frame), ignored);
-    return grains || forces || walls;
+    const bool cell = std::filesystem::remove(directory_ / "fields" / cell_name(frame), ignored);
+    return grains || forces || walls || cell;
   }
   void write_collections() const {
     collect(collections[0], grain_files_);
     if (contacts_) collect(collections[1], force_files_);
     if (!walls_.empty()) collect(collections[3], wall_files_);
+    if (periodic_) collect(collections[4], cell_files_);
     std::vector<FieldFile> all;
     for (const FieldFile& file : grain_files_) all.push_back({file.time, 0, "fields/" + file.path});
     for (const FieldFile& file : force_files_) all.push_back({file.time, 1, "fields/" + file.path});
     for (const FieldFile& file : wall_files_) all.push_back({file.time, 2, "fields/" + file.path});
+    for (const FieldFile& file : cell_files_) all.push_back({file.time, 3, "fields/" + file.path});
     collect(collections[2], all);
   }
 
+  /// Walls and cell, around the grains of all ranks.
+  void write_surroundings(const Frame& part, const Bounds& grains) const {
+    if (ranks_.rank() != 0) return;
+    if (!walls_.empty())
+      write_whole(directory_ / "fields" / walls_name(frames_),
+                  walls_vtp(part, wall_triangles(walls_, part.walls, grains), wall_materials_));
+    if (periodic_) write_whole(directory_ / "fields" / cell_name(frames_), cell_vtp(part, grains));
+  }
   /// Made of the parts of all ranks; rank 0 writes.
   void write(const std::string& name, const std::function<void(const WriteText&)>& make) const {
     if (ranks_.rank() == 0)
@@ -113,9 +123,10 @@ class FieldSink : public OutputSink {
   std::filesystem::path directory_;
   bool contacts_;
   std::vector<Wall> walls_;
+  bool periodic_;
   std::vector<std::int64_t> wall_materials_;
   const graph::Communicator& ranks_;
-  std::vector<FieldFile> grain_files_, force_files_, wall_files_;  ///< paths relative to fields/
+  std::vector<FieldFile> grain_files_, force_files_, wall_files_, cell_files_;  ///< paths relative to fields/
   std::size_t frames_ = 0;
 };
 
@@ -129,7 +140,8 @@ const SinkKind field_sink{SinkUse::by_default,
                             return std::ranges::find(collections, name) != collections.end() ||
                                    is_numbered_name(name, "fields/grains_", ".vtp") ||
                                    is_numbered_name(name, "fields/forces_", ".vtp") ||
-                                   is_numbered_name(name, "fields/walls_", ".vtp");
+                                   is_numbered_name(name, "fields/walls_", ".vtp") ||
+                                   is_numbered_name(name, "fields/cell_", ".vtp");
                           }};
 
 }  // namespace talus::io

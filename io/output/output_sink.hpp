@@ -42,6 +42,7 @@ struct OutputContext {
   FrameFormat format = {};                        ///< of results.h5
   std::int64_t tables_every = 1;                  ///< steps between lines of walls, triaxial and cell.csv
   std::vector<Wall> walls = {};                   ///< in the order of Frame::walls
+  bool periodic = false;                          ///< the sample stands in a periodic cell
   std::vector<std::string> material_names = {};   ///< of the setup
   GrainLoad load = {};                            ///< of the scene
   std::vector<std::string> grids = {};            ///< names of the fields of the setup

@@ -25,6 +25,7 @@ OutputContext output_context(const std::filesystem::path& directory, const Setup
   OutputContext context{
       .directory = directory, .walls = setup.walls, .material_names = setup.material_names, .ranks = ranks};
   for (const FieldRule& field : setup.fields) context.grids.push_back(field.name);
+  context.periodic = setup.domain.repeats;
   for (const Stage& stage : setup.stages) context.axis_of_stage.emplace(stage.name, stage.end.strain_axis);
   for (const Wall& wall : setup.walls)
     context.load.pressure = std::max(context.load.pressure, wall.load.pressure);

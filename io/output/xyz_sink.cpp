@@ -5,7 +5,9 @@
 #include <array>
 
 #include "io/output/sinks.hpp"
+#include "io/results/cell_outline.hpp"
 #include "io/results/csv_writer.hpp"
+#include "io/results/wall_triangles.hpp"
 
 namespace talus::io {
 namespace {
@@ -17,6 +19,16 @@ struct GrainLine {
   double radius;            ///< [m]
   std::array<double, 3> u;  ///< [m/s]
 };
+
+/// Of a periodic cell its edges, where it stands, and which of them repeat.
+std::string lattice_text(const std::optional<CellBox>& cell) {
+  if (!cell) return "";
+  const auto& h = cell->edges;
+  const auto flag = [&](std::size_t axis) { return cell->repeats[axis] ? 'T' : 'F'; };
+  return fmt::format("Lattice=\"{} 0 0 {} {} 0 {} {} {}\" Origin=\"{} {} {}\" pbc=\"{} {} {}\" ", h(0, 0),
+                     h(0, 1), h(1, 1), h(0, 2), h(1, 2), h(2, 2), cell->low[0], cell->low[1], cell->low[2],
+                     flag(0), flag(1), flag(2));
+}
 
 class XyzSink : public OutputSink {
  public:
@@ -37,9 +49,11 @@ class XyzSink : public OutputSink {
                        {part.u[k][0], part.u[k][1], part.u[k][2]}});
     std::int64_t grains[1] = {static_cast<std::int64_t>(lines.size())};
     ranks_.sum(grains);
+    const std::string lattice =
+        part.domain.repeats ? lattice_text(cell_box(part.domain, grain_bounds(part, ranks_))) : "";
     if (file_)
-      file_->pending() += fmt::format("{}\nProperties=id:I:1:pos:R:3:radius:R:1:velo:R:3 Time={} Step={}\n",
-                                      grains[0], part.time, part.step);
+      file_->pending() += fmt::format("{}\n{}Properties=id:I:1:pos:R:3:radius:R:1:velo:R:3 Time={} Step={}\n",
+                                      grains[0], lattice, part.time, part.step);
     ranks_.records_to_first(std::span<const GrainLine>(lines), [&](std::span<const GrainLine> piece) {
       for (const auto& [id, x, radius, u] : piece)
         file_->pending() +=

@@ -78,17 +78,6 @@ ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& opt
   return slab;
 }
 
-/// The faces of a periodic cell along x and z.
-void draw_cell(Svg& svg, const View& view, const Domain& domain) {
-  const Vec3 &low = domain.low, high = low + domain.edges();
-  for (const double x : {low.x(), high.x()})
-    if (domain.cell.xx > 0)
-      svg.line(view.x(x), view.y(view.z_low), view.x(x), view.y(view.z_high), {style::soft_ink, 1});
-  for (const double z : {low.z(), high.z()})
-    if (domain.cell.zz > 0)
-      svg.line(view.x(view.x_low), view.y(z), view.x(view.x_high), view.y(z), {style::soft_ink, 1});
-}
-
 /// Width of a line [px]: proportional to the force, five units are as wide as 0.6 mean radii, if that is not
 /// too wide for the page.
 double line_width(double normal, const ForceSlab& slab, const View& view) {
@@ -165,7 +154,7 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
   }
   svg.end_group();
   detail::draw_walls(svg, view, cuts);
-  draw_cell(svg, view, frame.domain);
+  detail::draw_cell(svg, view, frame.domain);
   draw_legend(svg, slab, view, bottom + 16);
   return svg.finish();
 }

@@ -74,6 +74,7 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
   }
   svg.end_group();
   detail::draw_walls(svg, view, cuts);
+  detail::draw_cell(svg, view, frame.domain);
   const double scale = detail::draw_scale(svg, view, bottom + 22, 8);
   page.legend(svg, margin_left + scale + 48, bottom + 22);
   return svg.finish();

@@ -8,12 +8,15 @@
 #include <numbers>
 #include <tuple>
 
+#include "io/results/wall_triangles.hpp"
+
 namespace talus::io {
 namespace {
 
 using Colour = std::array<double, 3>;
 
 constexpr std::size_t samples = 2;  // per pixel and direction
+constexpr Colour edge_colour{0.35, 0.4, 0.45};
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Directions of the image in space: to the right, up, and towards the viewer.
@@ -203,7 +206,6 @@ bool stands_before(const Wall& wall, const Vec3& part, const Vec3& middle, const
 void draw_wall(Canvas& canvas, const Projection& view, const Wall& wall, const Vec3& grains,
                std::span<const Triangle> triangles) {
   if (triangles.empty()) return;
-  constexpr Colour edge{0.35, 0.4, 0.45};
   Vec3 middle = Vec3::Zero();
   for (const Triangle& triangle : triangles)
     middle += centre_of(triangle) / static_cast<double>(triangles.size());
@@ -217,10 +219,18 @@ void draw_wall(Canvas& canvas, const Projection& view, const Wall& wall, const V
     canvas.triangle({view.of(triangle[0]), view.of(triangle[1]), view.of(triangle[2])},
                     {bright, bright, std::min(1.0, bright + 0.015)});
   }
-  for (const auto& [a, b] : edges_of(triangles)) canvas.line(view.of(a), view.of(b), edge);
+  for (const auto& [a, b] : edges_of(triangles)) canvas.line(view.of(a), view.of(b), edge_colour);
 }
 
 }  // namespace
+
+std::vector<CellLine> lines_of_cell(const Frame& frame) {
+  const std::optional<CellBox> cell = cell_box(frame.domain, grain_bounds(frame));
+  if (!cell) return {};
+  std::vector<CellLine> lines = cell_lines(*cell);
+  std::erase_if(lines, [](const CellLine& line) { return line.edge != 0; });
+  return lines;
+}
 
 Bounds view_bounds(const Frame& frame, std::span<const std::vector<Triangle>> walls) {
   Bounds box{Vec3::Constant(infinity), Vec3::Constant(-infinity)};
@@ -231,6 +241,8 @@ Bounds view_bounds(const Frame& frame, std::span<const std::vector<Triangle>> wa
   for (const std::vector<Triangle>& wall : walls)
     for (const Triangle& triangle : wall)
       for (const Vec3& corner : triangle) widen(corner, 0);
+  for (const CellLine& line : lines_of_cell(frame))
+    for (const Vec3& end : line.ends) widen(end, 0);
   return box;
 }
 
@@ -277,6 +289,8 @@ Image render_view(const Frame& frame, std::span<const Wall> walls,
   const Vec3 middle = (box.low + box.high) / 2;
   for (std::size_t w = 0; w < std::min(walls.size(), triangles.size()); ++w)
     draw_wall(canvas, view, walls[w], middle, triangles[w]);
+  for (const CellLine& line : lines_of_cell(frame))
+    canvas.line(view.of(line.ends[0]), view.of(line.ends[1]), edge_colour);
   return canvas.image();
 }
 

@@ -5,30 +5,41 @@
 #include <algorithm>
 #include <iterator>
 
+#include "io/results/cell_outline.hpp"
+#include "io/results/wall_triangles.hpp"
+
 namespace talus::io {
 namespace {
 
-/// Corners of the box around the grains [m]; zeros without any.
-std::array<Vec3, 2> bounds(const Frame& frame) {
-  if (frame.x.empty()) return {Vec3::Zero(), Vec3::Zero()};
-  Vec3 low = frame.x[0], high = frame.x[0];
-  for (std::size_t k = 0; k < frame.x.size(); ++k) {
-    low = low.cwiseMin(frame.x[k] - Vec3::Constant(frame.radius[k]));
-    high = high.cwiseMax(frame.x[k] + Vec3::Constant(frame.radius[k]));
+/// The box around the grains, zeros without any; or the periodic cell: a leaning one by the box around it and
+/// its tilts xy, xz, yz.
+std::string box_of(const Frame& frame) {
+  Bounds grains = grain_bounds(frame);
+  if (frame.x.empty()) grains = {Vec3::Zero(), Vec3::Zero()};
+  const CellBox box =
+      cell_box(frame.domain, grains).value_or(CellBox{grains.low, (grains.high - grains.low).asDiagonal()});
+  const double xy = box.edges(0, 1), xz = box.edges(0, 2), yz = box.edges(1, 2);
+  const auto [back, ahead] = std::minmax({0.0, xy, xz, xy + xz});
+  const Vec3 before(back, std::min(0.0, yz), 0), behind(ahead, std::max(0.0, yz), 0), tilts(xy, xz, yz);
+  std::string text = box.leans() ? "ITEM: BOX BOUNDS xy xz yz" : "ITEM: BOX BOUNDS";
+  for (const bool repeats : box.repeats) text += repeats ? " pp" : " ff";
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double low = box.low[axis], high = box.repeats[static_cast<std::size_t>(axis)]
+                                                 ? low + box.edges(axis, axis)
+                                                 : grains.high[axis];
+    text += fmt::format("\n{} {}", low + before[axis], high + behind[axis]);
+    if (box.leans()) text += fmt::format(" {}", tilts[axis]);
   }
-  return {low, high};
+  return text + '\n';
 }
 
 }  // namespace
 
 std::string lammps_dump(const Frame& frame) {
-  const auto [low, high] = bounds(frame);
-  std::string text = fmt::format(
-      "ITEM: UNITS\nsi\nITEM: TIME\n{}\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{}\nITEM: BOX BOUNDS ff "
-      "ff ff\n",
-      frame.time, frame.step, frame.id.size());
+  std::string text =
+      fmt::format("ITEM: UNITS\nsi\nITEM: TIME\n{}\nITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n{}\n{}",
+                  frame.time, frame.step, frame.id.size(), box_of(frame));
   const auto out = std::back_inserter(text);
-  for (int axis = 0; axis < 3; ++axis) fmt::format_to(out, "{} {}\n", low[axis], high[axis]);
   text += "ITEM: ATOMS id type radius x y z vx vy vz";
   if (!frame.omega.empty()) text += " omegax omegay omegaz";
   if (!frame.orientation.empty()) text += " quatw quati quatj quatk";

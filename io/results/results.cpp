@@ -174,7 +174,8 @@ void ResultsWriter::append(const Frame& part) {
     }
   }
   const detail::WallColumns walls(part.walls);
-  const std::vector<FrameArray> arrays = detail::frame_arrays(part, walls, format_, ranks_);
+  const detail::CellColumns cell(part.domain);
+  const std::vector<FrameArray> arrays = detail::frame_arrays(part, walls, cell, format_, ranks_);
   if (ranks_.rank() == 0) detail::keep_directory(path_);
   append_here(part, arrays);
   if (ranks_.rank() == 0) detail::drop_directory(path_);

@@ -11,6 +11,7 @@
 ///   /frames/000000/walls         position [w], velocity [w], force [w,3], normal [w,3], present [w]; where
 ///   one
 ///                                has moved that is no plane rotation [w,9], translation [w,3]
+///   /frames/000000/cell          of a periodic cell: origin [3], edges [3,3], rates [3,3], an edge a row
 ///
 /// n bodies, m active contacts, w walls; every dataset has an attribute `units`. Arrays are stored plain
 /// unless FrameFormat says otherwise. Rank 0 lays a frame out, and every rank writes its rows at their

@@ -5,6 +5,7 @@
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/error.hpp"
 #include "io/results/results.hpp"
+#include "runtime/step/cell_flow.hpp"
 
 namespace talus::io {
 namespace {
@@ -71,6 +72,21 @@ void read_places(detail::Place frame, std::vector<WallReport>& walls) {
   }
 }
 
+/// The periodic cell, of which there may be none. Throws std::invalid_argument for edges that are no cell.
+Domain read_cell(detail::Place frame) {
+  if (H5Lexists(frame.group, "cell", H5P_DEFAULT) <= 0) return {};
+  const auto origin = read_doubles<double>(frame.group, frame.file, "cell/origin");
+  const auto edges = read_doubles<Vec3>(frame.group, frame.file, "cell/edges");
+  const auto rates = read_doubles<Vec3>(frame.group, frame.file, "cell/rates");
+  if (origin.size() != 3 || edges.size() != 3 || rates.size() != 3)
+    throw FileError(frame.file, "cell/origin, cell/edges and cell/rates must have three rows each");
+  Domain domain = periodic_domain({edges[0][0], edges[1][1], edges[2][2]}, Vec3(origin.data()),
+                                  {edges[1][0], edges[2][0], edges[2][1]});
+  domain.rates = {rates[0][0], rates[1][1], rates[2][2], rates[1][0], rates[2][0], rates[2][1]};
+  domain.flows = matrix_of(domain.rates) != Mat3::Zero();
+  return domain;
+}
+
 }  // namespace
 
 std::size_t frame_count(const std::filesystem::path& path) {
@@ -124,6 +140,7 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   }
   read_places({h, name}, frame.walls);
   try {
+    frame.domain = read_cell({h, name});
     validate(frame);
   } catch (const std::invalid_argument& error) {
     throw FileError(name, prefix + " is damaged: " + error.what());

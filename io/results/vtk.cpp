@@ -7,10 +7,12 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string_view>
 
+#include "io/results/cell_outline.hpp"
 #include "io/results/detail/base64.hpp"
 #include "io/results/detail/body_index.hpp"
 #include "runtime/graph/one_rank.hpp"
@@ -292,6 +294,28 @@ std::string walls_vtp(const Frame& frame, std::span<const std::vector<Triangle>>
   file.text("</CellData>\n");
   file.points(floats(corners));
   file.cells("Polys", wall.size(), {0, wall.size()}, 3);
+  file.end();
+  return text;
+}
+
+std::string cell_vtp(const Frame& frame, const Bounds& grains) {
+  std::vector<CellLine> lines;
+  if (const std::optional<CellBox> cell = cell_box(frame.domain, grains)) lines = cell_lines(*cell);
+  std::vector<std::int64_t> edge;
+  std::vector<Vec3> ends;
+  for (const CellLine& line : lines) {
+    edge.push_back(line.edge);
+    ends.insert(ends.end(), line.ends.begin(), line.ends.end());
+  }
+  std::string text;
+  const WriteText out = [&](std::string_view more) { text += more; };
+  const VtpText file(graph::one_rank(), out);
+  file.begin(frame.time, ends.size(), 0, lines.size());
+  file.text("<CellData Scalars=\"edge\">\n");
+  file.integers("edge", edge);
+  file.text("</CellData>\n");
+  file.points(floats(ends));
+  file.cells("Lines", lines.size(), {0, lines.size()}, 2);
   file.end();
   return text;
 }

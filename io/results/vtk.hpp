@@ -48,6 +48,10 @@ void write_forces_vtp(const Frame& part, const graph::Communicator& ranks, const
 std::string walls_vtp(const Frame& frame, std::span<const std::vector<Triangle>> triangles,
                       std::span<const std::int64_t> materials);
 
+/// Text of a .vtp file with the lines of a periodic cell (cell_outline.hpp); cell data `edge` is that of
+/// CellLine. `grains`: the box around them.
+std::string cell_vtp(const Frame& frame, const Bounds& grains);
+
 /// One file of a collection.
 struct FieldFile {
   double time = 0;   ///< [s]

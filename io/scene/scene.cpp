@@ -276,12 +276,14 @@ class SceneReader {
                 const std::vector<WallLoad>& in_force) {
     const std::string end_path = path + ".end";
     const toml::node* node = table.get("end");
-    const std::string conditions = "one of steps, time, strain, shear_strain, equilibrium";
+    const std::string conditions =
+        "one of steps, time, strain, shear_strain, equilibrium, stress_ratio, inertial_below, "
+        "inertial_above, steady";
     if (!node) fail_at(table, end_path, fmt::format("missing; stage '{}' needs {}", stage.name, conditions));
     if (!node->is_table()) fail_at(*node, end_path, "must be a table, e.g. end = { steps = 100 }");
     StageEnd& end = stage.end;
     read_table(*node->as_table(), end_path, keys_.stage_end, {}, end);
-    if (!end.steps && !end.time && !end.strain && !end.shear_strain && !end.equilibrium)
+    if (!end.any())
       fail_at(*node, end_path, fmt::format("stage '{}' never ends: give {}", stage.name, conditions));
     if (end.strain && !bounded(end.strain_axis))
       fail_at(*node, end_path + ".strain",
@@ -289,6 +291,15 @@ class SceneReader {
                           "xyz"[end.strain_axis]));
     if (end.shear_strain && !scene_.setup.domain.repeats)
       fail_at(*node, end_path + ".shear_strain", "there is no periodic cell that is sheared");
+    const bool flows = scene_.setup.domain.repeats && stage.flows();
+    for (const char* key : {"inertial_below", "inertial_above"})
+      if (node->as_table()->contains(key) && !flows)
+        fail_at(*node, fmt::format("{}.{}", end_path, key),
+                "needs a periodic cell that flows in this stage: [cell], and rates or a stress");
+    if (end.steady && !end.steady_time && !flows)
+      fail_at(
+          *node, end_path + ".steady",
+          "no periodic cell is sheared in this stage, by whose shear windows are measured: give steady_time");
     const bool pushed = std::any_of(in_force.begin(), in_force.end(), [](const WallLoad& load) {
       return (load.drive == WallDrive::pressure && load.pressure > 0) ||
              (load.drive == WallDrive::force && load.force > 0);

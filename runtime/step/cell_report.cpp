@@ -46,6 +46,16 @@ Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::C
   return sum;
 }
 
+double stress_ratio(const Mat3& stress) {
+  const double p = stress.trace() / 3;
+  return p > 0 ? std::sqrt(1.5) * deviator(stress).norm() / p : 0;
+}
+
+double inertial_time(const SampleSize& size, double p) {
+  const double density = size.volume > 0 ? size.total_mass / size.volume : 0;
+  return p > 0 ? size.mean_diameter * std::sqrt(density / p) : 0;
+}
+
 std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepReport& report,
                                       const graph::Communicator& ranks) {
   const StepState& state = outcome.state;
@@ -67,7 +77,7 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.kinetic_stress = symmetric(kinetic);
   out.p = contact.trace() / 3;
   out.q = std::sqrt(1.5) * deviator(contact).norm();
-  out.q_over_p = out.p > 0 ? out.q / out.p : 0;
+  out.q_over_p = stress_ratio(contact);
   out.solid_fraction = report.solid_fraction;
   out.contacts_a_grain = 2 * static_cast<double>(report.active) /
                          static_cast<double>(std::max<std::int64_t>(1, outcome.sample.bodies));
@@ -77,9 +87,7 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.a_n = along_stress(fabric.of_normal_forces, deviator(contact));
   out.a_t = along_stress(fabric.of_tangential_forces, deviator(contact));
   out.coordination = coordination(state, ranks, contacts_to_hold(outcome.parameters));
-  const double rate = shear_rate(gradient);
-  const double density = outcome.sample.volume > 0 ? outcome.sample.total_mass / outcome.sample.volume : 0;
-  out.inertial_number = out.p > 0 ? rate * outcome.sample.mean_diameter * std::sqrt(density / out.p) : 0;
+  out.inertial_number = shear_rate(gradient) * inertial_time(outcome.sample, out.p);
   out.converged = report.converged;
   return out;
 }

@@ -17,6 +17,7 @@
 #include "runtime/step/population.hpp"
 #include "runtime/step/probes.hpp"
 #include "runtime/step/setup.hpp"
+#include "runtime/step/stage_end.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/stiffness_memory.hpp"
 #include "runtime/step/time_step.hpp"
@@ -137,6 +138,7 @@ struct CheckpointHead {
   bool over = false;
   double sheared = 0;
   double held = 0;
+  StageMemory memory;
   double time_step = 0;
   double impulse_time = 0;  ///< of the last step [s]: forces are impulses over it
   Vec3 lengths_at_start = Vec3::Zero();
@@ -205,6 +207,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("over", head.over);
   visit("sheared", head.sheared);
   visit("held", head.held);
+  StageMemory::each_number(head.memory, visit);
   visit("time_step", head.time_step);
   visit("impulse_time", head.impulse_time);
   visit("lengths_at_start", head.lengths_at_start);

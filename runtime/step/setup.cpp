@@ -167,6 +167,29 @@ void validate_probes(const Setup& setup) {
   }
 }
 
+void validate_end(const Setup& setup, const Stage& stage) {
+  const StageEnd& end = stage.end;
+  const auto demand = [&](bool holds, const char* what) {
+    require(holds, fmt::format("stage '{}': end.{}", stage.name, what));
+  };
+  require(end.any(), fmt::format("stage '{}': no end condition (steps, time, strain, shear_strain, "
+                                 "equilibrium, stress_ratio, inertial_below, inertial_above or steady)",
+                                 stage.name));
+  demand(end.equilibrium_hold >= 0 && std::isfinite(end.equilibrium_hold),
+         "equilibrium_hold must be finite and >= 0");
+  demand(end.inertial_hold >= 0 && std::isfinite(end.inertial_hold), "inertial_hold must be finite and >= 0");
+  demand(end.stress_ratio.value_or(1) > 0 && end.steady.value_or(1) > 0 &&
+             end.inertial_below.value_or(1) > 0 && end.inertial_above.value_or(1) > 0,
+         "stress_ratio, steady, inertial_below and inertial_above must be > 0");
+  demand(end.steady_strain > 0 && end.steady_time.value_or(1) > 0,
+         "steady_strain and steady_time must be > 0");
+  const bool flows = setup.domain.repeats && stage.flows();
+  demand(flows || (!end.inertial_below && !end.inertial_above),
+         "inertial_below and inertial_above need a periodic cell that flows");
+  demand(flows || !end.steady || end.steady_time,
+         "steady needs steady_time where no periodic cell flows, whose shear is the measure otherwise");
+}
+
 }  // namespace
 
 void validate(const Setup& setup) {
@@ -189,12 +212,7 @@ void validate(const Setup& setup) {
       require(stage.laws.knows(wall.material),
               fmt::format("stage '{}': its laws do not have material {} of wall '{}'", stage.name,
                           wall.material, wall.name));
-    require(stage.end.steps || stage.end.time || stage.end.strain || stage.end.shear_strain ||
-                stage.end.equilibrium,
-            fmt::format("stage '{}': no end condition (steps, time, strain or equilibrium)", stage.name));
-    require(stage.end.equilibrium_hold >= 0 && std::isfinite(stage.end.equilibrium_hold),
-            fmt::format("stage '{}': end.equilibrium_hold must be finite and >= 0, got {}", stage.name,
-                        stage.end.equilibrium_hold));
+    validate_end(setup, stage);
     for (const auto& [name, load] : stage.loads) {
       const auto wall = std::find_if(setup.walls.begin(), setup.walls.end(),
                                      [&name = name](const Wall& w) { return w.name == name; });

@@ -45,6 +45,23 @@ struct StageEnd {
   /// its diameter under the load of the sample (fall_time in step_report.hpp): a sample that has just begun
   /// to move is slow, too.
   double equilibrium_hold = 3;
+  /// q/p of the contacts in a step, q = root of 3/2 s : s, at which the stage ends.
+  std::optional<double> stress_ratio;
+  /// Bounds on the inertial number of a periodic cell (cell.csv), below and above, and for how many inertial
+  /// times d root of density over p, >= 0, one of them must have held without a break.
+  std::optional<double> inertial_below, inertial_above;
+  double inertial_hold = 3;
+  /// Bound on the drift of a steady state: the larger of the changes of the mean q/p and of the mean solid
+  /// fraction from one window to the next.
+  std::optional<double> steady;
+  double steady_strain = 0.1;         ///< length of a window, as path of the cell's shear, > 0
+  std::optional<double> steady_time;  ///< instead, as time [s]
+
+  /// Ends that depend on what the grains do.
+  bool by_state() const { return strain || shear_strain || equilibrium || by_memory(); }
+  /// ... and on steps before the last one, or its stress.
+  bool by_memory() const { return stress_ratio || inertial_below || inertial_above || steady; }
+  bool any() const { return steps || time || by_state(); }
 };
 
 /// The stress that components of a periodic cell follow, as it pushes the grains together: xx, yy, zz, xy,

@@ -54,7 +54,8 @@ SavedState Simulation::save() const {
           impl_->stage_begins,
           impl_->population.state(),
           impl_->state.domain,
-          impl_->state.flow};
+          impl_->state.flow,
+          impl_->memory};
 }
 
 void Simulation::begin_from(std::vector<GivenForce> forces) {

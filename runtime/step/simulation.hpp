@@ -14,6 +14,7 @@
 #include "runtime/step/runaway.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/solver_loop.hpp"
+#include "runtime/step/stage_end.hpp"
 #include "runtime/step/state.hpp"
 #include "runtime/step/step_graph.hpp"
 #include "runtime/step/time_step.hpp"
@@ -38,6 +39,7 @@ struct SavedState {
   PopulationState population = {};
   Domain domain = {};
   CellFlow flow = {};
+  StageMemory memory = {};
 };
 
 /// A simulation: stages of time steps, each step one graph of tasks (docs/theory.md, "One time

@@ -135,5 +135,29 @@ TEST_F(CellsOnRanks, FollowAStressToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
   EXPECT_EQ(digest_of("parts"), digest_of("stressed8"));
 }
 
+/// Ends that look back: they come with the same step on any ranks, and where a run was stopped before.
+TEST_F(CellsOnRanks, EndTheirStagesWithTheSameStepOnAnyRanksAndBehindACheckpoint) {
+  std::string scene = stressed_cell;
+  const auto change = [&](const std::string& from, const std::string& to) {
+    scene.replace(scene.find(from), from.size(), to);
+  };
+  change("end = { steps = 150 }", "end = { steady = 0.1, steady_time = 2e-3, steps = 400 }");
+  change("end = { steps = 60 }", "end = { inertial_below = 0.08, inertial_hold = 0.2, steps = 400 }");
+  write(at("scene.toml"), scene);
+  expect_same_bits(8, {{2, 1}}, "ends");
+  const std::string command = "run scene.toml --set decomposition.subdomains=8 --threads 1 --out parts";
+  const Table steps = read_table(at("ends") / "cell.csv");
+  ASSERT_GT(steps.rows.size(), 20U);
+  ASSERT_LT(steps.rows.size(), 400U) << "ends by what the grains do, not by steps";
+  for (const std::size_t before : {std::size_t{70}, steps.rows.size() - 3}) {
+    const Outcome first = run(2, fmt::format("{} --resume --steps {}", command, before));
+    ASSERT_EQ(first.code, 0) << first.messages;
+  }
+  const Outcome rest = run(1, command + " --resume");
+  ASSERT_EQ(rest.code, 0) << rest.messages;
+  EXPECT_EQ(digest_of("parts"), digest_of("ends"));
+  EXPECT_EQ(read_table(at("parts") / "cell.csv").rows.size(), steps.rows.size());
+}
+
 }  // namespace
 }  // namespace talus::test

@@ -24,6 +24,24 @@ HEAP = {
 }
 
 
+# Grains that are pressed and sheared in a periodic cell, which leans at the end: contacts across its faces.
+SHEARED = {
+    "name": "sheared",
+    "time_step": 5e-4,
+    "material": {"density": 2600},
+    "cell": {"lengths": [0.05, 0.045, 0.05], "origin": [-1, 2, 3]},
+    "sample": {"kind": "random", "count": 60, "radius": 0.005},
+    "stage": [{"name": "shear", "shear_rates": [0, 2.0, 0], "stress": {"xx": 1e3, "yy": 1e3, "zz": 1e3},
+               "end": {"steps": 400}}],
+    "output": {"every_steps": 200, "xyz": True},
+}
+
+
+@pytest.fixture(scope="session")
+def sheared_run(tmp_path_factory):
+    return talus.run(copy.deepcopy(SHEARED), tmp_path_factory.mktemp("runs") / "sheared", threads=1, progress=False)
+
+
 @pytest.fixture
 def heap():
     return copy.deepcopy(HEAP)

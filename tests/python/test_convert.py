@@ -70,6 +70,28 @@ def test_a_lammps_dump_has_the_frames_to_the_bit(rain):
             assert high >= (frame.positions[:, axis] + frame.radii).max()
 
 
+def test_a_dump_of_a_leaning_cell_has_the_box_around_it_and_its_tilts(sheared_run):
+    assert convert(sheared_run.directory, "--to", "lammps").returncode == 0
+    text = (sheared_run.directory / "grains.lammpstrj").read_text()
+    assert text.count("ITEM: BOX BOUNDS pp pp pp\n") == 1 and text.count("ITEM: BOX BOUNDS xy xz yz pp pp pp\n") == 2
+    frame = sheared_run.frame(-1)
+    head, _ = read_dump(sheared_run.directory / "grains.lammpstrj")[-1]
+    (x_low, x_high, xy), (y_low, y_high, xz), (z_low, z_high, yz) = head["box"]
+    # By LAMMPS' manual: the corners of the cell, and what of them the bounds take in.
+    corners = np.array([frame.cell_origin + np.array([i, j, k]) @ frame.cell for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    assert [x_low, y_low, z_low] == pytest.approx(corners.min(axis=0)) and [xy, xz, yz] == [
+        frame.cell[1, 0], frame.cell[2, 0], frame.cell[2, 1]]
+    assert [x_high, y_high, z_high] == pytest.approx(corners.max(axis=0))
+
+
+def test_extended_xyz_has_the_lattice(sheared_run):
+    lines = (sheared_run.directory / "frames.xyz").read_text().splitlines()
+    line = [line for line in lines if "Properties=" in line][-1]
+    words = line.split('"')
+    assert np.array_equal(np.array(words[1].split(), dtype=float).reshape(3, 3), sheared_run.frame(-1).cell)
+    assert words[3].split() == ["-1", "2", "3"] and words[5] == "T T T"
+
+
 def step_of(root, s):
     """Points and point data of step s, as docs.vtk.org says that PolyData with time is to be read."""
     steps = root["Steps"]

@@ -55,6 +55,30 @@ def test_contacts_touch_where_positions_radii_and_normals_say(heap_run):
     assert np.all(frame.normal_forces > 0)
 
 
+def test_a_periodic_cell_is_what_its_table_and_its_contacts_say(sheared_run):
+    frame, row = sheared_run.frame(-1), sheared_run.cell[-1]
+    names = ("edge_xx", "edge_yy", "edge_zz", "edge_xy", "edge_xz", "edge_yz")
+    assert [frame.cell[k] for k in ((0, 0), (1, 1), (2, 2), (1, 0), (2, 0), (2, 1))] == [row[name] for name in names]
+    assert np.all(frame.cell_origin == [-1, 2, 3])
+    # dh/dt = L h: the shear of 2/s is prescribed, and the cell follows a stress along x.
+    along_x = frame.cell_rates[0, 0] / frame.cell[0, 0]
+    assert frame.cell_rates[2, 0] == pytest.approx(along_x * frame.cell[2, 0] + 2 * frame.cell[2, 2], rel=1e-3)
+    low, high = frame.cell_origin, frame.cell_origin + np.diag(frame.cell)
+    assert np.all((frame.positions >= low - 1e-12) & (frame.positions <= high + 1e-12)), "grains are wrapped"
+    first, second = frame.rows(frame.contacts[:, 0]), frame.rows(frame.contacts[:, 1])
+    across = frame.positions[first] - frame.positions[second]
+    branch = frame.nearest(across)
+    distance = np.linalg.norm(branch, axis=1)
+    assert np.count_nonzero(np.linalg.norm(across, axis=1) > 2 * distance) > 10, "contacts across faces"
+    assert np.allclose(distance - frame.radii[first] - frame.radii[second], frame.gaps, atol=1e-12)
+    assert np.allclose(branch / distance[:, None], frame.normals, atol=2e-2)  # those of the middle of the step
+
+
+def test_between_walls_there_is_no_cell(heap_run):
+    with pytest.raises(talus.MissingData, match=r"no \[cell\]"):
+        heap_run.frame(-1).cell
+
+
 def test_frames_are_those_of_the_output_times(heap_run):
     assert [frame.step for frame in heap_run.frames] == [0, 10, 20, 30]
     assert np.allclose(heap_run.frames.times, [0, 0.01, 0.02, 0.03])

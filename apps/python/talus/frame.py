@@ -177,6 +177,30 @@ class Frame:
             walls[column] = self.array(f"walls/{column}")
         return walls
 
+    @cached_property
+    def cell(self) -> np.ndarray:
+        """Edges a, b, c of the periodic cell [m], one a row, 0 along axes of walls; shape (3, 3)."""
+        return self.array("cell/edges")
+
+    @cached_property
+    def cell_rates(self) -> np.ndarray:
+        """How fast these edges change [m/s]; shape (3, 3)."""
+        return self.array("cell/rates")
+
+    @cached_property
+    def cell_origin(self) -> np.ndarray:
+        """Lower corner of the periodic cell [m]; `positions` lie in the brick between it and the diagonal of `cell`."""
+        return self.array("cell/origin")
+
+    def nearest(self, differences: np.ndarray) -> np.ndarray:
+        """Differences of positions [m], shape (..., 3), to the nearest image in the periodic cell."""
+        d = np.array(differences, dtype=float)
+        for axis in (2, 1, 0):
+            edge = self.cell[axis]
+            if edge[axis] > 0:
+                d -= np.rint(d[..., axis, None] / edge[axis]) * edge
+        return d
+
     def rows(self, ids: np.ndarray) -> np.ndarray:
         """Rows of `positions` and the like at which the grains of these ids stand, of any shape.
 
@@ -195,6 +219,9 @@ _WRITTEN_BY = {
     "bodies/omega": " (the scene says rotation = false, or output.velocities = false)",
     "bodies/orientation": " (the scene does not say orientation = true)",
     "bodies/material": " (the materials of the scene have no names)",
+    "cell/edges": " (the scene has no [cell], or the run is of an earlier version)",
+    "cell/rates": " (the scene has no [cell], or the run is of an earlier version)",
+    "cell/origin": " (the scene has no [cell], or the run is of an earlier version)",
     "contacts/point": " (the scene says output.contact_geometry = false)",
     "contacts/normal": " (the scene says output.contact_geometry = false)",
     "contacts/gap": " (the scene says output.contact_geometry = false)",

@@ -54,7 +54,12 @@ View view_of(const Frame& frame, const Slab& slab, std::span<const Cut> walls, c
     z_low = std::min(z_low, frame.x[k].z() - frame.radius[k]);
     z_high = std::max(z_high, frame.x[k].z() + frame.radius[k]);
   }
-  if (slab.grains.empty()) x_low = z_low = 0, x_high = z_high = 1;
+  const Domain& domain = frame.domain;
+  const Vec3 far = domain.low + domain.edges();
+  if (domain.cell.xx > 0) x_low = std::min(x_low, domain.low.x()), x_high = std::max(x_high, far.x());
+  if (domain.cell.zz > 0) z_low = std::min(z_low, domain.low.z()), z_high = std::max(z_high, far.z());
+  if (!(x_low < x_high)) x_low = 0, x_high = 1;
+  if (!(z_low < z_high)) z_low = 0, z_high = 1;
   const double x_reach = 0.5 * (x_high - x_low), z_reach = 0.5 * (z_high - z_low);
   const double x_least = x_low - x_reach, x_most = x_high + x_reach, z_least = z_low - z_reach,
                z_most = z_high + z_reach;
@@ -91,6 +96,20 @@ void draw_walls(Svg& svg, const View& view, std::span<const Cut> walls) {
              view.y(wall.z1 + end * dz), {style::ink, 3});
   }
   svg.end_group();
+}
+
+void draw_cell(Svg& svg, const View& view, const Domain& domain) {
+  const Vec3 &low = domain.low, high = low + domain.edges();
+  const Stroke faces{style::soft_ink, 1};
+  for (const double x : {low.x(), high.x()})
+    if (domain.cell.xx > 0) svg.line(view.x(x), view.y(view.z_low), view.x(x), view.y(view.z_high), faces);
+  for (const double z : {low.z(), high.z()})
+    if (domain.cell.zz > 0) svg.line(view.x(view.x_low), view.y(z), view.x(view.x_high), view.y(z), faces);
+  if (domain.cell.xz == 0) return;
+  // Of the two edges c of the front the one that stays within the view.
+  const double foot = domain.cell.xz > 0 ? low.x() : high.x();
+  svg.line(view.x(foot), view.y(low.z()), view.x(foot + domain.cell.xz), view.y(high.z()),
+           {style::soft_ink, 1, "5 4"});
 }
 
 double draw_scale(Svg& svg, const View& view, double y, int parts) {

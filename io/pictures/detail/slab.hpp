@@ -49,12 +49,15 @@ struct Placement {
   double left, top;
 };
 
-/// The grains of the slab, the walls about them, and a border of a mean radius. Walls that go on beyond half
-/// the grains' extent are cut off.
+/// The grains of the slab, the walls and the periodic cell about them, and a border of a mean radius. Walls
+/// that go on beyond half the grains' extent are cut off.
 View view_of(const Frame& frame, const Slab& slab, std::span<const Cut> walls, const Placement& at);
 
 /// Walls within the view.
 void draw_walls(Svg& svg, const View& view, std::span<const Cut> walls);
+
+/// The faces of a periodic cell along x and z; where they lean, c as a dashed line from a lower corner.
+void draw_cell(Svg& svg, const View& view, const Domain& domain);
 
 /// Draws at the left edge of the view and the height y [px] both axes with their names, and a bar of a round
 /// length, about 1/`parts` of the view's width, with the length below. Returns the width of both [px].

@@ -13,6 +13,7 @@
 
 #include "io/files/detail/all_or_none.hpp"
 #include "io/files/detail/descriptor.hpp"
+#include "runtime/step/cell_flow.hpp"
 
 namespace talus::io::detail {
 
@@ -157,8 +158,18 @@ WallColumns::WallColumns(const std::vector<WallReport>& walls) {
   }
 }
 
-std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls, const FrameFormat& format,
-                                     const graph::Communicator& ranks) {
+CellColumns::CellColumns(const Domain& domain) {
+  if (!domain.repeats) return;
+  const Mat3 h = edges_of(domain), change = matrix_of(domain.rates);
+  origin.assign(domain.low.begin(), domain.low.end());
+  for (const Eigen::Index k : {0, 1, 2}) {
+    edges.push_back(h.col(k));
+    rates.push_back(change.col(k));
+  }
+}
+
+std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls, const CellColumns& cell,
+                                     const FrameFormat& format, const graph::Communicator& ranks) {
   // Rows of each rank, and whether they have the optional arrays: a rank may have no body.
   constexpr std::size_t counts = 5;
   const std::int64_t own[counts] = {static_cast<std::int64_t>(part.id.size()),
@@ -201,9 +212,15 @@ std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls
     of_walls("rotation", "1", walls.rotation);
     of_walls("translation", "m", walls.translation);
   }
+  const Lister of_cell{arrays, "cell", false, {0, cell.edges.size()}};
+  if (!cell.edges.empty()) {
+    of_cell("origin", "m", cell.origin);
+    of_cell("edges", "m", cell.edges);
+    of_cell("rates", "m/s", cell.rates);
+  }
   if (ranks.rank() != 0)
     for (FrameArray& array : arrays)
-      if (array.group == of_walls.group) array.values = {};
+      if (array.group == of_walls.group || array.group == of_cell.group) array.values = {};
   return arrays;
 }
 

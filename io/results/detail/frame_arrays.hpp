@@ -18,7 +18,7 @@ namespace talus::io::detail {
 
 /// An array of numbers of 8 bytes, of which each rank has a run of rows.
 struct FrameArray {
-  const char* group;  ///< "bodies", "contacts" or "walls"
+  const char* group;  ///< "bodies", "contacts", "walls" or "cell"
   const char* name;
   const char* units;
   bool real;    ///< doubles; else integers of 64 bits
@@ -42,10 +42,17 @@ struct WallColumns {
   std::vector<Vec3> translation;
 };
 
-/// The arrays of a frame, the same on all ranks but for their values. Collective. `part` and `walls` must
-/// outlive them.
-std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls, const FrameFormat& format,
-                                     const graph::Communicator& ranks);
+/// The periodic cell of a frame, edges in rows: empty between walls. Every rank knows it; rank 0 writes it.
+struct CellColumns {
+  explicit CellColumns(const Domain& domain);
+  std::vector<double> origin;      ///< lower corner [m]
+  std::vector<Vec3> edges, rates;  ///< a, b, c [m]; how fast they change [m/s]
+};
+
+/// The arrays of a frame, the same on all ranks but for their values. Collective. `part`, `walls` and `cell`
+/// must outlive them.
+std::vector<FrameArray> frame_arrays(const Frame& part, const WallColumns& walls, const CellColumns& cell,
+                                     const FrameFormat& format, const graph::Communicator& ranks);
 
 /// Creates the arrays and their groups within `frame`; with compression, in chunks. Returns where each
 /// begins in the file [byte]: -1 for one without rows or in chunks.

@@ -206,6 +206,35 @@ Section<StageEnd> stage_end_keys() {
                         "√(2 d m/load), under gravity alone √(2 d/g).",
                         &StageEnd::equilibrium_hold)
               .only("equilibrium is given", [](const StageEnd& end) { return end.equilibrium.has_value(); }),
+          key<StageEnd>("stress_ratio", "", positive,
+                        "q/p of the contacts in a step, q = √(3/2 s : s) of the stress deviator s: the stage "
+                        "ends where it is reached.",
+                        &StageEnd::stress_ratio),
+          key<StageEnd>("inertial_below", "", positive,
+                        "The inertial number of the periodic cell (cell.csv) is at most this: it has come "
+                        "to rest.",
+                        &StageEnd::inertial_below),
+          key<StageEnd>("inertial_above", "", positive,
+                        "The inertial number is at least this: it flows, as under a shear stress that grows.",
+                        &StageEnd::inertial_above),
+          key<StageEnd>("inertial_hold", "", not_negative,
+                        "Time for which such a bound must have held, in inertial times d √(ρ/p).",
+                        &StageEnd::inertial_hold)
+              .only("inertial_below or inertial_above is given",
+                    [](const StageEnd& end) { return end.inertial_below || end.inertial_above; }),
+          key<StageEnd>(
+              "steady", "", positive,
+              "Steady state: bound on the drift of the means of q/p and of the solid fraction, from "
+              "one window to the next.",
+              &StageEnd::steady),
+          key<StageEnd>("steady_strain", "", positive,
+                        "Length of a window: path of the shear of the periodic cell.",
+                        &StageEnd::steady_strain)
+              .only("steady is given, and no steady_time",
+                    [](const StageEnd& end) { return end.steady && !end.steady_time; }),
+          key<StageEnd>("steady_time", "s", positive, "Length of a window, instead: time.",
+                        &StageEnd::steady_time)
+              .only("steady is given", [](const StageEnd& end) { return end.steady.has_value(); }),
       }};
 }
 

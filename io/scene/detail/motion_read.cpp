@@ -84,8 +84,7 @@ std::optional<double> time_of(const Scene& scene, StageRange stages) {
   for (std::size_t k = stages.from; k < stages.until; ++k) {
     const Stage& stage = scene.setup.stages[k];
     const StageEnd& end = stage.end;
-    if (end.strain || end.shear_strain || end.equilibrium || (end.steps && stage.chooses_time_step))
-      return std::nullopt;
+    if (end.by_state() || (end.steps && stage.chooses_time_step)) return std::nullopt;
     double time = end.time.value_or(std::numeric_limits<double>::infinity());
     if (end.steps) time = std::min(time, static_cast<double>(*end.steps) * stage.time_step);
     sum += time;

@@ -10,6 +10,7 @@
 #include "kernels/detection/domain.hpp"
 #include "runtime/step/cell.hpp"
 #include "runtime/step/cell_loads.hpp"
+#include "runtime/step/cell_report.hpp"
 #include "runtime/step/dealing.hpp"
 #include "runtime/step/first_state.hpp"
 #include "runtime/step/named_bodies.hpp"
@@ -78,6 +79,7 @@ struct Simulation::Implementation {
     clock = from.clock;
     held = from.held;
     sheared = from.sheared;
+    memory = from.memory;
     population.go_on_from(from.population);
     // The impulses are those of the last step.
     if (stage().chooses_time_step && report.step > 0) parameters.time_step = report.time_step;
@@ -106,6 +108,7 @@ struct Simulation::Implementation {
     stage_steps = head.stage_steps;
     held = head.held;
     sheared = head.sheared;
+    memory = head.memory;
     lengths_at_start = head.lengths_at_start;
     for (std::size_t w = 0; w < state.walls.size(); ++w) {
       const std::vector<double> load = numbers_of(state.walls[w].load);
@@ -135,6 +138,7 @@ struct Simulation::Implementation {
     head.over = over;
     head.held = held;
     head.sheared = sheared;
+    head.memory = memory;
     head.time_step = parameters.time_step;
     head.impulse_time = parameters.impulse_time();
     head.lengths_at_start = lengths_at_start;
@@ -224,6 +228,7 @@ struct Simulation::Implementation {
     }
     stage_steps = 0;
     held = sheared = 0;
+    memory = {};
     lengths_at_start = state.domain.lengths(state.walls);
   }
 
@@ -277,7 +282,15 @@ struct Simulation::Implementation {
       report.time = clock.time();
     }
     const StageEnd& end = stage().end;
-    sheared += report.time_step * shear_rate_now();
+    const double shear_rate = shear_rate_now();
+    sheared += report.time_step * shear_rate;
+    if (end.by_memory()) {
+      const Mat3& moment = graph.sums().contacts.moment;
+      const double volume = state.domain.volume(state.walls);
+      const double p = volume > 0 ? moment.trace() / (3 * volume * parameters.impulse_time()) : 0;
+      memory.add(end, {report.time_step, report.time_step * shear_rate, stress_ratio(moment),
+                       report.solid_fraction, inertial_time(size, p), shear_rate});
+    }
     held = end.equilibrium && report.equilibrium <= *end.equilibrium ? held + report.time_step : 0;
     const StepSpan last{report.time - report.time_step, report.time, &stage(), stage_begins[stage_index]};
     if (held > 0 && population.expects_grains(last)) held = 0;
@@ -314,7 +327,7 @@ struct Simulation::Implementation {
   StageDone done() const {
     const StageEnd& end = stage().end;
     return stage_done(stage(), {stage_steps, clock, end.strain ? strain(end.strain_axis) : 0, sheared, held,
-                                held > 0 ? fall_time(outcome()) : 0});
+                                held > 0 ? fall_time(outcome()) : 0, memory});
   }
 
   void pass_ended_stages() {
@@ -341,6 +354,7 @@ struct Simulation::Implementation {
   StageClock clock;    ///< of a stage that chooses its time steps
   double sheared = 0;  ///< path of the cell's shear since the stage began
   double held = 0;     ///< time for which the stage's bound on equilibrium has held [s]
+  StageMemory memory;  ///< of ends that look back
   std::size_t stage_index = 0;
   std::vector<double> stage_begins;  ///< times of the run at which stages up to this one began [s]
   std::int64_t stage_steps = 0;

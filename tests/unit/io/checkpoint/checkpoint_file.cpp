@@ -9,6 +9,7 @@
 
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "io/checkpoint/number_text.hpp"
+#include "io/files/detail/hdf5_write.hpp"
 #include "io/files/error.hpp"
 #include "runtime/graph/one_rank.hpp"
 #include "runtime/graph/pretend_ranks.hpp"
@@ -117,6 +118,22 @@ TEST(CheckpointFiles, OfOtherKindsAreRefused) {
   const test::ScratchDirectory folder;
   std::ofstream(folder / "checkpoint_000001.h5") << "no HDF5";
   EXPECT_THROW(io::read_checkpoint_head(folder / "checkpoint_000001.h5"), io::FileError);
+}
+
+// Version 4 did not know what the ends of stages remember.
+TEST(CheckpointFiles, OfEarlierVersionsAreRefusedByTheirNumber) {
+  const test::ScratchDirectory folder;
+  const std::string path = (folder / "checkpoint_000001.h5").string();
+  io::write_checkpoint(path, small_file({0, 1, 2}), graph::one_rank());
+  {
+    const io::detail::Hdf5Object access = io::detail::file_access(path);
+    const io::detail::Hdf5Object file = io::detail::hold(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.id()),
+                                                         H5Fclose, path, "opening the file");
+    ASSERT_GE(H5Adelete(file.id(), "talus_checkpoint"), 0);
+    io::detail::write_attribute({file.id(), path}, "talus_checkpoint", std::int64_t{4});
+  }
+  const std::string message = test::message_of<io::FileError>([&] { io::read_checkpoint_head(path); });
+  EXPECT_NE(message.find("version 4"), std::string::npos) << message;
 }
 
 TEST(CheckpointFolder, KeepsTheLastAndThoseThatAreArchived) {

@@ -145,6 +145,24 @@ TEST(Results, ReadBackBitForBit) {
   expect_same(read_frame(scratch / "results.h5", 2), turned);
 }
 
+TEST(Results, HoldTheCellOfEachFrame) {
+  const ScratchDirectory scratch;
+  ResultsWriter writer(scratch / "results.h5", {"bottom", "left"});
+  Frame frame = three_grains();
+  frame.domain = periodic_domain({1.0 / 3, 0, 0.7}, {-1, 0, 2}, {0, 0.1, 0});
+  frame.domain.rates = {.xx = -0.1, .xz = 3};
+  writer.append(frame);
+  writer.append(three_grains());
+  const Domain read = read_frame(scratch / "results.h5", 0).domain;
+  EXPECT_EQ(read.edges(), frame.domain.edges());
+  EXPECT_EQ(read.low, frame.domain.low);
+  EXPECT_EQ(read.cell.xz, 0.1);
+  EXPECT_EQ(read.rates.xx, -0.1);
+  EXPECT_EQ(read.rates.xz, 3);
+  EXPECT_TRUE(read.flows);
+  EXPECT_FALSE(read_frame(scratch / "results.h5", 1).domain.repeats) << "between walls";
+}
+
 TEST(Results, HoldASampleWithoutBodiesAndWalls) {
   const ScratchDirectory scratch;
   ResultsWriter writer(scratch / "results.h5", {});

@@ -87,6 +87,31 @@ TEST(CellScene, RefusesAStressThatTheCellCannotFollow) {
          "overlaps grow");
 }
 
+TEST(CellScene, ReadsAndWritesEndsByWhatTheGrainsDo) {
+  const std::size_t end = cube.find("end ="), line = cube.find('\n', end);
+  const auto with_end = [&](const std::string& conditions, const std::string& flow) {
+    return std::string(cube).replace(end, line - end, flow + "end = { " + conditions + " }");
+  };
+  const std::string flow = "shear_rates = [0, 1, 0]\n";
+  const Scene scene =
+      parsed(with_end("stress_ratio = 0.3, inertial_below = 1e-4, inertial_above = 0.1, "
+                      "inertial_hold = 7, steady = 0.02, steady_strain = 0.25",
+                      flow));
+  for (const Scene& read : {scene, parse_scene(resolved_scene(scene), "resolved.toml")}) {
+    const StageEnd& ends = read.setup.stages.at(0).end;
+    EXPECT_EQ(ends.stress_ratio, 0.3);
+    EXPECT_EQ(ends.inertial_below, 1e-4);
+    EXPECT_EQ(ends.inertial_above, 0.1);
+    EXPECT_EQ(ends.inertial_hold, 7);
+    EXPECT_EQ(ends.steady, 0.02);
+    EXPECT_EQ(ends.steady_strain, 0.25);
+  }
+  EXPECT_EQ(parsed(with_end("steady = 0.02, steady_time = 0.5", "")).setup.stages.at(0).end.steady_time, 0.5);
+  refuse(with_end("steady = 0.02", ""), "stage[0].end.steady", "give steady_time");
+  refuse(with_end("inertial_below = 0.02", ""), "stage[0].end.inertial_below", "cell that flows");
+  refuse(with_end("steady_strain = 0.5, steps = 3", flow), "stage[0].end.steady_strain", "steady is given");
+}
+
 TEST(CellScene, RandomGrainsStandInTheCell) {
   const Scene scene = parsed(cube);
   const Sample sample = build_sample(scene);

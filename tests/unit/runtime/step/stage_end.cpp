@@ -63,5 +63,130 @@ TEST(Equilibrium, HoldIsPartOfASavedState) {
   EXPECT_EQ(second.report().step, 190);
 }
 
+/// A cubic lattice of touching spheres in a cell under a stress: it rests, and carries what it is asked for.
+constexpr double density = 1000;
+Simulation lattice(const StressLoad& load, const StageEnd& end, graph::Executor& executor) {
+  talus::Setup setup;
+  setup.domain = periodic_domain(Vec3::Constant(8 * radius));
+  setup.decomposition.coupling = Coupling::nscdd;
+  setup.solver.tolerance = setup.solver.balance_tolerance = 1e-8;  // stresses exact
+  Stage& stage = setup.stages.emplace_back();
+  stage.name = "press";
+  stage.time_step = h;
+  stage.stress = load;
+  stage.end = end;
+  stage.end.steps = 500;
+  Bodies bodies;
+  for (int k = 0; k < 64; ++k)
+    add_sphere(bodies, BodyId{k}, radius * Vec3(2 * (k % 4) + 1, 2 * (k / 4 % 4) + 1, 2 * (k / 16) + 1),
+               radius, density);
+  return {setup, std::move(bodies), executor};
+}
+
+// q/p = (zz - 1)/((zz + 2)/3) of stresses (1, 1, zz) kPa, with zz from 1 to 4 kPa in 0.3 s, as a step's
+// middle has it: 0.75 at 2 kPa, which the 101st step is the first to reach.
+TEST(StressRatio, EndsAStageWithTheStepThatReachesIt) {
+  StressLoad load;
+  load.to = {1e3, 1e3, 4e3, {}, {}, {}};
+  load.ramp_time = 0.3;
+  graph::Executor executor({});
+  StageEnd end;
+  end.stress_ratio = 0.75;
+  talus::Setup setup = lattice(load, end, executor).setup();
+  // A stage before, from whose stress the ramp comes.
+  setup.stages.insert(setup.stages.begin(), setup.stages.front());
+  setup.stages[0].name = "before";
+  setup.stages[0].stress.to = {1e3, 1e3, 1e3, {}, {}, {}};
+  setup.stages[0].stress.ramp_time = 0;
+  setup.stages[0].end = {};
+  setup.stages[0].end.steps = 5;
+  Bodies bodies = lattice(load, end, executor).state().bodies;
+  Simulation simulation(setup, std::move(bodies), executor);
+  while (!simulation.finished()) {
+    ASSERT_TRUE(simulation.step().converged);
+    if (simulation.stage_fraction() >= 1 && simulation.stage_index() == 1) break;
+    simulation.begin_next_stage();
+  }
+  EXPECT_STREQ(simulation.end_reached(), "stress_ratio");
+  EXPECT_EQ(simulation.steps_of_stage(), 101);
+}
+
+// d root of rho over p = 0.02 sqrt(1000/1000) s: three of them are 60 steps.
+TEST(InertialNumber, MustBeLowForInertialTimesAlsoAcrossASavedState) {
+  StressLoad load;
+  load.to = {1e3, 1e3, 1e3, {}, {}, {}};
+  StageEnd end;
+  end.inertial_below = 1e-6;
+  graph::Executor executor({});
+  Simulation simulation = lattice(load, end, executor);
+  for (int k = 0; k < 25; ++k) simulation.step();
+  Simulation rest(simulation.setup(), simulation.save(), executor);
+  for (Simulation* each : {&simulation, &rest}) {
+    while (each->stage_fraction() < 1) each->step();
+    EXPECT_STREQ(each->end_reached(), "inertial_below");
+    EXPECT_NEAR(static_cast<double>(each->report().step), 60, 1);  // p is 1 kPa within the tolerance
+  }
+  EXPECT_EQ(simulation.report().step, rest.report().step);
+}
+
+TEST(InertialNumber, AboveABoundCountsFromTheLastStepBelowIt) {
+  StageEnd end;
+  end.inertial_above = 0.01;
+  end.inertial_hold = 2;
+  const StageStep fast{.time_step = 0.5, .inertial_time = 1, .shear_rate = 0.02};
+  StageStep slow = fast, loose = fast;
+  slow.shear_rate = 0.009;
+  loose.inertial_time = 0;  // no pressure: no inertial number
+  talus::Stage stage;
+  stage.end = end;
+  const StageClock clock;
+  StageMemory memory;
+  const auto ended_after = [&](std::initializer_list<StageStep> steps) {
+    for (const StageStep& step : steps) memory.add(end, step);
+    return stage_done(stage, {1, clock, 0, 0, 0, 0, memory}).fraction >= 1;
+  };
+  EXPECT_FALSE(ended_after({fast, fast, fast, slow}));
+  EXPECT_FALSE(ended_after({fast, fast, fast, loose}));
+  EXPECT_FALSE(ended_after({fast, fast, fast}));
+  EXPECT_TRUE(ended_after({fast}));
+}
+
+// Means of 0.3 + exp(-t) over windows of length w: each is 0.3 + exp(-t_begin) (1 - exp(-w))/w, so that the
+// drift from one to the next is exp(-t_begin) (1 - exp(-w))^2/w at t_begin of the earlier one.
+TEST(SteadyState, EndsWhereTheDriftOfMeansFallsBelowTheBound) {
+  const double w = 0.5, bound = 0.01, dt = 1e-3;
+  StageEnd end;
+  end.steady = bound;
+  end.steady_time = w;
+  talus::Stage stage;
+  stage.end = end;
+  const StageClock clock;
+  StageMemory memory;
+  std::int64_t steps = 0;
+  do {
+    const double t = (static_cast<double>(steps) + 0.5) * dt;
+    memory.add(end, {.time_step = dt, .stress_ratio = 0.3 + std::exp(-t), .solid_fraction = 0.6});
+    ++steps;
+  } while (stage_done(stage, {steps, clock, 0, 0, 0, 0, memory}).fraction < 1 && steps < 100000);
+  const double gone = 1 - std::exp(-w), begin = std::log(gone * gone / w / bound);
+  EXPECT_EQ(steps, static_cast<std::int64_t>(std::ceil(begin / w) + 2) * 500);
+}
+
+// The ratio is steady at once; the sample dilates with the shear g as 0.6 - g, by 0.1 from window to window.
+TEST(SteadyState, WatchesTheSolidFractionOverThePathOfShear) {
+  StageEnd end;
+  end.steady_strain = 0.1;
+  talus::Stage stage;
+  const StageClock clock;
+  for (const double bound : {0.09, 0.11}) {
+    end.steady = bound;
+    stage.end = end;
+    StageMemory memory;
+    for (int k = 0; k < 40; ++k)
+      memory.add(end, {.time_step = 1, .shear = 0.01, .stress_ratio = 0.3, .solid_fraction = 0.6 - 0.01 * k});
+    EXPECT_EQ(stage_done(stage, {40, clock, 0, 0, 0, 0, memory}).fraction >= 1, bound > 0.1) << bound;
+  }
+}
+
 }  // namespace
 }  // namespace talus::stage_end_test
