@@ -172,7 +172,10 @@ class PretendCommunicator final : public Communicator {
     }
   }
   void sum(std::span<std::int64_t> values) const override {
-    reduce(values, [](std::int64_t a, std::int64_t b) { return a + b; });
+    // Modulo 2^64, as MPI adds: digests are sums.
+    reduce(values, [](std::int64_t a, std::int64_t b) {
+      return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+    });
   }
   void max(std::span<double> values) const override {
     reduce(values, [](double a, double b) { return std::max(a, b); });
