@@ -29,8 +29,11 @@ std::optional<Frame> last_frame(const RunFolder& run) {
   try {
     const std::filesystem::path results = run.directory / "results.h5";
     const std::size_t frames = std::filesystem::exists(results) ? io::frame_count(results) : 0;
-    if (frames == 0 || run.summary.value("bodies", std::size_t{0}) > most_drawn) return std::nullopt;
-    return io::read_frame(results, frames - 1);
+    const std::size_t grains = run.summary.value("bodies", std::size_t{0});
+    if (frames == 0 || grains > most_drawn) return std::nullopt;
+    // Forces are shown by the live view only.
+    return io::read_frame(results, frames - 1,
+                          grains > most_live ? io::FrameParts::without_contacts : io::FrameParts::all);
   } catch (const std::exception&) {
     return std::nullopt;  // a frame of which parts were left out, or one that is being written
   }

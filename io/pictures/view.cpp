@@ -14,6 +14,7 @@ namespace talus::io {
 namespace {
 
 using Colour = std::array<double, 3>;
+using Tint = std::array<float, 3>;  ///< of a sample: there are millions
 
 constexpr std::size_t samples = 2;  // per pixel and direction
 constexpr Colour edge_colour{0.35, 0.4, 0.45};
@@ -67,8 +68,8 @@ class Canvas {
   explicit Canvas(const Projection& view)
       : width_(static_cast<std::size_t>(view.width)),
         height_(static_cast<std::size_t>(view.height)),
-        colour_(width_ * height_, Colour{1, 1, 1}),
-        depth_(width_ * height_, -infinity) {}
+        colour_(width_ * height_, Tint{1, 1, 1}),
+        depth_(width_ * height_, empty) {}
 
   std::size_t width() const { return width_; }
   std::size_t height() const { return height_; }
@@ -116,31 +117,32 @@ class Canvas {
   /// Darkens grains that lie deeper than those around them within `reach` samples (after Luft, Colditz and
   /// Deussen 2006): gaps look deep. What is drawn later is left as it is.
   void darken_gaps(double reach) {
-    std::vector<double> around(depth_.size(), 0.0), weight(depth_.size(), 0.0);
+    std::vector<float> around(depth_.size(), 0.0F), weight(depth_.size(), 0.0F);
     for (std::size_t k = 0; k < depth_.size(); ++k)
-      if (depth_[k] > -infinity) around[k] = depth_[k], weight[k] = 1;
+      if (depth_[k] > empty) around[k] = depth_[k], weight[k] = 1;
     const auto radius = static_cast<std::size_t>(std::clamp(reach, 1.0, 60.0));
     for (int pass = 0; pass < 2; ++pass)
-      for (std::vector<double>* of : {&around, &weight}) {
+      for (std::vector<float>* of : {&around, &weight}) {
         blur(*of, width_, height_, 1, width_, radius);
         blur(*of, height_, width_, width_, 1, radius);
       }
     for (std::size_t k = 0; k < depth_.size(); ++k) {
-      if (depth_[k] == -infinity) continue;
-      const double deep = std::clamp((around[k] / weight[k] - depth_[k]) / (2 * reach), 0.0, 1.0);
-      for (double& c : colour_[k]) c *= 1 - 0.6 * deep;
+      if (depth_[k] == empty) continue;
+      const double deep = std::clamp(double{around[k] / weight[k] - depth_[k]} / (2 * reach), 0.0, 1.0);
+      for (float& c : colour_[k]) c *= static_cast<float>(1 - 0.6 * deep);
     }
   }
 
   Image image() const {
     Image out{width_ / samples, height_ / samples, {}};
+    out.rgb.reserve(3 * out.width * out.height);
     for (std::size_t y = 0; y < out.height; ++y)
       for (std::size_t x = 0; x < out.width; ++x)
         for (std::size_t c = 0; c < 3; ++c) {
           double sum = 0;
           for (std::size_t v = 0; v < samples; ++v)
             for (std::size_t u = 0; u < samples; ++u)
-              sum += colour_[(y * samples + v) * width_ + x * samples + u][c];
+              sum += double{colour_[(y * samples + v) * width_ + x * samples + u][c]};
           out.rgb.push_back(
               static_cast<std::uint8_t>(std::lround(255 * std::clamp(sum / (samples * samples), 0.0, 1.0))));
         }
@@ -169,27 +171,29 @@ class Canvas {
   }
   void put(std::size_t x, std::size_t y, double depth, const Colour& colour) {
     const std::size_t k = y * width_ + x;
-    if (depth <= depth_[k]) return;
-    depth_[k] = depth;
-    colour_[k] = colour;
+    const auto height = static_cast<float>(depth);
+    if (height <= depth_[k]) return;
+    depth_[k] = height;
+    for (std::size_t c = 0; c < 3; ++c) colour_[k][c] = static_cast<float>(colour[c]);
   }
   /// Mean over 2 radius + 1 neighbours along lines of `length` values, `step` apart; `lines` of them.
-  static void blur(std::vector<double>& values, std::size_t length, std::size_t lines, std::size_t step,
+  static void blur(std::vector<float>& values, std::size_t length, std::size_t lines, std::size_t step,
                    std::size_t next, std::size_t radius) {
     std::vector<double> sum(length + 1);
     for (std::size_t line = 0; line < lines; ++line) {
-      double* first = values.data() + line * next;
-      for (std::size_t k = 0; k < length; ++k) sum[k + 1] = sum[k] + first[k * step];
+      float* first = values.data() + line * next;
+      for (std::size_t k = 0; k < length; ++k) sum[k + 1] = sum[k] + double{first[k * step]};
       for (std::size_t k = 0; k < length; ++k) {
         const std::size_t from = k < radius ? 0 : k - radius, to = std::min(length, k + radius + 1);
-        first[k * step] = (sum[to] - sum[from]) / static_cast<double>(to - from);
+        first[k * step] = static_cast<float>((sum[to] - sum[from]) / static_cast<double>(to - from));
       }
     }
   }
 
   std::size_t width_, height_;
-  std::vector<Colour> colour_;
-  std::vector<double> depth_;
+  static constexpr float empty = -std::numeric_limits<float>::infinity();
+  std::vector<Tint> colour_;
+  std::vector<float> depth_;
 };
 
 Vec3 centre_of(const Triangle& t) {

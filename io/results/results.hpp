@@ -97,8 +97,11 @@ class ResultsWriter {
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);
 
+/// What of a frame is read: contacts are most of it.
+enum class FrameParts { all, without_contacts };
+
 /// Frame `index`, bit for bit as it was written. Throws FileError when there is no such frame, or its arrays
 /// were left out.
-Frame read_frame(const std::filesystem::path& path, std::size_t index);
+Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts = FrameParts::all);
 
 }  // namespace talus::io

@@ -44,6 +44,15 @@ std::vector<T> read_integers(hid_t file, const std::string& path, const std::str
   return read_array<T>({file, path}, name, H5T_NATIVE_INT64, numbers_in<T>);
 }
 
+void read_contacts(detail::Place group, Frame& frame) {
+  const auto& [h, name] = group;
+  frame.contact_bodies = read_integers<std::array<std::int64_t, 2>>(h, name, "contacts/bodies");
+  frame.contact_point = read_doubles<Vec3>(h, name, "contacts/point");
+  frame.contact_normal = read_doubles<Vec3>(h, name, "contacts/normal");
+  frame.contact_gap = read_doubles<double>(h, name, "contacts/gap");
+  frame.contact_force = read_doubles<Vec3>(h, name, "contacts/force");
+}
+
 /// Where walls are and how they stand; files of earlier versions do not tell.
 void read_places(detail::Place frame, std::vector<WallReport>& walls) {
   const auto has = [&](const char* array) { return H5Lexists(frame.group, array, H5P_DEFAULT) > 0; };
@@ -95,7 +104,7 @@ std::size_t frame_count(const std::filesystem::path& path) {
   return count_frames(file.id(), path.string());
 }
 
-Frame read_frame(const std::filesystem::path& path, std::size_t index) {
+Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts) {
   const detail::QuietHdf5 quiet;
   const std::string name = path.string();
   const Hdf5Object file = open_results(name);
@@ -122,11 +131,7 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index) {
   }
   if (H5Lexists(h, "bodies/material", H5P_DEFAULT) > 0)
     frame.material = read_integers<std::int64_t>(h, name, "bodies/material");
-  frame.contact_bodies = read_integers<std::array<std::int64_t, 2>>(h, name, "contacts/bodies");
-  frame.contact_point = read_doubles<Vec3>(h, name, "contacts/point");
-  frame.contact_normal = read_doubles<Vec3>(h, name, "contacts/normal");
-  frame.contact_gap = read_doubles<double>(h, name, "contacts/gap");
-  frame.contact_force = read_doubles<Vec3>(h, name, "contacts/force");
+  if (parts == FrameParts::all) read_contacts({h, name}, frame);
 
   const auto names = read_names({file.id(), name}, "/walls/name");
   const auto position = read_doubles<double>(h, name, "walls/position");

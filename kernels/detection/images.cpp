@@ -31,7 +31,8 @@ void fold_images(std::size_t bodies, std::span<const Slot> original, std::vector
 }
 
 void drop_repeated(std::vector<GrainPair>& pairs) {
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  // Not std::ranges::unique: clang 14 does not take libstdc++'s subrange.
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }
 
 std::vector<GrainPair> near_pairs(const Domain& domain, std::span<const Vec3> x,

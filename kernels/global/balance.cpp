@@ -172,7 +172,7 @@ VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& li
                              const BalanceThresholds& thresholds) {
   const BodyParts parts(problems, link);
   const double kappa = thresholds.firmness * estimate_stiffness(parts);
-  const PartField V = velocities_of(parts, impulses_of(parts));
+  const PartField V = velocities_of(parts);
   std::vector<Wishes> wishes(parts.size());
   parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p], thresholds); });
 

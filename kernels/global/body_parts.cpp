@@ -65,17 +65,32 @@ void set_free(std::span<BodyProblem> parts, const PartLink& link) {
     }
 }
 
-PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse) {
+namespace {
+
+/// impulse_of(p): those of part p.
+template <class ImpulseOf>
+PartField velocities_from(const BodyParts& parts, const ImpulseOf& impulse_of) {
   PartField V = parts.field();
   parts.each([&](std::size_t p) {
     const auto& contacts = parts[p].contacts;
-    for (std::size_t k = 0; k < contacts.size(); ++k) add_force(contacts[k], impulse[p][k], V[p]);
+    const std::span<const Vec3> impulse = impulse_of(p);
+    for (std::size_t k = 0; k < contacts.size(); ++k) add_force(contacts[k], impulse[k], V[p]);
   });
   parts.link().sum_copies(V);
   parts.each([&](std::size_t p) {
     for (std::size_t b = 0; b < V[p].size(); ++b) velocity_from_force(parts[p].bodies[b], V[p][b]);
   });
   return V;
+}
+
+}  // namespace
+
+PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse) {
+  return velocities_from(parts, [&](std::size_t p) { return std::span(impulse[p]); });
+}
+
+PartField velocities_of(const BodyParts& parts) {
+  return velocities_from(parts, [&](std::size_t p) { return std::span(parts[p].impulse); });
 }
 
 std::vector<std::vector<std::int32_t>> heavy_unknowns(const BodyParts& parts, double ratio) {

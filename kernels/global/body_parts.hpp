@@ -83,6 +83,8 @@ void set_free(std::span<BodyProblem> parts, const PartLink& link);
 
 /// V = V_free + M^-1 H r.
 PartField velocities_of(const BodyParts& parts, const PartImpulses& impulse);
+/// The same of the impulses that the parts have.
+PartField velocities_of(const BodyParts& parts);
 
 /// Per part, the unknowns that count there and are much heavier than what they touch: walls of finite mass,
 /// and bodies of more than `ratio` times the mean mass of their neighbours; ascending.

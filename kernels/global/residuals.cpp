@@ -50,7 +50,7 @@ Vec3 approach(const ContactEquation& c, std::span<const Twist> V) {
 }  // namespace
 
 Residuals residuals_of(const BodyParts& parts) {
-  const PartField V = velocities_of(parts, impulses_of(parts));
+  const PartField V = velocities_of(parts);
   Residuals out;
   out.contact.resize(parts.size());
   out.body.resize(parts.size());

@@ -7,6 +7,7 @@
 #include <string>
 #include <tuple>
 
+#include "kernels/samples/detail/radius_slices.hpp"
 #include "kernels/samples/resting_site.hpp"
 #include "kernels/samples/sample.hpp"
 
@@ -15,14 +16,15 @@ namespace talus {
 namespace {
 
 // The search. A site is a triple of supports; for a range of radii a grain can rest on it. All sites are born
-// when their youngest support is placed, and only shrink as later grains block them. Radii are cut into
-// classes, and each class keeps its sites in a heap, keyed by the height of the site for the smallest radius
-// of the class. Height grows at least as fast as radius (resting_site.hpp), so that the key and what the
-// radius has beyond that of the class bound from below what a grain can get there. To place a grain, sites
-// leave the heap until the bound exceeds the best height found: exact for the grain's own radius, and only
-// the sites within a part of a class width of the lowest are examined; on a wide base that is many, and it is
-// what a deposition takes longest for. A new grain does not update the sites that it blocks: each site is
-// checked against its neighbours when it is examined.
+// when their youngest support is placed, and only shrink as later grains block them. The radii are halved
+// again and again (radius_slices.hpp), and each slice has a heap of sites, keyed by their height for the
+// smallest radius of the slice. Height grows at least as fast as radius (resting_site.hpp), so that the key
+// and what the radius has beyond that of the slice bound from below what a grain can get there. A site begins
+// in the slice of all radii. To place a grain, sites leave the heaps of the slices that hold its radius until
+// the bound exceeds the best height found: exact for the grain's own radius. A site whose bound was too low
+// goes on to the halves of its slice: only those that come near to being the lowest are ever sorted finely,
+// and most are buried before. A new grain does not update the sites that it blocks: each site is checked
+// against its neighbours when it is examined.
 
 // Supports that are not grains; the lower number counts as the older.
 enum Plane : std::int32_t { floor_plane = -1, x_high = -2, x_low = -3, y_high = -4, y_low = -5 };
@@ -99,53 +101,58 @@ class Cells {
 };
 
 class Deposition {
+  using Slices = detail::RadiusSlices;
+
  public:
   Deposition(double smallest, double largest, double length_x, double length_y, std::size_t n)
       : smallest_(smallest),
         largest_(largest),
         lx_(length_x),
         ly_(length_y),
-        cells_(2 * largest, length_x, length_y) {
+        cells_(2 * largest, length_x, length_y),
+        slices_(smallest, largest),
+        heaps_(Slices::end) {
     grains_.reserve(n);
-    // Narrow classes bound heights sharply but multiply the entries; 3 % of a radius was fastest for spreads
-    // of 10 to 50 %.
-    const double classes = std::ceil((largest - smallest) / (0.03 * smallest));
-    heaps_.resize(static_cast<std::size_t>(std::clamp(classes, 1.0, 32.0)));
     for (const std::int32_t x : {x_low, x_high})
       for (const std::int32_t y : {y_low, y_high}) add_site({floor_plane, x, y}, 0, {smallest, largest});
   }
 
   /// The centre of the next grain.
   Vec3 place(double radius) {
-    const std::size_t c = class_of(radius);
-    std::vector<Entry>& heap = heaps_[c];
+    const std::array<std::size_t, Slices::levels> around = slices_.around(radius);
     Vec3 best = Vec3::Constant(std::numeric_limits<double>::infinity());
     std::int32_t best_site = -1;
     aside_.clear();
     // Less what rounding may hide: sites of equal height must all be examined.
-    const double rise = radius - class_low(c) - 1e-9 * largest_;
-    while (!heap.empty() && heap.front().bound + rise <= best[2]) {
-      std::pop_heap(heap.begin(), heap.end(), Higher());
-      Entry entry = heap.back();
-      heap.pop_back();
+    const auto rise = [&](std::size_t slice) { return radius - slices_.low(slice) - 1e-9 * largest_; };
+    for (;;) {
+      std::size_t slice = 0;
+      double least = std::numeric_limits<double>::infinity();
+      for (const std::size_t s : around)
+        if (!heaps_[s].empty() && heaps_[s].front().bound + rise(s) < least)
+          least = heaps_[s].front().bound + rise(slice = s);
+      if (slice == 0 || least > best[2]) break;
+      Entry entry = pop(slice);
       const std::int32_t id = entry.site;
-      if (entry.version != site(id).version && !bound_in_class(site(id), c, entry.bound)) {
+      if (entry.version != site(id).version && !renew(entry, slice)) {
         release(id);
         continue;
       }
-      entry.version = site(id).version;
-      aside_.push_back(entry);
-      if (entry.bound + rise > best[2] || radius < site(id).range.low || radius > site(id).range.high)
-        continue;
-      const Vec3 x = centre(site(id), radius);
-      if (shrink_if_blocked(id, x, radius)) continue;
-      if (best_site < 0 || x[2] < best[2] ||
-          (x[2] == best[2] && seniority(site(id)) < seniority(site(best_site)))) {
-        best = x;
-        best_site = id;
+      if (entry.bound + rise(slice) <= best[2] && radius >= site(id).range.low &&
+          radius <= site(id).range.high) {
+        const Vec3 x = centre(site(id), radius);
+        if (!shrink_if_blocked(id, x, radius) &&
+            (best_site < 0 || x[2] < best[2] ||
+             (x[2] == best[2] && seniority(site(id)) < seniority(site(best_site))))) {
+          best = x;
+          best_site = id;
+          aside_.push_back({entry, slice});
+          continue;
+        }
       }
+      put_aside(entry, slice);
     }
-    for (const Entry& entry : aside_) push(c, entry);
+    for (const auto& [entry, slice] : aside_) push(slice, entry);
     if (best_site < 0)
       throw std::invalid_argument("deposit: no place with three supports for a grain of radius " +
                                   std::to_string(radius) + " m in a base of " + std::to_string(lx_) +
@@ -157,15 +164,6 @@ class Deposition {
  private:
   Site& site(std::int32_t id) { return sites_[static_cast<std::size_t>(id)]; }
   const LyingGrain& grain(std::int32_t g) const { return grains_[static_cast<std::size_t>(g)]; }
-
-  double class_low(std::size_t c) const {
-    return smallest_ + static_cast<double>(c) * (largest_ - smallest_) / static_cast<double>(heaps_.size());
-  }
-  std::size_t class_of(double radius) const {
-    std::size_t c = 0;
-    while (c + 1 < heaps_.size() && radius >= class_low(c + 1)) ++c;
-    return c;
-  }
 
   /// Obstacle `s`, grain or plane, seen from `base`.
   Obstacle obstacle(std::int32_t s, const LyingGrain& base) const {
@@ -212,14 +210,42 @@ class Deposition {
     if (plane == y_high) x[1] = ly_ - radius;
   }
 
-  /// The bound of an entry of class c for the site, if higher than `bound`; false if no grain of the class
-  /// will ever rest there.
-  bool bound_in_class(const Site& s, std::size_t c, double& bound) const {
-    if (s.range.low > s.range.high || s.range.high < class_low(c)) return false;
-    if (c + 1 < heaps_.size() && s.range.low >= class_low(c + 1)) return false;
-    const double from = std::max(s.range.low, class_low(c));
-    bound = std::max(bound, centre(s, from)[2] - (from - class_low(c)));
+  bool meets(const RadiusRange& range, std::size_t slice) const {
+    return range.low <= range.high && range.high >= slices_.low(slice) && range.low < slices_.high(slice);
+  }
+
+  /// What a site's entry in the heap of a slice that its range meets is sorted by.
+  double bound_in(const Site& s, std::size_t slice) const {
+    const double from = std::max(s.range.low, slices_.low(slice));
+    return centre(s, from)[2] - (from - slices_.low(slice));
+  }
+
+  /// Brings an entry of the slice up to date with its site. False if no grain of the slice will ever rest
+  /// there.
+  bool renew(Entry& entry, std::size_t slice) {
+    if (!meets(site(entry.site).range, slice)) return false;
+    entry.bound = std::max(entry.bound, bound_in(site(entry.site), slice));
+    entry.version = site(entry.site).version;
     return true;
+  }
+
+  /// Gives the slice an entry of the site if its range meets it.
+  void enter(std::int32_t id, std::size_t slice) {
+    if (!meets(site(id).range, slice)) return;
+    push(slice, {bound_in(site(id), slice), id, site(id).version});
+    ++site(id).uses;
+  }
+
+  /// Behind an examination: from a leaf an entry is kept from coming up again for this grain, others are
+  /// handed to the halves of their slice.
+  void put_aside(const Entry& entry, std::size_t slice) {
+    if (Slices::is_leaf(slice)) {
+      aside_.push_back({entry, slice});
+      return;
+    }
+    enter(entry.site, 2 * slice);
+    enter(entry.site, 2 * slice + 1);
+    release(entry.site);
   }
 
   /// Whether a grain overlaps others at x; if so, the radii that the blocking grain forbids leave the site's
@@ -312,17 +338,19 @@ class Deposition {
       free_.pop_back();
     }
     site(id) = {support, side, 0, 0, range};
-    for (std::size_t c = 0; c < heaps_.size(); ++c) {
-      Entry entry{-std::numeric_limits<double>::infinity(), id};
-      if (!bound_in_class(site(id), c, entry.bound)) continue;
-      push(c, entry);
-      ++site(id).uses;
-    }
+    enter(id, 1);
   }
 
-  void push(std::size_t c, const Entry& entry) {
-    heaps_[c].push_back(entry);
-    std::push_heap(heaps_[c].begin(), heaps_[c].end(), Higher());
+  void push(std::size_t slice, const Entry& entry) {
+    heaps_[slice].push_back(entry);
+    std::push_heap(heaps_[slice].begin(), heaps_[slice].end(), Higher());
+  }
+  Entry pop(std::size_t slice) {
+    std::vector<Entry>& heap = heaps_[slice];
+    std::pop_heap(heap.begin(), heap.end(), Higher());
+    const Entry entry = heap.back();
+    heap.pop_back();
+    return entry;
   }
 
   void release(std::int32_t id) {
@@ -337,10 +365,11 @@ class Deposition {
   std::vector<LyingGrain> grains_;
   std::vector<Site> sites_;
   std::vector<std::int32_t> free_;
-  std::vector<std::vector<Entry>> heaps_;  ///< by class of radius
-  std::vector<Entry> aside_;               ///< scratch
-  std::vector<Near> near_;                 ///< scratch
-  RadiusRanges ranges_;                    ///< scratch
+  Slices slices_;
+  std::vector<std::vector<Entry>> heaps_;             ///< by slice
+  std::vector<std::pair<Entry, std::size_t>> aside_;  ///< entries and their slices; scratch
+  std::vector<Near> near_;                            ///< scratch
+  RadiusRanges ranges_;                               ///< scratch
 };
 
 }  // namespace

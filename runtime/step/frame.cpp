@@ -107,6 +107,12 @@ std::vector<std::int64_t> splitters(std::vector<std::int64_t> ids, const graph::
   return first;
 }
 
+/// Room for `rows` entries of each: a rank gets about as many rows as it has, and growing would copy them.
+template <class... Columns>
+void reserve(std::size_t rows, Columns&... columns) {
+  (columns.reserve(rows), ...);
+}
+
 /// Sends row(k), k < count, to the rank that has `id_of(row)`, and calls add(row) for those that come here.
 template <class Row, class IdOf, class Add>
 void deal_rows(std::size_t count, std::span<const std::int64_t> first, const graph::Communicator& ranks,
@@ -155,6 +161,8 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   }
   const std::vector<std::int64_t> first = splitters(std::move(ids), ranks);
   const bool orientation = state.decomposition.orientation;
+  reserve(counted.size(), frame.id, frame.x, frame.radius, frame.u);
+  if (rotation) frame.omega.reserve(counted.size());
   deal_rows(
       counted.size(), first, ranks, [&](std::size_t k) { return body_row(state, counted[k]); },
       [](const BodyRow& row) { return row.id; },
@@ -180,6 +188,8 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   permute(frame.material, by_id);
   if (!contacts) return;
   const std::vector<Active> active = active_contacts(state);
+  reserve(active.size(), frame.contact_bodies, frame.contact_normal, frame.contact_point, frame.contact_gap,
+          frame.contact_force);
   deal_rows(
       active.size(), first, ranks, [&](std::size_t k) { return contact_row(state, active[k], impulse_time); },
       [](const ContactRow& row) { return row.bodies[0]; },

@@ -75,7 +75,7 @@ class StepLink final : public PartLink {
 
 /// Kinetic energy of the velocities that impulses make, twice [J].
 double energy_of(const BodyParts& parts) {
-  const PartField velocity = velocities_of(parts, impulses_of(parts));
+  const PartField velocity = velocities_of(parts);
   return parts.total(1, [&](std::size_t p, std::span<double> row) {
     const BodyProblem& problem = parts[p];
     for (std::size_t b = 0; b < problem.bodies.size(); ++b)

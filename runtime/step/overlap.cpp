@@ -42,8 +42,9 @@ std::vector<GivenOverlap> deepest_of_pairs(std::vector<GivenOverlap> all) {
   std::ranges::sort(all, [](const GivenOverlap& a, const GivenOverlap& b) {
     return a.pair != b.pair ? a.pair < b.pair : a.depth > b.depth;
   });
-  const auto rest = std::ranges::unique(all, {}, &GivenOverlap::pair);
-  all.erase(rest.begin(), rest.end());
+  // Not std::ranges::unique: clang 14 does not take libstdc++'s subrange.
+  const auto same = [](const GivenOverlap& a, const GivenOverlap& b) { return a.pair == b.pair; };
+  all.erase(std::unique(all.begin(), all.end(), same), all.end());
   return all;
 }
 

@@ -107,6 +107,19 @@ TEST(Results, InSinglePrecisionAreTheNearestFloats) {
   }
 }
 
+TEST(Results, ContactsThatAreNotAskedForAreNotRead) {
+  const ScratchDirectory scratch;
+  ResultsWriter(scratch / "flat.h5", {"bottom", "left"}, graph::one_rank(), {.contact_geometry = false})
+      .append(three_grains());
+  Frame expected = three_grains();
+  expected.contact_bodies.clear();
+  expected.contact_point.clear();
+  expected.contact_normal.clear();
+  expected.contact_gap.clear();
+  expected.contact_force.clear();
+  expect_same(read_frame(scratch / "flat.h5", 0, FrameParts::without_contacts), expected);
+}
+
 TEST(Results, WithoutVelocitiesOrGeometrySayWhatIsMissing) {
   const ScratchDirectory scratch;
   ResultsWriter(scratch / "still.h5", {"bottom", "left"}, graph::one_rank(), {.velocities = false})

@@ -9,6 +9,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kernels/samples/detail/radius_slices.hpp"
 #include "kernels/samples/resting_site.hpp"
 
 namespace talus {
@@ -215,6 +216,27 @@ TEST(Deposition, EveryGrainTakesTheLowestPlace) {
           << "grain " << k << ", seed " << seed;
     }
   }
+}
+
+TEST(RadiusSlices, HalveTheirRadiiAndHoldEachRadiusOnceALevel) {
+  const detail::RadiusSlices slices(0.01, 0.03);
+  EXPECT_EQ(slices.low(1), 0.01);
+  for (std::size_t k = 1; k < detail::RadiusSlices::leaves; ++k) {
+    EXPECT_EQ(slices.low(2 * k), slices.low(k));
+    EXPECT_EQ(slices.high(2 * k), slices.low(2 * k + 1));
+    EXPECT_EQ(slices.high(2 * k + 1), slices.high(k));
+  }
+  for (const double radius : {0.01, 0.0125, 0.02, 0.0200000001, 0.03})
+    for (const std::size_t slice : slices.around(radius)) {
+      EXPECT_GE(radius, slices.low(slice)) << slice;
+      EXPECT_LT(radius, slices.high(slice)) << slice;
+    }
+}
+
+TEST(RadiusSlices, OfEqualRadiiTheLastOfEachLevelHoldsThem) {
+  const detail::RadiusSlices slices(0.01, 0.01);
+  for (const std::size_t slice : slices.around(0.01))
+    EXPECT_EQ(slices.high(slice), std::numeric_limits<double>::infinity());
 }
 
 TEST(Deposition, FirstGrainLiesInTheFirstCorner) {
