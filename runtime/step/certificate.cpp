@@ -25,8 +25,9 @@ void Certificate::begin(Scales scales) {
 void Certificate::measure(const CheckSums& sums) {
   const ErrorSums& error = sums.error;
   const auto count = static_cast<double>(error.contacts);
-  // Forces that fade away leave velocities that rounding makes: they must pass whatever is asked.
-  const double rounding = scales_.rounding_velocity / settings_.tolerance;
+  // Forces that fade away leave velocities that rounding makes: no sweep can mend those, so they must pass.
+  const double rounding =
+      scales_.rounding_velocity / std::max(settings_.tolerance, thresholds_.finest_rounding);
   residual2_ = error.residual2;
   scale2_ = larger(larger(error.impulse2, error.velocity2), count * rounding * rounding);
   result_.error_rms = scale2_ != 0 ? std::sqrt(error.residual2 / scale2_) : 0;

@@ -57,6 +57,9 @@ struct CertificateThresholds {
   int most_direct = 200;
   /// But not where the tolerance on the balance is below this, > 0: rounding of the direct solve may hide it.
   double finest_direct = 1e-6;
+  /// Where forces fade away, velocities that rounding makes pass, but not a tolerance below this, > 0: what
+  /// is asked for there is less than rounding, and the step says that it was not reached.
+  double finest_rounding = 1e-10;
   /// In larger ones, where at least so many sweeps are needed, > 0: about what a velocity check costs.
   double velocity_check_cost = 100;
   /// And at least so many plain sweeps per contact, >= 0: that is stiff for a problem of its size.
