@@ -6,8 +6,8 @@
 
 namespace talus {
 
-/// Each chunk at a wall that has contacts holds a copy of it; of a cell that follows a stress, each that has
-/// any. Collective.
+/// Each chunk at a wall that has contacts holds a copy of it; of a cell that follows a stress, each other
+/// that has any. Collective.
 void SolverLoop::split_walls() {
   const Chunks& chunks = state_.chunks;
   for (WallState& wall : state_.wall_states) {
@@ -22,7 +22,7 @@ void SolverLoop::split_walls() {
   cell.held.clear();
   cell.copies.assign(cell.loaded() ? chunks.size() : 0, {});
   for (std::size_t c = 0; c < cell.copies.size(); ++c)
-    if (state_.contacts.count[c] > 0) cell.held.emplace_back(c);
+    if (chunks.wall[c] < 0 && state_.contacts.count[c] > 0) cell.held.emplace_back(c);
   gluing_.begin();
   gluing_.forget_jumps();
   const CellVelocity split_cell = cell.inv_mass(static_cast<double>(cell.copies_everywhere));
