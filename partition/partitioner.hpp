@@ -103,6 +103,7 @@ struct PartitionOptions {
   /// The partition in force, or nullptr. `rcb` then keeps its axes while the spreads allow it, and `metis`
   /// gives a new region the number of the old one it overlaps most, so that fewer bodies migrate.
   const Partition* previous = nullptr;
+  Domain domain = {};  ///< that the points stand in: `metis` ties regions across the faces of a periodic cell
 };
 
 /// Collective over the ranks of `reduction`. The result is the same for any order of the points and any way

@@ -193,6 +193,7 @@ int partition_command(const PartitionCommandOptions& options) {
       print_error("talus: warning: no grain touches another: there are no contacts to share out\n");
     std::vector<Cut> cuts;
     PartitionOptions cutting = partition_options(scene.setup.decomposition, options.subdomains);
+    cutting.domain = scene.setup.domain;
     for (const PartitionKind kind : kinds) {
       cutting.kind = kind;
       cuts.push_back(cut_sample(cutting, bodies, contacts, scene.setup.walls.size(), points));

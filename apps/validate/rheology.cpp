@@ -73,10 +73,15 @@ CaseResult forces_case(const Effort& effort) {
   const Steady steady =
       flow({effort.brief ? 250 : 1000, 0.3, 0.3, effort.brief ? 0.02 : slow, effort.brief ? 0.4 : 1.0},
            effort, result, look);
-  // For axes of stress and fabric that coincide (the triaxial case); in simple shear they do not quite.
+  // To first order, for axial compression: in plane shear the products of the anisotropies count.
   result.measures.push_back({"0.4 (a_c + a_n + 1.5 a_t) over q/p",
                              steady.forces.value / steady.q_over_p.value,
                              steady.forces.error / steady.q_over_p.value});
+  const double part = effort.brief ? 0.1 : 0.05;
+  result.measures.push_back({"the same with products of anisotropies",
+                             steady.products.value / steady.q_over_p.value,
+                             steady.products.error / steady.q_over_p.value, 1 - part, 1 + part,
+                             "stress-force-fabric relation (Rothenburg & Bathurst 1989; docs/theory.md)"});
   // Beyond the mean the logarithm of the density falls by beta for each mean force: the mean excess over a
   // bound is 1/beta of an exponential tail, wherever the bound.
   const auto excess = [&](double bound) {

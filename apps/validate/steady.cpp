@@ -7,7 +7,7 @@ namespace talus::literature {
 
 Steady flow(const FlowPlan& plan, const Effort& effort, CaseResult& result,
             const std::function<void(const CellRun&)>& look) {
-  std::array<std::vector<double>, 5> found;
+  std::array<std::vector<double>, 6> found;
   for (int seed = 1; seed <= effort.seeds; ++seed) {
     const Stage stage = plan.triaxial ? triaxial_stage(plan.friction, plan.rate, plan.strain)
                                       : shear_stage(plan.friction, plan.rate, plan.strain);
@@ -28,9 +28,11 @@ Steady flow(const FlowPlan& plan, const Effort& effort, CaseResult& result,
     take(2, [](const CellReport& row) { return row.solid_fraction; });
     take(3, [](const CellReport& row) { return row.coordination; });
     take(4, [](const CellReport& row) { return 0.4 * (row.a_c + row.a_n + 1.5 * row.a_t); });
+    take(5, [](const CellReport& row) { return row.fabric_q_over_p; });
     if (look) look(run);
   }
-  return {mean_of(found[0]), mean_of(found[1]), mean_of(found[2]), mean_of(found[3]), mean_of(found[4])};
+  return {mean_of(found[0]), mean_of(found[1]), mean_of(found[2]),
+          mean_of(found[3]), mean_of(found[4]), mean_of(found[5])};
 }
 
 io::Chart chart_of(const std::string& name, const std::string& title, const std::string& x,

@@ -10,7 +10,8 @@ namespace talus::literature {
 
 /// What a steady flow comes to, each over the second half of the strain and over seeds.
 struct Steady {
-  Mean ratio, q_over_p, solid_fraction, coordination, forces;  ///< forces: 0.4 (a_c + a_n + 1.5 a_t)
+  Mean ratio, q_over_p, solid_fraction, coordination;
+  Mean forces, products;  ///< q/p by the anisotropies: 0.4 (a_c + a_n + 1.5 a_t), and with their products
 };
 
 struct FlowPlan {

@@ -265,6 +265,8 @@ constexpr Column<CellReport> cell_columns[] = {
      [](std::string& t, const auto& r) { put(t, r.a_n); }},
     {"a_t", "1", "anisotropy of tangential forces, along the stress; q/p = 0.4 (a_c + a_n + 1.5 a_t)",
      [](std::string& t, const auto& r) { put(t, r.a_t); }},
+    {"fabric_q_over_p", "1", "q/p that the three anisotropies make, their products included",
+     [](std::string& t, const auto& r) { put(t, r.fabric_q_over_p); }},
     {"inertial_number", "1", "I = rate d (density/p)^1/2; 0 without stress",
      [](std::string& t, const auto& r) { put(t, r.inertial_number); }},
     {"converged", "1", "1: the step is within all tolerances; 0: it missed one",

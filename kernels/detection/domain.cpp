@@ -14,6 +14,20 @@ Vec3 Domain::edges_between(const Vec3& a, const Vec3& b) const {
   return {nearest_integer(cell.per_xx * x), beside, c};
 }
 
+double Domain::mean_edge() const {
+  double product = 1;
+  int axes = 0;
+  for (const double edge : {cell.xx, cell.yy, cell.zz})
+    if (edge > 0) product *= edge, ++axes;
+  return axes > 0 ? std::pow(product, 1.0 / axes) : 0;
+}
+
+Vec3 Domain::flow_drift(const Vec3& x) const {
+  const double c = cell.per_zz * (x[2] - low[2]), b = cell.per_yy * (x[1] - low[1] - cell.yz * c),
+               a = cell.per_xx * (x[0] - low[0] - cell.xz * c - cell.xy * b);
+  return times(drift_rates, {a, b, c});
+}
+
 Vec3 Domain::midpoint(const Vec3& a, const Vec3& b) const {
   Vec3 middle = 0.5 * (a + b);
   if (!repeats) return middle;

@@ -27,8 +27,8 @@ struct Domain {
 
   /// Edges of the brick [m]; 0 along an axis of walls.
   Vec3 edges() const { return {cell.xx, cell.yy, cell.zz}; }
-  /// Edge of a cube of its volume [m]; 0 where it does not repeat itself along all axes.
-  double mean_edge() const { return std::cbrt(cell.xx * cell.yy * cell.zz); }
+  /// Geometric mean of its edges [m].
+  double mean_edge() const;
 
   /// work(space): the type that inner loops need.
   template <class Work>
@@ -53,6 +53,8 @@ struct Domain {
     return flows ? times(rates, edges_between(a, b)) : Vec3(Vec3::Zero());
   }
   Vec3 image_drift(const Vec3& a, const Vec3& b) const { return times(drift_rates, edges_between(a, b)); }
+  /// Velocity of the flow at x in the step's solution [m/s]: walls stretch with the cell, along their planes.
+  Vec3 flow_drift(const Vec3& x) const;
   static Vec3 times(const EdgeRates& r, const Vec3& k) {
     return {r.xx * k[0] + r.xy * k[1] + r.xz * k[2], r.yy * k[1] + r.yz * k[2], r.zz * k[2]};
   }

@@ -110,7 +110,9 @@ void write_drift(const ChunkPhase& phase, const Vec3& n, std::size_t place, Cont
   if (contacts.vx.empty()) return;
   const auto i = at(contacts.first[place]);
   const Wall& wall = phase.in.walls[at(phase.chunks.wall[phase.chunk])];
-  set_drift(contacts, place, wall.drift_at(phase.in.x[i] - phase.in.radius[i] * n, n));
+  Vec3 drift = wall.drift_at(phase.in.x[i] - phase.in.radius[i] * n, n);
+  if (phase.in.domain.flows) drift += phase.in.domain.flow_drift(phase.in.x[i]);
+  set_drift(contacts, place, drift);
 }
 
 /// Finds the contacts of a chunk at a plane.

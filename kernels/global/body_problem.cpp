@@ -163,7 +163,9 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     if (w >= 0) {
       const Vec3 drive = source.walls[at(w)].free_velocity + drift_of(contacts, k);
       // Of a wall of finite mass only the normal velocity is an unknown.
-      if (contact.second < 0) contact.drive = drive.norm();
+      // A wall that stretches with a flow moves nothing against the grains, which flow too.
+      if (contact.second < 0)
+        contact.drive = contacts.drifts_between ? source.walls[at(w)].free_velocity.norm() : drive.norm();
       contact.offset -= contact.second < 0 ? drive : Vec3(drive - problem.bodies[at(contact.second)].free.u);
     }
     if (w < 0 && contacts.drifts_between) {
@@ -173,7 +175,7 @@ BodyProblem gather(const BodyProblemSource& source, const BodyProblemPart* part)
     }
     if (source.cell.mass > 0) {
       contact.cell = static_cast<std::int32_t>(problem.bodies.size()) - 1;
-      contact.reach = contacts.reach[k];
+      contact.reach = w < 0 ? contacts.reach[k] : 0;
     }
     contact.place = static_cast<std::int32_t>(k);
     contact.wall = w;

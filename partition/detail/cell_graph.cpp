@@ -52,15 +52,39 @@ std::array<std::int32_t, 3> place_of(const CellTable& table, std::size_t cell) {
           static_cast<std::int32_t>(cell / (nx * ny))};
 }
 
-/// Cell next to `place` in a direction of -1, 0, 1 per axis, or -1 outside the grid.
-std::int64_t neighbour(const CellTable& table, const std::array<std::int32_t, 3>& place,
+/// Cell next to `place` in a direction of -1, 0, 1 per axis, or -1 outside a grid that does not close there.
+/// Back from there in the other direction is `place`.
+std::int64_t neighbour(const CellTable& table, const CellRing& ring, std::array<std::int32_t, 3> place,
                        const std::array<std::int32_t, 3>& direction) {
-  std::array<std::int32_t, 3> c;
-  for (std::size_t k = 0; k < 3; ++k) {
-    c[k] = place[k] + direction[k];
-    if (c[k] < 0 || c[k] >= table.cells[k]) return -1;
+  // What leaves through the upper face along an axis comes in at the lower one, and as far back along the
+  // axes before as that face is displaced.
+  const std::array<std::array<std::int32_t, 2>, 3> leans{{{0, 0}, {ring.xy, 0}, {ring.xz, ring.yz}}};
+  for (std::size_t k = 3; k-- > 0;) {
+    place[k] += direction[k];
+    if (place[k] >= 0 && place[k] < table.cells[k]) continue;
+    if (!ring.closes[k]) return -1;
+    const std::int32_t turns =
+        place[k] < 0 ? -((table.cells[k] - 1 - place[k]) / table.cells[k]) : place[k] / table.cells[k];
+    place[k] -= turns * table.cells[k];
+    for (std::size_t j = 0; j < 2 && j < k; ++j) place[j] -= turns * leans[k][j];
   }
-  return c[0] + std::int64_t{table.cells[0]} * (c[1] + std::int64_t{table.cells[1]} * c[2]);
+  return place[0] + std::int64_t{table.cells[0]} * (place[1] + std::int64_t{table.cells[1]} * place[2]);
+}
+
+CellRing ring_of(const CellTable& table, const IntegerFrame& frame, const Domain& domain) {
+  CellRing ring;
+  const Vec3 edges = domain.edges();
+  const auto in_cells = [&](double length, Eigen::Index axis) {
+    return ring.closes[at(axis)]
+               ? static_cast<std::int32_t>(std::lround(length / frame.lengths[axis] * table.cells[at(axis)]))
+               : 0;
+  };
+  for (const Eigen::Index axis : {0, 1, 2})
+    ring.closes[at(axis)] = edges[axis] > 0 && table.cells[at(axis)] > 2;
+  ring.xy = in_cells(domain.cell.xy, 0);
+  ring.xz = in_cells(domain.cell.xz, 0);
+  ring.yz = in_cells(domain.cell.yz, 1);
+  return ring;
 }
 
 /// The graph of the cells with weight, as METIS reads it; its weights are 32-bit.
@@ -101,9 +125,9 @@ Compressed compress(const CellGraph& graph, const CellTable& table) {
     };
     for (std::size_t d = 0; d < half_neighbours.size(); ++d) {
       const auto& step = half_neighbours[d];
-      const std::int64_t before = neighbour(table, place, {-step[0], -step[1], -step[2]});
+      const std::int64_t before = neighbour(table, graph.ring, place, {-step[0], -step[1], -step[2]});
       if (before >= 0) tie(before, shared_by(at(before), d));
-      tie(neighbour(table, place, step), shared_by(at(cell), d));
+      tie(neighbour(table, graph.ring, place, step), shared_by(at(cell), d));
     }
     result.begin.push_back(static_cast<idx_t>(result.to.size()));
   }
@@ -167,10 +191,12 @@ CellTable choose_cells(const PartitionPoints& points, const IntegerFrame& frame,
 }
 
 CellGraph build_cell_graph(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
-                           const Reduction& reduction) {
+                           const Reduction& reduction, const Domain& domain) {
   CellGraph graph;
   const CellTable table = choose_cells(points, frame, wanted, reduction, graph.weight);
   graph.cells = table.cells;
+  graph.ring = ring_of(table, frame, domain);
+  const Vec3 low = domain.low, high = low + domain.edges();
   graph.shared.assign(13 * graph.weight.size(), 0);
   for (std::size_t k = 0; k < points.x.size(); ++k) {
     const std::int64_t weight = points.weight.empty() ? 1 : points.weight[k];
@@ -178,13 +204,17 @@ CellGraph build_cell_graph(const PartitionPoints& points, const IntegerFrame& fr
     const auto place = place_of(table, own);
     for (const double side : {1.0, -1.0}) {
       const Vec3 centre = points.x[k] + side * points.half[k];
-      const std::size_t other = table.cell_of(frame.coordinates(centre));
-      if (other == own) continue;
-      const auto target = place_of(table, other);
+      const auto target = place_of(table, table.cell_of(frame.coordinates(centre)));
       std::array<std::int32_t, 3> step;
-      for (std::size_t axis = 0; axis < 3; ++axis) step[axis] = std::clamp(target[axis] - place[axis], -1, 1);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto e = static_cast<Eigen::Index>(axis);
+        step[axis] = std::clamp(target[axis] - place[axis], -1, 1);
+        if (graph.ring.closes[axis] && centre[e] < low[e]) step[axis] = -1;
+        if (graph.ring.closes[axis] && centre[e] >= high[e]) step[axis] = 1;
+      }
+      if (step == std::array<std::int32_t, 3>{}) continue;
       const bool forward = std::tuple(step[2], step[1], step[0]) > std::tuple(0, 0, 0);
-      const std::size_t from = forward ? own : at(neighbour(table, place, step));
+      const std::size_t from = forward ? own : at(neighbour(table, graph.ring, place, step));
       if (!forward) step = {-step[0], -step[1], -step[2]};
       const auto d =
           std::find(half_neighbours.begin(), half_neighbours.end(), step) - half_neighbours.begin();
@@ -221,7 +251,7 @@ CellTable cut_cell_graph(const CellGraph& graph, std::int32_t n, const Reduction
       {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
   for (std::size_t k = 0; k < front.size(); ++k)
     for (const auto& face : faces) {
-      const std::int64_t other = neighbour(table, place_of(table, front[k]), face);
+      const std::int64_t other = neighbour(table, graph.ring, place_of(table, front[k]), face);
       if (other < 0 || table.subdomain[at(other)] >= 0) continue;
       table.subdomain[at(other)] = table.subdomain[front[k]];
       front.push_back(at(other));

@@ -9,10 +9,17 @@
 
 namespace talus::detail {
 
+/// How a grid of cells goes on behind its faces, in a periodic cell.
+struct CellRing {
+  std::array<bool, 3> closes{};  ///< along x, y, z; only with three cells or more, so that neighbours differ
+  std::int32_t xy = 0, xz = 0, yz = 0;  ///< by how many cells the face behind is displaced (PeriodicSpace)
+};
+
 /// Weighted grid of cells over a frame, summed over all ranks. An edge joins a cell to one of its 26
-/// neighbours; it is kept at the cell that comes first.
+/// neighbours; it is kept at the cell that comes first, or stands before a face that the grid closes at.
 struct CellGraph {
   std::array<std::int32_t, 3> cells{};
+  CellRing ring;
   std::vector<std::int64_t> weight;  ///< per cell: sum of the weights of its points
   std::vector<std::int64_t>
       shared;  ///< 13 per cell, for the neighbours `half_neighbours`: see build_cell_graph
@@ -46,9 +53,9 @@ CellTable choose_cells(const PartitionPoints& points, const IntegerFrame& frame,
 /// between the two is likely to leave the body with contacts on both sides. So an edge counts the bodies that
 /// two cells share once per contact across it; unlike a count of bodies it is a sum over candidates, that
 /// every rank can begin without knowing the candidates of another. A centre further away than a neighbour
-/// ties to the neighbour on the way.
+/// ties to the neighbour on the way, and one beyond a face of a periodic domain to the cell behind it.
 CellGraph build_cell_graph(const PartitionPoints& points, const IntegerFrame& frame, std::int64_t wanted,
-                           const Reduction& reduction);
+                           const Reduction& reduction, const Domain& domain = {});
 
 /// Cells to n subdomains by METIS_PartGraphKway, with a fixed seed, on the first rank, whose answer all get.
 /// Cells without weight go to the subdomain of the nearest cell (in steps through faces) that has some.

@@ -9,8 +9,9 @@ namespace {
 
 void cut_metis(const Cutting& cutting, Partition& partition) {
   const std::int32_t n = partition.subdomains;
-  const auto graph = detail::build_cell_graph(cutting.points, partition.frame,
-                                              detail::cells_per_subdomain * n, cutting.reduction);
+  const auto graph =
+      detail::build_cell_graph(cutting.points, partition.frame, detail::cells_per_subdomain * n,
+                               cutting.reduction, cutting.options.domain);
   partition.table = detail::cut_cell_graph(graph, n, cutting.reduction);
   if (cutting.previous != nullptr)
     detail::keep_numbers(partition.table, *cutting.previous, cutting.points, partition.frame, n,

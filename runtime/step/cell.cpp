@@ -36,7 +36,15 @@ void validate_flow(const Setup& setup, const Stage& stage) {
     refuse(fmt::format("the cell is strained by more than {} in a step; make the time step shorter", most));
 }
 
-/// Components that follow a stress: of a cell of spheres that repeats itself along all axes.
+/// Something stands at both ends of an axis.
+bool bounded(const Setup& setup, Eigen::Index axis) {
+  const auto faces = [&](double direction) {
+    return std::ranges::any_of(setup.walls, [&](const Wall& wall) { return wall.normal[axis] == direction; });
+  };
+  return setup.domain.edges()[axis] > 0 || (faces(1) && faces(-1));
+}
+
+/// Components that follow a stress: of a cell of spheres, between axes that repeat. Walls bound the others.
 void validate_stress(const Setup& setup, const Stage& stage) {
   const StressLoad& load = stage.stress;
   const bool swings = std::ranges::any_of(load.amplitude, [](double a) { return a != 0; });
@@ -45,12 +53,30 @@ void validate_stress(const Setup& setup, const Stage& stage) {
     throw std::invalid_argument(fmt::format("stage '{}', stress: {}", stage.name, what));
   };
   constexpr const char* names[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
-  if (setup.domain.edges().minCoeff() == 0)
-    refuse("the cell must be periodic along x, y and z; give all three of cell.lengths");
-  if (!setup.clumps.empty()) refuse("grains that are no spheres cannot push a cell yet");
+  for (const Eigen::Index axis : {0, 1, 2})
+    if (!bounded(setup, axis))
+      refuse(
+          fmt::format("nothing bounds the sample along {0}, so that it has no volume and no stress; give "
+                      "cell.lengths[{1}], or walls at both ends",
+                      "xyz"[axis], axis));
+  if (!setup.clumps.empty())
+    refuse(
+        "grains that are no spheres cannot push a cell yet; take shape = \"sphere\", or strain_rates and "
+        "shear_rates instead of a stress");
   const CellVelocity rates{stage.strain_rates[0], stage.strain_rates[1], stage.strain_rates[2],
                            stage.shear_rates[0],  stage.shear_rates[1],  stage.shear_rates[2]};
   for (std::size_t k = 0; k < cell_freedoms; ++k) {
+    const Eigen::Index first = k < 3    ? static_cast<Eigen::Index>(k)
+                               : k == 5 ? 1
+                                        : 0,
+                       second = k < 3    ? first
+                                : k == 3 ? 1
+                                         : 2;
+    if (load.to[k] && (setup.domain.edges()[first] == 0 || setup.domain.edges()[second] == 0))
+      refuse(fmt::format(
+          "the cell is not periodic along {}, so that nothing follows {}; load the walls there, or "
+          "give all of cell.lengths",
+          "xyz"[setup.domain.edges()[first] == 0 ? first : second], names[k]));
     if (load.to[k] && rates[k] != 0)
       refuse(fmt::format("{} has a rate, too; a component follows either a rate or a stress", names[k]));
     if ((load.to[k] && !std::isfinite(*load.to[k])) || !std::isfinite(load.amplitude[k]))
@@ -99,8 +125,8 @@ void validate_cell(const Setup& setup) {
 void validate_coupling(const Setup& setup) {
   if (setup.decomposition.coupling != Coupling::nscdd && any_stress(setup))
     throw std::invalid_argument(
-        "a cell that follows a stress is pushed by all subdomains at once; take "
-        "\"nscdd\"");
+        "a cell that follows a stress is pushed by all subdomains at once, and not in turns; take "
+        "\"nscdd\", or leave coupling out");
 }
 
 void validate_correction(const Setup& setup) {

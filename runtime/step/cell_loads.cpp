@@ -1,6 +1,5 @@
 #include "runtime/step/cell_loads.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -51,8 +50,7 @@ CellDrive drive_cell(const Setup& setup, const StageMoment& at, const StepParame
   std::copy(cell.follows.begin(), cell.follows.end(), follows.begin());
   // In the middle of the step, as the edges are.
   cell.aim = stress_aimed_at(setup, {at.stage, at.time + 0.5 * parameters.time_step});
-  const Mat3 edges = edges_of(state.domain), flow = matrix_of(state.domain.rates) * edges.inverse();
-  const CellVelocity kinetic = components_of(kinetic_moment(state, flow, ranks));
+  const CellVelocity kinetic = components_of(kinetic_moment(state, gradient_before(state.domain, 0), ranks));
   const double volume = state.domain.volume(state.walls);
   for (std::size_t k = 0; k < cell_freedoms; ++k) {
     cell.push[k] =

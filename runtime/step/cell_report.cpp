@@ -86,6 +86,7 @@ std::optional<CellReport> cell_report(const StepOutcome& outcome, const StepRepo
   out.a_c = along_stress(fabric.of_contacts, deviator(contact));
   out.a_n = along_stress(fabric.of_normal_forces, deviator(contact));
   out.a_t = along_stress(fabric.of_tangential_forces, deviator(contact));
+  out.fabric_q_over_p = stress_ratio_of(fabric, deviator(contact));
   out.coordination = coordination(state, ranks, contacts_to_hold(outcome.parameters));
   out.inertial_number = shear_rate(gradient) * inertial_time(outcome.sample, out.p);
   out.converged = report.converged;

@@ -109,11 +109,11 @@ void ChunkWork::accumulate(std::size_t c, int epoch) {
     else if (!courses_.now().single)
       loosen(owned(c), state_.bodies.velocity, acceleration_.last_v);
     if (at_wall(c)) loosen(c, state_.copies[c], acceleration_);
-    if (stressed()) loosen(c, state_.cell.copies[c], acceleration_);
+    if (stressed(c)) loosen(c, state_.cell.copies[c], acceleration_);
   }
   reset_to_free(owned(c), state_.free, velocity);
   add_moments(state_.contacts, range, state_.bodies.radius, velocity);
-  if (stressed()) {
+  if (stressed(c)) {
     CellCopy& copy = state_.cell.copies[c];
     copy.velocity = impulse_on_cell(state_.contacts, range);
     for (std::size_t k = 0; k < cell_freedoms; ++k) copy.velocity[k] *= copy.inv_mass[k];
@@ -147,7 +147,7 @@ void ChunkWork::measure(std::size_t c) {
     Eigen::Map<Vec3>(errors_[c].wall_impulse) -= sum_of_cohesion(contacts, range_of(c));
   } else if (blocks(c)) {
     errors_[c] = error_blocks(contacts, range_of(c), velocity, friction_of(c), nullptr, parts);
-  } else if (stressed()) {
+  } else if (stressed(c)) {
     const CellCopy whole{state_.cell.copies[c].velocity, state_.cell.inv_mass()};
     errors_[c] = kernels_.error_cell<Friction>(contacts, range_of(c), velocity, friction_of(c), whole, parts);
     cell_impulses_[c] = impulse_on_cell(contacts, range_of(c));
@@ -176,7 +176,7 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
     const int sweep = schedule_.sweep(epoch);
     const SweepMomentum momentum{courses_.beta(sweep), courses_.omega(sweep), acceleration_.steps};
     SingleState& single = state_.single;
-    if (stressed())
+    if (stressed(c))
       kernels_.sweep_cell<Friction>(contacts, range, velocity, friction, state_.cell.copies[c], momentum);
     else if (course.single && wall)
       kernels_.sweep_wall<Friction>(contacts, single, range, friction, copy, momentum);
@@ -188,7 +188,7 @@ void ChunkWork::sweep(std::size_t c, int epoch) {
       kernels_.sweep_grains<Friction>(contacts, range, velocity, friction, momentum);
   } else if (wall) {
     kernels_.sweep_wall<Friction>(contacts, range, velocity, friction, copy);
-  } else if (stressed()) {
+  } else if (stressed(c)) {
     kernels_.sweep_cell<Friction>(contacts, range, velocity, friction, state_.cell.copies[c]);
   } else {
     kernels_.sweep_grains<Friction>(contacts, range, velocity, friction);
@@ -256,13 +256,13 @@ void ChunkWork::carry_on(std::size_t c, int epoch) {
   else if (sweep == course.begun)
     begin_steps(range_of(c), acceleration_.steps);
   if (schedule_.opens_segment(epoch) && at_wall(c)) fasten(c, copy, acceleration_);
-  if (schedule_.opens_segment(epoch) && stressed()) fasten(c, state_.cell.copies[c], acceleration_);
+  if (schedule_.opens_segment(epoch) && stressed(c)) fasten(c, state_.cell.copies[c], acceleration_);
   if (course.single)
     carry_velocities(kernels_, beta, owned(c), state_.single.velocity, state_.single.last_v);
   else
     carry_velocities(kernels_, carry, beta, owned(c), state_.bodies.velocity, acceleration_);
   if (at_wall(c)) carry_wall(carry, beta, c, copy, acceleration_);
-  if (stressed()) carry_cell(carry, beta, c, state_.cell.copies[c], acceleration_);
+  if (stressed(c)) carry_cell(carry, beta, c, state_.cell.copies[c], acceleration_);
 }
 
 }  // namespace talus

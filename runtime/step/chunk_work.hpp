@@ -69,7 +69,8 @@ class ChunkWork {
   void to_double(std::size_t c, int epoch, bool before);
   ChunkFriction friction_of(std::size_t c) const;
   bool at_wall(std::size_t c) const { return state_.chunks.wall[c] >= 0; }
-  bool stressed() const { return !state_.cell.copies.empty(); }
+  /// Its contacts push a cell that follows a stress: walls stretch with that, and their contacts do not.
+  bool stressed(std::size_t c) const { return !state_.cell.copies.empty() && !at_wall(c); }
   bool blocks(std::size_t c) const { return state_.chunks.kind[c] == ChunkKind::blocks; }
 
   StepState& state_;

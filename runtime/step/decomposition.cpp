@@ -218,6 +218,7 @@ void cut_space(Decomposition& decomposition, const DecompositionSettings& settin
   const bool first = before.tree.cuts.empty() && before.table.subdomain.empty();
   PartitionOptions options = partition_options(settings, before.subdomains);
   options.previous = first ? nullptr : &before;
+  options.domain = domain;
   decomposition.partition = make_partition(points_to_cut(decomposition, bodies, candidates, all[0], domain),
                                            options, reduction_over(ranks));
 }

@@ -79,4 +79,12 @@ double along_stress(const Mat3& anisotropy, const Mat3& stress_deviator) {
   return size > 0 ? std::sqrt(1.5) * anisotropy.cwiseProduct(stress_deviator).sum() / size : 0;
 }
 
+double stress_ratio_of(const ForceFabric& of, const Mat3& stress_deviator) {
+  const Mat3 &c = of.of_contacts, &n = of.of_normal_forces, &t = of.of_tangential_forces;
+  const Mat3 first = 2.0 / 15 * (c + n + 1.5 * t),
+             second = 1.0 / 105 * deviator(4 * (c * n + n * c) + 3 * (c * t + t * c));
+  const double mean = 1 + 2.0 / 15 * c.cwiseProduct(n).sum();
+  return mean > 0 ? 3 * along_stress(first + second, stress_deviator) / mean : 0;
+}
+
 }  // namespace talus

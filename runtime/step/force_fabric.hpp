@@ -21,7 +21,15 @@ struct ForceFabric {
 ForceFabric force_fabric(const StepState& state, const graph::Communicator& ranks);
 
 /// The scalar of an anisotropy A beside the stress deviator s: sqrt(3/2) A : s/|s|, negative where A is
-/// opposed to the stress; with it q/p = 0.4 (a_c + a_n + 1.5 a_t) (Guo & Zhao 2013, (16)). 0 where s is.
+/// opposed to the stress; with it q/p = 0.4 (a_c + a_n + 1.5 a_t) to first order (Guo & Zhao 2013, (16)). 0
+/// where s is.
 double along_stress(const Mat3& anisotropy, const Mat3& stress_deviator);
+
+/// The part of q/p along the stress deviator s of contacts that have these densities and forces and no
+/// others, all products of two anisotropies included: between equal spheres sigma is in proportion to
+///   1/3 (1 + 2/15 A_c : A_n) + 2/15 (A_c + A_n + 1.5 A_t) + dev(4 (A_c A_n + A_n A_c) + 3 (A_c A_t + A_t
+///   A_c))/105.
+/// In plane shear, of eigenvalues a, 0, -a, the last term lies across s, while what is added to p remains.
+double stress_ratio_of(const ForceFabric& of, const Mat3& stress_deviator);
 
 }  // namespace talus

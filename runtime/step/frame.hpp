@@ -172,6 +172,7 @@ struct CellReport {
   double coordination = 0;           ///< likewise, without rattlers and their contacts
   std::array<double, 6> fabric{};    ///< mean of n (x) n over the contacts that carry, symmetric: xx, ..., yz
   double a_c = 0, a_n = 0, a_t = 0;  ///< anisotropies along the stress (runtime/step/force_fabric.hpp)
+  double fabric_q_over_p = 0;        ///< q/p that these make together (stress_ratio_of)
   double inertial_number = 0;        ///< rate of shear x mean diameter x root of density over p; 0 without p
   bool converged = true;             ///< of the step (StepReport)
 };

@@ -7,7 +7,7 @@
 namespace talus {
 
 /// Gives a copy of a wall to each chunk that has contacts at it, and a copy of a cell that follows a stress
-/// to each chunk that has contacts. Collective.
+/// to each other chunk that has contacts. Collective.
 void SolverLoop::split_walls() {
   const Chunks& chunks = state_.chunks;
   for (WallState& wall : state_.wall_states) {
@@ -22,7 +22,7 @@ void SolverLoop::split_walls() {
   cell.held.clear();
   cell.copies.assign(cell.loaded() ? chunks.size() : 0, {});
   for (std::size_t c = 0; c < cell.copies.size(); ++c)
-    if (state_.contacts.count[c] > 0) cell.held.emplace_back(c);
+    if (chunks.wall[c] < 0 && state_.contacts.count[c] > 0) cell.held.emplace_back(c);
   gluing_.begin();
   gluing_.forget_jumps();
   const CellVelocity split_cell = cell.inv_mass(static_cast<double>(cell.copies_everywhere));

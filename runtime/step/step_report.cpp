@@ -22,9 +22,11 @@ double load_of(const StepOutcome& outcome) {
   double load = outcome.sample.total_mass * outcome.parameters.gravity.norm();
   for (const WallState& wall : outcome.state.wall_states) load += std::abs(wall.applied);
   const StressedCell& cell = outcome.state.cell;
-  const Vec3 edges = outcome.state.domain.edges();
+  if (!cell.loaded()) return load;
+  const Vec3 lengths = outcome.state.domain.lengths(outcome.state.walls);
   for (const Eigen::Index k : {0, 1, 2})
-    if (cell.loaded()) load += std::abs(cell.aim[static_cast<std::size_t>(k)]) * edges.prod() / edges[k];
+    if (const auto at = static_cast<std::size_t>(k); cell.follows[at])
+      load += std::abs(cell.aim[at]) * lengths.prod() / lengths[k];
   return load;
 }
 

@@ -93,6 +93,22 @@ TEST_F(CellsOnRanks, FlowToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
   EXPECT_EQ(digest_of("parts"), digest_of("one"));
 }
 
+/// Walls along z, a stress along x and y, and rough walls that stretch with the cell.
+TEST_F(CellsOnRanks, FollowAStressBetweenWallsToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
+  std::string scene = pressed_cell;
+  scene.replace(scene.find("friction = 0.4"), 0, "wall_friction = 0.5\n");
+  scene.replace(scene.find("end = { steps = 150 }"), 0, "stress = { xx = 1e3, yy = 2e3 }\n");
+  write(at("scene.toml"), scene);
+  for (const int subdomains : {1, 4})
+    expect_same_bits(subdomains, {{1, 2}, {2, 1}}, fmt::format("walled{}", subdomains));
+  const std::string command = "run scene.toml --set decomposition.subdomains=4 --threads 1 --out parts";
+  const Outcome first = run(2, command + " --steps 67");
+  ASSERT_EQ(first.code, 0) << first.messages;
+  const Outcome rest = run(1, command + " --resume");
+  ASSERT_EQ(rest.code, 0) << rest.messages;
+  EXPECT_EQ(digest_of("parts"), digest_of("walled4"));
+}
+
 /// Grains that a stress squeezes, while they are sheared at constant pressure.
 const std::string stressed_cell = R"(name = "cell"
 time_step = 1e-4

@@ -57,9 +57,11 @@ Section<StressLoad> stress_keys() {
   keys.push_back(key<StressLoad>("period", "s", not_negative, "Of those swings.", &StressLoad::period)
                      .blank_when_zero());
   return {"[stage.stress]",
-          "Of a cell that is periodic along x, y and z: components of the stress that its edges follow, each "
-          "within the contact problem of the step, so that the stress of a step is that of its own solution "
-          "([theory.md](theory.md), \"Cells under stress\").",
+          "Of a periodic cell of spheres: components of the stress that its edges follow, each within the "
+          "contact "
+          "problem of the step, so that the stress of a step is that of its own solution "
+          "([theory.md](theory.md), \"Cells under stress\"). Walls at both ends bound the axes that do not "
+          "repeat.",
           std::move(keys)};
 }
 

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <set>
 
+#include "partition/detail/cell_graph.hpp"
 #include "partition/partitioner.hpp"
 #include "partition/partitioners.hpp"
 #include "runtime/graph/pretend_ranks.hpp"
@@ -278,6 +279,32 @@ TEST(Partition, MetisGivesARegionTheNumberOfTheOneItOverlaps) {
   };
   options.previous = &before;
   EXPECT_GT(stays(make_partition(points, options)), points.x.size() / 3);
+}
+
+// A pair across the lower face ties its cell of the graph to the one that holds the second body's stored
+// image, which a cell that leans displaces. Without the domain it ties nothing.
+TEST(Partition, MetisTiesRegionsAcrossTheFacesOfAPeriodicCell) {
+  for (const double lean : {0.0, 1.0, -2.0}) {
+    const Domain domain = periodic_domain({4, 4, 4}, Vec3::Zero(), {0, lean, 0});
+    PartitionPoints points;
+    for (int k = 0; k < 64; ++k) points.x.push_back(Vec3(k % 4 + 0.5, k / 4 % 4 + 0.5, k / 16 + 0.5));
+    points.half.assign(points.x.size(), Vec3::Zero());
+    points.weight.assign(points.x.size(), 1);
+    const Vec3 middle(1.5, 2.5, 0.1), half(0, 0, 0.3);
+    points.x.push_back(middle);
+    points.half.push_back(half);
+    points.weight.push_back(7);
+    const IntegerFrame frame = make_frame(Vec3(Vec3::Zero()), Vec3(Vec3::Constant(4)));
+    const detail::CellGraph tied = detail::build_cell_graph(points, frame, 64, {}, domain);
+    ASSERT_EQ(tied.cells, (std::array<std::int32_t, 3>{4, 4, 4}));
+    const CellTable table{tied.cells, {}};
+    const std::size_t image = table.cell_of(frame.coordinates(domain.wrap(middle - half)));
+    constexpr std::size_t upwards = 8;  // of half_neighbours
+    EXPECT_EQ(tied.shared[13 * image + upwards], 7) << lean;
+    EXPECT_EQ(std::accumulate(tied.shared.begin(), tied.shared.end(), std::int64_t{0}), 7);
+    const detail::CellGraph open = detail::build_cell_graph(points, frame, 64, {});
+    EXPECT_EQ(std::accumulate(open.shared.begin(), open.shared.end(), std::int64_t{0}), 0);
+  }
 }
 
 TEST(Partition, RefusesWhatHasNoMeaningAndSaysWhy) {

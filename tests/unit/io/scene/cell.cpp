@@ -77,7 +77,12 @@ TEST(CellScene, RefusesAStressThatTheCellCannotFollow) {
   refuse(
       replaced(replaced(stage("stress = { xx = 1 }"), "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0]"), "radius = 0.005",
                "radius = 0.005\nregion = { shape = \"box\", low = [0, 0, 0], high = [0.1, 0.1, 0.1] }"),
-      "cell", "periodic along");
+      "cell", "nothing bounds the sample along z");
+  refuse(replaced(replaced(stage("stress = { zz = 1 }"), "[0.1, 0.1, 0.1]", "[0.1, 0.1, 0]"), "[sample]",
+                  "[[wall]]\nname = \"z-\"\nside = \"z-\"\n[[wall]]\nname = \"z+\"\nside = "
+                  "\"z+\"\n[sample]\nregion = { shape = "
+                  "\"box\", low = [0, 0, 0], high = [0.1, 0.1, 0.1] }"),
+         "cell", "not periodic along z, so that nothing follows zz");
   refuse(stage("stress = { zz = 1 }\nstrain_rates = [0, 0, -1]"), "cell", "zz has a rate");
   refuse(stage("stress = { zz = 1, amplitude_xx = 2, period = 1 }"), "cell", "amplitude_xx");
   refuse(stage("stress = { zz = 1, amplitude_zz = 2 }"), "cell", "period");

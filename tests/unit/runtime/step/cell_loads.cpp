@@ -113,6 +113,31 @@ TEST(ForceFabric, FindsTheAnisotropiesThatForcesWereMadeOf) {
   EXPECT_LT((found.of_tangential_forces - of_tangents).norm(), 2e-3) << found.of_tangential_forces;
 }
 
+/// The stress of contacts with such densities and forces, added up over all directions.
+TEST(ForceFabric, MakesTheStressRatioWithTheProductsOfItsAnisotropies) {
+  ForceFabric of;
+  of.of_contacts << 0.5, 0.2, 0.1, 0.2, -0.4, 0.05, 0.1, 0.05, -0.1;
+  of.of_normal_forces << 0.6, -0.1, 0.3, -0.1, -0.2, 0.15, 0.3, 0.15, -0.4;
+  of.of_tangential_forces << 0.1, 0.05, 0.2, 0.05, 0.1, 0, 0.2, 0, -0.2;
+  Mat3 stress = Mat3::Zero();
+  constexpr int count = 40000;
+  for (int k = 0; k < count; ++k) {
+    const double z = 1 - (2 * k + 1.0) / count, turn = k * std::numbers::pi * (3 - std::sqrt(5.0)),
+                 flat = std::sqrt(1 - z * z);
+    const Vec3 n(flat * std::cos(turn), flat * std::sin(turn), z);
+    const auto along = [&](const Mat3& m) { return n.dot(m * n); };
+    const Vec3 force = (1 + along(of.of_normal_forces)) * n + of.of_tangential_forces * n -
+                       along(of.of_tangential_forces) * n;
+    stress += (1 + along(of.of_contacts)) * force * n.transpose();
+  }
+  const Mat3 even = 0.5 * (stress + stress.transpose()), s = even - even.trace() / 3 * Mat3::Identity();
+  const double ratio = std::sqrt(1.5) * s.norm() / (even.trace() / 3);
+  EXPECT_NEAR(stress_ratio_of(of, s), ratio, 1e-4);
+  const double first = 0.4 * (along_stress(of.of_contacts, s) + along_stress(of.of_normal_forces, s) +
+                              1.5 * along_stress(of.of_tangential_forces, s));
+  EXPECT_GT(std::abs(first - ratio), 0.02) << "products count";
+}
+
 TEST(ForceFabric, HasTheSignOfItsStress) {
   const Mat3 deviator = Eigen::Vector3d(0.1, 0.1, -0.2).asDiagonal();
   EXPECT_NEAR(along_stress(deviator, deviator), std::sqrt(1.5) * deviator.norm(), 1e-15);
