@@ -11,6 +11,7 @@
 #include "io/checkpoint/checkpoint_file.hpp"
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "io/results/results.hpp"
+#include "runtime/step/cell_flow.hpp"
 
 namespace talus {
 
@@ -38,6 +39,7 @@ StateSample state_of_frame(const io::Scene& scene) {
       file, spec.frame ? static_cast<std::size_t>(*spec.frame) : std::max<std::size_t>(frames, 1) - 1);
   StateSample state;
   state.walls = frame.walls;
+  state.domain = frame.domain;
   for (std::size_t k = 0; k < frame.id.size(); ++k)
     add_body(frame.id[k], frame.x[k], frame.radius[k], frame.u[k],
              frame.omega.empty() ? Vec3(Vec3::Zero()) : Vec3(frame.radius[k] * frame.omega[k]), state.sample);
@@ -107,6 +109,13 @@ StateSample state_of_checkpoint(const io::Scene& scene) {
     const Vec3 point(&head.wall_points.at(3 * w)), velocity(&head.wall_velocities.at(3 * w));
     state.walls.push_back({wall.name, wall.normal.dot(point), wall.normal.dot(velocity), Vec3::Zero()});
   }
+  state.domain = before.setup.domain;
+  if (!head.cell_edges.empty()) {
+    const auto &h = head.cell_edges, &r = head.cell_rates;
+    state.domain =
+        periodic_domain({h.at(0), h.at(1), h.at(2)}, before.cell.origin, {h.at(3), h.at(4), h.at(5)});
+    state.domain.rates = {r.at(0), r.at(1), r.at(2), r.at(3), r.at(4), r.at(5)};
+  }
   std::vector<std::int32_t> subdomains(static_cast<std::size_t>(head.subdomains));
   std::iota(subdomains.begin(), subdomains.end(), 0);
   for (const CheckpointPart& part : io::read_checkpoint_parts(path, subdomains)) {
@@ -122,6 +131,33 @@ StateSample state_of_checkpoint(const io::Scene& scene) {
   return state;
 }
 
+/// Edges and shears of a cell as a scene writes them.
+std::string words_of(const Domain& domain) {
+  if (!domain.repeats) return "no [cell]";
+  const PeriodicSpace& c = domain.cell;
+  return fmt::format("[cell] lengths = [{}, {}, {}], shears = [{}, {}, {}], origin = [{}, {}, {}]", c.xx,
+                     c.yy, c.zz, c.xy, c.xz, c.yz, domain.low[0], domain.low[1], domain.low[2]);
+}
+
+/// But for what writing numbers down may lose.
+bool same_cell(const Domain& a, const Domain& b) {
+  const double small = 1e-9 * edges_of(a).cwiseAbs().maxCoeff();
+  return a.repeats == b.repeats && (edges_of(a) - edges_of(b)).cwiseAbs().maxCoeff() <= small &&
+         (!a.repeats || (a.low - b.low).cwiseAbs().maxCoeff() <= small);
+}
+
+/// The flow of the next stage would come on top of that of the last one.
+void leave_flow(const Domain& domain, Sample& sample) {
+  const Mat3 rates = matrix_of(domain.rates);
+  if (!domain.repeats || rates.isZero(0)) return;
+  Mat3 edges = edges_of(domain);
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    if (edges(axis, axis) == 0) edges(axis, axis) = 1;
+  const Mat3 gradient = rates * edges.inverse();
+  for (std::size_t k = 0; k < sample.size(); ++k)
+    Eigen::Map<Vec3>(sample.velocity[k].data()) -= gradient * (sample.x[k] - domain.low);
+}
+
 }  // namespace
 
 StateSample read_state(const io::Scene& scene) {
@@ -133,6 +169,10 @@ StateSample read_state(const io::Scene& scene) {
   if (checkpoint && scene.samples.front().frame) refuse("a checkpoint has no frames: leave `frame` out");
   StateSample state = checkpoint ? state_of_checkpoint(scene) : state_of_frame(scene);
   if (!scene.setup.clumps.empty()) refuse("states of clumps cannot be begun from");
+  if (!same_cell(state.domain, scene.setup.domain))
+    refuse(fmt::format("it is of a run with {}, and the scene has {}: write the former",
+                       words_of(state.domain), words_of(scene.setup.domain)));
+  leave_flow(state.domain, state.sample);
   Sample& sample = state.sample;
   sample.density = scene.density;
   sample.rotates = scene.setup.rotation;

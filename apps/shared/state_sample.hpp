@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "io/scene/scene.hpp"
+#include "kernels/detection/domain.hpp"
 #include "kernels/samples/sample.hpp"
 #include "runtime/step/frame.hpp"
 #include "runtime/step/given_forces.hpp"
@@ -11,13 +12,16 @@ namespace talus {
 
 /// Where an earlier run was ([sample] kind = "state"), and what the first step may begin from.
 struct StateSample {
-  Sample sample;
+  Sample sample;                   ///< velocities against the flow of a periodic cell: a run begins with its
+                                   ///< cell at rest
+  Domain domain;                   ///< of that run
   std::vector<WallReport> walls;   ///< of that run
   std::vector<GivenForce> forces;  ///< walls by their numbers in the new scene; of others left out
 };
 
-/// Reads the checkpoint or the frame that the scene names. Throws io::SceneError for clumps, and where bodies
-/// are of materials that the scene has not; io::FileError for a file that cannot be read.
+/// Reads the checkpoint or the frame that the scene names. Throws io::SceneError for clumps, where bodies are
+/// of materials that the scene has not, and where the scene's periodic cell is not that of the state;
+/// io::FileError for a file that cannot be read.
 StateSample read_state(const io::Scene& scene);
 
 /// Puts walls of the scene that nothing has placed yet where those of the same name were, with their

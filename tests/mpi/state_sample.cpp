@@ -78,5 +78,66 @@ TEST_F(BegunFromAState, BeginsFromItsForcesOnAnyRanks) {
   EXPECT_EQ(digest_of("parts"), digest_of("warm"));
 }
 
+/// A dilute gas that goes with the flow of a sheared cell; the shear [m] that it begins with, and the sample.
+constexpr const char* sheared_gas = R"(name = "gas"
+time_step = 1e-4
+[material]
+density = 2600
+[cell]
+lengths = [0.1, 0.1, 0.1]
+shears = [{}, 0.0, 0.0]
+[sample]
+{}
+[[stage]]
+shear_rates = [20.0, 0.0, 0.0]
+end = {{ steps = 15 }}
+[output]
+every_steps = 5
+pictures = false
+[checkpoint]
+every_steps = 5
+)";
+
+class BegunInACell : public OnRanks {
+ protected:
+  void SetUp() override {
+    write(at("gas.toml"),
+          fmt::format(fmt::runtime(sheared_gas), 0.0, "kind = \"random\"\ncount = 40\nradius = 1e-3"));
+    ASSERT_EQ(run(1, "run gas.toml --out gas --threads 1").code, 0);
+  }
+  /// The largest velocity of a grain against the flow [m/s].
+  double against_the_flow(const std::string& out) const {
+    const Frame frame = last_frame(out);
+    double most = 0;
+    for (std::size_t k = 0; k < frame.x.size(); ++k)
+      most = std::max(most, (frame.u[k] - Vec3(20 * frame.x[k][1], 0, 0)).norm());
+    return most;
+  }
+};
+
+TEST_F(BegunInACell, GrainsGoOnWithTheFlowAndNotTwiceAsFast) {
+  ASSERT_LT(against_the_flow("gas"), 1e-12);
+  const double shear = last_frame("gas").domain.cell.xy;
+  ASSERT_GT(shear, 1e-3);
+  for (const std::string from : {"results.h5", "checkpoint_000015.h5"}) {
+    write(at("branch.toml"),
+          fmt::format(fmt::runtime(sheared_gas), shear, "kind = \"state\"\nfile = \"gas/" + from + "\""));
+    const Outcome branch = run(1, "run branch.toml --out branch --force --threads 1");
+    ASSERT_EQ(branch.code, 0) << from << branch.messages;
+    EXPECT_LT(against_the_flow("branch"), 1e-12) << from;
+  }
+}
+
+TEST_F(BegunInACell, AnotherCellThanThatOfTheStateIsRefused) {
+  for (const std::string from : {"results.h5", "checkpoint_000015.h5"}) {
+    write(at("branch.toml"),
+          fmt::format(fmt::runtime(sheared_gas), 0.0, "kind = \"state\"\nfile = \"gas/" + from + "\""));
+    const Outcome branch = run(1, "run branch.toml --out branch --threads 1");
+    EXPECT_EQ(branch.code, 2) << from;
+    EXPECT_NE(branch.messages.find("shears = [0.00"), std::string::npos) << branch.messages;
+    EXPECT_FALSE(fs::exists(at("branch")));
+  }
+}
+
 }  // namespace
 }  // namespace talus::state_sample_test
