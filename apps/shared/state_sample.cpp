@@ -110,12 +110,7 @@ StateSample state_of_checkpoint(const io::Scene& scene) {
     state.walls.push_back({wall.name, wall.normal.dot(point), wall.normal.dot(velocity), Vec3::Zero()});
   }
   state.domain = before.setup.domain;
-  if (!head.cell_edges.empty()) {
-    const auto &h = head.cell_edges, &r = head.cell_rates;
-    state.domain =
-        periodic_domain({h.at(0), h.at(1), h.at(2)}, before.cell.origin, {h.at(3), h.at(4), h.at(5)});
-    state.domain.rates = {r.at(0), r.at(1), r.at(2), r.at(3), r.at(4), r.at(5)};
-  }
+  restore_cell(head, state.domain);
   std::vector<std::int32_t> subdomains(static_cast<std::size_t>(head.subdomains));
   std::iota(subdomains.begin(), subdomains.end(), 0);
   for (const CheckpointPart& part : io::read_checkpoint_parts(path, subdomains)) {
@@ -148,12 +143,8 @@ bool same_cell(const Domain& a, const Domain& b) {
 
 /// The flow of the next stage would come on top of that of the last one.
 void leave_flow(const Domain& domain, Sample& sample) {
-  const Mat3 rates = matrix_of(domain.rates);
-  if (!domain.repeats || rates.isZero(0)) return;
-  Mat3 edges = edges_of(domain);
-  for (Eigen::Index axis = 0; axis < 3; ++axis)
-    if (edges(axis, axis) == 0) edges(axis, axis) = 1;
-  const Mat3 gradient = rates * edges.inverse();
+  if (!domain.repeats) return;
+  const Mat3 gradient = gradient_before(domain, 0);
   for (std::size_t k = 0; k < sample.size(); ++k)
     Eigen::Map<Vec3>(sample.velocity[k].data()) -= gradient * (sample.x[k] - domain.low);
 }

@@ -1,14 +1,12 @@
 #include "io/results/cell_outline.hpp"
 
-#include <algorithm>
+#include "runtime/step/cell_flow.hpp"
 
 namespace talus::io {
 
 std::optional<CellBox> cell_box(const Domain& domain, const Bounds& grains) {
   if (!domain.repeats) return std::nullopt;
-  const PeriodicSpace& c = domain.cell;
-  CellBox box{domain.low, Mat3::Zero(), {}};
-  box.edges << c.xx, c.xy, c.xz, 0, c.yy, c.yz, 0, 0, c.zz;
+  CellBox box{domain.low, edges_of(domain), {}};
   for (const Eigen::Index axis : {0, 1, 2}) {
     box.repeats[static_cast<std::size_t>(axis)] = box.edges(axis, axis) > 0;
     if (box.edges(axis, axis) > 0 || !(grains.low[axis] <= grains.high[axis])) continue;

@@ -285,7 +285,7 @@ class SceneReader {
     read_table(*node->as_table(), end_path, keys_.stage_end, {}, end);
     if (!end.any())
       fail_at(*node, end_path, fmt::format("stage '{}' never ends: give {}", stage.name, conditions));
-    if (end.strain && !bounded(end.strain_axis))
+    if (end.strain && !bounded(scene_.setup, end.strain_axis))
       fail_at(*node, end_path + ".strain",
               fmt::format("no two walls bound the sample along {0}, and nothing is periodic there",
                           "xyz"[end.strain_axis]));
@@ -307,14 +307,6 @@ class SceneReader {
     if (end.equilibrium && !pushed && !stage.stress.any() && stage.gravity.norm() == 0)
       fail_at(*node, end_path + ".equilibrium",
               "neither gravity, a pushed wall nor the stress of a cell loads the sample in this stage");
-  }
-
-  bool bounded(int axis) const {
-    const auto faces = [&](double direction) {
-      return std::any_of(scene_.setup.walls.begin(), scene_.setup.walls.end(),
-                         [&](const Wall& wall) { return wall.normal[axis] == direction; });
-    };
-    return scene_.setup.domain.edges()[axis] > 0 || (faces(1) && faces(-1));
   }
 
   const toml::table& root_;

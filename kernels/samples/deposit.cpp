@@ -128,9 +128,11 @@ class Deposition {
     for (;;) {
       std::size_t slice = 0;
       double least = std::numeric_limits<double>::infinity();
-      for (const std::size_t s : around)
-        if (!heaps_[s].empty() && heaps_[s].front().bound + rise(s) < least)
-          least = heaps_[s].front().bound + rise(slice = s);
+      for (const std::size_t s : around) {
+        if (heaps_[s].empty() || heaps_[s].front().bound + rise(s) >= least) continue;
+        least = heaps_[s].front().bound + rise(s);
+        slice = s;
+      }
       if (slice == 0 || least > best[2]) break;
       Entry entry = pop(slice);
       const std::int32_t id = entry.site;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -36,14 +37,6 @@ void validate_flow(const Setup& setup, const Stage& stage) {
     refuse(fmt::format("the cell is strained by more than {} in a step; make the time step shorter", most));
 }
 
-/// Something stands at both ends of an axis.
-bool bounded(const Setup& setup, Eigen::Index axis) {
-  const auto faces = [&](double direction) {
-    return std::ranges::any_of(setup.walls, [&](const Wall& wall) { return wall.normal[axis] == direction; });
-  };
-  return setup.domain.edges()[axis] > 0 || (faces(1) && faces(-1));
-}
-
 /// Components that follow a stress: of a cell of spheres, between axes that repeat. Walls bound the others.
 void validate_stress(const Setup& setup, const Stage& stage) {
   const StressLoad& load = stage.stress;
@@ -53,6 +46,7 @@ void validate_stress(const Setup& setup, const Stage& stage) {
     throw std::invalid_argument(fmt::format("stage '{}', stress: {}", stage.name, what));
   };
   constexpr const char* names[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
+  constexpr std::array<Eigen::Index, 2> axes[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
   for (const Eigen::Index axis : {0, 1, 2})
     if (!bounded(setup, axis))
       refuse(
@@ -66,12 +60,7 @@ void validate_stress(const Setup& setup, const Stage& stage) {
   const CellVelocity rates{stage.strain_rates[0], stage.strain_rates[1], stage.strain_rates[2],
                            stage.shear_rates[0],  stage.shear_rates[1],  stage.shear_rates[2]};
   for (std::size_t k = 0; k < cell_freedoms; ++k) {
-    const Eigen::Index first = k < 3    ? static_cast<Eigen::Index>(k)
-                               : k == 5 ? 1
-                                        : 0,
-                       second = k < 3    ? first
-                                : k == 3 ? 1
-                                         : 2;
+    const auto [first, second] = axes[k];
     if (load.to[k] && (setup.domain.edges()[first] == 0 || setup.domain.edges()[second] == 0))
       refuse(fmt::format(
           "the cell is not periodic along {}, so that nothing follows {}; load the walls there, or "
@@ -89,6 +78,13 @@ void validate_stress(const Setup& setup, const Stage& stage) {
 }
 
 }  // namespace
+
+bool bounded(const Setup& setup, Eigen::Index axis) {
+  const auto faces = [&](double direction) {
+    return std::ranges::any_of(setup.walls, [&](const Wall& wall) { return wall.normal[axis] == direction; });
+  };
+  return setup.domain.edges()[axis] > 0 || (faces(1) && faces(-1));
+}
 
 bool any_stress(const Setup& setup) {
   return std::ranges::any_of(setup.stages, [](const Stage& stage) { return stage.stress.any(); });

@@ -11,6 +11,9 @@ namespace talus {
 /// repeats, walls that are no planes or that turn, and grains that come or go.
 void validate_cell(const Setup& setup);
 
+/// Something stands at both ends of an axis: walls, or the images of the cell.
+bool bounded(const Setup& setup, Eigen::Index axis);
+
 /// Some stage has a cell that follows a stress.
 bool any_stress(const Setup& setup);
 /// Throws std::invalid_argument where one does and subdomains are not coupled by NSCDD.

@@ -239,6 +239,10 @@ void save_state(const StepState& state, Checkpoint& to);
 /// fit one another or the setup.
 StepState restore_state(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks);
 
+/// Edges and rates of a periodic cell that flows; others stay as they are. Throws std::invalid_argument where
+/// the domain is no cell, or numbers are missing.
+void restore_cell(const CheckpointHead& head, Domain& domain);
+
 /// Groups of candidates that are cut into the same chunks as were saved.
 std::vector<CandidateGroup> restored_groups(const StepState& state, const Checkpoint& from);
 

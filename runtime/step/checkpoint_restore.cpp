@@ -145,22 +145,21 @@ void restore_walls(const CheckpointHead& head, StepState& state) {
   state.time_then = head.time_then;
 }
 
-/// Rates and edges of a cell that flows, 6 numbers each; none of others.
-void restore_cell(const CheckpointHead& head, StepState& state) {
-  if (head.cell_edges.empty()) return;
-  demand(state.domain.repeats && head.cell_edges.size() == 6 && head.cell_rates.size() == 6 &&
-             head.cell_edges_then.size() == 6,
-         "it has another cell than the scene");
-  const auto numbers = [](const std::vector<double>& v) {
-    return EdgeRates{v[0], v[1], v[2], v[3], v[4], v[5]};
-  };
-  state.domain.flows = true;
-  set_edges(state.domain, matrix_of(numbers(head.cell_edges)));
-  state.domain.rates = numbers(head.cell_rates);
-  state.flow.edges_then = matrix_of(numbers(head.cell_edges_then));
+EdgeRates six_numbers(const std::vector<double>& v) {
+  return {v[0], v[1], v[2], v[3], v[4], v[5]};
 }
 
 }  // namespace
+
+void restore_cell(const CheckpointHead& head, Domain& domain) {
+  if (head.cell_edges.empty()) return;
+  demand(domain.repeats && head.cell_edges.size() == 6 && head.cell_rates.size() == 6 &&
+             head.cell_edges_then.size() == 6,
+         "it has another cell than the scene");
+  domain.flows = true;
+  set_edges(domain, matrix_of(six_numbers(head.cell_edges)));
+  domain.rates = six_numbers(head.cell_rates);
+}
 
 StepState restore_state(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks) {
   const CheckpointHead& head = from.head;
@@ -172,7 +171,8 @@ StepState restore_state(const Setup& setup, const Checkpoint& from, const graph:
   state.walls = setup.walls;
   state.clumps = setup.clumps;
   state.domain = setup.domain;
-  restore_cell(head, state);
+  restore_cell(head, state.domain);
+  if (!head.cell_edges_then.empty()) state.flow.edges_then = matrix_of(six_numbers(head.cell_edges_then));
   state.wall_states.resize(state.walls.size());
   restore_walls(head, state);
   for (const SubdomainPlace e : all.here.indices()) {

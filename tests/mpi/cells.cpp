@@ -48,6 +48,20 @@ pictures = false
 class CellsOnRanks : public OnRanks {
  protected:
   void SetUp() override { write(at("scene.toml"), pressed_cell); }
+  /// Stopped on two ranks after so many steps, each time, then run to the end on one: the digest of
+  /// `whole`, which ran in one piece.
+  void expect_same_when_stopped(int subdomains, const std::vector<std::size_t>& steps,
+                                const std::string& whole) const {
+    const std::string command = fmt::format(
+        "run scene.toml --set decomposition.subdomains={} --threads 1 --out parts --resume", subdomains);
+    for (const std::size_t before : steps) {
+      const Outcome first = run(2, fmt::format("{} --steps {}", command, before));
+      ASSERT_EQ(first.code, 0) << first.messages;
+    }
+    const Outcome rest = run(1, command);
+    ASSERT_EQ(rest.code, 0) << rest.messages;
+    EXPECT_EQ(digest_of("parts"), digest_of(whole));
+  }
 };
 
 TEST_F(CellsOnRanks, ChangeNoBitWithRanksAndThreads) {
@@ -85,12 +99,7 @@ TEST_F(CellsOnRanks, FlowToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
                 "shear_rates = [20.0, 0.0, 0.0]\nstrain_rates = [-0.5, 0.2, 0.0]\n");
   write(at("scene.toml"), scene);
   expect_same_bits(4, {{1, 2}, {2, 1}}, "one");
-  const std::string command = "run scene.toml --set decomposition.subdomains=4 --threads 1 --out parts";
-  const Outcome first = run(2, command + " --steps 67");
-  ASSERT_EQ(first.code, 0) << first.messages;
-  const Outcome rest = run(1, command + " --resume");
-  ASSERT_EQ(rest.code, 0) << rest.messages;
-  EXPECT_EQ(digest_of("parts"), digest_of("one"));
+  expect_same_when_stopped(4, {67}, "one");
 }
 
 /// Walls along z, a stress along x and y, and rough walls that stretch with the cell.
@@ -103,12 +112,7 @@ TEST_F(CellsOnRanks, FollowAStressBetweenWallsToTheSameBitsOnAnyRanksAndBehindAC
   write(at("scene.toml"), scene);
   for (const int subdomains : {1, 4})
     expect_same_bits(subdomains, {{1, 2}, {2, 1}}, fmt::format("walled{}", subdomains));
-  const std::string command = "run scene.toml --set decomposition.subdomains=4 --threads 1 --out parts";
-  const Outcome first = run(2, command + " --steps 67");
-  ASSERT_EQ(first.code, 0) << first.messages;
-  const Outcome rest = run(1, command + " --resume");
-  ASSERT_EQ(rest.code, 0) << rest.messages;
-  EXPECT_EQ(digest_of("parts"), digest_of("walled4"));
+  expect_same_when_stopped(4, {67}, "walled4");
 }
 
 /// Grains that a stress squeezes, while they are sheared at constant pressure.
@@ -143,14 +147,7 @@ TEST_F(CellsOnRanks, FollowAStressToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
   write(at("scene.toml"), stressed_cell);
   for (const int subdomains : {1, 2, 8})
     expect_same_bits(subdomains, {{1, 2}, {2, 1}}, fmt::format("stressed{}", subdomains));
-  const std::string command = "run scene.toml --set decomposition.subdomains=8 --threads 1 --out parts";
-  for (const int steps : {70, 171}) {
-    const Outcome first = run(2, fmt::format("{} --resume --steps {}", command, steps));
-    ASSERT_EQ(first.code, 0) << first.messages;
-  }
-  const Outcome rest = run(1, command + " --resume");
-  ASSERT_EQ(rest.code, 0) << rest.messages;
-  EXPECT_EQ(digest_of("parts"), digest_of("stressed8"));
+  expect_same_when_stopped(8, {70, 171}, "stressed8");
 }
 
 /// Ends that look back: they come with the same step on any ranks, and where a run was stopped before.
@@ -163,17 +160,10 @@ TEST_F(CellsOnRanks, EndTheirStagesWithTheSameStepOnAnyRanksAndBehindACheckpoint
   change("end = { steps = 60 }", "end = { inertial_below = 0.08, inertial_hold = 0.2, steps = 400 }");
   write(at("scene.toml"), scene);
   expect_same_bits(8, {{2, 1}}, "ends");
-  const std::string command = "run scene.toml --set decomposition.subdomains=8 --threads 1 --out parts";
   const Table steps = read_table(at("ends") / "cell.csv");
   ASSERT_GT(steps.rows.size(), 20U);
   ASSERT_LT(steps.rows.size(), 400U) << "ends by what the grains do, not by steps";
-  for (const std::size_t before : {std::size_t{70}, steps.rows.size() - 3}) {
-    const Outcome first = run(2, fmt::format("{} --resume --steps {}", command, before));
-    ASSERT_EQ(first.code, 0) << first.messages;
-  }
-  const Outcome rest = run(1, command + " --resume");
-  ASSERT_EQ(rest.code, 0) << rest.messages;
-  EXPECT_EQ(digest_of("parts"), digest_of("ends"));
+  expect_same_when_stopped(8, {70, steps.rows.size() - 3}, "ends");
   EXPECT_EQ(read_table(at("parts") / "cell.csv").rows.size(), steps.rows.size());
 }
 

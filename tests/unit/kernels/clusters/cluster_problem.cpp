@@ -11,6 +11,7 @@
 #include "kernels/bodies/index.hpp"
 #include "kernels/clusters/contact_matrix.hpp"
 #include "kernels/clusters/step_error.hpp"
+#include "tests/unit/kernels/clusters/cluster_makers.hpp"
 #include "tests/unit/kernels/global/cut_problem.hpp"
 
 namespace talus::cluster_problem_test {
@@ -38,16 +39,8 @@ BodyProblem heaps(int count, double mu, double plate, std::uint32_t seed) {
       problem.bodies.push_back(body);
     }
     const auto touch = [&](std::int32_t a, std::int32_t b, const Vec3& n) {
-      ContactEquation c;
-      c.normal = n;
-      c.offset = Vec3::Zero();
-      c.mu = mu;
-      c.first = a;
-      c.second = b;
-      c.wall = b < 0 ? 0 : -1;
-      problem.contacts.push_back(c);
-      problem.impulse.push_back(problem.contacts.size() % 2 == 0 ? Vec3(0.3 * n * std::abs(fall))
-                                                                 : Vec3::Zero());
+      cluster_makers::add_contact(problem, a, b, n, mu, b < 0 ? 0 : -1);
+      if (problem.contacts.size() % 2 == 0) problem.impulse.back() = 0.3 * n * std::abs(fall);
     };
     for (std::int32_t a = first; a < first + grains; ++a) {
       if (problem.bodies[at(a)].x[2] < 0.011) touch(a, -1, Vec3::UnitZ());
@@ -66,15 +59,8 @@ BodyProblem heaps(int count, double mu, double plate, std::uint32_t seed) {
     wall.axis = -Vec3::UnitZ();
     wall.free.u = Vec3(0, 0, fall);
     problem.bodies.push_back(wall);
-    ContactEquation c;
-    c.normal = -Vec3::UnitZ();
-    c.offset = Vec3::Zero();
-    c.mu = mu;
-    c.first = lid.back();
-    c.second = static_cast<std::int32_t>(problem.grains);
-    c.wall = 1;
-    problem.contacts.push_back(c);
-    problem.impulse.push_back(Vec3::Zero());
+    cluster_makers::add_contact(problem, lid.back(), static_cast<std::int32_t>(problem.grains),
+                                -Vec3::UnitZ(), mu, 1);
   }
   return problem;
 }
