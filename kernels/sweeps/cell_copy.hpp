@@ -2,6 +2,8 @@
 
 /// Copies of a periodic cell that follows a stress (kernels/bodies/cell_velocity.hpp), as sweeps see it.
 
+#include <span>
+
 #include "kernels/bodies/cell_velocity.hpp"
 #include "kernels/detection/contacts.hpp"
 #include "kernels/sweeps/sweep.hpp"
@@ -16,5 +18,9 @@ struct CellCopy {
 
 /// The sum of r (x) b/d over the contacts of a range [N s], of what they do to their bodies: cohesion counts.
 CellVelocity impulse_on_cell(const Contacts& contacts, ContactRange range);
+/// The same where contacts do not keep b, since the cell follows no stress: the sum of the radii [m] stands
+/// for its length. `length`: d [m].
+CellVelocity impulse_through_cell(const Contacts& contacts, ContactRange range,
+                                  std::span<const double> radius, double length);
 
 }  // namespace talus

@@ -43,7 +43,7 @@ std::vector<const double*> by_subdomain(std::span<const double> rows, std::size_
 }  // namespace
 
 std::size_t pushed_vectors(const StepState& state) {
-  return state.walls.size() + (state.cell.loaded() ? cell_freedoms / 3 : 0);
+  return state.walls.size() + (state.domain.repeats ? cell_freedoms / 3 : 0);
 }
 
 std::size_t check_row_width(std::size_t vectors) {

@@ -16,8 +16,8 @@ namespace talus {
 struct CheckSums {
   ErrorSums error;  ///< all but its wall_impulse
   JumpSums jump;
-  /// Impulse of each wall on the grains [N s]; then, for a cell that follows a stress, the two halves of the
-  /// impulse of the contacts on it.
+  /// Impulse of each wall on the grains [N s]; then, in a periodic cell, the two halves of the impulse of the
+  /// contacts on it (kernels/bodies/cell_velocity.hpp), whose faces carry forces as walls would.
   std::vector<Vec3> wall_impulse;
   double imbalance = 0;  ///< contacts of the fullest subdomain over those of the mean one, less 1
 };
@@ -29,7 +29,7 @@ std::size_t check_row_width(std::size_t vectors);
 /// What a check has measured of each chunk.
 struct ChunkErrors {
   std::span<const ErrorSums> sums;
-  std::span<const CellVelocity> cell = {};  ///< impulses on a cell that follows a stress [N s], or none
+  std::span<const CellVelocity> cell = {};  ///< impulses on a periodic cell [N s], or none
 };
 /// The rows of the subdomains of this rank. `jumps`: per subdomain of this rank, or empty.
 std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors,

@@ -25,7 +25,7 @@ void ChunkWork::begin(bool damped, bool keep_impulses) {
   keep_impulses_ = keep_impulses;
   before_.resize(damped ? state_.chunks.size() : 0);
   errors_.assign(state_.chunks.size(), {});
-  cell_impulses_.assign(state_.cell.copies.size(), {});
+  cell_impulses_.assign(state_.domain.repeats ? state_.chunks.size() : 0, {});
 }
 
 void ChunkWork::make_room() {
@@ -154,6 +154,8 @@ void ChunkWork::measure(std::size_t c) {
   } else {
     errors_[c] = kernels_.error_grains<Friction>(contacts, range_of(c), velocity, friction_of(c), parts);
   }
+  if (state_.domain.repeats && !at_wall(c) && !stressed(c))
+    cell_impulses_[c] = impulse_through_cell(contacts, range_of(c), state_.bodies.radius, state_.cell.length);
   add_error_of_moments(contacts, range_of(c), state_.bodies.radius, velocity, parts, errors_[c]);
   if (keep_impulses_) store_impulses(contacts, chunks, c, state_.candidates);
 }

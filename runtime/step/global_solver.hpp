@@ -32,8 +32,9 @@ class GlobalSolver {
   void assist() { crew_.help(); }
 
   // Collective.
-  /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness.
-  double sweeps_needed() const;
+  /// About the number of Gauss-Seidel sweeps that the problem needs: estimate_stiffness; in a cell without
+  /// walls, by its size. `spread`: the mass of the heaviest grain over that of the lightest.
+  double sweeps_needed(double spread) const;
 
   /// Finds the clusters of the step's contacts. Those of at most `most_direct` bodies are small;
   /// with 0 none is, and nothing is asked.

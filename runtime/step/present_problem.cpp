@@ -41,7 +41,7 @@ double PresentProblem::plain_sweeps_needed() {
     problem.carrying.push_back(certificate_.wall_impulses()[w] != Vec3::Zero() ? state_.walls[w].inv_mass()
                                                                                : -1);
   return stiffness_.sweeps_needed(problem, certificate_.stiff_for(contacts),
-                                  [&] { return global_.sweeps_needed(); });
+                                  [&] { return global_.sweeps_needed(stiffness_.spread()); });
 }
 
 }  // namespace talus

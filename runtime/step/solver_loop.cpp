@@ -139,9 +139,9 @@ void SolverLoop::begin() {
       std::numeric_limits<double>::epsilon() * problem_.farthest() / parameters_.time_step;
   for (const WallState& wall : state_.wall_states)
     scales.wall_pushes.push_back(parameters_.impulse_time() * wall.applied);
-  if (state_.cell.loaded())
-    for (std::size_t k = 0; k < cell_freedoms; k += 3)
-      scales.wall_pushes.push_back(Eigen::Map<const Vec3>(&state_.cell.push[k]).norm());
+  for (std::size_t w = state_.walls.size(), k = 0; w < pushed_vectors(state_); ++w, k += 3)
+    scales.wall_pushes.push_back(state_.cell.loaded() ? Eigen::Map<const Vec3>(&state_.cell.push[k]).norm()
+                                                      : 0);
   certificate_.begin(std::move(scales));
   problem_.begin();
   pending_.reset();
@@ -306,7 +306,7 @@ bool SolverLoop::judge() {
       add_check_rows(pending_->wait(), pushed_vectors(state_), state_.decomposition.partition.subdomains);
   imbalance_ = sums.imbalance;
   for (std::size_t w = 0; w < state_.walls.size(); ++w) state_.wall_states[w].impulse = sums.wall_impulse[w];
-  if (state_.cell.loaded())
+  if (state_.domain.repeats)
     for (std::size_t k = 0; k < cell_freedoms; ++k)
       state_.cell.impulse[k] =
           sums.wall_impulse[state_.walls.size() + k / 3][static_cast<Eigen::Index>(k % 3)];

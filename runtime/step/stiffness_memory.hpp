@@ -43,6 +43,8 @@ class StiffnessMemory {
   /// ranks when they pass the same.
   double sweeps_needed(const Problem& problem, double stiff, const std::function<double()>& estimate);
   bool grains_alike() const { return spread_ < reuse_.alike; }
+  /// The mass of the heaviest grain over that of the lightest.
+  double spread() const { return spread_; }
 
   /// visit(name, member) for each member of a state, which may be const.
   template <class Memory, class Visit>

@@ -89,5 +89,36 @@ TEST(CellSweeps, GiveTheCellWhatContactsGiveAndTheSameBitsByEveryInstructionSet)
   expect_momentum_and_bits<false>(4);
 }
 
+/// Of bodies that touch, sum r (x) (x_i - x_j)/d over contacts is the moment of what each body gets.
+TEST(CellSweeps, WhatGoesThroughACellIsTheMomentOfWhatItsBodiesGet) {
+  const double length = 0.7;
+  const std::vector<double> radius{1, 2, 0.5, 3};
+  std::vector<Vec3> x{{4, -1, 2}};
+  Contacts contacts;
+  std::vector<Vec3> given(radius.size(), Vec3::Zero());
+  for (std::size_t k = 0; k + 1 < radius.size(); ++k) {
+    const Vec3 n = Vec3(0.3 - static_cast<double>(k), 0.8, 0.1 + 0.4 * static_cast<double>(k)).normalized(),
+               r = (2 + static_cast<double>(k)) * n + 0.3 * n.unitOrthogonal();
+    x.push_back(x[k] - (radius[k] + radius[k + 1]) * n);
+    contacts.first.push_back(static_cast<Slot>(k));
+    contacts.second.push_back(static_cast<Slot>(k + 1));
+    contacts.nx.push_back(n[0]);
+    contacts.ny.push_back(n[1]);
+    contacts.nz.push_back(n[2]);
+    contacts.rx.push_back(r[0]);
+    contacts.ry.push_back(r[1]);
+    contacts.rz.push_back(r[2]);
+    given[k] += r;
+    given[k + 1] -= r;
+  }
+  CellVelocity moment{};
+  for (std::size_t b = 0; b < given.size(); ++b) add_impulse(given[b], x[b] / length, moment);
+  const CellVelocity found = impulse_through_cell(contacts, {0, contacts.nx.size()}, radius, length);
+  for (std::size_t k = 0; k < cell_freedoms; ++k) {
+    EXPECT_NEAR(found[k], moment[k], 1e-12) << "component " << k;
+    EXPECT_GT(std::abs(moment[k]), 0.1);
+  }
+}
+
 }  // namespace
 }  // namespace talus::cell_sweeps_test
