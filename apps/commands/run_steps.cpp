@@ -122,6 +122,7 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
     feed.later("dump of a contact problem", fclib_dump(simulation, run.directory));
   const double now = graph::seconds_now();
   all.limit.took_step(now - before);
+  all.limit.took_frame(feed.frame_seconds());
   const bool first = run.ranks.rank() == 0;
   const Asked asked = agree(run.ranks, first && limit.reached(now), first && keeper.wall_due(now));
   const bool due = keeper.due(report);
@@ -139,8 +140,9 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   stop.asked = simulation.finished() ? Asked{} : asked;
   const bool ends = simulation.finished() || last || stop.asked.ends();
   if (due || asked.save || stop.asked.ends() || (ends && options.resume)) stop.saved = all.save(all.mark());
-  // Where a run stops for good; one that goes on cuts this frame off again.
-  if (ends && !written && run.scene.output.stage_frames) all.write_frame();
+  // Where a run stops for good; one that goes on cuts this frame off again, and its time may be up.
+  const bool in_haste = stop.asked.ends() && run.granted;
+  if (ends && !written && !in_haste && run.scene.output.stage_frames) all.write_frame();
   if (all.status) all.status->update(simulation, memory.tally, keeper, now);
   return ends;
 }

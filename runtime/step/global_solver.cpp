@@ -10,6 +10,7 @@
 #include "kernels/clusters/step_error.hpp"
 #include "kernels/global/balance.hpp"
 #include "kernels/global/residuals.hpp"
+#include "kernels/global/step_reader.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -171,12 +172,11 @@ class GlobalSolver::Whole {
   trace::Span span_;
 };
 
-template <class Gathered, class Gather>
-std::vector<Gathered> GlobalSolver::gather_parts(const Gather& gather) const {
+/// gather(source), or gather(source, part) of each subdomain.
+template <class Gather>
+auto GlobalSolver::gather_parts(const BodyProblemSource& source, const Gather& gather) const {
   const Decomposition& all = state_.decomposition;
-  const std::vector<WallMotion> walls = motions_of(state_);
-  const BodyProblemSource source = source_of(state_, parameters_, walls);
-  std::vector<Gathered> parts;
+  std::vector<decltype(gather(source))> parts;
   if (!all.several()) {
     parts.push_back(gather(source));
     return parts;
@@ -190,9 +190,17 @@ std::vector<Gathered> GlobalSolver::gather_parts(const Gather& gather) const {
 }
 
 std::vector<BodyProblem> GlobalSolver::gather() const {
-  auto parts = gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
+  const std::vector<WallMotion> walls = motions_of(state_);
+  auto parts = gather_parts(source_of(state_, parameters_, walls),
+                            [](const auto&... of) { return gather_problem(of...); });
   if (knows_more(parameters_)) set_free(parts, *link_);
   return parts;
+}
+
+std::vector<ContactGraph> GlobalSolver::gather_graphs() const {
+  const std::vector<WallMotion> walls = motions_of(state_);
+  return gather_parts(source_of(state_, parameters_, walls),
+                      [](const auto&... of) { return gather_graph(of...); });
 }
 
 double GlobalSolver::sweeps_needed() const {
@@ -203,8 +211,7 @@ double GlobalSolver::sweeps_needed() const {
     return layers * layers;
   }
   const Whole span(*this);
-  const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
-  return estimate_stiffness(graphs, *link_);
+  return estimate_stiffness(gather_graphs(), *link_);
 }
 
 void GlobalSolver::find_clusters(int most_direct) {
@@ -213,7 +220,7 @@ void GlobalSolver::find_clusters(int most_direct) {
   // A cell that follows a stress ties all contacts together.
   if (most_direct == 0 || state_.cell.loaded()) return;
   const Whole span(*this);
-  const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
+  const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);
   in_small_ = in_clusters_of(clusters, 1, most_direct);
   const std::vector<double> rows =
@@ -225,16 +232,40 @@ void GlobalSolver::find_clusters(int most_direct) {
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
 
+Vec3 GlobalSolver::checked_impulse(std::size_t place, const Vec3& normal) const {
+  return state_.candidates.impulse.force(static_cast<std::size_t>(state_.contacts.candidate[place]), normal);
+}
+
 std::vector<BodyProblem> GlobalSolver::checked() const {
   std::vector<BodyProblem> problems = gather();
   if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
     for (BodyProblem& problem : problems)
       for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-        const auto place = static_cast<std::size_t>(problem.contacts[k].place);
-        const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
-        problem.impulse[k] = state_.candidates.impulse.force(from, problem.contacts[k].normal);
+        const ContactEquation& c = problem.contacts[k];
+        problem.impulse[k] = checked_impulse(static_cast<std::size_t>(c.place), c.normal);
       }
   return problems;
+}
+
+ProblemReaders GlobalSolver::read_checked(const BodyProblemSource& source) const {
+  auto steps = gather_parts(source, [](const auto&... of) { return std::make_unique<StepReader>(of...); });
+  if (knows_more(parameters_)) {
+    PartField free;
+    for (const auto& step : steps) step->add_known(free.emplace_back(step->unknowns()));
+    link_->sum_copies(free);
+    for (std::size_t p = 0; p < steps.size(); ++p) {
+      for (std::size_t b = 0; b < free[p].size(); ++b) velocity_from_force(steps[p]->unknown(b), free[p][b]);
+      steps[p]->set_free(std::move(free[p]));
+    }
+  }
+  ProblemReaders readers;
+  for (auto& step : steps) {
+    if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
+      step->set_impulses(
+          [this](std::size_t place, const Vec3& normal) { return checked_impulse(place, normal); });
+    readers.push_back(std::move(step));
+  }
+  return readers;
 }
 
 std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
@@ -270,14 +301,15 @@ double GlobalSolver::large_error(double enough) const {
 
 double GlobalSolver::quantile_error(double part) const {
   const Whole span(*this);
-  const std::vector<BodyProblem> problems = checked();
-  return quantile_of(residuals_of({problems, *link_}), *link_, part);
+  const std::vector<WallMotion> walls = motions_of(state_);
+  const ProblemReaders problems = read_checked(source_of(state_, parameters_, walls));
+  return quantile_of(residuals_of(problems, *link_), *link_, part);
 }
 
 WorstErrors GlobalSolver::worst_errors() const {
   const Whole span(*this);
-  const std::vector<BodyProblem> problems = checked();
-  const BodyParts parts(problems, *link_);
+  const std::vector<WallMotion> motions = motions_of(state_);
+  const ProblemReaders parts = read_checked(source_of(state_, parameters_, motions));
   const Decomposition& all = state_.decomposition;
   UnknownNames names;
   const std::span<const BodyId> ids = state_.bodies.id;
@@ -289,7 +321,7 @@ WorstErrors GlobalSolver::worst_errors() const {
     }
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     if (state_.walls[w].inv_mass() > 0) names.walls.push_back(static_cast<std::int32_t>(w));
-  const WorstErrors here = worst_errors_of(parts, residuals_of(parts), names);
+  const WorstErrors here = worst_errors_of(parts, residuals_of(parts, *link_), names);
   WorstErrors worst;
   for (const WorstErrors& of_rank : ranks_.gather_records(std::span<const WorstErrors>(&here, 1)))
     worst.take(of_rank);

@@ -66,12 +66,17 @@ class GlobalSolver {
  private:
   class Whole;  ///< a span of it in a trace
   /// gather(source), or gather(source, part) of each subdomain.
-  template <class Gathered, class Gather>
-  std::vector<Gathered> gather_parts(const Gather& gather) const;
+  template <class Gather>
+  auto gather_parts(const BodyProblemSource& source, const Gather& gather) const;
+  std::vector<ContactGraph> gather_graphs() const;
   std::vector<BodyProblem> gather() const;
   /// All contacts with the impulses of the last check, or those of small or of large clusters.
   std::vector<BodyProblem> checked() const;
   std::vector<BodyProblem> checked(bool small) const;
+  /// The impulse of the last check of a contact.
+  Vec3 checked_impulse(std::size_t place, const Vec3& normal) const;
+  /// The same problem as checked(), which `source` outlives.
+  ProblemReaders read_checked(const BodyProblemSource& source) const;
 
   StepState& state_;
   const StepParameters& parameters_;
