@@ -85,6 +85,7 @@ struct Advance {
   /// Frames are counted through all parts of a run, so that the same ones have contacts.
   void write_frame() {
     const io::OutputSpec& output = run.scene.output;
+    simulation.release_room();
     feed.frame(simulation.frame(output.contacts && frames_given++ % output.contacts_every == 0));
   }
 
@@ -94,6 +95,7 @@ struct Advance {
     return recorder.mark();
   }
   bool save(io::OutputMark mark) {
+    simulation.release_room();
     RunMemory now = memory;
     now.mark = std::move(mark);
     now.frames_passed = frames.passed();

@@ -335,6 +335,12 @@ void GlobalSolver::correct() {
   }
 }
 
+void GlobalSolver::release_room() {
+  problems_ = {};
+  change_ = {};
+  mends_ = false;
+}
+
 BodyAdmmResult GlobalSolver::improve(double tolerance, int calls) {
   const Whole span(*this);
   std::vector<BodyProblem> problems = gather();

@@ -57,6 +57,8 @@ class GlobalSolver {
   /// `state.contacts`; velocities are left to be made afresh.
   bool correction_helps() const { return mends_; }
   void correct();
+  /// Between steps: gives back what was kept for `correct`.
+  void release_room();
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
