@@ -209,7 +209,11 @@ void note_stop(const Stop& stop, std::int64_t step, io::Summary& summary) {
 std::unique_ptr<Simulation> make_simulation(const PreparedRun& run, Sample sample,
                                             std::vector<GivenForce> forces, graph::Executor& executor) {
   const Setup& setup = run.scene.setup;
-  if (run.resume) return std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
+  if (run.resume) {
+    auto simulation = std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
+    run.resume->file.state.parts = {};  // some 230 bytes a grain
+    return simulation;
+  }
   auto simulation = std::make_unique<Simulation>(
       setup, deal_out(std::move(sample), setup.decomposition, run.ranks), executor, run.ranks);
   if (run.scene.from_state()) simulation->begin_from(std::move(forces));

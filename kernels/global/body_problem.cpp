@@ -29,25 +29,6 @@ ContactGraph graph_of(const StepReader& step) {
   return graph;
 }
 
-BodyProblem problem_of(const StepReader& step) {
-  BodyProblem problem;
-  note_copies(step, problem);
-  problem.grains = step.grains();
-  problem.bodies.reserve(step.unknowns());
-  for (std::size_t b = 0; b < step.unknowns(); ++b) problem.bodies.push_back(step.unknown(b));
-  const std::size_t contacts = step.contacts();
-  problem.contacts.reserve(contacts);
-  problem.impulse.reserve(contacts);
-  step.each_contact([&](const ContactEquation& contact, const Vec3& impulse) {
-    problem.contacts.push_back(contact);
-    problem.impulse.push_back(impulse);
-  });
-  if (!step.knows_more() || contacts == 0) return problem;
-  problem.known.resize(problem.bodies.size());
-  step.add_known(problem.known);
-  return problem;
-}
-
 }  // namespace
 
 ContactGraph graph_of(const BodyProblem& problem) {
@@ -68,23 +49,34 @@ ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart
   return graph_of(StepReader(source, part));
 }
 
+BodyProblem gather_problem(const StepReader& step, std::span<const char> taken) {
+  BodyProblem problem;
+  note_copies(step, problem);
+  problem.grains = step.grains();
+  problem.bodies.reserve(step.unknowns());
+  for (std::size_t b = 0; b < step.unknowns(); ++b) problem.bodies.push_back(step.unknown(b));
+  std::size_t contacts = 0;
+  const auto is_taken = [&](std::int32_t first) { return taken.empty() || taken[at(first)] != 0; };
+  step.each_place([&](std::size_t c, std::size_t k) { contacts += is_taken(step.pair_at(c, k)[0]) ? 1 : 0; });
+  problem.contacts.reserve(contacts);
+  problem.impulse.reserve(contacts);
+  step.each_contact([&](const ContactEquation& contact, const Vec3& impulse) {
+    if (!is_taken(contact.first)) return;
+    problem.contacts.push_back(contact);
+    problem.impulse.push_back(impulse);
+  });
+  if (!step.knows_more() || step.contacts() == 0) return problem;
+  problem.known.resize(problem.bodies.size());
+  step.add_known(problem.known);
+  return problem;
+}
+
 BodyProblem gather_problem(const BodyProblemSource& source) {
-  return problem_of(StepReader(source));
+  return gather_problem(StepReader(source));
 }
 
 BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part) {
-  return problem_of(StepReader(source, part));
-}
-
-void keep_contacts(BodyProblem& problem, std::span<const char> taken) {
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    if (taken[at(problem.contacts[k].first)] == 0) continue;
-    problem.contacts[kept] = problem.contacts[k];
-    problem.impulse[kept++] = problem.impulse[k];
-  }
-  problem.contacts.resize(kept);
-  problem.impulse.resize(kept);
+  return gather_problem(StepReader(source, part));
 }
 
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts) {

@@ -72,4 +72,8 @@ class StepReader final : public ProblemReader {
   ImpulseOf impulse_of_;
 };
 
+/// Puts the problem together, as gather_problem of the source does: its contacts whose first body is `taken`,
+/// an entry per unknown, or all where that is empty.
+BodyProblem gather_problem(const StepReader& step, std::span<const char> taken = {});
+
 }  // namespace talus

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -10,7 +11,6 @@
 #include "kernels/clusters/step_error.hpp"
 #include "kernels/global/balance.hpp"
 #include "kernels/global/residuals.hpp"
-#include "kernels/global/step_reader.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -232,22 +232,8 @@ void GlobalSolver::find_clusters(int most_direct) {
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
 
-Vec3 GlobalSolver::checked_impulse(std::size_t place, const Vec3& normal) const {
-  return state_.candidates.impulse.force(static_cast<std::size_t>(state_.contacts.candidate[place]), normal);
-}
-
-std::vector<BodyProblem> GlobalSolver::checked() const {
-  std::vector<BodyProblem> problems = gather();
-  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
-    for (BodyProblem& problem : problems)
-      for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-        const ContactEquation& c = problem.contacts[k];
-        problem.impulse[k] = checked_impulse(static_cast<std::size_t>(c.place), c.normal);
-      }
-  return problems;
-}
-
-ProblemReaders GlobalSolver::read_checked(const BodyProblemSource& source) const {
+std::vector<std::unique_ptr<const StepReader>> GlobalSolver::read_checked(
+    const BodyProblemSource& source) const {
   auto steps = gather_parts(source, [](const auto&... of) { return std::make_unique<StepReader>(of...); });
   if (knows_more(parameters_)) {
     PartField free;
@@ -258,24 +244,30 @@ ProblemReaders GlobalSolver::read_checked(const BodyProblemSource& source) const
       steps[p]->set_free(std::move(free[p]));
     }
   }
-  ProblemReaders readers;
-  for (auto& step : steps) {
-    if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
-      step->set_impulses(
-          [this](std::size_t place, const Vec3& normal) { return checked_impulse(place, normal); });
-    readers.push_back(std::move(step));
-  }
-  return readers;
+  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
+    for (const auto& step : steps)
+      step->set_impulses([this](std::size_t place, const Vec3& normal) {
+        const auto candidate = static_cast<std::size_t>(state_.contacts.candidate[place]);
+        return state_.candidates.impulse.force(candidate, normal);
+      });
+  return {std::make_move_iterator(steps.begin()), std::make_move_iterator(steps.end())};
+}
+
+ProblemReaders GlobalSolver::read_all_checked(const BodyProblemSource& source) const {
+  auto steps = read_checked(source);
+  return {std::make_move_iterator(steps.begin()), std::make_move_iterator(steps.end())};
 }
 
 std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
-  std::vector<BodyProblem> problems = checked();
-  if (!(small_ && large_)) return problems;
-  for (std::size_t p = 0; p < problems.size(); ++p) {
-    std::vector<char> taken = in_small_[p];
+  const std::vector<WallMotion> walls = motions_of(state_);
+  const auto steps = read_checked(source_of(state_, parameters_, walls));
+  std::vector<BodyProblem> problems;
+  for (std::size_t p = 0; p < steps.size(); ++p) {
+    std::vector<char> taken;
+    if (small_ && large_) taken = in_small_[p];
     if (!small)
       for (char& t : taken) t = t == 0 ? 1 : 0;
-    keep_contacts(problems[p], taken);
+    problems.push_back(gather_problem(*steps[p], taken));
   }
   return problems;
 }
@@ -290,6 +282,9 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
       step_error(problems_, *link_, {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls});
   change_ = std::move(error.change);
   mends_ = error.mends;
+  // For `correct` the contacts and their impulses are enough.
+  if (!mends_) problems_ = {};
+  for (BodyProblem& problem : problems_) problem.bodies = {};
   return {error.relative(), error.solved};
 }
 
@@ -302,14 +297,14 @@ double GlobalSolver::large_error(double enough) const {
 double GlobalSolver::quantile_error(double part) const {
   const Whole span(*this);
   const std::vector<WallMotion> walls = motions_of(state_);
-  const ProblemReaders problems = read_checked(source_of(state_, parameters_, walls));
+  const ProblemReaders problems = read_all_checked(source_of(state_, parameters_, walls));
   return quantile_of(residuals_of(problems, *link_), *link_, part);
 }
 
 WorstErrors GlobalSolver::worst_errors() const {
   const Whole span(*this);
   const std::vector<WallMotion> motions = motions_of(state_);
-  const ProblemReaders parts = read_checked(source_of(state_, parameters_, motions));
+  const ProblemReaders parts = read_all_checked(source_of(state_, parameters_, motions));
   const Decomposition& all = state_.decomposition;
   UnknownNames names;
   const std::span<const BodyId> ids = state_.bodies.id;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/global/admm.hpp"
+#include "kernels/global/step_reader.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/crew.hpp"
 #include "runtime/step/certificate.hpp"
@@ -72,13 +73,11 @@ class GlobalSolver {
   auto gather_parts(const BodyProblemSource& source, const Gather& gather) const;
   std::vector<ContactGraph> gather_graphs() const;
   std::vector<BodyProblem> gather() const;
-  /// All contacts with the impulses of the last check, or those of small or of large clusters.
-  std::vector<BodyProblem> checked() const;
+  /// The problem with the impulses of the last check, read from the arrays of the step, which `source` names.
+  std::vector<std::unique_ptr<const StepReader>> read_checked(const BodyProblemSource& source) const;
+  ProblemReaders read_all_checked(const BodyProblemSource& source) const;
+  /// The same with the contacts of small or of large clusters alone, put together.
   std::vector<BodyProblem> checked(bool small) const;
-  /// The impulse of the last check of a contact.
-  Vec3 checked_impulse(std::size_t place, const Vec3& normal) const;
-  /// The same problem as checked(), which `source` outlives.
-  ProblemReaders read_checked(const BodyProblemSource& source) const;
 
   StepState& state_;
   const StepParameters& parameters_;
