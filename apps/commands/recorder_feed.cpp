@@ -1,5 +1,6 @@
 #include "apps/commands/recorder_feed.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace talus {
@@ -30,12 +31,17 @@ void RecorderFeed::frame(Frame&& frame) {
   flush();
   if (ranks_.ranks() > 1) {
     executor_.drain();
-    recorder_.record_frame(std::move(frame));
+    record(std::move(frame));
     return;
   }
-  executor_.submit_background("output of a frame", [this, moved = std::move(frame)]() mutable {
-    recorder_.record_frame(std::move(moved));
-  });
+  executor_.submit_background("output of a frame",
+                              [this, moved = std::move(frame)]() mutable { record(std::move(moved)); });
+}
+
+void RecorderFeed::record(Frame&& frame) {
+  const double began = graph::seconds_now();
+  recorder_.record_frame(std::move(frame));
+  frame_seconds_.store(std::max(frame_seconds(), graph::seconds_now() - began), std::memory_order_relaxed);
 }
 
 void RecorderFeed::later(const char* name, std::function<void()> work) {

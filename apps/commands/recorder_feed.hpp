@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -32,6 +33,9 @@ class RecorderFeed {
   /// Anything that writes files: one thread at a time may be inside HDF5. `name` is for the trace.
   void later(const char* name, std::function<void()> work);
 
+  /// That the longest output of a frame so far has taken [s].
+  double frame_seconds() const { return frame_seconds_.load(std::memory_order_relaxed); }
+
   void flush();
   /// The same, and waits until all of it is with the recorder. Throws what a write has thrown.
   void drain() {
@@ -40,12 +44,17 @@ class RecorderFeed {
   }
 
  private:
+  void record(Frame&& frame);
+
   graph::Executor& executor_;
   io::Recorder& recorder_;
   const graph::Communicator& ranks_;
   StepList error_steps_;
   std::vector<io::StepRecord> rows_;
   double flushed_ = graph::seconds_now();
+  /// Written by the thread that records frames, read between steps. Relaxed: a number that comes a step late
+  /// makes an estimate late, and nothing hangs on it.
+  std::atomic<double> frame_seconds_ = 0;
 };
 
 }  // namespace talus

@@ -210,7 +210,11 @@ void print_resumption(const Terminal& terminal, const ResumePoint& point) {
 }
 
 /// The page of the run. What it lacks room or memory for is no fault of the run.
-void write_page(const Terminal& terminal, const std::string& directory) {
+void write_page(const Terminal& terminal, const std::string& directory, bool in_haste) {
+  if (in_haste) {
+    terminal.say("report.html was left out, as time is limited; `talus report {}` writes it", directory);
+    return;
+  }
   try {
     io::write_whole(directory + "/report.html", run_report(directory));
   } catch (const std::exception& error) {
@@ -248,7 +252,7 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
   const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
   if (ranks.rank() == 0) {
     print_end(terminal, summary, scene.setup.solver, run.directory);
-    write_page(terminal, run.directory);
+    write_page(terminal, run.directory, summary.status == "stopped" && run.granted);
   } else if (summary.status == "failed")
     terminal.warn("rank {}: {}", ranks.rank(), summary.message);
   if (summary.status == "failed" && ranks.ranks() > 1)

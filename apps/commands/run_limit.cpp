@@ -72,8 +72,13 @@ void WallLimit::took_save(double seconds) {
   save_ = std::max(seconds, save_);
 }
 
+void WallLimit::took_frame(double seconds) {
+  frame_ = std::max(seconds, frame_);
+}
+
 bool WallLimit::reached(double now) const {
-  return end_ && now + 2 * (step_ + save_) + ending > *end_;
+  const double save = save_ > 0 ? save_ : frame_;
+  return end_ && now + 2 * (step_ + frame_ + save) + ending > *end_;
 }
 
 }  // namespace talus

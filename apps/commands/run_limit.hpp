@@ -21,16 +21,18 @@ class WallLimit {
   /// `end`: clock (graph::seconds_now) when the process must have ended.
   explicit WallLimit(std::optional<double> end) : end_(end) {}
 
-  /// A step has taken so long [s]; a checkpoint.
+  /// A step has taken so long [s]; a checkpoint; the output of a frame.
   void took_step(double seconds);
   void took_save(double seconds);
-  /// The clock is `now`, behind a step: the next one, twice as long as the longest of late, and a checkpoint,
-  /// twice as long as any, would end too late.
+  void took_frame(double seconds);
+  /// The clock is `now`, behind a step: the next one, twice as long as the longest of late, and a frame and a
+  /// checkpoint, twice as long as any, would end too late. Before the first checkpoint the frame stands for
+  /// it too, which has about as many bytes.
   bool reached(double now) const;
 
  private:
   std::optional<double> end_;
-  double step_ = 0, save_ = 0;
+  double step_ = 0, save_ = 0, frame_ = 0;
 };
 
 }  // namespace talus

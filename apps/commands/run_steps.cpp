@@ -85,6 +85,7 @@ struct Advance {
   /// Frames are counted through all parts of a run, so that the same ones have contacts.
   void write_frame() {
     const io::OutputSpec& output = run.scene.output;
+    simulation.release_room();
     feed.frame(simulation.frame(output.contacts && frames_given++ % output.contacts_every == 0));
   }
 
@@ -94,6 +95,7 @@ struct Advance {
     return recorder.mark();
   }
   bool save(io::OutputMark mark) {
+    simulation.release_room();
     RunMemory now = memory;
     now.mark = std::move(mark);
     now.frames_passed = frames.passed();
@@ -122,6 +124,7 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
     feed.later("dump of a contact problem", fclib_dump(simulation, run.directory));
   const double now = graph::seconds_now();
   all.limit.took_step(now - before);
+  all.limit.took_frame(feed.frame_seconds());
   const bool first = run.ranks.rank() == 0;
   const Asked asked = agree(run.ranks, first && limit.reached(now), first && keeper.wall_due(now));
   const bool due = keeper.due(report);
@@ -139,8 +142,9 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   stop.asked = simulation.finished() ? Asked{} : asked;
   const bool ends = simulation.finished() || last || stop.asked.ends();
   if (due || asked.save || stop.asked.ends() || (ends && options.resume)) stop.saved = all.save(all.mark());
-  // Where a run stops for good; one that goes on cuts this frame off again.
-  if (ends && !written && run.scene.output.stage_frames) all.write_frame();
+  // Where a run stops for good; one that goes on cuts this frame off again, and its time may be up.
+  const bool in_haste = stop.asked.ends() && run.granted;
+  if (ends && !written && !in_haste && run.scene.output.stage_frames) all.write_frame();
   if (all.status) all.status->update(simulation, memory.tally, keeper, now);
   return ends;
 }
@@ -205,7 +209,11 @@ void note_stop(const Stop& stop, std::int64_t step, io::Summary& summary) {
 std::unique_ptr<Simulation> make_simulation(const PreparedRun& run, Sample sample,
                                             std::vector<GivenForce> forces, graph::Executor& executor) {
   const Setup& setup = run.scene.setup;
-  if (run.resume) return std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
+  if (run.resume) {
+    auto simulation = std::make_unique<Simulation>(setup, run.resume->file.state, executor, run.ranks);
+    run.resume->file.state.parts = {};  // some 230 bytes a grain
+    return simulation;
+  }
   auto simulation = std::make_unique<Simulation>(
       setup, deal_out(std::move(sample), setup.decomposition, run.ranks), executor, run.ranks);
   if (run.scene.from_state()) simulation->begin_from(std::move(forces));

@@ -30,7 +30,7 @@ struct PreparedRun {
   const Recordings& recordings;
   const graph::Communicator& ranks;
   const Terminal& terminal;
-  const ResumePoint* resume = nullptr;     ///< null: from the beginning
+  ResumePoint* resume = nullptr;           ///< null: from the beginning; its state goes into the simulation
   std::string resolved = {};               ///< the scene as it was loaded, before its walls were placed
   double wall_mass = 0;                    ///< io::automatic_wall_mass of the sample [kg]; rank 0's
   double began = 0;                        ///< clock when the process began (graph::seconds_now)

@@ -40,7 +40,7 @@ std::vector<Vec3> lattice_sites(const io::SampleSpec& sample, const std::vector<
 /// Throws SceneError when this process cannot hold the grains that it is to make.
 void demand_memory(const io::Scene& scene, double grains) {
   // What a grain takes while it is deposited, and all in all with its contacts (docs/performance.md).
-  constexpr double bytes_made = 100, bytes_run = 1160;
+  constexpr double bytes_made = 100, bytes_run = 1260;
   const double there =
       static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
   if (grains * bytes_made > there)

@@ -28,12 +28,8 @@ class PictureSink : public OutputSink {
     if (record.triaxial && context_.has_table_line(record.step.step)) curve_.add(*record.triaxial);
   }
   void frame(const Frame& part) override {
-    if (context_.ranks.ranks() == 1) {
-      draw_grain_pictures(part);
-    } else {
-      const Frame all = gather_for_picture(part, context_.ranks, {});
-      if (context_.ranks.rank() == 0) draw_grain_pictures(all);
-    }
+    const SlabFrame slab = gather_slab(part, context_.ranks);
+    if (context_.ranks.rank() == 0) draw_grain_pictures(slab);
     draw_triaxial_picture();
   }
   void close() override { draw_triaxial_picture(); }
@@ -48,11 +44,12 @@ class PictureSink : public OutputSink {
     });
   }
 
-  void draw_grain_pictures(const Frame& all) const {
+  void draw_grain_pictures(const SlabFrame& slab) const {
+    const auto& [all, sample] = slab;
     if (all.with_contacts)
       write_whole(context_.directory / "forces.svg",
-                  draw_forces(all, context_.walls, {.load = context_.load}));
-    const GrainPicture picture{.walls = context_.walls};
+                  draw_forces(all, context_.walls, {.load = context_.load, .sample = sample}));
+    const GrainPicture picture{.walls = context_.walls, .sample = sample};
     write_whole(context_.directory / "velocities.svg", draw_velocities(all, picture));
     if (!all.material.empty())
       write_whole(context_.directory / "materials.svg",

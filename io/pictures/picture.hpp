@@ -3,6 +3,7 @@
 /// Pictures of a run as SVG text, for those who want to see at once whether it makes sense.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -29,9 +30,20 @@ struct GrainLoad {
   double weight = 0;    ///< [N/m^3] density of the heaviest grains times gravity
 };
 
+/// All grains of a sample, of which pictures show a slab.
+struct SampleExtent {
+  std::int64_t grains = 0;
+  double mean_radius = 0;         ///< [m]
+  double y_low = 0, y_high = -1;  ///< of the centres [m]
+  Bounds box;                     ///< around the spheres [m]
+};
+/// Of a frame of which each rank has a part; the same for any ranks. Collective.
+SampleExtent sample_extent(const Frame& part, const graph::Communicator& ranks);
+
 struct ForcePicture {
-  double thickness = 0;  ///< [m] of the slab; 0: four mean radii
-  GrainLoad load = {};   ///< forces far below it are drawn thin
+  double thickness = 0;                     ///< [m] of the slab; 0: four mean radii
+  GrainLoad load = {};                      ///< forces far below it are drawn thin
+  std::optional<SampleExtent> sample = {};  ///< that the frame has the slab of; none: it has all grains
 };
 
 /// Grains whose centre lies in a slab about the middle of the sample, normal to y, seen along y, and the
@@ -41,13 +53,19 @@ struct ForcePicture {
 /// body or wall that is not there.
 std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const ForcePicture& options);
 
-/// Collective: what draw_forces needs of a frame of which each rank has a part, on rank 0: all bodies, but of
-/// the contacts only those about the slab. Empty on others; rows travel in bounded pieces.
-Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, const ForcePicture& options);
+/// What the pictures need of a sample.
+struct SlabFrame {
+  Frame frame;          ///< the grains of the slab, and the contacts between them and with walls
+  SampleExtent sample;  ///< on all ranks
+};
+/// Collective: the slab of a frame of which each rank has a part, on rank 0. No rows on others; they travel
+/// in bounded pieces. `thickness` as in the pictures.
+SlabFrame gather_slab(const Frame& part, const graph::Communicator& ranks, double thickness = 0);
 
 struct GrainPicture {
-  double thickness = 0;              ///< [m] of the slab; 0: four mean radii
-  std::span<const Wall> walls = {};  ///< those of the frame, drawn as those of ForcePicture
+  double thickness = 0;                     ///< [m] of the slab; 0: four mean radii
+  std::span<const Wall> walls = {};         ///< those of the frame, drawn as those of ForcePicture
+  std::optional<SampleExtent> sample = {};  ///< as in ForcePicture
 };
 
 /// Grains of such a slab coloured by their speed, from 0 to the one that nineteen of twenty of them do not

@@ -46,7 +46,7 @@ double grain_force(const GrainLoad& load, double radius) {
 }
 
 ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& options) {
-  ForceSlab slab{detail::cut_slab(frame, options.thickness), {}, 0, 0, 0};
+  ForceSlab slab{detail::cut_slab(frame, options.thickness, options.sample), {}, 0, 0, 0};
   std::vector<Force> others;
   const auto inside = [&](std::size_t k) { return slab.holds(frame.x[k]); };
   const detail::BodyIndex index(frame.id);
@@ -70,7 +70,7 @@ ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& opt
   for (const Force& force : slab.forces) slab.mean_force += force.normal;
   if (!slab.forces.empty()) slab.mean_force /= static_cast<double>(slab.forces.size());
   constexpr double least_part = 0.01;
-  slab.unit = std::max(slab.mean_force, least_part * grain_force(options.load, slab.mean_radius));
+  slab.unit = std::max(slab.mean_force, least_part * grain_force(options.load, slab.sample.mean_radius));
   slab.forces.insert(slab.forces.end(), others.begin(), others.end());
   // Strong chains on top; equal forces keep the order of the frame, so that the same frame gives the same
   // file.
@@ -82,7 +82,8 @@ ForceSlab slab_of(const Frame& frame, std::size_t walls, const ForcePicture& opt
 /// too wide for the page.
 double line_width(double normal, const ForceSlab& slab, const View& view) {
   constexpr double widest = 14;
-  return std::clamp(normal / slab.unit, 0.0, 5.0) / 5 * std::min(0.6 * slab.mean_radius * view.scale, widest);
+  return std::clamp(normal / slab.unit, 0.0, 5.0) / 5 *
+         std::min(0.6 * slab.sample.mean_radius * view.scale, widest);
 }
 
 /// Forces far below those of the scene's load are what remains where nothing presses any more, and no chains.
@@ -139,7 +140,7 @@ std::string draw_forces(const Frame& frame, std::span<const Wall> walls, const F
     svg.text(margin_left, 74,
              fmt::format("hardly loaded: the mean force is {}, the scene's load puts some {} on a grain",
                          detail::with_unit(slab.mean_force, "N"),
-                         detail::with_unit(grain_force(options.load, slab.mean_radius), "N")),
+                         detail::with_unit(grain_force(options.load, slab.sample.mean_radius), "N")),
              {12, style::soft_ink});
   svg.begin_group(fmt::format(R"(stroke="{}" stroke-width="0.7")", style::grain_edge));
   for (const std::size_t k : slab.grains) {

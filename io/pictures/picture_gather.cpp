@@ -1,11 +1,14 @@
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
+#include <limits>
+#include <span>
 #include <type_traits>
 
 #include "io/pictures/detail/slab.hpp"
 #include "io/pictures/picture.hpp"
+#include "io/results/wall_triangles.hpp"
+#include "runtime/step/exact_sum.hpp"
 
 namespace talus::io {
 namespace {
@@ -24,10 +27,24 @@ void append_parts(const std::vector<T>& part, const graph::Communicator& ranks, 
   });
 }
 
-/// Contacts k of `part` for which keep(k).
+/// Rows k of the bodies of `part` for which keep(k).
 template <class Keep>
-Frame contacts_of(const Frame& part, const Keep& keep) {
+Frame bodies_of(const Frame& part, const Keep& keep) {
   Frame kept;
+  for (std::size_t k = 0; k < part.id.size(); ++k) {
+    if (!keep(k)) continue;
+    kept.id.push_back(part.id[k]);
+    kept.x.push_back(part.x[k]);
+    kept.radius.push_back(part.radius[k]);
+    kept.u.push_back(part.u[k]);
+    if (!part.material.empty()) kept.material.push_back(part.material[k]);
+  }
+  return kept;
+}
+
+/// Rows k of its contacts for which keep(k), behind those that `kept` has.
+template <class Keep>
+void add_contacts(const Frame& part, const Keep& keep, Frame& kept) {
   for (std::size_t k = 0; k < part.contact_bodies.size(); ++k) {
     if (!keep(k)) continue;
     kept.contact_bodies.push_back(part.contact_bodies[k]);
@@ -36,40 +53,67 @@ Frame contacts_of(const Frame& part, const Keep& keep) {
     kept.contact_gap.push_back(part.contact_gap[k]);
     kept.contact_force.push_back(part.contact_force[k]);
   }
-  return kept;
+}
+
+/// Whether a body is among `ids`, ascending.
+bool is_among(std::span<const std::int64_t> ids, std::int64_t id) {
+  return std::ranges::binary_search(ids, id);
 }
 
 }  // namespace
 
-Frame gather_for_picture(const Frame& part, const graph::Communicator& ranks, const ForcePicture& options) {
-  Frame all;
+SampleExtent sample_extent(const Frame& part, const graph::Communicator& ranks) {
+  enum { lowest, highest, radius, count };  // the lowest as its negative
+  constexpr double nowhere = -std::numeric_limits<double>::infinity();
+  std::array<double, count> most{nowhere, nowhere, 0};
+  for (std::size_t k = 0; k < part.id.size(); ++k) {
+    most[lowest] = std::max(most[lowest], -part.x[k].y());
+    most[highest] = std::max(most[highest], part.x[k].y());
+    most[radius] = std::max(most[radius], part.radius[k]);
+  }
+  ranks.max(most);
+  ExactSum sum(most[radius]);
+  for (const double r : part.radius) sum.add(r);
+  std::int64_t grains[1] = {static_cast<std::int64_t>(part.id.size())};
+  ranks.sum(grains);
+  const double all = sum.over(ranks);
+  if (grains[0] == 0) return {.box = grain_bounds(part, ranks)};
+  return {grains[0], all / static_cast<double>(grains[0]), -most[lowest], most[highest],
+          grain_bounds(part, ranks)};
+}
+
+SlabFrame gather_slab(const Frame& part, const graph::Communicator& ranks, double thickness) {
+  SlabFrame slab;
+  slab.sample = sample_extent(part, ranks);
+  Frame& all = slab.frame;
   all.step = part.step;
   all.time = part.time;
   all.stage = part.stage;
   all.domain = part.domain;
   all.walls = part.walls;
   all.with_contacts = part.with_contacts;
-  append_parts(part.id, ranks, all.id);
-  append_parts(part.x, ranks, all.x);
-  append_parts(part.radius, ranks, all.radius);
-  append_parts(part.u, ranks, all.u);
-  append_parts(part.material, ranks, all.material);
-  const detail::Slab slab = detail::cut_slab(all, options.thickness);
-  double largest[1] = {0};
-  for (double r : part.radius) largest[0] = std::max(largest[0], r);
-  ranks.max(largest);
-  const double own[2] = {slab.middle, slab.half};
-  const std::vector<double> shared = ranks.gather_records(std::span<const double>(own));  // rank 0's first
-  // The point of a contact lies between its centres, up to their overlap.
-  const Frame near = contacts_of(part, [&](std::size_t k) {
-    return std::abs(part.contact_point[k].y() - shared[0]) <= shared[1] + largest[0];
-  });
-  append_parts(near.contact_bodies, ranks, all.contact_bodies);
-  append_parts(near.contact_point, ranks, all.contact_point);
-  append_parts(near.contact_normal, ranks, all.contact_normal);
-  append_parts(near.contact_gap, ranks, all.contact_gap);
-  append_parts(near.contact_force, ranks, all.contact_force);
-  return all;
+  const detail::Slab plane = detail::empty_slab(slab.sample, thickness);
+  Frame own = bodies_of(part, [&](std::size_t k) { return plane.holds(part.x[k]); });
+  // The first body of a contact stands on the same rank, the second may not.
+  add_contacts(
+      part, [&](std::size_t k) { return is_among(own.id, part.contact_bodies[k][0]); }, own);
+  append_parts(own.id, ranks, all.id);
+  append_parts(own.x, ranks, all.x);
+  append_parts(own.radius, ranks, all.radius);
+  append_parts(own.u, ranks, all.u);
+  append_parts(own.material, ranks, all.material);
+  Frame come;
+  append_parts(own.contact_bodies, ranks, come.contact_bodies);
+  append_parts(own.contact_point, ranks, come.contact_point);
+  append_parts(own.contact_normal, ranks, come.contact_normal);
+  append_parts(own.contact_gap, ranks, come.contact_gap);
+  append_parts(own.contact_force, ranks, come.contact_force);
+  const auto inside = [&](std::size_t k) {
+    const std::int64_t second = come.contact_bodies[k][1];
+    return second < 0 || is_among(all.id, second);
+  };
+  add_contacts(come, inside, all);
+  return slab;
 }
 
 }  // namespace talus::io

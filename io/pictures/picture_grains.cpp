@@ -62,7 +62,7 @@ std::string draw_page(const Frame& frame, const detail::Slab& slab, const GrainP
   svg.text(margin_left, 56,
            fmt::format("slab of {} about y = {}, seen along y: {} of {} grains",
                        detail::with_unit(2 * slab.half, "m"), detail::with_unit(slab.middle, "m"),
-                       slab.grains.size(), frame.id.size()),
+                       slab.grains.size(), slab.sample.grains),
            {13, style::soft_ink});
   // The nearest to the eye on top; equal ones keep the order of the frame, for the same file each time.
   std::vector<std::size_t> order = slab.grains;
@@ -91,7 +91,7 @@ void draw_arrow(Svg& svg, const View& view, const Frame& frame, std::size_t k, d
 }  // namespace
 
 std::string draw_velocities(const Frame& frame, const GrainPicture& options) {
-  const detail::Slab slab = detail::cut_slab(frame, options.thickness);
+  const detail::Slab slab = detail::cut_slab(frame, options.thickness, options.sample);
   const double usual = usual_speed(frame, slab);
   GrainPage page;
   page.title = "Velocities";
@@ -111,7 +111,7 @@ std::string draw_velocities(const Frame& frame, const GrainPicture& options) {
 
 std::string draw_materials(const Frame& frame, std::span<const std::string> names,
                            const GrainPicture& options) {
-  const detail::Slab slab = detail::cut_slab(frame, options.thickness);
+  const detail::Slab slab = detail::cut_slab(frame, options.thickness, options.sample);
   const auto material = [&](std::size_t k) {
     return frame.material.empty() ? std::size_t{0} : static_cast<std::size_t>(frame.material[k]);
   };

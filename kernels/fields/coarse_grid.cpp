@@ -50,7 +50,8 @@ void add_grain(const Grid& grid, const Lucy& lucy, const SpreadGrain& grain, Gri
   const auto& [x, u, mass, volume] = grain;
   const Vec3 reach = Vec3::Constant(lucy.cutoff());
   spread(
-      grid, x - reach, x + reach, sums, [&](const Vec3& place) { return lucy.at(place - x); },
+      grid, x - reach, x + reach, sums,
+      [&lucy, &centre = x](const Vec3& place) { return lucy.at(place - centre); },
       [&, m = mass, v = volume, &velocity = u](double weight, double* cell) {
         cell[GridSums::density] += weight * m;
         cell[GridSums::volume] += weight * v;

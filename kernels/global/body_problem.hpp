@@ -143,9 +143,6 @@ BodyProblem gather_problem(const BodyProblemSource& source);
 /// The same for one subdomain. Walls count in the first subdomain.
 BodyProblem gather_problem(const BodyProblemSource& source, const BodyProblemPart& part);
 
-/// Drops the contacts whose first body is not `taken`, an entry per unknown.
-void keep_contacts(BodyProblem& problem, std::span<const char> taken);
-
 /// Writes the impulses back.
 void scatter_impulses(const BodyProblem& problem, Contacts& contacts);
 

@@ -1,6 +1,7 @@
 #include "kernels/global/body_system.hpp"
 
 #include <Eigen/Cholesky>
+#include <utility>
 
 #include "kernels/bodies/index.hpp"
 
@@ -82,8 +83,7 @@ BodySystem::BodySystem(const BodyProblem& problem, std::span<const double> rho)
       begin_(problem.bodies.size() + 1, 0),
       middle_(problem.bodies.size(), 0),
       touched_(problem.bodies.size(), 0),
-      diagonal_(problem.bodies.size(), Matrix6::Zero()),
-      inverse_(problem.bodies.size(), Matrix6::Zero()) {
+      diagonal_(problem.bodies.size(), Matrix6::Zero()) {
   inertia_.reserve(problem.bodies.size());
   for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
     const BodyUnknown& body = problem.bodies[b];
@@ -135,9 +135,12 @@ void BodySystem::close() {
     // A trace other than 0 shows contacts of the body in some part. It is 0 or NaN where weights are too
     // small or are no numbers.
     if (diagonal_[b].trace() != 0) touched_[b] = 1;
-    if (!problem_.counted(b)) continue;
-    const BodyUnknown& body = problem_.bodies[b];
     Matrix6 inverse = Matrix6::Zero();
+    if (!problem_.counted(b)) {
+      diagonal_[b] = inverse;
+      continue;
+    }
+    const BodyUnknown& body = problem_.bodies[b];
     if (body.cell) {
       Matrix6 block = diagonal_[b];
       block.diagonal().array() += body.mass;
@@ -159,9 +162,10 @@ void BodySystem::close() {
       block.diagonal().tail<3>().array() += body.spin_mass;
       inverse = block.llt().solve(Matrix6::Identity());
     }
-    inverse_[b] = 0.5 * (inverse + inverse.transpose());
+    diagonal_[b] = 0.5 * (inverse + inverse.transpose());
   }
-  diagonal_ = {};
+  // In place: two such arrays would be the most that ADMM ever holds.
+  inverse_ = std::move(diagonal_);
 }
 
 namespace {

@@ -37,8 +37,7 @@ class BodySystem {
   BodySystem(const BodyProblem& problem, std::span<const double> rho);
 
   std::vector<Matrix6>& diagonal() { return diagonal_; }
-  /// Factorises the diagonal blocks, once `diagonal` holds the contributions of all parts. `diagonal` is
-  /// released.
+  /// Inverts the diagonal blocks, once `diagonal` holds the contributions of all parts. It is empty then.
   void close();
   /// Per unknown: some part has contacts of it.
   const std::vector<char>& touched() const { return touched_; }
@@ -58,7 +57,7 @@ class BodySystem {
   /// Second half: one backward pass from x, whose `rest` is summed.
   void smooth_backward(std::span<const Twist> rest, std::span<Twist> x) const;
 
-  std::size_t size() const { return inverse_.size(); }
+  std::size_t size() const { return inertia_.size(); }
 
  private:
   static constexpr std::int32_t rough = -1, slick = -2;  ///< contacts of spheres; slick: normal part only

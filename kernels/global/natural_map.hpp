@@ -20,11 +20,15 @@ struct NaturalMap {
   double residual(const Vec3& r) const { return (r - carried).norm() / m; }
 };
 
-inline NaturalMap natural_map_of(const BodyProblem& problem, const ContactEquation& c, const Vec3& r,
-                                 const Vec3& velocity) {
-  const double m = effective_mass(problem, c), shift = c.mu * tangential(c, velocity).norm();
+/// `m`: effective mass [kg].
+inline NaturalMap natural_map_of(double m, const ContactEquation& c, const Vec3& r, const Vec3& velocity) {
+  const double shift = c.mu * tangential(c, velocity).norm();
   const Vec3 aim = r - m * (velocity + shift * c.normal);
   return {m, shift, aim, project_on_cone(aim, c.normal, c.mu)};
+}
+inline NaturalMap natural_map_of(const BodyProblem& problem, const ContactEquation& c, const Vec3& r,
+                                 const Vec3& velocity) {
+  return natural_map_of(effective_mass(problem, c), c, r, velocity);
 }
 
 }  // namespace talus

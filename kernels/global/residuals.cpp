@@ -47,36 +47,57 @@ Vec3 approach(const ContactEquation& c, std::span<const Twist> V) {
   return constrained(c, relative_velocity(c, V) + c.offset);
 }
 
+PartField field_of(const ProblemReaders& parts) {
+  PartField field;
+  for (const auto& part : parts) field.emplace_back(part->unknowns());
+  return field;
+}
+
+/// V = V_free + M^-1 H r.
+PartField velocities_of(const ProblemReaders& parts, const PartLink& link) {
+  PartField V = field_of(parts);
+  link.each(parts.size(), [&](std::size_t p) {
+    parts[p]->each_contact([&](const ContactEquation& c, const Vec3& r) { add_force(c, r, V[p]); });
+  });
+  link.sum_copies(V);
+  link.each(parts.size(), [&](std::size_t p) {
+    for (std::size_t b = 0; b < V[p].size(); ++b) velocity_from_force(parts[p]->unknown(b), V[p][b]);
+  });
+  return V;
+}
+
 }  // namespace
 
-Residuals residuals_of(const BodyParts& parts) {
-  const PartField V = velocities_of(parts);
+Residuals residuals_of(const ProblemReaders& parts, const PartLink& link) {
+  PartField V = velocities_of(parts, link), change = field_of(parts);
   Residuals out;
   out.contact.resize(parts.size());
   out.body.resize(parts.size());
-  PartField change = parts.field();
   enum { impulse2, velocity2, contacts, width };
-  const std::vector<double> sums = parts.total(width, [&](std::size_t p, std::span<double> row) {
-    const BodyProblem& problem = parts[p];
-    out.contact[p].reserve(problem.contacts.size());
-    for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-      const ContactEquation& c = problem.contacts[k];
-      const Vec3 v = approach(c, V[p]), &r = problem.impulse[k];
-      const NaturalMap map = natural_map_of(problem, c, r, v);
-      add_force(c, map.carried - r, change[p]);
-      out.contact[p].push_back(map.residual(r));
-      row[impulse2] += r.squaredNorm() / (map.m * map.m);
-      if (c.normal.dot(r) > 0 || c.normal.dot(v) < 0) row[velocity2] += v.squaredNorm();
-      row[contacts] += 1;
-    }
-  });
-  parts.link().sum_copies(change);
+  const std::vector<double> sums =
+      total_of(link, parts.size(), width, [&](std::size_t p, std::span<double> row) {
+        const ProblemReader& problem = *parts[p];
+        out.contact[p].reserve(problem.contacts());
+        problem.each_contact([&](const ContactEquation& c, const Vec3& r) {
+          const Vec3 v = approach(c, V[p]);
+          const double m = effective_mass_by([&](std::size_t body) { return problem.mass(body); }, c);
+          const NaturalMap map = natural_map_of(m, c, r, v);
+          add_force(c, map.carried - r, change[p]);
+          out.contact[p].push_back(map.residual(r));
+          row[impulse2] += r.squaredNorm() / (map.m * map.m);
+          if (c.normal.dot(r) > 0 || c.normal.dot(v) < 0) row[velocity2] += v.squaredNorm();
+          row[contacts] += 1;
+        });
+      });
+  V = {};
+  link.sum_copies(change);
   if (sums[contacts] > 0) out.scale = std::sqrt(std::max(sums[impulse2], sums[velocity2]) / sums[contacts]);
   const double over = out.scale > 0 ? 1 / out.scale : 0;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     for (double& residual : out.contact[p]) residual *= over;
-    for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
-      const BodyUnknown& body = parts[p].bodies[b];
+    out.body[p].reserve(change[p].size());
+    for (std::size_t b = 0; b < change[p].size(); ++b) {
+      const BodyUnknown body = parts[p]->unknown(b);
       restrict_to_freedoms(body, change[p][b]);
       out.body[p].push_back(change[p][b].u.norm() / body.mass * over);
     }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "kernels/global/body_parts.hpp"
+#include "kernels/global/problem_reader.hpp"
 
 namespace talus {
 
@@ -21,8 +22,9 @@ struct Residuals {
   double scale = 0;
 };
 
-/// The residuals of the problem's impulses and of the velocities that these give. Collective.
-Residuals residuals_of(const BodyParts& parts);
+/// The residuals of the problem's impulses and of the velocities that these give. Collective. Takes two
+/// twists an unknown for a while, 96 bytes.
+Residuals residuals_of(const ProblemReaders& parts, const PartLink& link);
 
 /// The residual that a share `part` in (0, 1] of all contacts does not exceed [1], rounded up by at most 10
 /// %. 0 without contacts. Collective.

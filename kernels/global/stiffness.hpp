@@ -19,12 +19,16 @@ double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& l
 double estimate_stiffness(const BodyParts& parts);
 double estimate_stiffness(const BodyProblem& problem);
 
-/// 1/W_nn of a contact [kg].
-inline double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
+/// 1/W_nn of a contact [kg]; mass(unknown) [kg].
+template <class Mass>
+double effective_mass_by(const Mass& mass, const ContactEquation& c) {
   const auto mobility = [&](std::int32_t body) {
-    return body < 0 ? 0 : 1 / problem.bodies[static_cast<std::size_t>(body)].mass;
+    return body < 0 ? 0 : 1 / mass(static_cast<std::size_t>(body));
   };
   return 1 / (mobility(c.first) + mobility(c.second) + c.reach * c.reach * mobility(c.cell));
+}
+inline double effective_mass(const BodyProblem& problem, const ContactEquation& c) {
+  return effective_mass_by([&](std::size_t body) { return problem.bodies[body].mass; }, c);
 }
 
 }  // namespace talus

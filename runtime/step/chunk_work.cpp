@@ -38,6 +38,13 @@ void ChunkWork::make_room() {
   if (course.plan.kind == SweepKind::conjugate) changes_.assign(chunks, 0);
 }
 
+void ChunkWork::release_room() {
+  const double unit = state_.single.contacts.unit;
+  state_.single = {};
+  state_.single.contacts.unit = unit;
+  acceleration_ = {};
+}
+
 ContactRange ChunkWork::range_of(std::size_t c) const {
   const auto begin = static_cast<std::size_t>(state_.chunks.begin[c]);
   return {begin, begin + static_cast<std::size_t>(state_.contacts.count[c])};

@@ -28,6 +28,8 @@ class ChunkWork {
   void begin(bool damped, bool keep_impulses);
   /// At a gate: allocates the history that the present course of sweeps needs.
   void make_room();
+  /// Between steps: gives that memory back; make_room() takes it anew.
+  void release_room();
 
   void run(std::size_t c, int epoch);
   /// At a gate, before a remedy that begins from the last check: brings back the impulses of that check.

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <vector>
 
 #include "kernels/bodies/index.hpp"
 #include "partition/partitioners.hpp"
+#include "runtime/step/exact_sum.hpp"
 
 namespace talus {
 
@@ -67,27 +67,6 @@ std::vector<std::int32_t> receivers(Sample& sample, const DecompositionSettings&
     rank[k] = decomposition.rank_of[partition.subdomain_of(sample.x[k])];
   return rank;
 }
-
-/// The sum over all ranks of one number per body, the same for any order: the terms are cut into integers of
-/// 31 bits, relative to the largest. What is cut off is below 2^-62 of the largest term.
-class ExactSum {
- public:
-  explicit ExactSum(double largest) : scale_(largest > 0 ? std::exp2(30 - std::ilogb(largest)) : 0) {}
-  void add(double term) {
-    const double scaled = term * scale_, high = std::floor(scaled);
-    parts_[0] += static_cast<std::int64_t>(high);
-    parts_[1] += static_cast<std::int64_t>((scaled - high) * 0x1p31);
-  }
-  double over(const graph::Communicator& ranks) {
-    ranks.sum(parts_);
-    if (scale_ == 0) return 0;
-    return (static_cast<double>(parts_[0]) + static_cast<double>(parts_[1]) * 0x1p-31) / scale_;
-  }
-
- private:
-  double scale_;
-  std::array<std::int64_t, 2> parts_{};
-};
 
 }  // namespace
 

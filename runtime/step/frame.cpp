@@ -107,16 +107,36 @@ std::vector<std::int64_t> splitters(std::vector<std::int64_t> ids, const graph::
   return first;
 }
 
-/// Room for `rows` entries of each: a rank gets about as many rows as it has, and growing would copy them.
+/// Room for `rows` entries of each: growing would copy them, and leave room for as many more.
 template <class... Columns>
 void reserve(std::size_t rows, Columns&... columns) {
   (columns.reserve(rows), ...);
 }
 
-/// Sends row(k), k < count, to the rank that has `id_of(row)`, and calls add(row) for those that come here.
+/// Where the rows go that ranks deal out.
+struct Dealing {
+  std::span<const std::int64_t> first;  ///< first ids of the ranks after the first
+  const graph::Communicator& ranks;
+
+  std::size_t rank_of(std::int64_t id) const {
+    return static_cast<std::size_t>(std::upper_bound(first.begin(), first.end(), id) - first.begin());
+  }
+};
+
+/// How many of all rows come here: id_of(k) for k < count of each rank. Collective.
+template <class IdOf>
+std::size_t rows_here(std::size_t count, const Dealing& dealing, const IdOf& id_of) {
+  if (dealing.ranks.ranks() == 1) return count;
+  std::vector<std::int64_t> rows(static_cast<std::size_t>(dealing.ranks.ranks()), 0);
+  for (std::size_t k = 0; k < count; ++k) ++rows[dealing.rank_of(id_of(k))];
+  dealing.ranks.sum(rows);
+  return static_cast<std::size_t>(rows[static_cast<std::size_t>(dealing.ranks.rank())]);
+}
+
+/// Sends row(k), k < count, to the rank of id_of(k), and calls add(row) for those that come here.
 template <class Row, class IdOf, class Add>
-void deal_rows(std::size_t count, std::span<const std::int64_t> first, const graph::Communicator& ranks,
-               const Row& row, const IdOf& id_of, const Add& add) {
+void deal_rows(std::size_t count, const Dealing& dealing, const Row& row, const IdOf& id_of, const Add& add) {
+  const graph::Communicator& ranks = dealing.ranks;
   if (ranks.ranks() == 1) {
     for (std::size_t k = 0; k < count; ++k) add(row(k));
     return;
@@ -125,11 +145,8 @@ void deal_rows(std::size_t count, std::span<const std::int64_t> first, const gra
   ranks.max(most);
   for (std::size_t begin = 0; begin < static_cast<std::size_t>(most[0]); begin += piece) {
     std::vector<std::vector<decltype(row(0))>> to(static_cast<std::size_t>(ranks.ranks()));
-    for (std::size_t k = begin; k < std::min(begin + piece, count); ++k) {
-      const auto made = row(k);
-      to[static_cast<std::size_t>(std::upper_bound(first.begin(), first.end(), id_of(made)) - first.begin())]
-          .push_back(made);
-    }
+    for (std::size_t k = begin; k < std::min(begin + piece, count); ++k)
+      to[dealing.rank_of(id_of(k))].push_back(row(k));
     for (const auto& part : ranks.exchange_records(std::move(to)))
       for (const auto& come : part) add(come);
   }
@@ -160,12 +177,18 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
     ids.push_back(static_cast<std::int64_t>(state.bodies.id[s]));
   }
   const std::vector<std::int64_t> first = splitters(std::move(ids), ranks);
+  const Dealing dealing{first, ranks};
+  const auto id_of_body = [&](std::size_t k) {
+    return static_cast<std::int64_t>(state.bodies.id[counted[k]]);
+  };
   const bool orientation = state.decomposition.orientation;
-  reserve(counted.size(), frame.id, frame.x, frame.radius, frame.u);
-  if (rotation) frame.omega.reserve(counted.size());
+  const std::size_t bodies = rows_here(counted.size(), dealing, id_of_body);
+  reserve(bodies, frame.id, frame.x, frame.radius, frame.u);
+  if (rotation) frame.omega.reserve(bodies);
+  if (orientation) frame.orientation.reserve(bodies);
+  if (state.decomposition.materials) frame.material.reserve(bodies);
   deal_rows(
-      counted.size(), first, ranks, [&](std::size_t k) { return body_row(state, counted[k]); },
-      [](const BodyRow& row) { return row.id; },
+      counted.size(), dealing, [&](std::size_t k) { return body_row(state, counted[k]); }, id_of_body,
       [&](const BodyRow& row) {
         frame.id.push_back(row.id);
         frame.x.push_back(vector_of(row.x));
@@ -188,11 +211,16 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
   permute(frame.material, by_id);
   if (!contacts) return;
   const std::vector<Active> active = active_contacts(state);
-  reserve(active.size(), frame.contact_bodies, frame.contact_normal, frame.contact_point, frame.contact_gap,
-          frame.contact_force);
+  const auto id_of_first = [&](std::size_t k) {
+    const auto contact = static_cast<std::size_t>(active[k].contact);
+    return static_cast<std::int64_t>(
+        state.bodies.id[static_cast<std::size_t>(state.contacts.first[contact])]);
+  };
+  reserve(rows_here(active.size(), dealing, id_of_first), frame.contact_bodies, frame.contact_normal,
+          frame.contact_point, frame.contact_gap, frame.contact_force);
   deal_rows(
-      active.size(), first, ranks, [&](std::size_t k) { return contact_row(state, active[k], impulse_time); },
-      [](const ContactRow& row) { return row.bodies[0]; },
+      active.size(), dealing, [&](std::size_t k) { return contact_row(state, active[k], impulse_time); },
+      id_of_first,
       [&](const ContactRow& row) {
         frame.contact_bodies.push_back({row.bodies[0], row.bodies[1]});
         frame.contact_normal.push_back(vector_of(row.normal));

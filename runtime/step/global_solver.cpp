@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -171,12 +172,11 @@ class GlobalSolver::Whole {
   trace::Span span_;
 };
 
-template <class Gathered, class Gather>
-std::vector<Gathered> GlobalSolver::gather_parts(const Gather& gather) const {
+/// gather(source), or gather(source, part) of each subdomain.
+template <class Gather>
+auto GlobalSolver::gather_parts(const BodyProblemSource& source, const Gather& gather) const {
   const Decomposition& all = state_.decomposition;
-  const std::vector<WallMotion> walls = motions_of(state_);
-  const BodyProblemSource source = source_of(state_, parameters_, walls);
-  std::vector<Gathered> parts;
+  std::vector<decltype(gather(source))> parts;
   if (!all.several()) {
     parts.push_back(gather(source));
     return parts;
@@ -190,9 +190,17 @@ std::vector<Gathered> GlobalSolver::gather_parts(const Gather& gather) const {
 }
 
 std::vector<BodyProblem> GlobalSolver::gather() const {
-  auto parts = gather_parts<BodyProblem>([](const auto&... of) { return gather_problem(of...); });
+  const std::vector<WallMotion> walls = motions_of(state_);
+  auto parts = gather_parts(source_of(state_, parameters_, walls),
+                            [](const auto&... of) { return gather_problem(of...); });
   if (knows_more(parameters_)) set_free(parts, *link_);
   return parts;
+}
+
+std::vector<ContactGraph> GlobalSolver::gather_graphs() const {
+  const std::vector<WallMotion> walls = motions_of(state_);
+  return gather_parts(source_of(state_, parameters_, walls),
+                      [](const auto&... of) { return gather_graph(of...); });
 }
 
 double GlobalSolver::sweeps_needed(double spread) const {
@@ -205,8 +213,7 @@ double GlobalSolver::sweeps_needed(double spread) const {
     return layers * std::max(layers, spread / contacts_of_a_grain);
   }
   const Whole span(*this);
-  const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
-  return estimate_stiffness(graphs, *link_);
+  return estimate_stiffness(gather_graphs(), *link_);
 }
 
 void GlobalSolver::find_clusters(int most_direct) {
@@ -215,7 +222,7 @@ void GlobalSolver::find_clusters(int most_direct) {
   // A cell that follows a stress ties all contacts together.
   if (most_direct == 0 || state_.cell.loaded()) return;
   const Whole span(*this);
-  const auto graphs = gather_parts<ContactGraph>([](const auto&... of) { return gather_graph(of...); });
+  const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);
   in_small_ = in_clusters_of(clusters, 1, most_direct);
   const std::vector<double> rows =
@@ -227,26 +234,42 @@ void GlobalSolver::find_clusters(int most_direct) {
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
 }
 
-std::vector<BodyProblem> GlobalSolver::checked() const {
-  std::vector<BodyProblem> problems = gather();
+std::vector<std::unique_ptr<const StepReader>> GlobalSolver::read_checked(
+    const BodyProblemSource& source) const {
+  auto steps = gather_parts(source, [](const auto&... of) { return std::make_unique<StepReader>(of...); });
+  if (knows_more(parameters_)) {
+    PartField free;
+    for (const auto& step : steps) step->add_known(free.emplace_back(step->unknowns()));
+    link_->sum_copies(free);
+    for (std::size_t p = 0; p < steps.size(); ++p) {
+      for (std::size_t b = 0; b < free[p].size(); ++b) velocity_from_force(steps[p]->unknown(b), free[p][b]);
+      steps[p]->set_free(std::move(free[p]));
+    }
+  }
   if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
-    for (BodyProblem& problem : problems)
-      for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-        const auto place = static_cast<std::size_t>(problem.contacts[k].place);
-        const auto from = static_cast<std::size_t>(state_.contacts.candidate[place]);
-        problem.impulse[k] = state_.candidates.impulse.force(from, problem.contacts[k].normal);
-      }
-  return problems;
+    for (const auto& step : steps)
+      step->set_impulses([this](std::size_t place, const Vec3& normal) {
+        const auto candidate = static_cast<std::size_t>(state_.contacts.candidate[place]);
+        return state_.candidates.impulse.force(candidate, normal);
+      });
+  return {std::make_move_iterator(steps.begin()), std::make_move_iterator(steps.end())};
+}
+
+ProblemReaders GlobalSolver::read_all_checked(const BodyProblemSource& source) const {
+  auto steps = read_checked(source);
+  return {std::make_move_iterator(steps.begin()), std::make_move_iterator(steps.end())};
 }
 
 std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
-  std::vector<BodyProblem> problems = checked();
-  if (!(small_ && large_)) return problems;
-  for (std::size_t p = 0; p < problems.size(); ++p) {
-    std::vector<char> taken = in_small_[p];
+  const std::vector<WallMotion> walls = motions_of(state_);
+  const auto steps = read_checked(source_of(state_, parameters_, walls));
+  std::vector<BodyProblem> problems;
+  for (std::size_t p = 0; p < steps.size(); ++p) {
+    std::vector<char> taken;
+    if (small_ && large_) taken = in_small_[p];
     if (!small)
       for (char& t : taken) t = t == 0 ? 1 : 0;
-    keep_contacts(problems[p], taken);
+    problems.push_back(gather_problem(*steps[p], taken));
   }
   return problems;
 }
@@ -261,6 +284,9 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
       step_error(problems_, *link_, {.enough = enough, .sweeps = sweeps, .still = still, .walls = walls});
   change_ = std::move(error.change);
   mends_ = error.mends;
+  // For `correct` the contacts and their impulses are enough.
+  if (!mends_) problems_ = {};
+  for (BodyProblem& problem : problems_) problem.bodies = {};
   return {error.relative(), error.solved};
 }
 
@@ -272,14 +298,15 @@ double GlobalSolver::large_error(double enough) const {
 
 double GlobalSolver::quantile_error(double part) const {
   const Whole span(*this);
-  const std::vector<BodyProblem> problems = checked();
-  return quantile_of(residuals_of({problems, *link_}), *link_, part);
+  const std::vector<WallMotion> walls = motions_of(state_);
+  const ProblemReaders problems = read_all_checked(source_of(state_, parameters_, walls));
+  return quantile_of(residuals_of(problems, *link_), *link_, part);
 }
 
 WorstErrors GlobalSolver::worst_errors() const {
   const Whole span(*this);
-  const std::vector<BodyProblem> problems = checked();
-  const BodyParts parts(problems, *link_);
+  const std::vector<WallMotion> motions = motions_of(state_);
+  const ProblemReaders parts = read_all_checked(source_of(state_, parameters_, motions));
   const Decomposition& all = state_.decomposition;
   UnknownNames names;
   const std::span<const BodyId> ids = state_.bodies.id;
@@ -291,7 +318,7 @@ WorstErrors GlobalSolver::worst_errors() const {
     }
   for (std::size_t w = 0; w < state_.walls.size(); ++w)
     if (state_.walls[w].inv_mass() > 0) names.walls.push_back(static_cast<std::int32_t>(w));
-  const WorstErrors here = worst_errors_of(parts, residuals_of(parts), names);
+  const WorstErrors here = worst_errors_of(parts, residuals_of(parts, *link_), names);
   WorstErrors worst;
   for (const WorstErrors& of_rank : ranks_.gather_records(std::span<const WorstErrors>(&here, 1)))
     worst.take(of_rank);
@@ -303,6 +330,12 @@ void GlobalSolver::correct() {
     for (std::size_t k = 0; k < change_[p].size(); ++k) problems_[p].impulse[k] += change_[p][k];
     scatter_impulses(problems_[p], state_.contacts);
   }
+}
+
+void GlobalSolver::release_room() {
+  problems_ = {};
+  change_ = {};
+  mends_ = false;
 }
 
 BodyAdmmResult GlobalSolver::improve(double tolerance, int calls) {

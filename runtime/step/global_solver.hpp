@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/global/admm.hpp"
+#include "kernels/global/step_reader.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/crew.hpp"
 #include "runtime/step/certificate.hpp"
@@ -58,6 +59,8 @@ class GlobalSolver {
   /// `state.contacts`; velocities are left to be made afresh.
   bool correction_helps() const { return mends_; }
   void correct();
+  /// Between steps: gives back what was kept for `correct`.
+  void release_room();
 
   /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
   /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
@@ -67,11 +70,14 @@ class GlobalSolver {
  private:
   class Whole;  ///< a span of it in a trace
   /// gather(source), or gather(source, part) of each subdomain.
-  template <class Gathered, class Gather>
-  std::vector<Gathered> gather_parts(const Gather& gather) const;
+  template <class Gather>
+  auto gather_parts(const BodyProblemSource& source, const Gather& gather) const;
+  std::vector<ContactGraph> gather_graphs() const;
   std::vector<BodyProblem> gather() const;
-  /// All contacts with the impulses of the last check, or those of small or of large clusters.
-  std::vector<BodyProblem> checked() const;
+  /// The problem with the impulses of the last check, read from the arrays of the step, which `source` names.
+  std::vector<std::unique_ptr<const StepReader>> read_checked(const BodyProblemSource& source) const;
+  ProblemReaders read_all_checked(const BodyProblemSource& source) const;
+  /// The same with the contacts of small or of large clusters alone, put together.
   std::vector<BodyProblem> checked(bool small) const;
 
   StepState& state_;

@@ -45,6 +45,8 @@ class PositionCorrection {
   void forget() { found_ = false; }
   /// At a gate, after the iterations.
   void begin();
+  /// Between steps: gives back what the next step need not find.
+  void release_room() { acceleration_ = {}; }
   /// What a chunk does in epoch number `epoch` of these, from 0.
   void run(std::size_t chunk, int epoch);
   /// At a gate, after the last sweep: gives the copies of walls their velocities back.

@@ -190,6 +190,10 @@ double Simulation::exposed() const {
   return impl_->graph.loop().gluing().exposed();
 }
 
+void Simulation::release_room() {
+  impl_->graph.release_room();
+}
+
 Frame Simulation::frame(bool contacts) const {
   Frame frame;
   frame.step = impl_->report.step;

@@ -73,6 +73,12 @@ class SolverLoop {
 
   /// Before the first epoch of a step: sizes copies and sums by the contacts found. Collective.
   void begin();
+  /// Between steps: gives back the memory that only iterations use.
+  void release_room() {
+    work_.release_room();
+    positions_.release_room();
+    global_.release_room();
+  }
 
   /// Collective, after the candidates were distributed.
   void plan();

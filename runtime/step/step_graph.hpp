@@ -71,6 +71,9 @@ class StepGraph {
   /// Collective.
   void restore(const Checkpoint& from);
 
+  /// Between steps: gives back the memory that only iterations use; the next step takes it anew.
+  void release_room() { loop_.release_room(); }
+
   const StepSums& sums() const { return sums_; }
   const SolverLoop& loop() const { return loop_; }
   const graph::Graph& graph() const { return graph_; }

@@ -16,26 +16,27 @@ void WorstErrors::take(const WorstErrors& other) {
   }
 }
 
-WorstErrors worst_errors_of(const BodyParts& parts, const Residuals& residuals, const UnknownNames& names) {
+WorstErrors worst_errors_of(const ProblemReaders& parts, const Residuals& residuals,
+                            const UnknownNames& names) {
   WorstErrors worst;
   for (std::size_t p = 0; p < parts.size(); ++p) {
-    const BodyProblem& problem = parts[p];
+    const ProblemReader& problem = *parts[p];
     const std::span<const BodyId> ids = names.bodies[p];
     const auto id = [&](std::int32_t unknown) {
       return static_cast<std::int64_t>(ids[static_cast<std::size_t>(unknown)]);
     };
-    for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-      const double error = residuals.contact[p][k];
-      if (!(error > 0) || error < worst.contact_error) continue;
-      const ContactEquation& c = problem.contacts[k];
+    std::size_t k = 0;
+    problem.each_contact([&](const ContactEquation& c, const Vec3& /*impulse*/) {
+      const double error = residuals.contact[p][k++];
+      if (!(error > 0) || error < worst.contact_error) return;
       worst.take({error,
                   c.wall >= 0 ? BodyPair::at_wall(id(c.first), c.wall)
                               : BodyPair::of_bodies(id(c.first), id(c.second)),
                   0, 0});
-    }
-    for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
+    });
+    for (std::size_t b = 0; b < problem.unknowns(); ++b) {
       const double error = residuals.body[p][b];
-      if (!problem.counted(b) || problem.bodies[b].cell) continue;  // a cell has no name
+      if (!problem.counted(b) || problem.unknown(b).cell) continue;  // a cell has no name
       if (!(error > 0) || error < worst.body_error) continue;
       worst.take({0,
                   {},

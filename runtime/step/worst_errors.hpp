@@ -30,6 +30,7 @@ struct UnknownNames {
 };
 
 /// The worst errors among the parts of this rank.
-WorstErrors worst_errors_of(const BodyParts& parts, const Residuals& residuals, const UnknownNames& names);
+WorstErrors worst_errors_of(const ProblemReaders& parts, const Residuals& residuals,
+                            const UnknownNames& names);
 
 }  // namespace talus

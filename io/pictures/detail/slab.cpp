@@ -8,22 +8,21 @@
 #include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/chart_style.hpp"
 #include "io/results/wall_triangles.hpp"
+#include "runtime/graph/one_rank.hpp"
 
 namespace talus::io::detail {
 
-Slab cut_slab(const Frame& frame, double thickness) {
+Slab empty_slab(const SampleExtent& sample, double thickness) {
   Slab slab;
-  if (frame.id.empty()) return slab;
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (std::size_t k = 0; k < frame.id.size(); ++k) {
-    low = std::min(low, frame.x[k].y());
-    high = std::max(high, frame.x[k].y());
-    slab.mean_radius += frame.radius[k];
-  }
-  slab.mean_radius /= static_cast<double>(frame.id.size());
-  slab.middle = (low + high) / 2;
-  slab.half = thickness > 0 ? thickness / 2 : 2 * slab.mean_radius;
+  slab.sample = sample;
+  if (sample.grains == 0) return slab;
+  slab.middle = (sample.y_low + sample.y_high) / 2;
+  slab.half = thickness > 0 ? thickness / 2 : 2 * sample.mean_radius;
+  return slab;
+}
 
+Slab cut_slab(const Frame& frame, double thickness, const std::optional<SampleExtent>& sample) {
+  Slab slab = empty_slab(sample ? *sample : sample_extent(frame, graph::one_rank()), thickness);
   for (std::size_t k = 0; k < frame.id.size(); ++k) {
     if (slab.holds(frame.x[k])) slab.grains.push_back(k);
   }
@@ -32,7 +31,7 @@ Slab cut_slab(const Frame& frame, double thickness) {
 
 std::vector<Cut> cut_walls(const Frame& frame, std::span<const Wall> walls, const Slab& slab) {
   std::vector<Cut> cuts;
-  for (const std::vector<Triangle>& wall : wall_triangles(walls, frame.walls, grain_bounds(frame)))
+  for (const std::vector<Triangle>& wall : wall_triangles(walls, frame.walls, slab.sample.box))
     for (const Triangle& triangle : wall) {
       std::array<Vec3, 3> ends;
       std::size_t found = 0;
@@ -68,7 +67,7 @@ View view_of(const Frame& frame, const Slab& slab, std::span<const Cut> walls, c
       x_low = std::min(x_low, std::max(x, x_least)), x_high = std::max(x_high, std::min(x, x_most));
       z_low = std::min(z_low, std::max(z, z_least)), z_high = std::max(z_high, std::min(z, z_most));
     }
-  const double border = slab.grains.empty() ? 0 : slab.mean_radius;
+  const double border = slab.grains.empty() ? 0 : slab.sample.mean_radius;
   x_low -= border, z_low -= border, x_high += border, z_high += border;
   const double scale = at.side / std::max(x_high - x_low, z_high - z_low);
   return {x_low, z_low, x_high, z_high, scale, at.left, at.top};

@@ -2,10 +2,12 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "io/pictures/detail/svg.hpp"
+#include "io/pictures/picture.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "runtime/step/frame.hpp"
 
@@ -14,14 +16,16 @@ namespace talus::io::detail {
 /// Grains whose centre lies in a slab about the middle of the sample, normal to y.
 struct Slab {
   double middle = 0, half = 0;      ///< |y - middle| <= half [m]
-  double mean_radius = 0;           ///< of all grains of the frame [m]
+  SampleExtent sample;              ///< all grains
   std::vector<std::size_t> grains;  ///< places in the frame, ascending
 
   bool holds(const Vec3& centre) const { return std::abs(centre.y() - middle) <= half; }
 };
 
-/// `thickness` [m]; 0: four mean radii. Without grains an empty slab.
-Slab cut_slab(const Frame& frame, double thickness);
+/// `thickness` [m]; 0: four mean radii. Without grains an empty slab. `sample`: as in ForcePicture.
+Slab cut_slab(const Frame& frame, double thickness, const std::optional<SampleExtent>& sample = {});
+/// The same without grains.
+Slab empty_slab(const SampleExtent& sample, double thickness);
 
 /// A straight line in the plane of x and z [m].
 struct Cut {

@@ -16,7 +16,7 @@ using NamedLoad = std::pair<std::string, WallLoad>;
 /// `time_step` of the stage that `stage_of` finds in a Part: a number, or "auto".
 template <class Part, class StageOf>
 Key<Part> time_step_key(const char* meaning, StageOf stage_of) {
-  constexpr double chosen = -1;
+  static constexpr double chosen = -1;
   return bound<double, Part>(
              "time_step", "s", positive, meaning,
              [stage_of](Part& part, double h) {

@@ -16,15 +16,18 @@ TEST(WallLimit, ReadsTimesAsBatchSystemsWriteThem) {
     EXPECT_THROW(parse_duration(text), std::invalid_argument) << text;
 }
 
-TEST(WallLimit, LeavesRoomForAStepAndACheckpoint) {
+TEST(WallLimit, LeavesRoomForAStepAFrameAndACheckpoint) {
   WallLimit limit(100);
   limit.took_step(5);
+  limit.took_frame(2);
+  EXPECT_FALSE(limit.reached(80));
+  EXPECT_TRUE(limit.reached(82)) << "a frame stands for the checkpoint that there was none of yet";
   limit.took_save(10);
-  EXPECT_FALSE(limit.reached(68));
-  EXPECT_TRUE(limit.reached(70));
+  EXPECT_FALSE(limit.reached(64));
+  EXPECT_TRUE(limit.reached(66));
   // A long step of hours ago counts less and less.
   for (int k = 0; k < 1000; ++k) limit.took_step(0.1);
-  EXPECT_FALSE(limit.reached(75));
+  EXPECT_FALSE(limit.reached(74));
   EXPECT_FALSE(WallLimit(std::nullopt).reached(1e9));
 }
 

@@ -8,6 +8,7 @@
 #include "io/files/detail/with_unit.hpp"
 #include "io/pictures/detail/svg.hpp"
 #include "io/pictures/picture.hpp"
+#include "runtime/graph/one_rank.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
 
 namespace talus::io {
@@ -28,6 +29,20 @@ TEST(Picture, DrawsTheGrainsAndForcesOfTheSlabOnly) {
   EXPECT_EQ(occurrences(one, "<circle"), 1u);
   EXPECT_NE(one.find("1 grains, 0 contacts"), std::string::npos);
   EXPECT_EQ(one.find("nan"), std::string::npos);
+}
+
+// What a rank gathers for the pictures is as small as they are, and they are the same.
+TEST(Picture, OfASlabIsThatOfTheWholeSample) {
+  Frame frame = three_grains();
+  frame.x[2].y() = 5;
+  frame.x[0].y() = -4.9;
+  const auto setup = setup_with_two_walls();
+  const auto [slab, sample] = gather_slab(frame, graph::one_rank());
+  EXPECT_EQ(slab.id.size(), 1U);
+  EXPECT_EQ(sample.grains, 3);
+  EXPECT_EQ(draw_forces(slab, setup.walls, {.sample = sample}), draw_forces(frame, setup.walls, {}));
+  EXPECT_EQ(draw_velocities(slab, {.walls = setup.walls, .sample = sample}),
+            draw_velocities(frame, {.walls = setup.walls}));
 }
 
 /// Widths of the lines of forces in order, those of the legend last.
