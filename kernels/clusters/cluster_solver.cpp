@@ -60,6 +60,11 @@ bool as_good(const ClusterAnswer& answer, const LawDefect& defect, const Cluster
          defect.worst <= thresholds.same_law * goal.relative * defect.largest;
 }
 
+bool has_friction(const BodyProblem& problem) {
+  return std::any_of(problem.contacts.begin(), problem.contacts.end(),
+                     [](const ContactEquation& c) { return c.mu > 0; });
+}
+
 /// Puts the changed impulses on the cones, and asks whether they are nearer to the law: by the residual, or
 /// without friction by the dual objective, which falls also where rounds have not settled.
 void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThresholds& thresholds,
@@ -71,17 +76,15 @@ void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThr
     return;
   }
   std::vector<Vec3> changed(problem.impulse);
-  bool friction = false;
   for (std::size_t k = 0; k < changed.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
-    friction |= c.mu > 0;
     changed[k] = project_on_cone(changed[k] + answer.impulse[k], c.normal, c.mu);
     answer.impulse[k] = changed[k] - problem.impulse[k];
     if (answer.solved) answer.found[k] = answer.impulse[k];
   }
   const LawDefect now = law_defect(problem, changed);
   // Comparisons are false for NaN.
-  answer.helps = now.residual2 < then.residual2 || (!friction && now.energy < then.energy);
+  answer.helps = now.residual2 < then.residual2 || (!has_friction(problem) && now.energy < then.energy);
 }
 
 /// What a correction of `now` means for the impulses of `from`, which has the same contacts. Changes of
@@ -148,12 +151,19 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
     ContactMatrix matrix = matrix_of(problem);
     const double budget =
         (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) * sweep_cost(matrix.problem);
-    double left = thresholds.proximal_share * budget;
-    const Correction proximal =
-        proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left);
-    ClusterAnswer other = answer_of(problem, problem, proximal);
-    if (other.solved || other.error < answer.error) answer = std::move(other);
-    left += (1 - thresholds.proximal_share) * budget;
+    const auto take = [&](const Correction& correction) {
+      ClusterAnswer other = answer_of(problem, problem, correction);
+      if (other.solved || other.error < answer.error) answer = std::move(other);
+    };
+    double left = 0;
+    if (has_friction(problem)) {
+      left = thresholds.coulomb_share * budget;
+      take(coulomb_correction(problem, goal.enough, thresholds.correction, thresholds.coulomb, left));
+    }
+    left += thresholds.proximal_share * budget;
+    if (!answer.solved)
+      take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
+    left += (1 - thresholds.coulomb_share - thresholds.proximal_share) * budget;
     if (!answer.solved) solve_by_matrix(problem, goal.enough, std::move(matrix), left, thresholds, answer);
   }
   admit(problem, goal, thresholds, answer);

@@ -191,11 +191,6 @@ Correction take_step(const BodyProblem& problem, ProximalStep& step) {
   return now;
 }
 
-/// What is still to come of steps that change by `now` and have changed by `before`: a geometric series.
-double rest_of(double before, double now) {
-  return now < before ? now * now / (before - now) : std::numeric_limits<double>::infinity();
-}
-
 }  // namespace
 
 Correction proximal_correction(const BodyProblem& problem, double enough,
@@ -226,9 +221,8 @@ Correction proximal_correction(const BodyProblem& problem, double enough,
     now.moved = momentum_of(problem, sum(step.motion, -1, before));
     const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
     // Behind a firmer step a softer one changes less, which says nothing.
-    now.missed = small && step.firmness >= firmness ? rest_of(moved, now.moved) : now.moved;
-    // What the minima leave tells nothing of the ratio.
-    if (now.moved <= proximal.inner * goal) now.missed = now.moved;
+    now.missed =
+        small && step.firmness >= firmness ? rest_of(moved, now.moved, proximal.inner * goal) : now.moved;
     moved = now.moved;
     now.settled = small && step.firmness >= std::max(firmness, proximal.firm_enough) &&
                   now.missed <= proximal.rest * goal;
