@@ -1,5 +1,6 @@
 #include "kernels/clusters/coulomb_newton.hpp"
 
+#include <Eigen/OrderingMethods>
 #include <Eigen/SparseCore>
 #include <Eigen/SparseLU>
 #include <algorithm>
@@ -96,7 +97,10 @@ class CoulombStep {
     }
     Matrix A(mass_.size(), mass_.size());
     A.setFromTriplets(entries.begin(), entries.end());
-    Eigen::SparseLU<Matrix> factor(A);
+    // The pattern is symmetric, and so is the order of elimination that fills it least.
+    Eigen::SparseLU<Matrix, Eigen::AMDOrdering<int>> factor;
+    factor.isSymmetric(true);
+    factor.compute(A);
     work -= work_of_entry * static_cast<double>(entries.size());
     if (factor.info() != Eigen::Success) return false;
     work -= static_cast<double>(factor.nnzL()) * static_cast<double>(factor.nnzU()) /
