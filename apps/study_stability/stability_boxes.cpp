@@ -79,8 +79,8 @@ Problem plate_on_pile(int count, double ratio) {
 }
 
 /// A cube of 4 x 4 x 4 grains that three walls press against three others, under gravity. The walls are
-/// smooth, so that each carries what the one opposite does, in steps that begin at rest: rows of grains buckle,
-/// and 5 % of a large pressure, which a step may leave, move the walls by metres per second.
+/// smooth, so that each carries what the one opposite does, in steps that begin at rest: rows of grains
+/// buckle, and 5 % of a large pressure, which a step may leave, move the walls by metres per second.
 Problem pressed_cube(double pressure, int subdomains) {
   constexpr int n = 4;
   const double edge = 2 * radius * n, force = pressure * edge * edge;
