@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "kernels/bodies/larger.hpp"
 #include "kernels/clusters/contact_matrix.hpp"
 #include "kernels/delassus/delassus_auto.hpp"
 #include "kernels/delassus/delassus_sweeps.hpp"
@@ -29,6 +30,8 @@ struct LawDefect {
   double residual2 = 0;  ///< sum of |r - P_Kmu(r - (v + mu |v_t| n)/W_nn)|^2 W_nn over the contacts [J]
   double energy = 0;     ///< dual objective 1/2 |V(r)|_M^2 + r.offset, which the answer makes least without
                          ///< friction [J]
+  double worst = 0;      ///< largest |r - P(...)| W_nn^(1/2) [J^(1/2)]
+  double largest = 0;    ///< |r| W_nn^(1/2), the largest [J^(1/2)]
 };
 LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impulse) {
   const std::vector<Twist> V = velocities_of(problem, impulse);
@@ -39,15 +42,39 @@ LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impuls
     const ContactEquation& c = problem.contacts[k];
     const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
     const NaturalMap map = natural_map_of(problem, c, impulse[k], v);
-    defect.residual2 += (impulse[k] - map.carried).squaredNorm() / map.m;
+    const double wrong2 = (impulse[k] - map.carried).squaredNorm() / map.m;
+    defect.residual2 += wrong2;
+    defect.worst = larger(defect.worst, std::sqrt(wrong2));
+    defect.largest = larger(defect.largest, impulse[k].norm() / std::sqrt(map.m));
     defect.energy += c.offset.dot(impulse[k]);
   }
   return defect;
 }
 
+/// Redundant contacts share forces by gaps that differ by no more than rounding, and by less than what the
+/// step before was certified to: an answer that shares them otherwise is none that is better. So impulses
+/// stay that meet the law themselves and give the velocities of the answer (ClusterThresholds::same_law).
+bool as_good(const ClusterAnswer& answer, const LawDefect& defect, const ClusterGoal& goal,
+             const ClusterThresholds& thresholds) {
+  return answer.solved && answer.error <= thresholds.same_velocities * goal.enough &&
+         defect.worst <= thresholds.same_law * goal.relative * defect.largest;
+}
+
+bool has_friction(const BodyProblem& problem) {
+  return std::any_of(problem.contacts.begin(), problem.contacts.end(),
+                     [](const ContactEquation& c) { return c.mu > 0; });
+}
+
 /// Puts the changed impulses on the cones, and asks whether they are nearer to the law: by the residual, or
 /// without friction by the dual objective, which falls also where rounds have not settled.
-void admit(const BodyProblem& problem, bool friction, ClusterAnswer& answer) {
+void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThresholds& thresholds,
+           ClusterAnswer& answer) {
+  const LawDefect then = law_defect(problem, problem.impulse);
+  if (as_good(answer, then, goal, thresholds)) {
+    answer.impulse.assign(problem.contacts.size(), Vec3::Zero());
+    answer.found = answer.impulse;
+    return;
+  }
   std::vector<Vec3> changed(problem.impulse);
   for (std::size_t k = 0; k < changed.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
@@ -55,9 +82,9 @@ void admit(const BodyProblem& problem, bool friction, ClusterAnswer& answer) {
     answer.impulse[k] = changed[k] - problem.impulse[k];
     if (answer.solved) answer.found[k] = answer.impulse[k];
   }
-  const LawDefect then = law_defect(problem, problem.impulse), now = law_defect(problem, changed);
+  const LawDefect now = law_defect(problem, changed);
   // Comparisons are false for NaN.
-  answer.helps = now.residual2 < then.residual2 || (!friction && now.energy < then.energy);
+  answer.helps = now.residual2 < then.residual2 || (!has_friction(problem) && now.energy < then.energy);
 }
 
 /// What a correction of `now` means for the impulses of `from`, which has the same contacts. Changes of
@@ -120,21 +147,26 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
     return answer;
   }
   answer = answer_of(problem, problem, correction_of(problem, goal.enough, thresholds.correction));
-  const bool friction = std::any_of(problem.contacts.begin(), problem.contacts.end(),
-                                    [](const ContactEquation& c) { return c.mu > 0; });
   if (!answer.solved) {
     ContactMatrix matrix = matrix_of(problem);
     const double budget =
         (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) * sweep_cost(matrix.problem);
-    double left = thresholds.proximal_share * budget;
-    const Correction proximal =
-        proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left);
-    ClusterAnswer other = answer_of(problem, problem, proximal);
-    if (other.solved || other.error < answer.error) answer = std::move(other);
-    left += (1 - thresholds.proximal_share) * budget;
+    const auto take = [&](const Correction& correction) {
+      ClusterAnswer other = answer_of(problem, problem, correction);
+      if (other.solved || other.error < answer.error) answer = std::move(other);
+    };
+    double left = 0;
+    if (has_friction(problem)) {
+      left = thresholds.coulomb_share * budget;
+      take(coulomb_correction(problem, goal.enough, thresholds.correction, thresholds.coulomb, left));
+    }
+    left += thresholds.proximal_share * budget;
+    if (!answer.solved)
+      take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
+    left += (1 - thresholds.coulomb_share - thresholds.proximal_share) * budget;
     if (!answer.solved) solve_by_matrix(problem, goal.enough, std::move(matrix), left, thresholds, answer);
   }
-  admit(problem, friction, answer);
+  admit(problem, goal, thresholds, answer);
   return answer;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kernels/clusters/correction.hpp"
+#include "kernels/clusters/coulomb_newton.hpp"
 #include "kernels/clusters/proximal_newton.hpp"
 #include "kernels/global/body_problem.hpp"
 
@@ -16,13 +17,20 @@ namespace talus {
 /// Every number that an answer depends on. Ratios have no unit.
 struct ClusterThresholds {
   CorrectionThresholds correction;
+  CoulombThresholds coulomb;
   ProximalThresholds proximal;
   /// Budget of an answer that rounds do not find, in multiplications, those of sweeps over the cluster's
   /// stored matrix (sweep_cost): so many, >= 0, and so many for each sweep that the step has had, >= 0.
   /// Beyond it the cluster is left without an answer.
-  double least_budget = 1500, budget_per_sweep = 4;
-  /// Part of it that proximal steps may take, in (0, 1).
-  double proximal_share = 0.7;
+  double least_budget = 20000, budget_per_sweep = 10;
+  /// Parts of it that the steps of coulomb_newton.hpp and proximal_newton.hpp may take, together in (0, 1);
+  /// the latter has also what the former leaves.
+  double coulomb_share = 0.5, proximal_share = 0.4;
+  /// Impulses are kept as they are, however far the answer that was found is from them, where they give its
+  /// velocities to this part of what need not be told apart, in (0, 1), and no contact is further from its
+  /// law than by `same_law` of it, over the largest impulse, in (0, 1): they are an answer to gaps that
+  /// differ by as little.
+  double same_velocities = 0.1, same_law = 1e-3;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.
   struct Turn {
@@ -45,15 +53,16 @@ struct ClusterAnswer {
 
 /// What is asked of an answer.
 struct ClusterGoal {
-  double enough = 0;  ///< momentum that need not be told apart [N s]
-  int sweeps = 0;     ///< that the step has had: its budget (ClusterThresholds) grows with them
+  double enough = 0;    ///< momentum that need not be told apart [N s]
+  double relative = 0;  ///< the same over the cluster's scale
+  int sweeps = 0;       ///< that the step has had: its budget (ClusterThresholds) grows with them
 };
 
-/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, proximal steps
-/// (proximal_newton.hpp); and where these do not either, with what is left of the budget the solvers that
-/// keep W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there.
-/// All by counted work, so the same bits come out every time. The changed impulses lie on the cones. Values
-/// that are not finite come back as an error that is not.
+/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, proximal steps,
+/// with friction first those of coulomb_newton.hpp, then proximal_newton.hpp; and where these do not either,
+/// with what is left of the budget the solvers that keep W (kernels/delassus/delassus_auto.hpp) from the
+/// impulses that it has, and rounds again from there. All by counted work, so the same bits come out every
+/// time. The changed impulses lie on the cones. Values that are not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

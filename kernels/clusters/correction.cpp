@@ -199,6 +199,11 @@ double goal_of(double found, double enough, const CorrectionThresholds& threshol
   return thresholds.tolerance * std::max(thresholds.sharpness * found, enough);
 }
 
+double rest_of(double before, double now, double rounding) {
+  if (now <= rounding) return now;
+  return now < before ? now * now / (before - now) : std::numeric_limits<double>::infinity();
+}
+
 double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion) {
   double sum = 0;
   for (std::size_t b = 0; b < motion.size(); ++b)

@@ -78,6 +78,10 @@ Correction correction_of(const BodyProblem& problem, double enough,
 /// What may be left of a correction that has found so much momentum [N s].
 double goal_of(double found, double enough, const CorrectionThresholds& thresholds);
 
+/// What is still to come of proximal steps that have changed the motion by `before` and by `now` at last: a
+/// geometric series. What is within `rounding` tells nothing of its ratio [all N s].
+double rest_of(double before, double now, double rounding);
+
 /// Sum m |u| + (I/R^2) |w| over the unknowns [N s].
 double momentum_of(const BodyProblem& problem, const std::vector<Twist>& motion);
 

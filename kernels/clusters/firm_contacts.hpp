@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "kernels/clusters/freedoms.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus {
@@ -42,12 +43,10 @@ class FirmContacts {
 
  private:
   void factorise(std::span<const ContactSpring> springs);
-  Eigen::VectorXd freedoms_of(std::span<const Twist> of) const;
-  std::vector<Twist> twists_of(const Eigen::VectorXd& x) const;
 
   const BodyProblem& problem_;
+  Freedoms freedoms_;
   std::vector<double> rho_;
-  std::vector<Eigen::Index> begin_;  ///< per unknown, its first freedom; and the number of all
   Eigen::SparseMatrix<double> matrix_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
   double work_ = 0;

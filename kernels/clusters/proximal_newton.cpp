@@ -143,14 +143,25 @@ struct Minimised {
   int factorisations = 0;  ///< that it took
 };
 
-/// The minimum of a step, until momentum is off by no more than its part of `goal`, or by what rounding
-/// leaves.
-Minimised minimise(double goal, const ProximalThresholds& proximal, ProximalStep& step, double& work) {
+/// What momentum may be off by behind a step [N s]: `enough` ends it, beyond `most` it has failed.
+struct StepGoal {
+  double enough, most;
+};
+
+/// `moved`: by which the last step has changed the motion.
+StepGoal step_goal(double goal, double moved, const ProximalThresholds& proximal) {
+  const double far = moved > proximal.far * goal ? proximal.loose * moved : 0;
+  return {std::max(proximal.inner * goal, far), std::max(goal, far)};
+}
+
+/// The minimum of a step, until momentum is off by no more than is enough, or by what rounding leaves.
+Minimised minimise(const StepGoal& goal, const ProximalThresholds& proximal, ProximalStep& step,
+                   double& work) {
   std::vector<Twist> force = step.force(step.motion);
   Minimised result{size_of(force), 0};
   double least = result.off;
-  for (int since = 0; result.off > proximal.inner * goal; ++since) {
-    const int patience = result.off <= goal ? proximal.patience_at_goal : proximal.patience;
+  for (int since = 0; result.off > goal.enough; ++since) {
+    const int patience = result.off <= goal.most ? proximal.patience_at_goal : proximal.patience;
     if (since >= patience || result.factorisations >= proximal.most || work <= 0) break;
     ++result.factorisations;
     const std::vector<Twist> way = step.way(force, work);
@@ -180,11 +191,6 @@ Correction take_step(const BodyProblem& problem, ProximalStep& step) {
   return now;
 }
 
-/// What is still to come of steps that change by `now` and have changed by `before`: a geometric series.
-double rest_of(double before, double now) {
-  return now < before ? now * now / (before - now) : std::numeric_limits<double>::infinity();
-}
-
 }  // namespace
 
 Correction proximal_correction(const BodyProblem& problem, double enough,
@@ -195,34 +201,37 @@ Correction proximal_correction(const BodyProblem& problem, double enough,
   best.impulse.assign(problem.contacts.size(), Vec3::Zero());
   best.motion.resize(problem.bodies.size());
   best.open = std::numeric_limits<double>::infinity();
-  double most = thresholds.firmness, firmness = 0, moved = 0;
+  double firmness = 0, moved = 0;
+  int wary = 0;
   for (int k = 1; k <= proximal.most_steps && work > 0 && !best.settled; ++k) {
     const double goal = goal_of(momentum_of(problem, step.motion), enough, thresholds);
+    const StepGoal until = step_goal(goal, moved, proximal);
     const std::vector<Twist> before = step.motion;
-    const Minimised minimum = minimise(goal, proximal, step, work);
-    if (!(minimum.off <= goal)) {
-      if (step.firmness <= proximal.first_firmness) break;
+    const Minimised minimum = minimise(until, proximal, step, work);
+    if (!(minimum.off <= until.most)) {
       step.motion = before;
-      most = step.firmness /= proximal.growth;
-      if (most < proximal.firm_enough) break;
+      step.firmness /= proximal.growth;
+      if (step.firmness < proximal.least_firmness) break;
+      wary = proximal.wary;
       continue;
     }
     Correction now = take_step(problem, step);
     now.rounds = k;
     now.left = minimum.off;
     now.moved = momentum_of(problem, sum(step.motion, -1, before));
-    const bool small = now.open <= goal && now.moved <= goal;
+    const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
     // Behind a firmer step a softer one changes less, which says nothing.
-    now.missed = small && step.firmness >= firmness ? rest_of(moved, now.moved) : now.moved;
-    // What the minima leave tells nothing of the ratio.
-    if (now.moved <= proximal.inner * goal) now.missed = now.moved;
+    now.missed =
+        small && step.firmness >= firmness ? rest_of(moved, now.moved, proximal.inner * goal) : now.moved;
     moved = now.moved;
     now.settled = small && step.firmness >= std::max(firmness, proximal.firm_enough) &&
                   now.missed <= proximal.rest * goal;
     firmness = step.firmness;
     if (now.settled || now.error() < best.error()) best = std::move(now);
-    if (minimum.factorisations <= proximal.easy)
-      step.firmness = std::min(proximal.growth * step.firmness, most);
+    if (wary > 0)
+      --wary;
+    else if (minimum.factorisations <= proximal.easy)
+      step.firmness = std::min(proximal.growth * step.firmness, thresholds.firmness);
   }
   return best;
 }

@@ -12,13 +12,20 @@ namespace talus {
 /// Every number that proximal steps depend on. Ratios have no unit.
 struct ProximalThresholds {
   /// rho W_nn of the first step; that of the next one is `growth`, > 1, times as large where a step has taken
-  /// at most `easy` factorisations, up to CorrectionThresholds::firmness. A step of `most` factorisations
-  /// that has not come to its minimum is taken back, and none is so firm again. Soft contacts find out who
-  /// carries; firm ones leave little to mend.
+  /// at most `easy` factorisations, up to CorrectionThresholds::firmness. Soft contacts find out who carries;
+  /// firm ones leave little to mend.
   double first_firmness = 1e2, growth = 5;
-  int easy = 5, most = 40;
+  int easy = 8;
+  /// A step that has not come to its minimum within `most` factorisations is taken back and tried again,
+  /// softer by `growth`; the next `wary` steps, >= 0, get no firmer. Below `least_firmness`, > 0, the search
+  /// ends.
+  int most = 25, wary = 2;
+  double least_firmness = 1;
   /// Momentum may be off by this part of the goal behind a step, in (0, 1).
   double inner = 1e-2;
+  /// As long as steps move by more than `far` goals, > 1, a minimum need not be known better than to this
+  /// part of what the last step has moved, in (0, 1).
+  double far = 100, loose = 0.1;
   /// A step of Newton's method may go beyond the minimum along its way until the slope is this part of the
   /// first one, in (0, 1); and how well the minimum is found where it goes further, likewise.
   double slope = 0.1, line = 0.1;

@@ -82,8 +82,8 @@ class Answers {
           rows[c][mass] * goal.still / std::max(goal.enough, std::numeric_limits<double>::epsilon());
       scales_[c] =
           std::max({scale_of(rows[c], thresholds_), thresholds_.interest * everywhere * share, still});
-      answers_[c] =
-          solve_cluster(clusters_[c].problem, {goal.enough * scales_[c], goal.sweeps}, thresholds_.cluster);
+      answers_[c] = solve_cluster(clusters_[c].problem, {goal.enough * scales_[c], goal.enough, goal.sweeps},
+                                  thresholds_.cluster);
     });
   }
 

@@ -102,6 +102,22 @@ TEST(StepError, OfAJammedGrainThatHasToSlideIsNotWhatItsContactsFindWrong) {
   EXPECT_GT(error.contact, 0.08);
 }
 
+/// A grain on two floors. Where one is lower by next to nothing any shares are an answer to floors that
+/// differ as little; where it is lower by as much as the step tells apart, the higher one carries all.
+TEST(StepError, OfSharesOfRedundantContactsCountsTheirGapsAsFarAsTheyAreKnown) {
+  for (const double lower : {1e-8, 1e-3}) {
+    BodyProblem problem;
+    const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0);
+    for (int wall = 0; wall < 2; ++wall) add_contact(problem, grain, -1, Vec3::UnitZ(), 0, wall);
+    problem.contacts[1].offset = lower * fall * Vec3::UnitZ();
+    problem.impulse = {0.3 * fall * Vec3::UnitZ(), 0.7 * fall * Vec3::UnitZ()};
+    const StepError error = step_error(problem, {.enough = 1e-4});
+    EXPECT_TRUE(error.solved) << lower;
+    EXPECT_NEAR(error.contact, lower < 1e-4 ? 0 : 0.7, 1e-6) << lower;
+    EXPECT_LE(error.velocity, 2 * lower) << lower;
+  }
+}
+
 /// Its first round alone does not say whether the contacts stick: no answer, so nothing is known.
 TEST(StepError, OfAClusterWithoutAnAnswerIsNotWhatItHappenedToFind) {
   BodyProblem problem = wedge(0.0412, 0.5);

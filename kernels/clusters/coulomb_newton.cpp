@@ -1,0 +1,251 @@
+#include "kernels/clusters/coulomb_newton.hpp"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
+#include <Eigen/SparseLU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "kernels/clusters/freedoms.hpp"
+#include "kernels/global/natural_map.hpp"
+#include "kernels/global/stiffness.hpp"
+
+namespace talus {
+
+namespace {
+
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::SparseMatrix<double>;
+
+/// A contact and the columns of H that belong to it: what impulses along x, y and z do to its two bodies.
+struct Columns {
+  struct OfBody {
+    Eigen::Index begin = 0, count = 0;
+    Eigen::Matrix<double, 6, 3> H;
+  };
+  std::array<OfBody, 2> of_body;
+};
+
+/// The problem of a step, around impulses t.
+class CoulombStep {
+ public:
+  explicit CoulombStep(const BodyProblem& problem)
+      : problem_(problem), freedoms_(problem), mass_(freedoms_.masses()) {
+    const std::vector<Twist> V = velocities_of(problem, problem.impulse);
+    for (const ContactEquation& c : problem.contacts) {
+      velocity_.push_back(constrained(c, relative_velocity(c, V) + c.offset));
+      add_columns(c);
+    }
+  }
+
+  Vector none() const { return Vector::Zero(freedoms_.size()); }
+  std::vector<Twist> twists(const Vector& d) const { return freedoms_.twists(d); }
+  /// |f| in the norm of M^-1 times the root of all masses: at least the sum of |f| over the bodies [N s].
+  double size(const Vector& f) const { return std::sqrt(mass_.sum() * f.cwiseQuotient(mass_).dot(f)); }
+
+  /// v + b n [m/s].
+  Vec3 velocity(std::size_t k, const Vector& d) const {
+    Vec3 change = Vec3::Zero();
+    for (const Columns::OfBody& body : columns_[k].of_body)
+      change += body.H.topRows(body.count).transpose() * d.segment(body.begin, body.count);
+    return velocity_[k] + constrained(problem_.contacts[k], change);
+  }
+  /// r(d), and where asked for P' rho.
+  Vec3 impulse(std::size_t k, const Vector& d, double firmness, const std::vector<Vec3>& t,
+               Mat3* slope = nullptr) const {
+    const ContactEquation& c = problem_.contacts[k];
+    const Mat3 along = c.normal * c.normal.transpose();
+    const Mat3 rho = firmness * (normal_[k] * along + tangential_[k] * (Mat3::Identity() - along));
+    const Vec3 z = t[k] - rho * velocity(k, d), side = tangential(c, z);
+    const double z_n = c.normal.dot(z), most = c.mu * z_n, length = side.norm();
+    if (slope != nullptr) slope->setZero();
+    if (!(z_n > 0)) return Vec3::Zero();
+    if (c.mu > 0 && length <= most) {
+      if (slope != nullptr) *slope = rho;
+      return z;
+    }
+    const Vec3 direction = c.mu > 0 ? Vec3(side / length) : Vec3(Vec3::Zero());
+    if (slope != nullptr) {
+      *slope = along + c.mu * direction * c.normal.transpose();
+      if (c.mu > 0) *slope += most / length * (Mat3::Identity() - along - direction * direction.transpose());
+      *slope = (*slope * rho).eval();
+    }
+    return z_n * c.normal + most * direction;
+  }
+  /// M d - H (r(d) - r) [N s].
+  Vector residual(const Vector& d, double firmness, const std::vector<Vec3>& t) const {
+    Vector f = mass_.cwiseProduct(d);
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const Vec3 change = impulse(k, d, firmness, t) - problem_.impulse[k];
+      for (const Columns::OfBody& body : columns_[k].of_body)
+        f.segment(body.begin, body.count) -= body.H.topRows(body.count) * change;
+    }
+    return f;
+  }
+  /// Newton's step from d, where the residual is f; its work is taken off. False where there is none.
+  bool way(const Vector& d, const Vector& f, double firmness, const std::vector<Vec3>& t, Vector& way,
+           double& work) const {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (Eigen::Index k = 0; k < mass_.size(); ++k) entries.emplace_back(k, k, mass_[k]);
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      Mat3 slope;
+      impulse(k, d, firmness, t, &slope);
+      if (!slope.isZero(0)) add_entries(columns_[k], slope, entries);
+    }
+    Matrix A(mass_.size(), mass_.size());
+    A.setFromTriplets(entries.begin(), entries.end());
+    // The pattern is symmetric, and so is the order of elimination that fills it least.
+    Eigen::SparseLU<Matrix, Eigen::AMDOrdering<int>> factor;
+    factor.isSymmetric(true);
+    factor.compute(A);
+    work -= work_of_entry * static_cast<double>(entries.size());
+    if (factor.info() != Eigen::Success) return false;
+    work -= static_cast<double>(factor.nnzL()) * static_cast<double>(factor.nnzU()) /
+            static_cast<double>(mass_.size());
+    way = factor.solve(-f);
+    way += factor.solve(Vector(-f - A * way));
+    return way.allFinite();
+  }
+
+ private:
+  /// And the masses that a contact feels along its normal and across it, 1/W_nn and 1/W_tt.
+  void add_columns(const ContactEquation& c) {
+    Columns columns;
+    Mat3 W = Mat3::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto column = freedoms_.column(c, Vec3(Vec3::Unit(axis)));
+      for (std::size_t b = 0; b < 2; ++b) {
+        columns.of_body[b].begin = column[b].begin;
+        columns.of_body[b].count = column[b].count;
+        columns.of_body[b].H.col(axis) = column[b].value;
+      }
+    }
+    for (const Columns::OfBody& body : columns.of_body)
+      for (Eigen::Index k = 0; k < body.count; ++k)
+        W += body.H.row(k).transpose() * body.H.row(k) / mass_[body.begin + k];
+    const double W_nn = c.normal.dot(W * c.normal);
+    normal_.push_back(1 / W_nn);
+    tangential_.push_back(c.mu > 0 ? 2 / (W.trace() - W_nn) : 1 / W_nn);
+    columns_.push_back(columns);
+  }
+  static void add_entries(const Columns& columns, const Mat3& slope,
+                          std::vector<Eigen::Triplet<double>>& entries) {
+    for (const Columns::OfBody& a : columns.of_body)
+      for (const Columns::OfBody& b : columns.of_body) {
+        const Eigen::Matrix<double, 6, 6> block = a.H * slope * b.H.transpose();
+        for (Eigen::Index i = 0; i < a.count; ++i)
+          for (Eigen::Index j = 0; j < b.count; ++j)
+            entries.emplace_back(a.begin + i, b.begin + j, block(i, j));
+      }
+  }
+
+  const BodyProblem& problem_;
+  Freedoms freedoms_;
+  Vector mass_;                              ///< per freedom [kg]
+  std::vector<Vec3> velocity_;               ///< v + b n at the impulses of the problem [m/s]
+  std::vector<double> normal_, tangential_;  ///< 1/W_nn, 1/W_tt [kg]
+  std::vector<Columns> columns_;             ///< per contact
+};
+
+/// Where the steps stand.
+struct Course {
+  double firmness;
+  std::vector<Vec3> t;  ///< per contact [N s]
+  Vector d;             ///< per freedom [m/s]
+  double open = 0;      ///< what the law finds wrong, sum of |r - P_Kmu(...)| [N s]
+  double off = 0;       ///< what momentum is off by [N s]
+};
+
+/// Solves the problem of a step. False, and d is anything, where momentum stays off by more than it may.
+bool solve_step(const CoulombStep& step, double goal, const CoulombThresholds& coulomb, Course& course,
+                double& work) {
+  const double enough = coulomb.inner * std::max(goal, course.open);
+  const double most = std::max(goal, coulomb.loose * course.open);
+  Vector f = step.residual(course.d, course.firmness, course.t), way, there;
+  course.off = step.size(f);
+  for (int k = 0; k < coulomb.most_iterations && course.off > enough && work > 0; ++k) {
+    if (!step.way(course.d, f, course.firmness, course.t, way, work)) break;
+    double part = 1, after = course.off;
+    for (int halving = 0; halving <= coulomb.halvings; ++halving, part /= 2) {
+      there = course.d + part * way;
+      f = step.residual(there, course.firmness, course.t);
+      after = step.size(f);
+      if (after <= (1 - coulomb.descent * part) * course.off) break;
+    }
+    if (!(after < course.off)) break;
+    course.d = there;
+    course.off = after;
+  }
+  return course.off <= most;
+}
+
+/// What a step has come to: its impulses are the next t.
+Correction take_step(const BodyProblem& problem, const CoulombStep& step, Course& course) {
+  Correction now;
+  std::vector<Vec3> next;
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const Vec3 r = step.impulse(k, course.d, course.firmness, course.t);
+    const NaturalMap map = natural_map_of(problem, problem.contacts[k], r, step.velocity(k, course.d));
+    now.open += (r - map.carried).norm();
+    now.impulse.push_back(r - problem.impulse[k]);
+    next.push_back(r);
+  }
+  course.t = std::move(next);
+  now.left = course.off;
+  now.motion = step.twists(course.d);
+  now.found = momentum_of(problem, now.motion);
+  return now;
+}
+
+}  // namespace
+
+Correction coulomb_correction(const BodyProblem& problem, double enough,
+                              const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
+                              double& work) {
+  const CoulombStep step(problem);
+  Course course{coulomb.first_firmness, problem.impulse, step.none()};
+  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
+    const Vec3& r = problem.impulse[k];
+    course.open +=
+        (r - natural_map_of(problem, problem.contacts[k], r, step.velocity(k, course.d)).carried).norm();
+  }
+  Correction best;
+  best.impulse.assign(problem.contacts.size(), Vec3::Zero());
+  best.motion.resize(problem.bodies.size());
+  best.open = std::numeric_limits<double>::infinity();
+  double moved = std::numeric_limits<double>::infinity(), firmness = 0;
+  int wary = 0;
+  for (int k = 1; k <= coulomb.most_steps && work > 0 && !best.settled; ++k) {
+    const double goal = goal_of(momentum_of(problem, step.twists(course.d)), enough, thresholds);
+    const Vector before = course.d;
+    if (!solve_step(step, goal, coulomb, course, work)) {
+      course.d = before;
+      course.firmness /= coulomb.growth;
+      if (course.firmness < coulomb.least_firmness) break;
+      wary = coulomb.wary;
+      continue;
+    }
+    Correction now = take_step(problem, step, course);
+    now.rounds = k;
+    now.moved = momentum_of(problem, step.twists(course.d - before));
+    const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
+    const bool comparable = small && course.firmness >= firmness;
+    now.missed = comparable ? rest_of(moved, now.moved, coulomb.inner * goal) : now.moved;
+    now.settled = comparable && course.firmness >= coulomb.firm_enough && now.missed <= coulomb.rest * goal;
+    const bool slow = now.open > coulomb.slow * course.open || small;
+    course.open = now.open;
+    moved = now.moved;
+    firmness = course.firmness;
+    if (now.settled || now.error() < best.error()) best = std::move(now);
+    if (wary > 0)
+      --wary;
+    else if (slow)
+      course.firmness = std::min(coulomb.growth * course.firmness, thresholds.firmness);
+  }
+  return best;
+}
+
+}  // namespace talus
