@@ -6,11 +6,18 @@
 #include <cmath>
 #include <cstdint>
 
+#include "kernels/clusters/correction.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus::cluster_makers {
 
-constexpr double fall = 9.81e-3;  ///< g h [m/s]
+constexpr double fall = 9.81e-3;        ///< g h [m/s]
+constexpr double enough = 1e-4 * fall;  ///< momentum that need not be told apart [N s]
+
+/// Impulse of contact k, corrected [N s].
+inline Vec3 impulse_of(const BodyProblem& problem, const Correction& correction, std::size_t k) {
+  return problem.impulse[k] + correction.impulse[k];
+}
 
 inline std::int32_t add_grain(BodyProblem& problem, const Vec3& x, double mu) {
   BodyUnknown body;

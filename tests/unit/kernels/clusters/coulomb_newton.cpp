@@ -14,42 +14,9 @@ namespace {
 
 using namespace cluster_makers;
 
-constexpr double enough = 1e-4 * fall;
-
 Correction corrected(const BodyProblem& problem) {
   double work = 1e9;
   return coulomb_correction(problem, enough, {}, {}, work);
-}
-
-Vec3 impulse_of(const BodyProblem& problem, const Correction& correction, std::size_t k) {
-  return problem.impulse[k] + correction.impulse[k];
-}
-
-TEST(CoulombSteps, AGrainSlidesOrSticksAsCoulombSays) {
-  constexpr double mu = 0.3, down = 0.1;
-  for (const double along : {1e-2, 1.0}) {
-    BodyProblem problem;
-    const std::int32_t grain = add_grain(problem, Vec3::Zero(), mu);
-    problem.bodies[0].free.u = Vec3(along, 0, -down);
-    add_contact(problem, grain, -1, Vec3::UnitZ(), mu, 0);
-    const Correction answer = corrected(problem);
-    ASSERT_TRUE(answer.settled) << along;
-    const bool slides = along > 3.5 * mu * down;  // a solid sphere keeps 5/7 of its speed where it sticks
-    EXPECT_NEAR(impulse_of(problem, answer, 0).z(), down, 1e-4);
-    EXPECT_NEAR(impulse_of(problem, answer, 0).x(), slides ? -mu * down : -2.0 / 7 * along, 1e-4) << along;
-    EXPECT_NEAR(answer.motion[0].u.z(), down, enough) << "it no longer sinks";
-  }
-}
-
-TEST(CoulombSteps, LetGoOfContactsThatWouldPull) {
-  BodyProblem problem;
-  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0.3);
-  add_contact(problem, grain, -1, Vec3::UnitZ(), 0.3, 0);
-  problem.bodies[0].free.u = Vec3(0, 0, fall);  // it leaves
-  problem.impulse[0] = 0.5 * fall * Vec3::UnitZ();
-  const Correction answer = corrected(problem);
-  ASSERT_TRUE(answer.settled);
-  EXPECT_NEAR(impulse_of(problem, answer, 0).norm(), 0, enough);
 }
 
 /// A grain jammed in a V, a hair's breadth above both walls, which has to slide down into it: its contacts

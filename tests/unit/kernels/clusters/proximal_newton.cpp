@@ -13,15 +13,9 @@ namespace {
 
 using namespace cluster_makers;
 
-constexpr double enough = 1e-4 * fall;
-
 Correction corrected(const BodyProblem& problem) {
   double work = 1e9;
   return proximal_correction(problem, enough, {}, {}, work);
-}
-
-Vec3 impulse_of(const BodyProblem& problem, const Correction& correction, std::size_t k) {
-  return problem.impulse[k] + correction.impulse[k];
 }
 
 TEST(ProximalSteps, FindTheForcesInAWedgeHoweverSharpItIs) {
@@ -50,32 +44,6 @@ TEST(ProximalSteps, LeaveRedundantContactsTheSharesThatTheyHave) {
     // A tenth of the weight is missing, and both take half of it.
     EXPECT_NEAR(impulse_of(problem, answer, 0).z(), (share + 0.05) * fall, 1e-3 * fall) << share;
     EXPECT_NEAR(impulse_of(problem, answer, 1).z(), (0.95 - share) * fall, 1e-3 * fall) << share;
-  }
-}
-
-TEST(ProximalSteps, LetGoOfContactsThatWouldPull) {
-  BodyProblem problem;
-  const std::int32_t grain = add_grain(problem, Vec3::Zero(), 0);
-  add_contact(problem, grain, -1, Vec3::UnitZ(), 0, 0);
-  problem.bodies[0].free.u = Vec3(0, 0, fall);  // it leaves
-  problem.impulse[0] = 0.5 * fall * Vec3::UnitZ();
-  const Correction answer = corrected(problem);
-  EXPECT_TRUE(answer.settled);
-  EXPECT_NEAR(impulse_of(problem, answer, 0).norm(), 0, enough);
-}
-
-TEST(ProximalSteps, WithFrictionAGrainSlidesOrSticksAsCoulombSays) {
-  constexpr double mu = 0.3, down = 0.1;
-  for (const double along : {1e-2, 1.0}) {
-    BodyProblem problem;
-    const std::int32_t grain = add_grain(problem, Vec3::Zero(), mu);
-    problem.bodies[0].free.u = Vec3(along, 0, -down);
-    add_contact(problem, grain, -1, Vec3::UnitZ(), mu, 0);
-    const Correction answer = corrected(problem);
-    ASSERT_TRUE(answer.settled) << along;
-    const bool slides = along > 3.5 * mu * down;  // a solid sphere keeps 5/7 of its speed where it sticks
-    EXPECT_NEAR(impulse_of(problem, answer, 0).z(), down, 1e-4);
-    EXPECT_NEAR(impulse_of(problem, answer, 0).x(), slides ? -mu * down : -2.0 / 7 * along, 1e-4) << along;
   }
 }
 
