@@ -277,4 +277,8 @@ double estimate_stiffness(const BodyProblem& problem) {
   return estimate_stiffness(BodyParts({&problem, 1}, alone));
 }
 
+double stiffness_of_cell(double layers, double spread, const CellStiffness& of) {
+  return layers * std::max(layers, spread / of.contacts);
+}
+
 }  // namespace talus

@@ -19,6 +19,17 @@ double estimate_stiffness(std::span<const ContactGraph> parts, const PartLink& l
 double estimate_stiffness(const BodyParts& parts);
 double estimate_stiffness(const BodyProblem& problem);
 
+/// Of a dense packing.
+struct CellStiffness {
+  double contacts = 6;  ///< of a grain, among which it shares what it has to get, >= 1
+};
+
+/// The same of a periodic cell that follows a stress or has no walls, by its size. Nothing is handed on there
+/// to any one body: what contacts tell one another diffuses over half of the cell, which is so many `layers`
+/// of grains along its longest edge; to a grain of `spread` times the mass of the lightest, the heaviest, as
+/// to a plate.
+double stiffness_of_cell(double layers, double spread, const CellStiffness& of = {});
+
 /// 1/W_nn of a contact [kg]; mass(unknown) [kg].
 template <class Mass>
 double effective_mass_by(const Mass& mass, const ContactEquation& c) {

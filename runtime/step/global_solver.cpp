@@ -11,6 +11,7 @@
 #include "kernels/clusters/step_error.hpp"
 #include "kernels/global/balance.hpp"
 #include "kernels/global/residuals.hpp"
+#include "kernels/global/stiffness.hpp"
 #include "runtime/step/task_kinds.hpp"
 #include "runtime/trace/recorder.hpp"
 
@@ -204,14 +205,8 @@ std::vector<ContactGraph> GlobalSolver::gather_graphs() const {
 }
 
 double GlobalSolver::sweeps_needed(double spread) const {
-  // In a cell that follows a stress, or has no walls, nothing is handed on to any one body: what contacts
-  // tell one another diffuses over half of the cell. To grains that are much heavier than others it goes as
-  // to a plate (estimate_stiffness).
-  if (state_.cell.loaded() || (state_.domain.repeats && state_.walls.empty())) {
-    constexpr double contacts_of_a_grain = 6;  // of dense packings
-    const double layers = 0.5 * state_.domain.edges().maxCoeff() / state_.cell.length;
-    return layers * std::max(layers, spread / contacts_of_a_grain);
-  }
+  if (state_.cell.loaded() || (state_.domain.repeats && state_.walls.empty()))
+    return stiffness_of_cell(0.5 * state_.domain.edges().maxCoeff() / state_.cell.length, spread);
   const Whole span(*this);
   return estimate_stiffness(gather_graphs(), *link_);
 }
