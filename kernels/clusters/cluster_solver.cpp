@@ -113,8 +113,9 @@ ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const C
 
 /// By the solvers that keep W, for so much work (DelassusGoal::most_work), and rounds from where they get.
 /// `answer`: so far, in; the best, out.
-void solve_by_matrix(const BodyProblem& problem, double enough, ContactMatrix matrix, double work,
+void solve_by_matrix(const BodyProblem& problem, double enough, double work,
                      const ClusterThresholds& thresholds, ClusterAnswer& answer) {
+  ContactMatrix matrix = matrix_of(problem);
   for (const ClusterThresholds::Turn& turn : thresholds.turns) {
     if (work <= 0) break;
     const DelassusGoal goal{.tolerance = turn.residual,
@@ -148,9 +149,8 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
   }
   answer = answer_of(problem, problem, correction_of(problem, goal.enough, thresholds.correction));
   if (!answer.solved) {
-    ContactMatrix matrix = matrix_of(problem);
-    const double budget =
-        (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) * sweep_cost(matrix.problem);
+    const double budget = (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) *
+                          sweep_cost(blocks_of(problem), problem.contacts.size());
     const auto take = [&](const Correction& correction) {
       ClusterAnswer other = answer_of(problem, problem, correction);
       if (other.solved || other.error < answer.error) answer = std::move(other);
@@ -164,7 +164,7 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
     if (!answer.solved)
       take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
     left += (1 - thresholds.coulomb_share - thresholds.proximal_share) * budget;
-    if (!answer.solved) solve_by_matrix(problem, goal.enough, std::move(matrix), left, thresholds, answer);
+    if (!answer.solved) solve_by_matrix(problem, goal.enough, left, thresholds, answer);
   }
   admit(problem, goal, thresholds, answer);
   return answer;

@@ -44,6 +44,18 @@ std::vector<Vec3> ContactMatrix::impulses() const {
   return in_space;
 }
 
+std::size_t blocks_of(const BodyProblem& problem) {
+  std::vector<std::size_t> touching(problem.bodies.size(), 0);
+  for (const ContactEquation& c : problem.contacts) {
+    ++touching[at(c.first)];
+    if (c.second >= 0) ++touching[at(c.second)];
+  }
+  std::size_t blocks = 0;
+  for (const std::size_t n : touching)
+    if (n > 0) blocks += n * (n - 1);
+  return blocks;
+}
+
 ContactMatrix matrix_of(const BodyProblem& problem) {
   const std::size_t n = problem.contacts.size();
   ContactMatrix matrix;

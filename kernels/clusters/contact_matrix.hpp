@@ -3,6 +3,7 @@
 /// A problem over bodies as one of relative velocities and a stored matrix, u = W r + q
 /// (kernels/delassus/delassus.hpp): for solvers that want W.
 
+#include <cstddef>
 #include <vector>
 
 #include "kernels/delassus/delassus.hpp"
@@ -19,6 +20,10 @@ struct ContactMatrix {
   /// Impulses in space, one per contact [N s].
   std::vector<Vec3> impulses() const;
 };
+
+/// Blocks off the diagonal of its matrix, told without it: pairs of contacts of a body, in both places. Those
+/// of contacts between the same two bodies count twice.
+std::size_t blocks_of(const BodyProblem& problem);
 
 /// Of a whole problem, in one part. Bodies that do not turn have no spin mass.
 ContactMatrix matrix_of(const BodyProblem& problem);

@@ -243,7 +243,7 @@ Correction correction_of(const BodyProblem& problem, double enough, const Correc
     if (apart <= thresholds.most_apart && at_first <= thresholds.exact * enough)
       return unchanged(problem, at_first);
     const double goal = goal_of(now.found, enough, thresholds);
-    now.settled = now.open <= goal && (!friction || (rounds > 1 && now.moved <= goal));
+    now.settled = now.open <= goal && now.left <= enough && (!friction || (rounds > 1 && now.moved <= goal));
     if (now.settled || now.error() < least) {
       least = now.error();
       best = std::move(now);

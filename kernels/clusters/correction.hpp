@@ -49,7 +49,8 @@ struct Correction {
   double at_first = 0;        ///< what the law and the first round find wrong with the impulses [N s]
   double moved = 0;           ///< momentum by which the last round has changed the motion [N s]
   int rounds = 0;
-  bool settled = false;  ///< no contact changed its state any more, but for what is small
+  bool settled = false;  ///< no contact changed its state any more, but for what is small, and rounding
+                         ///< leaves less than need not be known
 
   /// All of it [N s].
   double error() const { return found + uncertain(); }

@@ -1,14 +1,12 @@
 #include "kernels/clusters/coulomb_newton.hpp"
 
-#include <Eigen/OrderingMethods>
-#include <Eigen/SparseCore>
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "kernels/clusters/block_elimination.hpp"
 #include "kernels/clusters/freedoms.hpp"
 #include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
@@ -18,7 +16,6 @@ namespace talus {
 namespace {
 
 using Vector = Eigen::VectorXd;
-using Matrix = Eigen::SparseMatrix<double>;
 
 /// A contact and the columns of H that belong to it: what impulses along x, y and z do to its two bodies.
 struct Columns {
@@ -48,10 +45,7 @@ class CoulombStep {
 
   /// v + b n [m/s].
   Vec3 velocity(std::size_t k, const Vector& d) const {
-    Vec3 change = Vec3::Zero();
-    for (const Columns::OfBody& body : columns_[k].of_body)
-      change += body.H.topRows(body.count).transpose() * d.segment(body.begin, body.count);
-    return velocity_[k] + constrained(problem_.contacts[k], change);
+    return velocity_[k] + constrained(problem_.contacts[k], change(k, d));
   }
   /// r(d), and where asked for P' rho.
   Vec3 impulse(std::size_t k, const Vector& d, double firmness, const std::vector<Vec3>& t,
@@ -88,25 +82,20 @@ class CoulombStep {
   /// Newton's step from d, where the residual is f; its work is taken off. False where there is none.
   bool way(const Vector& d, const Vector& f, double firmness, const std::vector<Vec3>& t, Vector& way,
            double& work) const {
-    std::vector<Eigen::Triplet<double>> entries;
-    for (Eigen::Index k = 0; k < mass_.size(); ++k) entries.emplace_back(k, k, mass_[k]);
+    std::vector<Mat3> slope(columns_.size());
+    std::vector<BlockElimination::Pair> pairs;
     for (std::size_t k = 0; k < columns_.size(); ++k) {
-      Mat3 slope;
-      impulse(k, d, firmness, t, &slope);
-      if (!slope.isZero(0)) add_entries(columns_[k], slope, entries);
+      impulse(k, d, firmness, t, &slope[k]);
+      const ContactEquation& c = problem_.contacts[k];
+      if (c.second >= 0 && !slope[k].isZero(0)) pairs.push_back({c.first, c.second});
     }
-    Matrix A(mass_.size(), mass_.size());
-    A.setFromTriplets(entries.begin(), entries.end());
-    // The pattern is symmetric, and so is the order of elimination that fills it least.
-    Eigen::SparseLU<Matrix, Eigen::AMDOrdering<int>> factor;
-    factor.isSymmetric(true);
-    factor.compute(A);
-    work -= work_of_entry * static_cast<double>(entries.size());
-    if (factor.info() != Eigen::Success) return false;
-    work -= static_cast<double>(factor.nnzL()) * static_cast<double>(factor.nnzU()) /
-            static_cast<double>(mass_.size());
-    way = factor.solve(-f);
-    way += factor.solve(Vector(-f - A * way));
+    BlockElimination system(freedoms_, mass_, pairs);
+    for (std::size_t k = 0; k < columns_.size(); ++k)
+      if (!slope[k].isZero(0)) add_blocks(k, slope[k], system);
+    system.factorise();
+    work -= system.work();
+    way = system.solve(-f);
+    way -= system.solve(f + product(slope, way));
     return way.allFinite();
   }
 
@@ -131,15 +120,31 @@ class CoulombStep {
     tangential_.push_back(c.mu > 0 ? 2 / (W.trace() - W_nn) : 1 / W_nn);
     columns_.push_back(columns);
   }
-  static void add_entries(const Columns& columns, const Mat3& slope,
-                          std::vector<Eigen::Triplet<double>>& entries) {
-    for (const Columns::OfBody& a : columns.of_body)
-      for (const Columns::OfBody& b : columns.of_body) {
-        const Eigen::Matrix<double, 6, 6> block = a.H * slope * b.H.transpose();
-        for (Eigen::Index i = 0; i < a.count; ++i)
-          for (Eigen::Index j = 0; j < b.count; ++j)
-            entries.emplace_back(a.begin + i, b.begin + j, block(i, j));
-      }
+  /// H S H^T of a contact.
+  void add_blocks(std::size_t k, const Mat3& slope, BlockElimination& system) const {
+    const std::array<std::int32_t, 2> bodies{problem_.contacts[k].first, problem_.contacts[k].second};
+    for (std::size_t a = 0; a < 2; ++a)
+      for (std::size_t b = 0; b < 2; ++b)
+        if (bodies[a] >= 0 && bodies[b] >= 0)
+          system.add(bodies[a], bodies[b],
+                     columns_[k].of_body[a].H * slope * columns_[k].of_body[b].H.transpose());
+  }
+  /// M x + sum of H S H^T x.
+  Vector product(const std::vector<Mat3>& slope, const Vector& x) const {
+    Vector y = mass_.cwiseProduct(x);
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      const Vec3 force = slope[k] * change(k, x);
+      for (const Columns::OfBody& body : columns_[k].of_body)
+        y.segment(body.begin, body.count) += body.H.topRows(body.count) * force;
+    }
+    return y;
+  }
+  /// H^T d of a contact.
+  Vec3 change(std::size_t k, const Vector& d) const {
+    Vec3 change = Vec3::Zero();
+    for (const Columns::OfBody& body : columns_[k].of_body)
+      change += body.H.topRows(body.count).transpose() * d.segment(body.begin, body.count);
+    return change;
   }
 
   const BodyProblem& problem_;

@@ -1,7 +1,5 @@
 #include "kernels/clusters/firm_contacts.hpp"
 
-#include <limits>
-
 #include "kernels/global/stiffness.hpp"
 
 namespace talus {
@@ -11,59 +9,76 @@ namespace {
 /// Each takes off what rounding has left, a millionth part of the step or less.
 constexpr int refinements = 2;
 
-}  // namespace
-
-FirmContacts::FirmContacts(const BodyProblem& problem, double firmness)
-    : problem_(problem), freedoms_(problem) {
+/// Of each contact, along its normal, with friction in all directions.
+std::vector<ContactSpring> springs_of(const BodyProblem& problem, double firmness) {
   std::vector<ContactSpring> springs;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
-    rho_.push_back(firmness * effective_mass(problem, c));
+    const double rho = firmness * effective_mass(problem, c);
     for (int axis = 0; axis < (c.mu > 0 ? 3 : 1); ++axis)
-      springs.push_back({k, c.mu > 0 ? Vec3(Vec3::Unit(axis)) : c.normal, rho_.back()});
+      springs.push_back({k, c.mu > 0 ? Vec3(Vec3::Unit(axis)) : c.normal, rho});
   }
-  factorise(springs);
+  return springs;
+}
+
+}  // namespace
+
+FirmContacts::FirmContacts(const BodyProblem& problem, double firmness)
+    : FirmContacts(problem, springs_of(problem, firmness)) {
+  for (const ContactEquation& c : problem.contacts) rho_.push_back(firmness * effective_mass(problem, c));
 }
 
 FirmContacts::FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs)
-    : problem_(problem), freedoms_(problem) {
-  factorise(springs);
+    : freedoms_(problem),
+      masses_(freedoms_.masses()),
+      columns_(columns_of(problem, freedoms_, springs)),
+      system_(freedoms_, masses_, pairs_of(columns_)) {
+  for (const Column& column : columns_)
+    for (std::size_t a = 0; a < 2; ++a)
+      for (std::size_t b = 0; b < 2; ++b)
+        if (column.body[a] >= 0 && column.body[b] >= 0)
+          system_.add(column.body[a], column.body[b],
+                      column.stiffness * column.of_body[a].value * column.of_body[b].value.transpose());
+  system_.factorise();
 }
 
-void FirmContacts::factorise(std::span<const ContactSpring> springs) {
-  std::vector<Eigen::Triplet<double>> entries;
-  const Eigen::VectorXd masses = freedoms_.masses();
-  for (Eigen::Index k = 0; k < masses.size(); ++k) entries.emplace_back(k, k, masses[k]);
+std::vector<FirmContacts::Column> FirmContacts::columns_of(const BodyProblem& problem,
+                                                           const Freedoms& freedoms,
+                                                           std::span<const ContactSpring> springs) {
+  std::vector<Column> columns;
   for (const ContactSpring& spring : springs) {
-    const auto column = freedoms_.column(problem_.contacts[spring.contact], spring.direction);
-    for (const Freedoms::Part& a : column)
-      for (const Freedoms::Part& b : column)
-        for (Eigen::Index k = 0; k < a.count; ++k)
-          for (Eigen::Index l = 0; l < b.count; ++l)
-            entries.emplace_back(a.begin + k, b.begin + l, spring.stiffness * a.value[k] * b.value[l]);
+    const ContactEquation& c = problem.contacts[spring.contact];
+    columns.push_back({{c.first, c.second}, freedoms.column(c, spring.direction), spring.stiffness});
   }
-  matrix_.resize(masses.size(), masses.size());
-  matrix_.setFromTriplets(entries.begin(), entries.end());
-  factor_.compute(matrix_);
-  work_ = work_of_entry * static_cast<double>(entries.size());
-  if (factor_.info() != Eigen::Success) return;
-  const auto& L = factor_.matrixL().nestedExpression();
-  for (Eigen::Index k = 0; k < L.outerSize(); ++k) {
-    const auto rows = static_cast<double>(L.outerIndexPtr()[k + 1] - L.outerIndexPtr()[k]);
-    work_ += rows * rows;
+  return columns;
+}
+
+std::vector<BlockElimination::Pair> FirmContacts::pairs_of(std::span<const Column> columns) {
+  std::vector<BlockElimination::Pair> pairs;
+  for (const Column& column : columns)
+    if (column.body[1] >= 0) pairs.push_back(column.body);
+  return pairs;
+}
+
+/// A x.
+Eigen::VectorXd FirmContacts::product(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd y = masses_.cwiseProduct(x);
+  for (const Column& column : columns_) {
+    double stretch = 0;
+    for (const Freedoms::Part& part : column.of_body)
+      stretch += part.value.head(part.count).dot(x.segment(part.begin, part.count));
+    for (const Freedoms::Part& part : column.of_body)
+      y.segment(part.begin, part.count) += column.stiffness * stretch * part.value.head(part.count);
   }
+  return y;
 }
 
 FirmContacts::Solution FirmContacts::solve(std::span<const Twist> force) const {
   const Eigen::VectorXd f = freedoms_.of(force);
-  Eigen::VectorXd x = Eigen::VectorXd::Constant(f.size(), std::numeric_limits<double>::quiet_NaN());
-  Eigen::VectorXd last = x;
-  if (factor_.info() == Eigen::Success) {
-    x = factor_.solve(f);
-    for (int k = 0; k < refinements; ++k) {
-      last = factor_.solve(f - matrix_ * x);
-      x += last;
-    }
+  Eigen::VectorXd x = system_.solve(f), last = Eigen::VectorXd::Zero(x.size());
+  for (int k = 0; k < refinements; ++k) {
+    last = system_.solve(f - product(x));
+    x += last;
   }
   return {freedoms_.twists(x), freedoms_.twists(last)};
 }

@@ -2,11 +2,12 @@
 
 /// The linear system of a cluster whose contacts are springs, so firm that next to nothing gives way.
 
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
+#include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
+#include "kernels/clusters/block_elimination.hpp"
 #include "kernels/clusters/freedoms.hpp"
 #include "kernels/global/body_problem.hpp"
 
@@ -24,32 +25,43 @@ struct ContactSpring {
 class FirmContacts {
  public:
   /// Each contact with the stiffness rho of `firmness` effective masses: along its normal, with mu > 0 in all
-  /// directions. Costs a sparse Cholesky factorisation.
+  /// directions. Costs an elimination.
   FirmContacts(const BodyProblem& problem, double firmness);
   /// With these springs. The same cost.
   FirmContacts(const BodyProblem& problem, std::span<const ContactSpring> springs);
 
+  // The elimination knows the freedoms by their place.
+  FirmContacts(const FirmContacts&) = delete;
+  FirmContacts& operator=(const FirmContacts&) = delete;
+
   double rho(std::size_t contact) const { return rho_[contact]; }  ///< [kg], of the first kind
 
-  /// Multiplications that it has taken, about: of the factor, and of what it is put together from.
-  double work() const { return work_; }
+  double work() const { return system_.work(); }  ///< multiplications of the elimination
 
   struct Solution {
     std::vector<Twist> motion;  ///< per unknown [m/s]
     std::vector<Twist> last;    ///< by which the last refinement has changed it: about its error
   };
-  /// A motion = force [N s], refined against rounding. NaN where A cannot be factorised.
+  /// A motion = force [N s], refined against rounding. Not finite where A cannot be factorised.
   Solution solve(std::span<const Twist> force) const;
 
  private:
-  void factorise(std::span<const ContactSpring> springs);
+  /// What a spring does to the bodies of its contact.
+  struct Column {
+    std::array<std::int32_t, 2> body;  ///< the second -1 at a driven wall
+    std::array<Freedoms::Part, 2> of_body;
+    double stiffness;
+  };
+  static std::vector<Column> columns_of(const BodyProblem& problem, const Freedoms& freedoms,
+                                        std::span<const ContactSpring> springs);
+  static std::vector<BlockElimination::Pair> pairs_of(std::span<const Column> columns);
+  Eigen::VectorXd product(const Eigen::VectorXd& x) const;
 
-  const BodyProblem& problem_;
   Freedoms freedoms_;
+  Eigen::VectorXd masses_;  ///< per freedom [kg]
   std::vector<double> rho_;
-  Eigen::SparseMatrix<double> matrix_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor_;
-  double work_ = 0;
+  std::vector<Column> columns_;
+  BlockElimination system_;
 };
 
 }  // namespace talus

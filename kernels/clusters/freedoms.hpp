@@ -11,16 +11,13 @@
 
 namespace talus {
 
-/// Multiplications that take as long as it takes to put an entry of a matrix over freedoms into its place and
-/// to order it.
-inline constexpr double work_of_entry = 30;
-
 /// Freedoms of the unknowns of a problem, one after the other. The problem must outlive this.
 class Freedoms {
  public:
   explicit Freedoms(const BodyProblem& problem);
 
   Eigen::Index size() const { return begin_.back(); }  ///< of all
+  std::size_t bodies() const { return begin_.size() - 1; }
   Eigen::Index begin(std::size_t body) const { return begin_[body]; }
   Eigen::Index count(std::size_t body) const { return begin_[body + 1] - begin_[body]; }
 

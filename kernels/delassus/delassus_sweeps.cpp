@@ -165,8 +165,12 @@ DelassusReport solve_nncg(const DelassusProblem& problem, const DelassusGoal& go
   return answer.hand_back();
 }
 
+double sweep_cost(std::size_t blocks, std::size_t contacts) {
+  return 9.0 * static_cast<double>(blocks) + 150.0 * static_cast<double>(contacts);
+}
+
 double sweep_cost(const DelassusProblem& problem) {
-  return 9.0 * static_cast<double>(problem.column.size()) + 150.0 * static_cast<double>(problem.contacts());
+  return sweep_cost(problem.column.size(), problem.contacts());
 }
 
 double check_cost(const DelassusProblem& problem) {

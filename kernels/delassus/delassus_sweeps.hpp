@@ -2,6 +2,7 @@
 
 /// Solvers of contact problems given by W that go from contact to contact (kernels/delassus/delassus.hpp).
 
+#include <cstddef>
 #include <span>
 
 #include "kernels/delassus/delassus.hpp"
@@ -85,7 +86,9 @@ class SweepsOnTheWay {
   double limit_ = 1, t_ = 1, last_step_;  ///< of momentum; last squared step, weighted with D_c
 };
 
-/// What a sweep costs, and the check of an error, in multiplications.
+/// What a sweep costs, and the check of an error, in multiplications; of a problem of so many contacts and
+/// blocks off the diagonal.
+double sweep_cost(std::size_t blocks, std::size_t contacts);
 double sweep_cost(const DelassusProblem& problem);
 double check_cost(const DelassusProblem& problem);
 
