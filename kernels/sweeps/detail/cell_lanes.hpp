@@ -117,7 +117,7 @@ struct WholeCell {
       most = cell.inv_mass[k] > most ? cell.inv_mass[k] : most;
     }
     const V of = load<V>(c.reach + at, 0, only);
-    m.du = m.du + cell_velocity(u, of * load_normal<V>(slice(c, at), 0, only));
+    m.du = m.du + cell_velocity(u, of * load_normal<V>({c, at}, 0, only));
     m.w_nn = fused(of * of, V{} + most, m.w_nn);
   }
 };

@@ -82,13 +82,13 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
 [[gnu::always_inline]] inline void error_block(std::size_t at, Only only, const Grains& a, const Grains& b,
                                                const Rule& rule, ErrorLanes<Lanes<W>>& sums) {
   using V = Lanes<W>;
-  const Slice<double> c = slice(rule.contacts, at);
+  const Slice<double> c{rule.contacts, at};
   const WholeView& of = rule.whole;
   const Space<V> n = load_normal<V>(c, 0, only);
   Meeting<V> m = gather<Friction, !AtWall>(a, b, V{});
   if (of.parts) {
-    m.w_nn = whole<V>(a, c.first, lanes_of<W>(only), of.parts);
-    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.second, lanes_of<W>(only), of.parts);
+    m.w_nn = whole<V>(a, c.of.first + c.k, lanes_of<W>(only), of.parts);
+    if constexpr (!AtWall) m.w_nn = m.w_nn + whole<V>(b, c.of.second + c.k, lanes_of<W>(only), of.parts);
   }
   if constexpr (AtWall) {
     Space<V> wall{V{} + of.wall[0], V{} + of.wall[1], V{} + of.wall[2]};
@@ -103,14 +103,16 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
   }
   rule.cell.take(rule.contacts, at, only, m);
   // Not approach_of, which needs w_tt and therefore gathers the spins: errors need neither.
-  const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.bias, 0, only), m.w_nn, V{}};
+  const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.of.bias + c.k, 0, only), m.w_nn,
+                            V{}};
   if constexpr (Friction)
     add_error(
         error_of_law(load_impulse<true, V>(c, 0, only, n), contact, rule.friction.template of<V>(c, 0, only)),
         sums);
   else
-    add_error(error_of_law(load<V>(c.rn, 0, only), fused_dot(contact.v, n) + contact.bias, contact.w_nn),
-              sums);
+    add_error(
+        error_of_law(load<V>(c.of.rn + c.k, 0, only), fused_dot(contact.v, n) + contact.bias, contact.w_nn),
+        sums);
 }
 
 template <bool Friction, bool AtWall, int W, class Mu, class Cell = NoCell>

@@ -20,37 +20,29 @@
 namespace talus {
 namespace {
 
-/// Contacts that a kernel works on at once: W x blocks of them, from `k` on.
+/// Contacts that a kernel works on at once: W x blocks of them, from place `k` of the columns on. The columns
+/// stay as they are, as those that a scene does not need are null.
 template <class Number>
 struct Slice {
-  const Number *nx, *ny, *nz, *bias, *rx, *ry, *rz, *rn, *mu;
-  const std::uint32_t *first, *second;
+  ContactViewOf<Number> of;
+  std::size_t k;
 };
 
 /// Where their impulses are written.
 template <class Number>
 struct Target {
-  Number *x, *y, *z, *n;
+  ImpulseViewOf<Number> of;
+  std::size_t k;
 };
-
-template <class Number>
-[[gnu::always_inline]] inline Slice<Number> slice(const ContactViewOf<Number>& c, std::size_t k) {
-  return {c.nx + k, c.ny + k, c.nz + k, c.bias + k,  c.rx + k,    c.ry + k,
-          c.rz + k, c.rn + k, c.mu + k, c.first + k, c.second + k};
-}
-
-template <class Number>
-[[gnu::always_inline]] inline Target<Number> target(const ImpulseViewOf<Number>& r, std::size_t k) {
-  return {r.x + k, r.y + k, r.z + k, r.n + k};
-}
 
 template <bool Friction, class V, class Only>
 [[gnu::always_inline]] inline Space<V> load_impulse(const Slice<NumberOf<V>>& c, std::size_t at, Only only,
                                                     const Space<V>& n) {
   if constexpr (Friction)
-    return {load<V>(c.rx, at, only), load<V>(c.ry, at, only), load<V>(c.rz, at, only)};
+    return {load<V>(c.of.rx + c.k, at, only), load<V>(c.of.ry + c.k, at, only),
+            load<V>(c.of.rz + c.k, at, only)};
   else
-    return load<V>(c.rn, at, only) * n;
+    return load<V>(c.of.rn + c.k, at, only) * n;
 }
 
 template <bool Friction, class V>
@@ -71,7 +63,7 @@ struct OwnFriction {
   [[gnu::always_inline]] explicit OwnFriction(double) {}
   template <class V, class Only>
   [[gnu::always_inline]] V of(const Slice<NumberOf<V>>& c, std::size_t at, Only only) const {
-    return load<V>(c.mu, at, only);
+    return load<V>(c.of.mu + c.k, at, only);
   }
 };
 
@@ -95,33 +87,36 @@ struct PlainStart {
 struct MomentumStart {
   float *x, *y, *z, *n;
   double beta, omega;
-  [[gnu::always_inline]] MomentumStart from(std::size_t k) const {
-    return {x + k, y + k, z + k, n + k, beta, omega};
+  std::size_t k = 0;
+  [[gnu::always_inline]] MomentumStart from(std::size_t place) const {
+    return {x, y, z, n, beta, omega, place};
   }
   template <class V, class Only>
   [[gnu::always_inline]] Space<V> begin(const Space<V>& s, std::size_t at, Only only) const {
     return add_scaled(V{} + static_cast<NumberOf<V>>(beta),
-                      Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)}, s);
+                      Space<V>{load<V>(x + k, at, only), load<V>(y + k, at, only), load<V>(z + k, at, only)},
+                      s);
   }
   template <class V, class Only>
   [[gnu::always_inline]] V begin(V s, std::size_t at, Only only) const {
-    return fused(V{} + static_cast<NumberOf<V>>(beta), load<V>(n, at, only), s);
+    return fused(V{} + static_cast<NumberOf<V>>(beta), load<V>(n + k, at, only), s);
   }
   template <class V, class Only>
   [[gnu::always_inline]] void end(const Space<V>& s, const Space<V>& s_new, std::size_t at, Only only) const {
-    store(x, at, s_new.x - s.x, only);
-    store(y, at, s_new.y - s.y, only);
-    store(z, at, s_new.z - s.z, only);
+    store(x + k, at, s_new.x - s.x, only);
+    store(y + k, at, s_new.y - s.y, only);
+    store(z + k, at, s_new.z - s.z, only);
   }
   template <class V, class Only>
   [[gnu::always_inline]] void end(V s, V s_new, std::size_t at, Only only) const {
-    store(n, at, s_new - s, only);
+    store(n + k, at, s_new - s, only);
   }
 };
 
 template <class V, class Only>
 [[gnu::always_inline]] inline Space<V> load_normal(const Slice<NumberOf<V>>& c, std::size_t at, Only only) {
-  return {load<V>(c.nx, at, only), load<V>(c.ny, at, only), load<V>(c.nz, at, only)};
+  return {load<V>(c.of.nx + c.k, at, only), load<V>(c.of.ny + c.k, at, only),
+          load<V>(c.of.nz + c.k, at, only)};
 }
 
 /// Without drift, velocities of bodies are those of their records.
@@ -165,7 +160,7 @@ template <bool Friction, class V, class Only>
   const Space<V> n = load_normal<V>(c, at, only);
   V w_tt{};
   if constexpr (Friction) w_tt = m.w_nn + m.spin;
-  return {n, relative_velocity<Friction>(m, n), load<V>(c.bias, at, only), m.w_nn, w_tt};
+  return {n, relative_velocity<Friction>(m, n), load<V>(c.of.bias + c.k, at, only), m.w_nn, w_tt};
 }
 
 /// Solves the law of the contacts from `at` on: stores the new impulse and returns it less the one that the
@@ -179,15 +174,15 @@ template <bool Friction, class V, class Rule, class Only>
   if constexpr (Friction) {
     const Space<V> s = load_impulse<true, V>(c, at, only, contact.n), r = rule.start.begin(s, at, only);
     const Space<V> r_new = solve_law(r, contact, rule.friction.template of<V>(c, at, only), omega);
-    store(out.x, at, r_new.x, only);
-    store(out.y, at, r_new.y, only);
-    store(out.z, at, r_new.z, only);
+    store(out.of.x + out.k, at, r_new.x, only);
+    store(out.of.y + out.k, at, r_new.y, only);
+    store(out.of.z + out.k, at, r_new.z, only);
     rule.start.end(s, r_new, at, only);
     return r_new - r;
   } else {
-    const V s = load<V>(c.rn, at, only), r_n = rule.start.begin(s, at, only);
+    const V s = load<V>(c.of.rn + c.k, at, only), r_n = rule.start.begin(s, at, only);
     const V r_n_new = solve_normal(r_n, fused_dot(contact.v, contact.n) + contact.bias, contact.w_nn, omega);
-    store(out.n, at, r_n_new, only);
+    store(out.of.n + out.k, at, r_n_new, only);
     rule.start.end(s, r_n_new, at, only);
     return (r_n_new - r_n) * contact.n;
   }
@@ -237,7 +232,7 @@ template <bool Friction, class V, int Blocks, class Rule, class Number>
   const auto [k, count] = run;
   const FewRecords<Number, room> a(first_of(c, k, bodies), count, spare),
       b(second_of(c, k, bodies), count, spare);
-  sweep_block<Friction, V, Blocks>(slice(c, k), target(r, k), a, b, rule.from(k), FirstLanes{count});
+  sweep_block<Friction, V, Blocks>({c, k}, {r, k}, a, b, rule.from(k), FirstLanes{count});
 }
 
 template <bool Friction, class V, class Rule, class Number>
@@ -254,7 +249,7 @@ template <bool Friction, class V, class Rule, class Number>
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
     for (; k + at_once <= end; k += at_once)
-      sweep_block<Friction, V, blocks_at_once>(slice(c, k), target(r, k), first_of(c, k, bodies),
+      sweep_block<Friction, V, blocks_at_once>({c, k}, {r, k}, first_of(c, k, bodies),
                                                second_of(c, k, bodies), rule.from(k), AllLanes{});
     if (k + W < end)
       sweep_rest<Friction, V, blocks_at_once>(c, r, {k, end - k}, bodies, spare, rule);
@@ -319,12 +314,12 @@ void accumulate_grains(const ContactView& view, double* bodies) {
     const std::size_t end = k + *group;
     prefetch_group(c, k, bodies);
     for (; k + W <= end; k += W)
-      accumulate_block<Friction, true, W>(slice(c, k), first_of(c, k, bodies), second_of(c, k, bodies),
+      accumulate_block<Friction, true, W>({c, k}, first_of(c, k, bodies), second_of(c, k, bodies),
                                           AllLanes{});
     if (k == end) continue;
     const FewRecords<double, W> a(first_of(c, k, bodies), end - k, spare),
         b(second_of(c, k, bodies), end - k, spare);
-    accumulate_block<Friction, true, W>(slice(c, k), a, b, FirstLanes{end - k});
+    accumulate_block<Friction, true, W>({c, k}, a, b, FirstLanes{end - k});
     k = end;
   }
 }

@@ -93,12 +93,12 @@ template <bool Friction, class V, class Rule, class Number>
   SplitWall<V> split(wall, c.end - c.begin);
   std::size_t k = c.begin, part = 0;
   for (; k + W <= c.end; k += W, part = (part + 1) % (wall_lanes / W))
-    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), first_of(c, k, bodies), rule.from(k), AllLanes{},
+    sweep_wall_block<Friction, V>({c, k}, {r, k}, first_of(c, k, bodies), rule.from(k), AllLanes{},
                                   {split, part, c, k});
   if (k < c.end) {
     SpareGrains<V> spare;
     const FewRecords<Number, W> a(first_of(c, k, bodies), c.end - k, spare);
-    sweep_wall_block<Friction, V>(slice(c, k), target(r, k), a, rule.from(k), FirstLanes{c.end - k},
+    sweep_wall_block<Friction, V>({c, k}, {r, k}, a, rule.from(k), FirstLanes{c.end - k},
                                   {split, part, c, k});
   }
   split.glue(wall);
@@ -133,11 +133,11 @@ void accumulate_wall(const ContactView& view, double* bodies, const WallView& wa
   };
   std::size_t k = c.begin, lanes = 0;
   for (; k + W <= c.end; k += W, lanes = (lanes + 1) % (wall_lanes / W))
-    add(slice(c, k), first_of(c, k, bodies), lanes, AllLanes{});
+    add(Slice<double>{c, k}, first_of(c, k, bodies), lanes, AllLanes{});
   if (k < c.end) {
     SpareGrains<Lanes<W>> spare;
     const FewRecords<double, W> a(first_of(c, k, bodies), c.end - k, spare);
-    add(slice(c, k), a, lanes, FirstLanes{c.end - k});
+    add(Slice<double>{c, k}, a, lanes, FirstLanes{c.end - k});
   }
   split.glue(wall);
 }
