@@ -82,10 +82,14 @@ class Canvas {
            const double rest = 1 - dx * dx - dy * dy;
            if (rest < 0) return;
            const Vec3 normal(dx, dy, std::sqrt(rest));
+           const double depth = at.z() + radius * normal.z();
+           if (hidden(x, y, depth)) return;  // most samples are: grains lie behind one another
            const double bright = std::max(0.0, normal.dot(light));
            const double rim = std::min(1.0, 0.55 + normal.z());  // the edge of a grain is darker
-           const double shine = 0.18 * std::pow(std::max(0.0, 2 * bright * normal.z() - light.z()), 24);
-           put(x, y, at.z() + radius * normal.z(), shaded(colour, (0.42 + 0.6 * bright) * rim, shine));
+           const double mirror = std::max(0.0, 2 * bright * normal.z() - light.z()),
+                        third = mirror * mirror * mirror;
+           const double twelfth = third * third * third * third, shine = 0.18 * twelfth * twelfth;
+           put(x, y, depth, shaded(colour, (0.42 + 0.6 * bright) * rim, shine));
          });
   }
 
@@ -169,11 +173,13 @@ class Canvas {
     for (std::size_t y = y0; y < y1; ++y)
       for (std::size_t x = x0; x < x1; ++x) visit(x, y);
   }
+  bool hidden(std::size_t x, std::size_t y, double depth) const {
+    return static_cast<float>(depth) <= depth_[y * width_ + x];
+  }
   void put(std::size_t x, std::size_t y, double depth, const Colour& colour) {
+    if (hidden(x, y, depth)) return;
     const std::size_t k = y * width_ + x;
-    const auto height = static_cast<float>(depth);
-    if (height <= depth_[k]) return;
-    depth_[k] = height;
+    depth_[k] = static_cast<float>(depth);
     for (std::size_t c = 0; c < 3; ++c) colour_[k][c] = static_cast<float>(colour[c]);
   }
   /// Mean over 2 radius + 1 neighbours along lines of `length` values, `step` apart; `lines` of them.
