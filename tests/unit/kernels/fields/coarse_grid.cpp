@@ -38,7 +38,8 @@ TEST(Lucy, ItsMeanAlongAWayIsThatOfItsPoints) {
                           {{-0.1, 0.01, 0}, {0.1, 0.012, 0.001}},  // right through, far beyond
                           {{0.015, 0.015, 0}, {0.02, 0.01, 0.01}},
                           {{0.1, 0, 0}, {0.1, 0.1, 0}}};  // past it
-  for (const auto& [a, b] : ends) {
+  for (const auto& way : ends) {
+    const Vec3 &a = way[0], &b = way[1];
     const double mean = integral(1, 200000, [&](double s) { return lucy.at(a + s * (b - a)); });
     EXPECT_NEAR(lucy.along(a, b), mean, 1e-7 * lucy.at(Vec3::Zero())) << a.transpose();
     EXPECT_NEAR(lucy.along(b, a), mean, 1e-7 * lucy.at(Vec3::Zero())) << a.transpose();
