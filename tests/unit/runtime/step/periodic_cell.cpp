@@ -59,6 +59,7 @@ struct Outcome {
   std::int64_t contacts = 0, migrants = 0;
   std::uint64_t digest = 0;
   bool converged = true;
+  Domain domain;  ///< at the end
 };
 Outcome simulate(const talus::Setup& setup, Sample sample,
                  const graph::Communicator& ranks = graph::one_rank(), int threads = 1) {
@@ -72,6 +73,7 @@ Outcome simulate(const talus::Setup& setup, Sample sample,
     outcome.converged = outcome.converged && report.converged;
   }
   outcome.digest = simulation.digest();
+  outcome.domain = simulation.state().domain;
   const Bodies& bodies = simulation.state().bodies;
   for (std::size_t s = 0; s < bodies.size(); ++s)
     outcome.grains.insert({bodies.id[s], {bodies.x[s], bodies.velocity[s]}});
@@ -326,7 +328,8 @@ TEST(PeriodicRun, EverySubdomainCountFindsTheSameMotionUnderAStress) {
     const Outcome other = simulate(setup, flying());
     EXPECT_EQ(other.contacts, one.contacts) << subdomains;
     for (const auto& [id, grain] : one.grains)
-      EXPECT_LT(setup.domain.separation(other.grains.at(id).first, grain.first).norm(), 1e-5 * radius);
+      // The cell has changed: across faces of its first edges a grain in one place would be in two.
+      EXPECT_LT(one.domain.separation(other.grains.at(id).first, grain.first).norm(), 1e-5 * radius);
   }
 }
 
