@@ -51,12 +51,24 @@ LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impuls
   return defect;
 }
 
+/// What the contacts do to the bodies: sum m |V(r) - V_free| [N s].
+double exchanged(const BodyProblem& problem) {
+  std::vector<Twist> change = velocities_of(problem, problem.impulse);
+  for (std::size_t b = 0; b < change.size(); ++b) {
+    change[b].u -= problem.bodies[b].free.u;
+    change[b].w -= problem.bodies[b].free.w;
+  }
+  return momentum_of(problem, change);
+}
+
 /// Redundant contacts share forces by gaps that differ by no more than rounding, and by less than what the
 /// step before was certified to: an answer that shares them otherwise is none that is better. So impulses
-/// stay that meet the law themselves and give the velocities of the answer (ClusterThresholds::same_law).
-bool as_good(const ClusterAnswer& answer, const LawDefect& defect, const ClusterGoal& goal,
-             const ClusterThresholds& thresholds) {
-  return answer.solved && answer.error <= thresholds.same_velocities * goal.enough &&
+/// stay that meet the law themselves and give the velocities of the answer (ClusterThresholds::same_law),
+/// also by the scale of what contacts do, beside which walls may press much harder.
+bool as_good(const BodyProblem& problem, const ClusterAnswer& answer, const LawDefect& defect,
+             const ClusterGoal& goal, const ClusterThresholds& thresholds) {
+  const double apart = std::min(goal.enough, goal.relative * exchanged(problem));
+  return answer.solved && answer.error <= thresholds.same_velocities * apart &&
          defect.worst <= thresholds.same_law * goal.relative * defect.largest;
 }
 
@@ -70,7 +82,7 @@ bool has_friction(const BodyProblem& problem) {
 void admit(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThresholds& thresholds,
            ClusterAnswer& answer) {
   const LawDefect then = law_defect(problem, problem.impulse);
-  if (as_good(answer, then, goal, thresholds)) {
+  if (as_good(problem, answer, then, goal, thresholds)) {
     answer.impulse.assign(problem.contacts.size(), Vec3::Zero());
     answer.found = answer.impulse;
     return;
