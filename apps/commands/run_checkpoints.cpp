@@ -63,6 +63,7 @@ void each_number_of(Memory& memory, const Visit& visit) {
 std::string text_of(const RunMemory& memory) {
   const io::NumberWriter write;
   each_number_of(memory, write);
+  write("jammed", memory.tally.jammed);
   const BodyPair deepest = memory.tally.deepest.overlapping.value_or(BodyPair{});
   write("deepest_pair", std::vector<std::int64_t>{deepest.body, deepest.with});
   const BodyPair& furthest = memory.tally.furthest.worst.contact;
@@ -82,6 +83,7 @@ RunMemory read_memory(const std::string& text, const std::string& file) {
   const io::NumberReader read(text, file);
   RunMemory memory;
   each_number_of(memory, read);
+  if (read.has("jammed")) read("jammed", memory.tally.jammed);  // checkpoints before 26 November 2026 lack it
   std::vector<std::int64_t> deepest, furthest, bytes;
   std::vector<std::string> files;
   read("deepest_pair", deepest);

@@ -22,6 +22,7 @@ void Tally::add(const Simulation& simulation) {
     ++stagnated;
     floor = std::max(floor, report.error_rms);
   }
+  if (simulation.iterations().jammed) ++jammed;
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
   worst_penetration = larger(worst_penetration, report.penetration_max);
@@ -167,6 +168,12 @@ void print_notes(const Terminal& terminal, const Simulation& simulation, const T
         "more sweeps do not help, so they ended there. Raise solver.tolerance above it, reduce "
         "time_step, or try another solver.method",
         tally.stagnated, tally.floor);
+  if (tally.jammed > 0)
+    terminal.warn(
+        "warning: in {} walls close on grains that cannot get away: no velocities keep all contacts from "
+        "approaching, so these steps have no solution and ended early. Push walls with a force instead of "
+        "driving them, slow them down, or remove what overlaps there",
+        counted(static_cast<std::size_t>(tally.jammed), "step"));
 }
 
 void print_end(const Terminal& terminal, const io::Summary& summary, const SolverSettings& solver,

@@ -51,6 +51,8 @@ class NumberReader {
   /// `file` is named in errors: FileError for a name that is missing and a value that is no number.
   NumberReader(std::string_view text, std::string file);
 
+  bool has(const char* name) const { return words_.count(name) > 0; }
+
   template <class T>
   void operator()(const char* name, T& value) const {
     const std::vector<std::string>& words = words_of(name);

@@ -147,6 +147,29 @@ void solve_by_matrix(const BodyProblem& problem, double enough, double work,
   }
 }
 
+/// What follows where rounds have not settled. `answer`: theirs, in; the best, out.
+void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterThresholds& thresholds,
+            ClusterAnswer& answer) {
+  const double budget = (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) *
+                        sweep_cost(blocks_of(problem), problem.contacts.size());
+  const auto take = [&](const Correction& correction) {
+    ClusterAnswer other = answer_of(problem, problem, correction);
+    if (other.solved || other.error < answer.error) answer = std::move(other);
+  };
+  double left = thresholds.admissible_share * budget;
+  answer.jammed = none_admissible(problem, thresholds.admissible, left);
+  if (answer.jammed) return;
+  if (has_friction(problem)) {
+    left += thresholds.coulomb_share * budget;
+    take(coulomb_correction(problem, goal.enough, thresholds.correction, thresholds.coulomb, left));
+  }
+  left += thresholds.proximal_share * budget;
+  if (!answer.solved)
+    take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
+  left += (1 - thresholds.admissible_share - thresholds.coulomb_share - thresholds.proximal_share) * budget;
+  if (!answer.solved) solve_by_matrix(problem, goal.enough, left, thresholds, answer);
+}
+
 }  // namespace
 
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
@@ -160,24 +183,7 @@ ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
     return answer;
   }
   answer = answer_of(problem, problem, correction_of(problem, goal.enough, thresholds.correction));
-  if (!answer.solved) {
-    const double budget = (thresholds.least_budget + thresholds.budget_per_sweep * goal.sweeps) *
-                          sweep_cost(blocks_of(problem), problem.contacts.size());
-    const auto take = [&](const Correction& correction) {
-      ClusterAnswer other = answer_of(problem, problem, correction);
-      if (other.solved || other.error < answer.error) answer = std::move(other);
-    };
-    double left = 0;
-    if (has_friction(problem)) {
-      left = thresholds.coulomb_share * budget;
-      take(coulomb_correction(problem, goal.enough, thresholds.correction, thresholds.coulomb, left));
-    }
-    left += thresholds.proximal_share * budget;
-    if (!answer.solved)
-      take(proximal_correction(problem, goal.enough, thresholds.correction, thresholds.proximal, left));
-    left += (1 - thresholds.coulomb_share - thresholds.proximal_share) * budget;
-    if (!answer.solved) solve_by_matrix(problem, goal.enough, left, thresholds, answer);
-  }
+  if (!answer.solved) search(problem, goal, thresholds, answer);
   admit(problem, goal, thresholds, answer);
   return answer;
 }

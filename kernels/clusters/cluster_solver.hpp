@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "kernels/clusters/admissible.hpp"
 #include "kernels/clusters/correction.hpp"
 #include "kernels/clusters/coulomb_newton.hpp"
 #include "kernels/clusters/proximal_newton.hpp"
@@ -17,15 +18,16 @@ namespace talus {
 /// Every number that an answer depends on. Ratios have no unit.
 struct ClusterThresholds {
   CorrectionThresholds correction;
+  AdmissibleThresholds admissible;
   CoulombThresholds coulomb;
   ProximalThresholds proximal;
   /// Budget of an answer that rounds do not find, in multiplications, those of sweeps over the cluster's
   /// stored matrix (sweep_cost): so many, >= 0, and so many for each sweep that the step has had, >= 0.
   /// Beyond it the cluster is left without an answer.
   double least_budget = 20000, budget_per_sweep = 10;
-  /// Parts of it that the steps of coulomb_newton.hpp and proximal_newton.hpp may take, together in (0, 1);
-  /// the latter has also what the former leaves.
-  double coulomb_share = 0.5, proximal_share = 0.4;
+  /// Parts of it that the question whether there is an answer, and the steps of coulomb_newton.hpp and
+  /// proximal_newton.hpp may take, together in (0, 1); each has also what those before it leave.
+  double admissible_share = 0.05, coulomb_share = 0.5, proximal_share = 0.4;
   /// Impulses are kept as they are, however far the answer that was found is from them, where they give its
   /// velocities to this part of what need not be told apart, in (0, 1), and no contact is further from its
   /// law than by `same_law` of it, over the largest impulse, in (0, 1): they are an answer to gaps that
@@ -49,6 +51,7 @@ struct ClusterAnswer {
   double error = 0;           ///< momentum of the motion, and what is not known of it [N s]
   bool solved = false;        ///< impulses and velocities satisfy the law but for what is small
   bool helps = false;         ///< with the change they are nearer to it than before
+  bool jammed = false;        ///< there is none: none_admissible
 };
 
 /// What is asked of an answer.
@@ -58,11 +61,12 @@ struct ClusterGoal {
   int sweeps = 0;       ///< that the step has had: its budget (ClusterThresholds) grows with them
 };
 
-/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, proximal steps,
-/// with friction first those of coulomb_newton.hpp, then proximal_newton.hpp; and where these do not either,
-/// with what is left of the budget the solvers that keep W (kernels/delassus/delassus_auto.hpp) from the
-/// impulses that it has, and rounds again from there. All by counted work, so the same bits come out every
-/// time. The changed impulses lie on the cones. Values that are not finite come back as an error that is not.
+/// Rounds of Newton's method over the bodies (correction.hpp). Where these do not settle, and there may be an
+/// answer (admissible.hpp), proximal steps, with friction first those of coulomb_newton.hpp, then
+/// proximal_newton.hpp; and where these do not either, with what is left of the budget the solvers that keep
+/// W (kernels/delassus/delassus_auto.hpp) from the impulses that it has, and rounds again from there. All by
+/// counted work, so the same bits come out every time. The changed impulses lie on the cones. Values that are
+/// not finite come back as an error that is not.
 ClusterAnswer solve_cluster(const BodyProblem& problem, const ClusterGoal& goal,
                             const ClusterThresholds& thresholds = {});
 

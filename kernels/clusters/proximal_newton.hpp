@@ -5,6 +5,7 @@
 /// (docs/decisions/0024-certificate.md).
 
 #include "kernels/clusters/correction.hpp"
+#include "kernels/clusters/proximal_step.hpp"
 #include "kernels/global/body_problem.hpp"
 
 namespace talus {
@@ -16,22 +17,16 @@ struct ProximalThresholds {
   /// firm ones leave little to mend.
   double first_firmness = 1e2, growth = 5;
   int easy = 8;
-  /// A step that has not come to its minimum within `most` factorisations is taken back and tried again,
-  /// softer by `growth`; the next `wary` steps, >= 0, get no firmer. Below `least_firmness`, > 0, the search
-  /// ends.
-  int most = 25, wary = 2;
+  /// A step that does not come to its minimum is taken back and tried again, softer by `growth`; the next
+  /// `wary` steps, >= 0, get no firmer. Below `least_firmness`, > 0, the search ends.
+  MinimumThresholds newton;
+  int wary = 2;
   double least_firmness = 1;
   /// Momentum may be off by this part of the goal behind a step, in (0, 1).
   double inner = 1e-2;
   /// As long as steps move by more than `far` goals, > 1, a minimum need not be known better than to this
   /// part of what the last step has moved, in (0, 1).
   double far = 100, loose = 0.1;
-  /// A step of Newton's method may go beyond the minimum along its way until the slope is this part of the
-  /// first one, in (0, 1); and how well the minimum is found where it goes further, likewise.
-  double slope = 0.1, line = 0.1;
-  /// Factorisations that have not halved what momentum is off by, after which a step ends; and where it is
-  /// within the goal: nothing but rounding is left.
-  int patience = 15, patience_at_goal = 3;
   int most_steps = 200;  ///< >= 1
   /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
   double firm_enough = 1e6;
@@ -43,14 +38,10 @@ struct ProximalThresholds {
 /// factorisations begin, in; what is left of them, out. `enough`, the goal and `open` are the same; settled:
 /// further steps would change next to nothing.
 ///
-/// A step from impulses t, with the shift s = mu |v_t| of the last velocities (none without friction), finds
-/// the change d of the velocities that makes
-///
-///   1/2 |d|_M^2 + r.H^T d + sum 1/(2 rho) |P_Kmu(t - rho (v + H^T d + s n))|^2
-///
-/// least, which is strictly convex and smooth; its projections are the next t. For given s they come as near
-/// as need be to an answer of that convex problem, one near the first t where redundant contacts leave
-/// several (Rockafellar 1976). s follows the velocities (Cadoux 2009); with friction it need not settle.
+/// The projections of a step (proximal_step.hpp) are the centres t of the next one, and its velocities make
+/// the next shift s = mu |v_t|, none without friction. For given s steps come as near as need be to an answer
+/// of that convex problem, one near the first t where redundant contacts leave several (Rockafellar 1976). s
+/// follows the velocities (Cadoux 2009); with friction it need not settle.
 Correction proximal_correction(const BodyProblem& problem, double enough,
                                const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
                                double& work);

@@ -102,6 +102,7 @@ class Answers {
     };
     error.mends = any(&ClusterAnswer::helps, true);
     error.solved = !any(&ClusterAnswer::solved, false);
+    error.jammed = any(&ClusterAnswer::jammed, true);
     error.change = changes();
     return error;
   }

@@ -39,7 +39,8 @@ void Certificate::measure(const CheckSums& sums) {
 
 Verdict Certificate::judge(const CheckSums& sums, const Check& check, WholeProblem& whole) {
   const Verdict verdict = verdict_on(sums, check, whole);
-  if (verdict == Verdict::exhausted || verdict == Verdict::stagnated || verdict == Verdict::diverged)
+  if (verdict == Verdict::exhausted || verdict == Verdict::stagnated || verdict == Verdict::diverged ||
+      verdict == Verdict::impossible)
     result_.worst = whole.worst_errors();
   return verdict;
 }
@@ -71,6 +72,7 @@ Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, Whole
   if (result_.converged) return Verdict::solved;
   // A NaN fails every comparison above.
   if (std::isnan(result_.error_rms)) return Verdict::not_finite;
+  if (result_.jammed) return Verdict::impossible;
   if (last) return Verdict::exhausted;
   if (result_.stagnated) return Verdict::stagnated;
   return stagnant ? Verdict::stuck : Verdict::go_on;
@@ -159,6 +161,8 @@ double Certificate::small_unbalance(WholeProblem& whole) {
     return std::numeric_limits<double>::infinity();
   return repeated(small_check_, settings_.balance_tolerance, [&](double enough) {
     const SmallError error = whole.small_error(enough, result_.iterations);
+    // Sweeps go on where others can still be put right.
+    result_.jammed = error.jammed && !error.mends;
     if (!error.solved) {
       ++doubts_;
       doubted_at_ = result_.iterations;

@@ -32,6 +32,7 @@ struct IterationResult {
   bool converged = false;
   bool diverged = false;   ///< the error grows without bound
   bool stagnated = false;  ///< more sweeps would not have made the error smaller
+  bool jammed = false;     ///< there is no solution: walls close on grains that cannot get away
   WorstErrors worst;       ///< where it did not converge
 };
 
@@ -87,6 +88,8 @@ struct CertificateThresholds {
 struct SmallError {
   double relative = 0;  ///< distance of what the impulses of the last check give from an answer
   bool solved = true;   ///< answers were found for all that are wrong by more than what was asked for
+  bool mends = false;   ///< of these some can be put right
+  bool jammed = false;  ///< one has none: no velocities keep its contacts from approaching
 };
 
 /// Answers about the problem as a whole. Each costs about as much as ten to a hundred sweeps, and is asked
@@ -120,6 +123,7 @@ enum class Verdict {
   diverged,    ///< the error grows without bound
   not_finite,  ///< sweeping on cannot mend a NaN; the step's end reports it
   exhausted,   ///< max_iterations are done
+  impossible,  ///< there is no solution
   stagnated,   ///< more sweeps would not make the error smaller
   stuck,       ///< likewise, but the method has another way
 };

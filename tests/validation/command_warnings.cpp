@@ -63,6 +63,27 @@ TEST_F(Warnings, AreInTheSummaryOfTheRun) {
   EXPECT_NE(warnings[0].get<std::string>().find("2.6 kg/m^3"), std::string::npos);
 }
 
+/// One grain that a lid is driven on: no velocities keep both contacts from approaching.
+TEST_F(Warnings, OfWallsThatCloseOnGrainsThatCannotGetAway) {
+  std::string scene = with_bodies(column_scene);
+  scene.replace(scene.find("side = \"z-\""), 11, "side = \"z-\"\nposition = 0");
+  scene += R"(
+[[wall]]
+name = "lid"
+side = "z+"
+position = 0.02
+drive = "velocity"
+velocity = [0, 0, -0.01]
+)";
+  write(at("scene.toml"), scene);
+  write(at("grains.csv"), "id,x,y,z,radius\n42,0,0,0.01,0.01\n");
+  const Outcome outcome = run("run scene.toml --out results");
+  EXPECT_EQ(outcome.code, 3) << outcome.messages;
+  EXPECT_NE(outcome.messages.find("in 4 steps walls close on grains that cannot get away"), std::string::npos)
+      << outcome.messages;
+  EXPECT_LT(summary(at("results")).at("iterations").get<int>(), 400) << "they end early";
+}
+
 /// A grain that begins on the floor at 3 m/s, 0.3 radii in a step, half of which it is in before it rebounds.
 std::string bouncing() {
   std::string scene = with_bodies(column_scene);

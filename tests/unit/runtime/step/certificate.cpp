@@ -29,7 +29,7 @@ class KnownProblem : public WholeProblem {
   bool large_clusters() override { return true; }
   SmallError small_error(double enough, int) override {
     const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
-    return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error)};
+    return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error), mends, jammed};
   }
   double large_error(double enough) override {
     const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
@@ -38,6 +38,7 @@ class KnownProblem : public WholeProblem {
   double quantile_error(double) override { return 0; }
   WorstErrors worst_errors() override { return {}; }
   std::size_t asked() const { return asked_; }
+  bool jammed = false, mends = false;  ///< what small clusters are besides
 
  private:
   double plain_sweeps_;
@@ -63,6 +64,7 @@ struct Situation {
   int admm_behind = -1;  ///< check behind which ADMM is called
   std::vector<double> small_errors = {};
   int newton_behind = -1;  ///< check behind which a Newton step is taken
+  bool jammed = false, mends = false;
 };
 
 CheckSums sums_of(const Found& found, std::int64_t contacts) {
@@ -88,6 +90,8 @@ Outcome judged(const Situation& given, const CertificateThresholds& thresholds =
   Certificate certificate(settings, thresholds);
   certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
   KnownProblem problem(given.plain_sweeps, given.velocity_errors, given.small_errors);
+  problem.jammed = given.jammed;
+  problem.mends = given.mends;
   Outcome outcome;
   for (std::size_t k = 0; k < given.checks.size(); ++k) {
     outcome.verdict = certificate.judge(sums_of(given.checks[k], given.contacts),
@@ -153,6 +157,17 @@ TEST(Certificate, SaysWhatASituationIs) {
        .checks = {{0, 1}, {10, 1e-4}},
        .verdict = go_on,
        .small_errors = {nan}},
+      {.what = "a small cluster between walls that close",
+       .checks = {{0, 1}, {10, 1e-4}},
+       .verdict = impossible,
+       .small_errors = {1},
+       .jammed = true},
+      {.what = "beside others that can be put right",
+       .checks = {{0, 1}, {10, 1e-4}},
+       .verdict = go_on,
+       .small_errors = {1},
+       .jammed = true,
+       .mends = true},
       {.what = "velocities near it, whatever walls do",
        .checks = {{0, 1, 1}, {10, 1e-4, 2}},
        .verdict = solved,
