@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <tuple>
 
 #include "io/results/wall_triangles.hpp"
@@ -76,14 +77,16 @@ class Canvas {
 
   void sphere(const Vec3& at, double radius, const Colour& colour) {
     static const Vec3 light = Vec3(-0.42, 0.55, 0.72).normalized();
+    const double nearest = at.z() + radius;
     each(at.x() - radius, at.x() + radius, at.y() - radius, at.y() + radius,
          [&](std::size_t x, std::size_t y) {
+           if (hidden(x, y, nearest)) return;  // most samples are: grains lie behind one another
            const double dx = (centre(x) - at.x()) / radius, dy = (at.y() - centre(y)) / radius;
            const double rest = 1 - dx * dx - dy * dy;
            if (rest < 0) return;
            const Vec3 normal(dx, dy, std::sqrt(rest));
            const double depth = at.z() + radius * normal.z();
-           if (hidden(x, y, depth)) return;  // most samples are: grains lie behind one another
+           if (hidden(x, y, depth)) return;
            const double bright = std::max(0.0, normal.dot(light));
            const double rim = std::min(1.0, 0.55 + normal.z());  // the edge of a grain is darker
            const double mirror = std::max(0.0, 2 * bright * normal.z() - light.z()),
@@ -232,6 +235,17 @@ void draw_wall(Canvas& canvas, const Projection& view, const Wall& wall, const V
   for (const auto& [a, b] : edges_of(triangles)) canvas.line(view.of(a), view.of(b), edge_colour);
 }
 
+/// Grains in the order in which they hide one another: behind those that are drawn there is nothing to do.
+std::vector<std::size_t> nearest_first(const Frame& frame, const Vec3& viewer) {
+  std::vector<std::size_t> order(frame.id.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<double> depth(order.size());
+  for (const std::size_t k : order) depth[k] = frame.x[k].dot(viewer);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return depth[a] > depth[b]; });
+  return order;
+}
+
 }  // namespace
 
 std::vector<CellLine> lines_of_cell(const Frame& frame) {
@@ -290,7 +304,7 @@ Image render_view(const Frame& frame, std::span<const Wall> walls,
   const std::vector<double> values = grain_values(frame, options.colour);
   const ColourRange range = options.range.value_or(colour_range(values, options.colour));
   double radii = 0;
-  for (std::size_t k = 0; k < frame.id.size(); ++k) {
+  for (const std::size_t k : nearest_first(frame, view.axes.viewer)) {
     radii += frame.radius[k];
     canvas.sphere(view.of(frame.x[k]), frame.radius[k] * view.scale,
                   colour_of(values[k], range, options.colour));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/step/cell_flow.hpp"
+#include "runtime/step/coordination.hpp"
 #include "runtime/step/force_fabric.hpp"
 
 namespace talus {

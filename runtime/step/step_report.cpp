@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <unordered_map>
 
 #include "kernels/bodies/larger.hpp"
+#include "runtime/step/coordination.hpp"
 
 namespace talus {
 
@@ -111,63 +111,6 @@ void add_step(StepReport& report, const StepOutcome& outcome, const DeepestOverl
 std::int32_t contacts_to_hold(const StepParameters& parameters) {
   if (parameters.friction) return 2;
   return parameters.gravity.norm() > 0 ? 3 : 4;
-}
-
-namespace {
-
-/// Adds up the counts of bodies whose contacts are spread over subdomains. Collective.
-void sum_over_copies(const StepState& state, const graph::Communicator& ranks,
-                     std::vector<std::int32_t>& touching) {
-  const Decomposition& all = state.decomposition;
-  if (!all.several()) return;
-  struct Part {
-    std::int64_t id, count;
-  };
-  std::vector<Part> parts;
-  for (std::size_t s = 0; s < touching.size(); ++s)
-    if (all.multiplicity[s] > 1)
-      parts.push_back({static_cast<std::int64_t>(state.bodies.id[s]), touching[s]});
-  parts = ranks.gather_records(std::span<const Part>(parts));
-  std::unordered_map<std::int64_t, std::int32_t> whole;
-  for (const Part& part : parts) whole[part.id] += static_cast<std::int32_t>(part.count);
-  for (std::size_t s = 0; s < touching.size(); ++s)
-    if (all.multiplicity[s] > 1) touching[s] = whole[static_cast<std::int64_t>(state.bodies.id[s])];
-}
-
-}  // namespace
-
-double coordination(const StepState& state, const graph::Communicator& ranks, std::int32_t hold) {
-  const auto at = [](Slot slot) { return static_cast<std::size_t>(slot); };
-  std::vector<char> rattles(state.bodies.size(), 0);
-  std::vector<std::int32_t> here(state.bodies.size(), 0);  // contacts on this rank with no rattler
-  std::vector<std::array<Slot, 2>> pairs = active_pairs(state.contacts, state.chunks);
-  const auto add = [&](const std::array<Slot, 2>& pair, std::int32_t count) {
-    here[at(pair[0])] += count;
-    if (pair[1] != pair[0]) here[at(pair[1])] += count;
-  };
-  for (const auto& pair : pairs) add(pair, 1);
-  for (;;) {
-    std::vector<std::int32_t> touching = here;
-    sum_over_copies(state, ranks, touching);
-    std::int64_t sums[3] = {0, 0, 0};  // grains, their contacts, rattlers found
-    for (std::size_t s = 0; s < touching.size(); ++s) {
-      if (rattles[s] != 0) continue;
-      if (touching[s] < hold) {
-        rattles[s] = 1;
-        ++sums[2];
-      } else if (counts(state.decomposition, s)) {
-        ++sums[0];
-        sums[1] += touching[s];
-      }
-    }
-    ranks.sum(sums);
-    if (sums[2] == 0) return sums[0] > 0 ? static_cast<double>(sums[1]) / static_cast<double>(sums[0]) : 0;
-    std::erase_if(pairs, [&](const std::array<Slot, 2>& pair) {
-      const bool lost = rattles[at(pair[0])] != 0 || rattles[at(pair[1])] != 0;
-      if (lost) add(pair, -1);
-      return lost;
-    });
-  }
 }
 
 std::optional<TriaxialReport> triaxial_report(const StepOutcome& outcome, const StepReport& report,

@@ -52,9 +52,4 @@ double fall_time(const StepOutcome& outcome);
 /// Fewest contacts that hold a grain still: 2 with friction; 4 without, one of which weight can replace.
 std::int32_t contacts_to_hold(const StepParameters& parameters);
 
-/// Coordination number: (2 x active contacts between grains + those with walls) / grains, without rattlers
-/// and their contacts. Rattlers are grains with fewer than `hold` active contacts that are not with rattlers.
-/// Points of contact count, of which clumps may have several. 0 where all are rattlers. Collective.
-double coordination(const StepState& state, const graph::Communicator& ranks, std::int32_t hold);
-
 }  // namespace talus

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <random>
 #include <utility>
 #include <vector>
 
 #include "runtime/graph/one_rank.hpp"
+#include "runtime/step/coordination.hpp"
 #include "runtime/step/step_report.hpp"
 
 namespace talus::coordination_test {
@@ -54,6 +56,48 @@ TEST(Coordination, LeavesOutRattlersWithAllTheirContacts) {
   EXPECT_EQ(coordination(state_of(7, pairs, {}), graph::one_rank(), 4), 4);
   EXPECT_DOUBLE_EQ(coordination(state_of(7, pairs, {}), graph::one_rank(), 3), 26.0 / 6);
   EXPECT_EQ(coordination(state_of(7, {{5, 6}}, {5}), graph::one_rank(), 2), 0);
+}
+
+/// The definition, word by word: grains with fewer than `hold` contacts go, again and again, with theirs.
+double by_definition(std::size_t grains, std::vector<std::pair<Slot, Slot>> pairs, std::vector<Slot> at_wall,
+                     int hold) {
+  std::vector<char> gone(grains, 0);
+  for (;;) {
+    std::vector<int> count(grains, 0);
+    for (const auto& [a, b] : pairs)
+      ++count[static_cast<std::size_t>(a)], ++count[static_cast<std::size_t>(b)];
+    for (const Slot a : at_wall) ++count[static_cast<std::size_t>(a)];
+    int left = 0, sum = 0;
+    bool again = false;
+    for (std::size_t k = 0; k < grains; ++k) {
+      if (gone[k] != 0) continue;
+      if (count[k] < hold)
+        gone[k] = 1, again = true;
+      else
+        ++left, sum += count[k];
+    }
+    if (!again) return left > 0 ? static_cast<double>(sum) / left : 0;
+    const auto lost = [&](Slot s) { return gone[static_cast<std::size_t>(s)] != 0; };
+    std::erase_if(pairs, [&](const auto& pair) { return lost(pair.first) || lost(pair.second); });
+    std::erase_if(at_wall, lost);
+  }
+}
+
+TEST(Coordination, IsThatOfItsDefinitionInRandomNetworks) {
+  std::mt19937 random(5);
+  constexpr std::size_t grains = 40;
+  std::uniform_int_distribution<Slot> any(0, grains - 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<std::pair<Slot, Slot>> pairs;
+    std::vector<Slot> at_wall;
+    for (int k = 0; k < 40 + trial / 3; ++k)
+      if (const Slot a = any(random), b = any(random); a != b) pairs.push_back({a, b});
+    for (int k = 0; k < trial % 7; ++k) at_wall.push_back(any(random));
+    for (int hold = 2; hold <= 4; ++hold)
+      EXPECT_EQ(coordination(state_of(grains, pairs, at_wall), graph::one_rank(), hold),
+                by_definition(grains, pairs, at_wall, hold))
+          << trial << ' ' << hold;
+  }
 }
 
 TEST(Coordination, WeightHoldsAGrainOnThree) {
