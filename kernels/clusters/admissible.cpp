@@ -35,18 +35,23 @@ Incoming coming_in(const BodyProblem& problem) {
   return in;
 }
 
-/// -f.b / |H f|_M^-1 [J^(1/2)] of the impulses f = max(0, -(v_n + b))/W_nn by which contacts still approach
-/// behind a step.
-double least_speed(const BodyProblem& problem, const ProximalStep& step) {
+/// Impulses f = max(0, -(v_n + b))/W_nn by which contacts still approach behind a step, and what they prove.
+struct Approach {
+  double sum = 0;    ///< of f [N s]
+  double speed = 0;  ///< -f.b / |H f|_M^-1 [J^(1/2)]
+};
+Approach approach_of(const BodyProblem& problem, const ProximalStep& step) {
   std::vector<Twist> momentum(problem.bodies.size());
+  Approach left;
   double work = 0;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
     const double approach = -c.normal.dot(step.velocity(k, step.motion));
     if (!(approach > 0)) continue;
-    const Vec3 f = effective_mass(problem, c) * approach * c.normal;
-    add_force(c, f, momentum);
-    work -= c.offset.dot(f);
+    const double f = effective_mass(problem, c) * approach;
+    left.sum += f;
+    add_force(c, Vec3(f * c.normal), momentum);
+    work -= c.offset.dot(f * c.normal);
   }
   double norm2 = 0;
   for (std::size_t b = 0; b < momentum.size(); ++b) {
@@ -55,24 +60,30 @@ double least_speed(const BodyProblem& problem, const ProximalStep& step) {
     norm2 += momentum[b].u.squaredNorm() / body.mass;
     if (body.spin_mass > 0) norm2 += momentum[b].w.squaredNorm() / body.spin_mass;
   }
-  return work > 0 ? work / std::sqrt(norm2) : 0;
+  left.speed = work > 0 ? work / std::sqrt(norm2) : 0;
+  return left;
 }
 
 }  // namespace
 
-bool none_admissible(const BodyProblem& problem, const AdmissibleThresholds& thresholds, double& work) {
+bool none_admissible(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
+                     double& work) {
   const BodyProblem smooth = frictionless(problem);
   const Incoming in = coming_in(smooth);
   const double scale = std::sqrt(in.speed2), off = thresholds.inner * std::sqrt(in.mass) * scale;
   ProximalStep step(smooth, thresholds.first_firmness);
-  double before = 0;
-  for (int k = 0; k < thresholds.most_steps && work > 0; ++k) {
+  double best = 0;
+  for (int k = 0, since = 0; k < thresholds.most_steps && since < thresholds.patience && work > 0; ++k) {
     minimise({off, off}, thresholds.newton, step, work);
-    const double speed = least_speed(smooth, step);
-    if (speed > thresholds.beyond * scale) return true;
-    // Soft springs tell little.
-    if (step.firmness >= thresholds.last_firmness && !(speed > thresholds.rise * before)) break;
-    before = speed;
+    const Approach left = approach_of(smooth, step);
+    if (!(left.sum > enough)) return false;
+    if (left.speed > thresholds.beyond * scale) return true;
+    const bool firm = step.firmness >= thresholds.last_firmness;  // soft springs tell little
+    if (left.speed > thresholds.rise * best)
+      since = 0;
+    else if (firm)
+      ++since;
+    best = std::max(best, left.speed);
     for (std::size_t c = 0; c < smooth.contacts.size(); ++c) step.centre[c] = step.carried(c, step.motion);
     step.firmness = std::min(thresholds.growth * step.firmness, thresholds.last_firmness);
   }

@@ -14,28 +14,32 @@ struct AdmissibleThresholds {
   /// rho W_nn of the first proximal step; that of each further one is `growth`, > 1, times as large, up to
   /// `last_firmness`; and how many there are, at most, >= 1.
   double first_firmness = 1e2, growth = 1e2, last_firmness = 1e6;
-  int most_steps = 8;
+  int most_steps = 10;
   MinimumThresholds newton;
   double inner = 1e-8;  ///< what momentum may be off by, over the scale, in (0, 1)
   /// Velocities are out of reach that are so many times what comes in and what drives, >> 1: a wedge or a
   /// chain asks for the inverse of its angle.
   double beyond = 1e5;
-  /// Where a step of `last_firmness` raises the bound by less than this, > 1, further ones will not raise it
-  /// far.
+  /// After so many steps of `last_firmness` that do not raise the bound to this multiple, >= 1 and > 1, it is
+  /// given up.
+  int patience = 3;
   double rise = 5;
 };
 
 /// True where all admissible velocities, those with which no contact approaches by more than its bias allows,
-/// are out of reach. Friction makes none admissible, so it is left out. False says nothing. `work`:
-/// multiplications after which no more factorisations begin, in; what is left of them, out.
+/// are out of reach, and contacts have to approach by more than need not be told apart: by sum m |u| >
+/// `enough` [N s], which walls that close by rounding do not. Friction adds no admissible velocities, so it
+/// is left out. False says nothing. `work`: multiplications after which no more factorisations begin, in;
+/// what is left of them, out. Not for problems with a cell.
 ///
 /// For impulses f >= 0 along the normals, and admissible V, sum f (H^T V + b) >= 0, so that
 ///
 ///   |V|_M >= -f.b / |H f|_M^-1:
 ///
 /// impulses that balance one another and do work against the bias prove it (Farkas), for whatever f. What
-/// proximal steps of the problem without friction leave of approach comes near such impulses where there are
+/// proximal steps of the problem without friction leave of approach tends to such impulses where there are
 /// any (Banjac et al. 2019).
-bool none_admissible(const BodyProblem& problem, const AdmissibleThresholds& thresholds, double& work);
+bool none_admissible(const BodyProblem& problem, double enough, const AdmissibleThresholds& thresholds,
+                     double& work);
 
 }  // namespace talus

@@ -157,7 +157,7 @@ void search(const BodyProblem& problem, const ClusterGoal& goal, const ClusterTh
     if (other.solved || other.error < answer.error) answer = std::move(other);
   };
   double left = thresholds.admissible_share * budget;
-  answer.jammed = none_admissible(problem, thresholds.admissible, left);
+  answer.jammed = none_admissible(problem, goal.enough, thresholds.admissible, left);
   if (answer.jammed) return;
   if (has_friction(problem)) {
     left += thresholds.coulomb_share * budget;

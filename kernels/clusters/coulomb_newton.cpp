@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 #include "kernels/clusters/block_elimination.hpp"
@@ -155,102 +154,86 @@ class CoulombStep {
   std::vector<Columns> columns_;             ///< per contact
 };
 
-/// Where the steps stand.
-struct Course {
-  double firmness;
-  std::vector<Vec3> t;  ///< per contact [N s]
-  Vector d;             ///< per freedom [m/s]
-  double open = 0;      ///< what the law finds wrong, sum of |r - P_Kmu(...)| [N s]
-  double off = 0;       ///< what momentum is off by [N s]
-};
+/// Steps of Coulomb's law (search_by_steps), whose impulses are the next t.
+class CoulombSteps {
+ public:
+  CoulombSteps(const BodyProblem& problem, const CoulombThresholds& thresholds)
+      : problem_(problem), thresholds_(thresholds), step_(problem), t_(problem.impulse), d_(step_.none()) {
+    for (std::size_t k = 0; k < t_.size(); ++k) open_ += (t_[k] - mapped(k, t_[k]).carried).norm();
+  }
 
-/// Solves the problem of a step. False, and d is anything, where momentum stays off by more than it may.
-bool solve_step(const CoulombStep& step, double goal, const CoulombThresholds& coulomb, Course& course,
-                double& work) {
-  const double enough = coulomb.inner * std::max(goal, course.open);
-  const double most = std::max(goal, coulomb.loose * course.open);
-  Vector f = step.residual(course.d, course.firmness, course.t), way, there;
-  course.off = step.size(f);
-  for (int k = 0; k < coulomb.most_iterations && course.off > enough && work > 0; ++k) {
-    if (!step.way(course.d, f, course.firmness, course.t, way, work)) break;
-    double part = 1, after = course.off;
-    for (int halving = 0; halving <= coulomb.halvings; ++halving, part /= 2) {
-      there = course.d + part * way;
-      f = step.residual(there, course.firmness, course.t);
-      after = step.size(f);
-      if (after <= (1 - coulomb.descent * part) * course.off) break;
+  std::vector<Twist> motion() const { return step_.twists(d_); }
+
+  bool solve(const StepStart& start, double& work) {
+    const Vector before = d_;
+    firmness_ = start.firmness;
+    const double enough = thresholds_.search.inner * std::max(start.goal, open_);
+    const double most = std::max(start.goal, thresholds_.loose * open_);
+    Vector f = step_.residual(d_, firmness_, t_), way;
+    off_ = step_.size(f);
+    for (int k = 0; k < thresholds_.most_iterations && off_ > enough && work > 0; ++k)
+      if (!step_.way(d_, f, firmness_, t_, way, work) || !go_along(way, f)) break;
+    if (off_ <= most) return true;
+    d_ = before;
+    return false;
+  }
+
+  Correction take() {
+    Correction now;
+    for (std::size_t k = 0; k < t_.size(); ++k) {
+      const Vec3 r = step_.impulse(k, d_, firmness_, t_);
+      now.open += (r - mapped(k, r).carried).norm();
+      now.impulse.push_back(r - problem_.impulse[k]);
+      t_[k] = r;
     }
-    if (!(after < course.off)) break;
-    course.d = there;
-    course.off = after;
+    now.left = off_;
+    now.motion = motion();
+    now.found = momentum_of(problem_, now.motion);
+    slow_ = now.open > thresholds_.slow * open_;
+    open_ = now.open;
+    return now;
   }
-  return course.off <= most;
-}
 
-/// What a step has come to: its impulses are the next t.
-Correction take_step(const BodyProblem& problem, const CoulombStep& step, Course& course) {
-  Correction now;
-  std::vector<Vec3> next;
-  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    const Vec3 r = step.impulse(k, course.d, course.firmness, course.t);
-    const NaturalMap map = natural_map_of(problem, problem.contacts[k], r, step.velocity(k, course.d));
-    now.open += (r - map.carried).norm();
-    now.impulse.push_back(r - problem.impulse[k]);
-    next.push_back(r);
+  bool firmer(bool small) const { return slow_ || small; }
+
+ private:
+  NaturalMap mapped(std::size_t k, const Vec3& r) const {
+    return natural_map_of(problem_, problem_.contacts[k], r, step_.velocity(k, d_));
   }
-  course.t = std::move(next);
-  now.left = course.off;
-  now.motion = step.twists(course.d);
-  now.found = momentum_of(problem, now.motion);
-  return now;
-}
+  /// Takes the part of an iteration that makes the residual f smaller. False where none does.
+  bool go_along(const Vector& way, Vector& f) {
+    Vector there;
+    double part = 1, after = off_;
+    for (int halving = 0; halving <= thresholds_.halvings; ++halving, part /= 2) {
+      there = d_ + part * way;
+      f = step_.residual(there, firmness_, t_);
+      after = step_.size(f);
+      if (after <= (1 - thresholds_.descent * part) * off_) break;
+    }
+    if (!(after < off_)) return false;
+    d_ = there;
+    off_ = after;
+    return true;
+  }
+
+  const BodyProblem& problem_;
+  const CoulombThresholds& thresholds_;
+  CoulombStep step_;
+  std::vector<Vec3> t_;  ///< per contact [N s]
+  Vector d_;             ///< per freedom [m/s]
+  double firmness_ = 0;  ///< of the last step
+  double off_ = 0;       ///< what momentum is off by behind it [N s]
+  double open_ = 0;      ///< what the law finds wrong there, sum of |r - P_Kmu(...)| [N s]
+  bool slow_ = false;    ///< that is hardly less than before it
+};
 
 }  // namespace
 
 Correction coulomb_correction(const BodyProblem& problem, double enough,
                               const CorrectionThresholds& thresholds, const CoulombThresholds& coulomb,
                               double& work) {
-  const CoulombStep step(problem);
-  Course course{coulomb.first_firmness, problem.impulse, step.none()};
-  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    const Vec3& r = problem.impulse[k];
-    course.open +=
-        (r - natural_map_of(problem, problem.contacts[k], r, step.velocity(k, course.d)).carried).norm();
-  }
-  Correction best;
-  best.impulse.assign(problem.contacts.size(), Vec3::Zero());
-  best.motion.resize(problem.bodies.size());
-  best.open = std::numeric_limits<double>::infinity();
-  double moved = std::numeric_limits<double>::infinity(), firmness = 0;
-  int wary = 0;
-  for (int k = 1; k <= coulomb.most_steps && work > 0 && !best.settled; ++k) {
-    const double goal = goal_of(momentum_of(problem, step.twists(course.d)), enough, thresholds);
-    const Vector before = course.d;
-    if (!solve_step(step, goal, coulomb, course, work)) {
-      course.d = before;
-      course.firmness /= coulomb.growth;
-      if (course.firmness < coulomb.least_firmness) break;
-      wary = coulomb.wary;
-      continue;
-    }
-    Correction now = take_step(problem, step, course);
-    now.rounds = k;
-    now.moved = momentum_of(problem, step.twists(course.d - before));
-    const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
-    const bool comparable = small && course.firmness >= firmness;
-    now.missed = comparable ? rest_of(moved, now.moved, coulomb.inner * goal) : now.moved;
-    now.settled = comparable && course.firmness >= coulomb.firm_enough && now.missed <= coulomb.rest * goal;
-    const bool slow = now.open > coulomb.slow * course.open || small;
-    course.open = now.open;
-    moved = now.moved;
-    firmness = course.firmness;
-    if (now.settled || now.error() < best.error()) best = std::move(now);
-    if (wary > 0)
-      --wary;
-    else if (slow)
-      course.firmness = std::min(coulomb.growth * course.firmness, thresholds.firmness);
-  }
-  return best;
+  CoulombSteps steps(problem, coulomb);
+  return search_by_steps(problem, enough, thresholds, coulomb.search, steps, work);
 }
 
 }  // namespace talus

@@ -1,82 +1,66 @@
 #include "kernels/clusters/proximal_newton.hpp"
 
 #include <algorithm>
-#include <limits>
-#include <utility>
 #include <vector>
 
-#include "kernels/clusters/proximal_step.hpp"
 #include "kernels/global/natural_map.hpp"
 
 namespace talus {
 
 namespace {
 
-/// `moved`: by which the last step has changed the motion.
-StepGoal step_goal(double goal, double moved, const ProximalThresholds& proximal) {
-  const double far = moved > proximal.far * goal ? proximal.loose * moved : 0;
-  return {std::max(proximal.inner * goal, far), std::max(goal, far)};
-}
+/// Convex steps (search_by_steps), whose projections are the next centre.
+class ProximalSteps {
+ public:
+  ProximalSteps(const BodyProblem& problem, const ProximalThresholds& thresholds)
+      : problem_(problem), thresholds_(thresholds), step_(problem, thresholds.search.first_firmness) {}
 
-/// What a step has come to: its projections are the next centre.
-Correction take_step(const BodyProblem& problem, ProximalStep& step) {
-  Correction now;
-  for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
-    const Vec3 r = step.carried(k, step.motion);
-    const NaturalMap map = natural_map_of(problem, problem.contacts[k], r, step.velocity(k, step.motion));
-    now.open += (r - map.carried).norm();
-    now.impulse.push_back(r - problem.impulse[k]);
-    step.centre[k] = r;
-    step.shift[k] = map.shift;
+  const std::vector<Twist>& motion() const { return step_.motion; }
+
+  bool solve(const StepStart& start, double& work) {
+    const std::vector<Twist> before = step_.motion;
+    step_.firmness = start.firmness;
+    const double far = start.moved > thresholds_.far * start.goal ? thresholds_.loose * start.moved : 0;
+    const StepGoal goal{std::max(thresholds_.search.inner * start.goal, far), std::max(start.goal, far)};
+    minimum_ = minimise(goal, thresholds_.newton, step_, work);
+    if (minimum_.off <= goal.most) return true;
+    step_.motion = before;
+    return false;
   }
-  now.motion = step.motion;
-  now.found = momentum_of(problem, step.motion);
-  return now;
-}
+
+  Correction take() {
+    Correction now;
+    for (std::size_t k = 0; k < problem_.contacts.size(); ++k) {
+      const Vec3 r = step_.carried(k, step_.motion);
+      const NaturalMap map =
+          natural_map_of(problem_, problem_.contacts[k], r, step_.velocity(k, step_.motion));
+      now.open += (r - map.carried).norm();
+      now.impulse.push_back(r - problem_.impulse[k]);
+      step_.centre[k] = r;
+      step_.shift[k] = map.shift;
+    }
+    now.motion = step_.motion;
+    now.found = momentum_of(problem_, step_.motion);
+    now.left = minimum_.off;
+    return now;
+  }
+
+  bool firmer(bool) const { return minimum_.factorisations <= thresholds_.easy; }
+
+ private:
+  const BodyProblem& problem_;
+  const ProximalThresholds& thresholds_;
+  ProximalStep step_;
+  Minimised minimum_;
+};
 
 }  // namespace
 
 Correction proximal_correction(const BodyProblem& problem, double enough,
                                const CorrectionThresholds& thresholds, const ProximalThresholds& proximal,
                                double& work) {
-  ProximalStep step(problem, std::min(proximal.first_firmness, thresholds.firmness));
-  Correction best;
-  best.impulse.assign(problem.contacts.size(), Vec3::Zero());
-  best.motion.resize(problem.bodies.size());
-  best.open = std::numeric_limits<double>::infinity();
-  double firmness = 0, moved = 0;
-  int wary = 0;
-  for (int k = 1; k <= proximal.most_steps && work > 0 && !best.settled; ++k) {
-    const double goal = goal_of(momentum_of(problem, step.motion), enough, thresholds);
-    const StepGoal until = step_goal(goal, moved, proximal);
-    const std::vector<Twist> before = step.motion;
-    const Minimised minimum = minimise(until, proximal.newton, step, work);
-    if (!(minimum.off <= until.most)) {
-      step.motion = before;
-      step.firmness /= proximal.growth;
-      if (step.firmness < proximal.least_firmness) break;
-      wary = proximal.wary;
-      continue;
-    }
-    Correction now = take_step(problem, step);
-    now.rounds = k;
-    now.left = minimum.off;
-    now.moved = momentum_of(problem, sum(step.motion, -1, before));
-    const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
-    // Behind a firmer step a softer one changes less, which says nothing.
-    now.missed =
-        small && step.firmness >= firmness ? rest_of(moved, now.moved, proximal.inner * goal) : now.moved;
-    moved = now.moved;
-    now.settled = small && step.firmness >= std::max(firmness, proximal.firm_enough) &&
-                  now.missed <= proximal.rest * goal;
-    firmness = step.firmness;
-    if (now.settled || now.error() < best.error()) best = std::move(now);
-    if (wary > 0)
-      --wary;
-    else if (minimum.factorisations <= proximal.easy)
-      step.firmness = std::min(proximal.growth * step.firmness, thresholds.firmness);
-  }
-  return best;
+  ProximalSteps steps(problem, proximal);
+  return search_by_steps(problem, enough, thresholds, proximal.search, steps, work);
 }
 
 }  // namespace talus

@@ -4,34 +4,19 @@
 /// solve: where rounds of an active set (correction.hpp) go in circles, as contacts carry more than they must
 /// (docs/decisions/0024-certificate.md).
 
-#include "kernels/clusters/correction.hpp"
-#include "kernels/clusters/proximal_step.hpp"
-#include "kernels/global/body_problem.hpp"
+#include "kernels/clusters/step_search.hpp"
 
 namespace talus {
 
 /// Every number that proximal steps depend on. Ratios have no unit.
 struct ProximalThresholds {
-  /// rho W_nn of the first step; that of the next one is `growth`, > 1, times as large where a step has taken
-  /// at most `easy` factorisations, up to CorrectionThresholds::firmness. Soft contacts find out who carries;
-  /// firm ones leave little to mend.
-  double first_firmness = 1e2, growth = 5;
+  /// A step is followed by a firmer one where it has taken at most `easy` factorisations, >= 0.
+  SearchThresholds search{.first_firmness = 1e2, .most_steps = 200};
   int easy = 8;
-  /// A step that does not come to its minimum is taken back and tried again, softer by `growth`; the next
-  /// `wary` steps, >= 0, get no firmer. Below `least_firmness`, > 0, the search ends.
   MinimumThresholds newton;
-  int wary = 2;
-  double least_firmness = 1;
-  /// Momentum may be off by this part of the goal behind a step, in (0, 1).
-  double inner = 1e-2;
   /// As long as steps move by more than `far` goals, > 1, a minimum need not be known better than to this
   /// part of what the last step has moved, in (0, 1).
   double far = 100, loose = 0.1;
-  int most_steps = 200;  ///< >= 1
-  /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
-  double firm_enough = 1e6;
-  /// What further steps would change, by how the last two did, may be so many goals, >= 1.
-  double rest = 10;
 };
 
 /// What would set all contacts right, as correction_of. `work`: multiplications after which no more

@@ -18,7 +18,7 @@ using namespace cluster_makers;
 
 bool none(const BodyProblem& problem) {
   double work = 1e9;
-  return none_admissible(problem, {}, work);
+  return none_admissible(problem, enough, {}, work);
 }
 
 /// The wall of the last contact moves against the grain [m/s].
@@ -59,6 +59,24 @@ TEST(Admissible, WallsThatOpenOrStandAskForNothing) {
   EXPECT_FALSE(none(row(20, 0, 0, 0)));
   EXPECT_FALSE(none(row(20, 0, -1, 0)));
   EXPECT_FALSE(none({}));
+}
+
+/// By what need not be told apart a solution may be wrong anyway.
+TEST(Admissible, WallsThatCloseByRoundingOnlyAreNoJam) {
+  for (const double speed : {1e-160, 1e-12, 0.1 * enough}) EXPECT_FALSE(none(row(1, 0, speed, 0.5))) << speed;
+  EXPECT_TRUE(none(row(1, 0, 10 * enough, 0.5)));
+}
+
+/// Gravity presses a grain on a floor, and walls at its sides close by a trifle: it slides to rest as ever.
+TEST(Admissible, ATrifleDoesNotTakeAnAnswerAway) {
+  for (const double closing : {1e-12, 1e-9}) {
+    BodyProblem problem = row(1, 0, closing, 0.5);
+    problem.bodies[0].free.u = Vec3(0.3, 0, -1);
+    add_contact(problem, 0, -1, Vec3::UnitZ(), 0.5, 2);
+    const ClusterAnswer answer = solve_cluster(problem, {.enough = 1e-4, .relative = 1e-3, .sweeps = 100});
+    EXPECT_TRUE(answer.solved) << closing;
+    EXPECT_FALSE(answer.jammed) << closing;
+  }
 }
 
 TEST(Admissible, AGrainLeavesAWedgeThatCloses) {
@@ -124,7 +142,7 @@ TEST(Admissible, AClusterWithoutAnAnswerIsNotSolvedAndSaidToBeJammed) {
 
 TEST(Admissible, KeepsToItsWork) {
   double work = 1;
-  EXPECT_FALSE(none_admissible(row(100, 0, 1, 0), {}, work));
+  EXPECT_FALSE(none_admissible(row(100, 0, 1, 0), enough, {}, work));
   EXPECT_LE(work, 0);
 }
 

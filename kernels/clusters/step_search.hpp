@@ -1,0 +1,87 @@
+#pragma once
+
+/// Proximal steps, one after another, to the answer of a cluster: what those of Coulomb's law
+/// (coulomb_newton.hpp) and the convex ones (proximal_newton.hpp) have in common.
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "kernels/clusters/correction.hpp"
+#include "kernels/clusters/proximal_step.hpp"
+
+namespace talus {
+
+/// Every number that a search by steps depends on. Ratios have no unit.
+struct SearchThresholds {
+  /// rho W_nn of the first step, > 0. Soft contacts find out who carries; firm ones leave little to mend. So
+  /// a step whose kind allows it is followed by one that is `growth`, > 1, times as firm, up to
+  /// CorrectionThresholds::firmness.
+  double first_firmness, growth = 5;
+  /// A step whose problem is not solved is taken back and tried again, softer by `growth`; the next `wary`
+  /// steps, >= 0, get no firmer. Below `least_firmness`, > 0, the search ends.
+  int wary = 2;
+  double least_firmness = 1;
+  int most_steps;  ///< >= 1
+  /// Momentum may be off by this part of the goal behind a step, in (0, 1).
+  double inner = 1e-2;
+  /// No softer step settles, > 0: of directions that W hardly resists, as in a chain, it shows too little.
+  /// And what further steps would change, by how the last two did, may be so many goals, >= 1.
+  double firm_enough = 1e6, rest = 10;
+};
+
+/// Where a step begins, and what is asked of it.
+struct StepStart {
+  double firmness;  ///< rho W_nn
+  double goal;      ///< what may be left (goal_of) [N s]
+  double moved;     ///< by which the last step has changed the motion [N s]
+};
+
+/// The best of the steps, settled where further ones would change next to nothing. `work`: multiplications
+/// after which no more steps begin, in; what is left of them, out. `Steps` has
+///
+///   std::vector<Twist> motion() const      since the impulses of the problem [m/s]
+///   bool solve(StepStart, double& work)    the problem of the next step; where false nothing has changed
+///   Correction take()                      its impulses and motion, `found`, `open` and `left`; the next
+///                                          step goes on from there
+///   bool firmer(bool small) const          whether the next one may be firmer; `small`: what is left of this
+///                                          one is within the goal
+template <class Steps>
+Correction search_by_steps(const BodyProblem& problem, double enough, const CorrectionThresholds& thresholds,
+                           const SearchThresholds& search, Steps& steps, double& work) {
+  Correction best;
+  best.impulse.assign(problem.contacts.size(), Vec3::Zero());
+  best.motion.resize(problem.bodies.size());
+  best.open = std::numeric_limits<double>::infinity();
+  double firmness = std::min(search.first_firmness, thresholds.firmness), last = 0, moved = 0;
+  int wary = 0;
+  for (int k = 1; k <= search.most_steps && work > 0 && !best.settled; ++k) {
+    const std::vector<Twist> before = steps.motion();
+    const double goal = goal_of(momentum_of(problem, before), enough, thresholds);
+    if (!steps.solve({firmness, goal, moved}, work)) {
+      firmness /= search.growth;
+      if (firmness < search.least_firmness) break;
+      wary = search.wary;
+      continue;
+    }
+    Correction now = steps.take();
+    now.rounds = k;
+    now.moved = momentum_of(problem, sum(now.motion, -1, before));
+    const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
+    // Behind a firmer step a softer one changes less, which says nothing.
+    const bool comparable = small && firmness >= last;
+    now.missed = comparable ? rest_of(moved, now.moved, search.inner * goal) : now.moved;
+    now.settled = comparable && firmness >= search.firm_enough && now.missed <= search.rest * goal;
+    moved = now.moved;
+    last = firmness;
+    if (wary > 0)
+      --wary;
+    else if (steps.firmer(small))
+      firmness = std::min(search.growth * firmness, thresholds.firmness);
+    if (now.settled || now.error() < best.error()) best = std::move(now);
+  }
+  return best;
+}
+
+}  // namespace talus
