@@ -2,11 +2,12 @@
 /// bytes of an iteration with centralised (CCS) and decentralised (DCS) exchange, and the part of the
 /// iterations that ranks waited for messages. Then the share of a run that partition and migration take.
 ///
-///   bench_exchange SCENE.toml [STEPS, default 10] [SWEEPS a step, default 200] [SUBDOMAINS, default all
-///   rows] mpirun -n 2 bench_exchange SCENE.toml ...
+///   bench_exchange SCENE.toml [STEPS] [SWEEPS] [SUBDOMAINS]
+///   mpirun -n 2 bench_exchange SCENE.toml ...
 ///
-/// SCENE: its first stage is run, frictionless if that is, from the sample as the scene makes it. SWEEPS 0:
-/// as many as the scene's tolerance asks for. Waited: median over the steps, of the rank that waited most.
+/// SCENE: its first stage is run, frictionless if that is, from the sample as the scene makes it. STEPS: 10
+/// without it. SWEEPS a step: 200; 0: as many as the scene's tolerance asks for. SUBDOMAINS: all rows of the
+/// table. Waited: median over the steps, of the rank that waited most.
 
 #include <fmt/format.h>
 

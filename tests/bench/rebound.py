@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What the rebound of the ball in the impact of Dosta et al. (2024) depends on: restitution, its law, the time step.
 
-    tests/bench/rebound.py DATA OUT [--talus build/release/talus] [--only NAME,...]
+    tests/bench/rebound.py DATA OUT [--talus build/release/talus] [--only NAME ...]
 
 Runs the case of `dosta2024.py impact` until 0.028 s, when the ball is 4 mm from its deepest place (OUT/before, taken as
 it is when it stands), and from there, once for each variant, until 0.034 s. Prints the velocity of the ball every half
@@ -46,7 +46,8 @@ def main():
     parser.add_argument("data", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--talus", default="build/release/talus")
-    parser.add_argument("--only", help="variants, separated by commas and spaces as printed")
+    parser.add_argument("--only", nargs="+", choices=VARIANTS, default=list(VARIANTS), metavar="NAME",
+                        help="variants, as printed")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     state = options.out / "before" / "results.h5"
@@ -60,7 +61,7 @@ def main():
     late = f'[[sample]]\nkind = "state"\nfile = "{state.resolve()}"\n'
     (options.out / "late.toml").write_text(scene[:samples] + late + scene[walls:])
     for name, settings in VARIANTS.items():
-        if options.only and name not in options.only.split(", "):
+        if name not in options.only:
             continue
         out = options.out / name.replace(" ", "-").replace(",", "").replace("'", "")
         seconds = talus(options, options.out / "late.toml", out,

@@ -84,13 +84,19 @@ def trial(runner, folder, steps, draw):
     return history, None
 
 
+def between(text):
+    """"LOW,HIGH", or one number for both."""
+    low, _, high = text.partition(",")
+    return int(low), int(high or low)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--talus", default="build/release/talus")
     parser.add_argument("--scene", default="apps/scenes/demo.toml")
     parser.add_argument("--trials", type=int, default=100)
-    parser.add_argument("--stops", type=lambda text: tuple(map(int, text.split(","))), default=(1, 1))
+    parser.add_argument("--stops", type=between, default=(1, 1), metavar="LOW,HIGH")
     parser.add_argument("--minutes", type=float, default=30)
     parser.add_argument("--patience", type=float, default=300)
     parser.add_argument("--seed", type=int, default=1)

@@ -106,7 +106,7 @@ std::vector<Key<SizeDistribution>> radius_keys() {
           &D::parts)
           .only("radius_distribution = sieve", is_drawn({RadiusKind::sieve}))
           .need(),
-      key<D>("fraction_radius", "m", positive, "RadiusKind that there are.", &D::sizes)
+      key<D>("fraction_radius", "m", positive, "Radii that there are.", &D::sizes)
           .only("radius_distribution = fractions", is_drawn({RadiusKind::fractions}))
           .need(),
       key<D>("fraction_mass", "", positive, "Mass of the grains of each of these radii, in any unit.",
