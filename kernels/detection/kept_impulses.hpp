@@ -42,6 +42,12 @@ class KeptImpulses {
     return kind_ == ImpulseKind::normal ? Vec3(r[0] * normal) : Vec3(r[0], r[1], r[2]);
   }
 
+  /// Moment of rolling resistance of a row on the first body [N m s]; 0 in rows of other kinds.
+  Vec3 moment(std::size_t k) const {
+    const std::span<const double> r = row(k);
+    return kind_ == ImpulseKind::rolling ? Vec3(r[3], r[4], r[5]) : Vec3(Vec3::Zero());
+  }
+
   void reserve(std::size_t rows) { values_.reserve(rows * length()); }
   void assign_zeros(std::size_t rows) { values_.assign(rows * length(), 0.0); }
   /// `of` is a row of this kind, or a longer one, of which the rest is not read.

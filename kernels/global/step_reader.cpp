@@ -140,14 +140,16 @@ ContactEquation StepReader::equation_at(std::size_t chunk, std::size_t place) co
 void StepReader::each_contact(const Visit& visit) const {
   each_place([&](std::size_t chunk, std::size_t place) {
     const ContactEquation contact = equation_at(chunk, place);
-    visit(contact, impulse_of_ ? impulse_of_(place, contact.normal) : law_impulse(source_.contacts, place));
+    visit(contact, kept_ != nullptr ? kept_->force(candidate_at(place), contact.normal)
+                                    : law_impulse(source_.contacts, place));
   });
 }
 
 /// Adds what the moment of a contact does to its bodies.
 void StepReader::add_moment(std::size_t place, const ContactEquation& contact, std::span<Twist> known) const {
   const Contacts& contacts = source_.contacts;
-  const Vec3 moment(contacts.mx[place], contacts.my[place], contacts.mz[place]);
+  const Vec3 moment = kept_ != nullptr ? kept_->moment(candidate_at(place))
+                                       : Vec3(contacts.mx[place], contacts.my[place], contacts.mz[place]);
   const auto turn = [&](std::int32_t body, double sign) {
     if (body < 0) return;
     const BodyUnknown unknown = unknown_of_source(at(body));

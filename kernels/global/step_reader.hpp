@@ -1,13 +1,13 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "kernels/bodies/index.hpp"
+#include "kernels/detection/kept_impulses.hpp"
 #include "kernels/global/problem_reader.hpp"
 
 namespace talus {
@@ -51,12 +51,13 @@ class StepReader final : public ProblemReader {
   /// as unknowns, while equations go on from those of the source.
   void set_free(std::vector<Twist> free) { free_ = std::move(free); }
 
-  /// Impulses instead of those that the contacts hold, of a place and its normal [N s].
-  using ImpulseOf = std::function<Vec3(std::size_t place, const Vec3& normal)>;
-  void set_impulses(ImpulseOf impulse_of) { impulse_of_ = std::move(impulse_of); }
+  /// Impulses and moments are those that candidates keep instead of those of the contacts, which sweeps have
+  /// changed since. `kept` has to live as long as the reader.
+  void set_kept(const KeptImpulses& kept) { kept_ = &kept; }
 
  private:
   bool has_cell() const { return source_.cell.mass > 0; }
+  std::size_t candidate_at(std::size_t place) const { return at(source_.contacts.candidate[place]); }
   double copies(std::size_t slot) const { return source_.parts.empty() ? 1 : source_.parts[slot]; }
   BodyUnknown unknown_of_source(std::size_t body) const;
   BodyUnknown unknown_of_slot(std::size_t slot) const;
@@ -69,7 +70,7 @@ class StepReader final : public ProblemReader {
   std::vector<std::size_t> walls_;          ///< of finite mass, by number
   std::vector<std::int32_t> wall_unknown_;  ///< per wall; -1 of driven ones
   std::vector<Twist> free_;
-  ImpulseOf impulse_of_;
+  const KeptImpulses* kept_ = nullptr;
 };
 
 /// Puts the problem together, as gather_problem of the source does: its contacts whose first body is `taken`,

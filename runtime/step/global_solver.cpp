@@ -232,6 +232,8 @@ void GlobalSolver::find_clusters(int most_direct) {
 std::vector<std::unique_ptr<const StepReader>> GlobalSolver::read_checked(
     const BodyProblemSource& source) const {
   auto steps = gather_parts(source, [](const auto&... of) { return std::make_unique<StepReader>(of...); });
+  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
+    for (const auto& step : steps) step->set_kept(state_.candidates.impulse);
   if (knows_more(parameters_)) {
     PartField free;
     for (const auto& step : steps) step->add_known(free.emplace_back(step->unknowns()));
@@ -241,12 +243,6 @@ std::vector<std::unique_ptr<const StepReader>> GlobalSolver::read_checked(
       steps[p]->set_free(std::move(free[p]));
     }
   }
-  if (ranks_.ranks() > 1)  // a sweep has gone on meanwhile
-    for (const auto& step : steps)
-      step->set_impulses([this](std::size_t place, const Vec3& normal) {
-        const auto candidate = static_cast<std::size_t>(state_.contacts.candidate[place]);
-        return state_.candidates.impulse.force(candidate, normal);
-      });
   return {std::make_move_iterator(steps.begin()), std::make_move_iterator(steps.end())};
 }
 

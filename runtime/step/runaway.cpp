@@ -62,6 +62,17 @@ void check_strain(const StepState& state, double time_step, const StepName& step
       step.text(), strain, most));
 }
 
+/// Energy of grains at the speed that cohesion gives them in a step [J]. It is no load, but contacts that
+/// pull and push leave a part of it, by the tolerance.
+double cohesive_energy(const StepOutcome& outcome) {
+  const double mass = outcome.sample.total_mass,
+               cohesion = outcome.parameters.laws.largest(&PairLaw::cohesion);
+  if (!(mass > 0)) return 0;
+  const double impulse = cohesion * outcome.parameters.impulse_time();
+  const double speed = impulse * static_cast<double>(outcome.sample.bodies) / mass;
+  return 0.5 * mass * speed * speed;
+}
+
 }  // namespace
 
 void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
@@ -88,7 +99,8 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
     fastest_wall2 = std::max({fastest_wall2, state.walls[w].load.velocity.squaredNorm(), speed * speed});
   }
   const double energy = motion.energy.translation + motion.energy.rotation;
-  const double supplied = motion.energy_free + wall_energy_free + sample.total_mass * fastest_wall2;
+  const double supplied =
+      motion.energy_free + wall_energy_free + sample.total_mass * fastest_wall2 + cohesive_energy(outcome);
   if (energy > 100 * supplied && energy > 0)
     throw RunawayError(
         fmt::format("{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "

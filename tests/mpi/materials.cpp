@@ -102,5 +102,32 @@ TEST_F(MaterialsOnRanks, ChangeNoBitWithRanksAndThreads) {
   }
 }
 
+/// Rolling resistance in a small cluster, which is solved on its own at a check: behind it a sweep has gone
+/// on where there are several ranks.
+TEST_F(MaterialsOnRanks, RollingClustersAreCheckedAsTheyWere) {
+  for (const std::string coupling : {"alternating", "nscdd"}) {
+    write(at("scene.toml"), R"(name = "rolling"
+allow_unconverged = true
+time_step = 1e-4
+box = true
+[material]
+density = 1000
+wall_friction = 0.3
+rolling_resistance = 0.03353
+[sample]
+kind = "lattice"
+radius = 0.01
+cells = [3, 3, 2]
+velocity = [-0.0009358, -0.04879, -0.269]
+[[stage]]
+end = { steps = 6 }
+[decomposition]
+partitioner = "hilbert"
+coupling = ")" + coupling + "\"\n");
+    expect_same_bits(2, {{2, 1}}, "one_" + coupling);
+    fs::remove_all(at("s2r2x1"));
+  }
+}
+
 }  // namespace
 }  // namespace talus::test

@@ -26,23 +26,6 @@ int times(const char* name, int otherwise) {
   return given ? std::atoi(given) : otherwise;
 }
 
-/// A column of a table left out: the time that a step took is of the day.
-std::string without(const std::string& table, const std::string& column) {
-  std::istringstream lines(table);
-  std::string kept;
-  std::ptrdiff_t place = -1;
-  for (std::string line; std::getline(lines, line);) {
-    std::vector<std::string> cells;
-    std::istringstream row(line);
-    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-    if (place < 0) place = std::ranges::find(cells, column) - cells.begin();
-    for (std::size_t k = 0; k < cells.size(); ++k)
-      if (static_cast<std::ptrdiff_t>(k) != place) kept += cells[k] + ',';
-    kept += '\n';
-  }
-  return kept;
-}
-
 /// What is summed up over a run, and what a frame has besides.
 const std::string probes = R"(
 [[probe]]

@@ -30,6 +30,23 @@ TEST(Cohesion, GrainHangsFromACeilingThatHoldsItsWeightAndFallsFromAWeakerOne) {
   EXPECT_EQ(falls.wall_force(0)[2], 0);
 }
 
+/// Nothing is at work but what pulls the grains together: the trifle by which a step is off is no runaway.
+TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
+  constexpr double r = 0.002;
+  for (const SolverMethod method : {SolverMethod::automatic, SolverMethod::nlgs, SolverMethod::admm}) {
+    Scene scene(4.47e-5);
+    scene.setup.solver = {};
+    scene.setup.solver.method = method;
+    scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
+    scene.stage().laws.set_all(&PairLaw::cohesion, 4.5e-3);
+    for (int k = 0; k < 16; ++k)
+      scene.sphere(r * Vec3(1 + 2 * (k % 2), 1 + 2 * (k / 2 % 2), 1 + 2 * (k / 4)), r, 3.35e-5);
+    Experiment run(std::move(scene));
+    run.steps(3);
+    EXPECT_NEAR(run.x(15)[2], 7 * r, 1e-6 * r);
+  }
+}
+
 TEST(Cohesion, TwoGrainsHoldUpToCAndPartAboveIt) {
   for (const bool holds : {true, false}) {
     Scene scene = hanging(2, 1e6);

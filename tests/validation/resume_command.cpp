@@ -14,6 +14,7 @@
 
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "tests/unit/io/results/output_helpers.hpp"
+#include "tests/unit/replaced.hpp"
 #include "tests/validation/command_helpers.hpp"
 
 namespace talus::resume_command_test {
@@ -199,6 +200,20 @@ TEST_F(Resume, BeginsAnewWhereThereIsNoCheckpoint) {
   EXPECT_EQ(anew.code, 0) << anew.messages;
   EXPECT_EQ(content(at("parts/walls.csv")), content(at("straight/walls.csv")));
   EXPECT_EQ(content(at("parts/notes.txt")), "mine");
+}
+
+/// They are about the point where a wall began, wherever it has got to.
+TEST_F(Resume, GoesOnWithTheTorquesOfWallsThatMove) {
+  for (const std::string moves : {"drive = \"velocity\"\nvelocity = [0.1, 0, 0]\n",
+                                  "[[wall.motion]]\nkind = \"velocity\"\nvelocity = [0.1, 0, 0]\n"}) {
+    std::string scene = replaced(column_scene, "side = \"z-\"\n", "side = \"z-\"\n" + moves);
+    write(at("moves.toml"), replaced(scene, "steps = 4", "steps = 20"));
+    ASSERT_EQ(run("run moves.toml --out straight --force --threads 1").code, 0);
+    fs::remove_all(at("parts"));
+    for (const std::string part : {"--steps 10", ""})
+      ASSERT_EQ(run("run moves.toml --out parts --resume --threads 1 " + part).code, 0);
+    EXPECT_EQ(content(at("parts/walls.csv")), content(at("straight/walls.csv"))) << moves;
+  }
 }
 
 TEST_F(Resume, DoesWithoutACheckpointThatTheDiskDoesNotTake) {
