@@ -38,22 +38,25 @@ Conversion conversion_of(const ConvertOptions& options) {
   const char* name = options.format == "lammps" ? "grains.lammpstrj" : "grains.vtkhdf";
   todo.out = options.out.empty() ? todo.results.parent_path() / name : fs::path(options.out);
   io::check_output_files({todo.results.string()}, {todo.out.string()}, options.force);
-  todo.frames = io::frame_count(todo.results);
-  if (todo.frames == 0)
-    throw std::invalid_argument(fmt::format("{}: holds no frame yet", todo.results.string()));
+  todo.frames = io::demand_frames(todo.results);
   return todo;
+}
+
+/// Neither format has contacts.
+Frame frame_of(const Conversion& todo, std::size_t k) {
+  return io::read_frame(todo.results, k, io::FrameParts::without_contacts);
 }
 
 void write_lammps(const Conversion& todo, const fs::path& part) {
   std::ofstream file(part, std::ios::binary);
-  for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(io::read_frame(todo.results, k));
+  for (std::size_t k = 0; k < todo.frames; ++k) file << io::lammps_dump(frame_of(todo, k));
   file.close();
   if (!file) throw io::FileError(part.string(), "cannot be written: no room or no right to");
 }
 
 void write_vtkhdf(const Conversion& todo, const fs::path& part) {
   io::VtkHdfWriter writer(part);
-  for (std::size_t k = 0; k < todo.frames; ++k) writer.append(io::read_frame(todo.results, k));
+  for (std::size_t k = 0; k < todo.frames; ++k) writer.append(frame_of(todo, k));
   writer.close();
 }
 

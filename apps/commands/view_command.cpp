@@ -34,15 +34,22 @@ class Viewed {
     view_.width = static_cast<std::size_t>(options.width);
     if (!fs::exists(results_))
       throw std::invalid_argument(fmt::format("{}: no results.h5 of a run there", options.run));
-    frames_ = io::frame_count(results_);
-    if (frames_ == 0) throw std::invalid_argument(fmt::format("{}: holds no frame yet", results_.string()));
+    frames_ = io::demand_frames(results_);
   }
 
   std::size_t frames() const { return frames_; }
   std::vector<std::vector<Triangle>> triangles(const Frame& frame) const {
     return io::wall_triangles(walls_, frame.walls, io::grain_bounds(frame));
   }
-  Frame frame(std::size_t k) const { return io::read_frame(results_, k); }
+  /// With what its colours are made of.
+  Frame frame(std::size_t k) const {
+    using enum io::GrainColour;
+    const bool forces = view_.colour == force, speeds = view_.colour == speed;
+    return io::read_frame(results_, k,
+                          forces   ? io::FrameParts::all
+                          : speeds ? io::FrameParts::without_contacts
+                                   : io::FrameParts::places);
+  }
 
   /// One scale and one place for all frames.
   void fit() {

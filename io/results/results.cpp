@@ -46,11 +46,11 @@ void demand_same_length(std::size_t length, std::size_t expected, const char* na
 
 }  // namespace
 
-void validate(const Frame& frame) {
+void validate(const Frame& frame, FrameParts parts) {
   const std::size_t bodies = frame.id.size();
   demand_same_length(frame.x.size(), bodies, "x");
   demand_same_length(frame.radius.size(), bodies, "radius");
-  demand_same_length(frame.u.size(), bodies, "u");
+  demand_same_length(frame.u.size(), parts == FrameParts::places ? 0 : bodies, "u");
   if (!frame.omega.empty()) demand_same_length(frame.omega.size(), bodies, "omega");
   if (!frame.orientation.empty()) demand_same_length(frame.orientation.size(), bodies, "orientation");
   if (!frame.material.empty()) demand_same_length(frame.material.size(), bodies, "material");

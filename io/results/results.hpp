@@ -34,9 +34,12 @@
 
 namespace talus::io {
 
+/// What of a frame is read: contacts are most of it. `places`: neither contacts nor velocities.
+enum class FrameParts { all, without_contacts, places };
+
 /// Throws std::invalid_argument naming the array whose length does not fit the others; `omega`,
-/// `orientation` and `material` may be empty.
-void validate(const Frame& frame);
+/// `orientation` and `material` may be empty, and `u` where places are all that is asked for.
+void validate(const Frame& frame, FrameParts parts = FrameParts::all);
 
 /// What of a frame is kept, and how.
 struct FrameFormat {
@@ -97,11 +100,11 @@ class ResultsWriter {
 /// Number of frames in a results.h5. Throws FileError when it is none.
 std::size_t frame_count(const std::filesystem::path& path);
 
-/// What of a frame is read: contacts are most of it.
-enum class FrameParts { all, without_contacts };
+/// The same. Throws FileError where there is none, and says when one is written.
+std::size_t demand_frames(const std::filesystem::path& path);
 
 /// Frame `index`, bit for bit as it was written. Throws FileError when there is no such frame, or its arrays
-/// were left out.
+/// were left out, and names the key that writes them.
 Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts = FrameParts::all);
 
 }  // namespace talus::io

@@ -44,8 +44,16 @@ std::vector<T> read_integers(hid_t file, const std::string& path, const std::str
   return read_array<T>({file, path}, name, H5T_NATIVE_INT64, numbers_in<T>);
 }
 
+/// Throws FileError where an array is not there because the scene said so, by `key` = false.
+void demand(const detail::Place& frame, const char* array, const char* key) {
+  if (H5Lexists(frame.group, array, H5P_DEFAULT) > 0) return;
+  throw FileError(frame.file, fmt::format("has no {}: run the scene with {} = true", array, key));
+}
+
 void read_contacts(detail::Place group, Frame& frame) {
   const auto& [h, name] = group;
+  demand(group, "contacts", "output.contacts");
+  demand(group, "contacts/point", "output.contact_geometry");
   frame.contact_bodies = read_integers<std::array<std::int64_t, 2>>(h, name, "contacts/bodies");
   frame.contact_point = read_doubles<Vec3>(h, name, "contacts/point");
   frame.contact_normal = read_doubles<Vec3>(h, name, "contacts/normal");
@@ -104,6 +112,15 @@ std::size_t frame_count(const std::filesystem::path& path) {
   return count_frames(file.id(), path.string());
 }
 
+std::size_t demand_frames(const std::filesystem::path& path) {
+  const std::size_t frames = frame_count(path);
+  if (frames > 0) return frames;
+  throw FileError(
+      path.string(),
+      "holds no frame: one is written at the times of [output] and, with stage_frames = true, at the "
+      "end of each stage");
+}
+
 Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts) {
   const detail::QuietHdf5 quiet;
   const std::string name = path.string();
@@ -123,7 +140,10 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index, FramePart
   frame.id = read_integers<std::int64_t>(h, name, "bodies/id");
   frame.x = read_doubles<Vec3>(h, name, "bodies/x");
   frame.radius = read_doubles<double>(h, name, "bodies/radius");
-  frame.u = read_doubles<Vec3>(h, name, "bodies/u");
+  if (parts != FrameParts::places) {
+    demand({h, name}, "bodies/u", "output.velocities");
+    frame.u = read_doubles<Vec3>(h, name, "bodies/u");
+  }
   if (H5Lexists(h, "bodies/omega", H5P_DEFAULT) > 0)
     frame.omega = read_doubles<Vec3>(h, name, "bodies/omega");
   if (H5Lexists(h, "bodies/orientation", H5P_DEFAULT) > 0) {
@@ -146,7 +166,7 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index, FramePart
   read_places({h, name}, frame.walls);
   try {
     frame.domain = read_cell({h, name});
-    validate(frame);
+    validate(frame, parts);
   } catch (const std::invalid_argument& error) {
     throw FileError(name, prefix + " is damaged: " + error.what());
   }
