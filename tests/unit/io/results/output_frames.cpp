@@ -124,14 +124,16 @@ TEST(Results, WithoutVelocitiesOrGeometrySayWhatIsMissing) {
   const ScratchDirectory scratch;
   ResultsWriter(scratch / "still.h5", {"bottom", "left"}, graph::one_rank(), {.velocities = false})
       .append(three_grains());
-  EXPECT_NE(message_of<FileError>([&] { read_frame(scratch / "still.h5", 0); })
-                .find("has no bodies/u: run the scene with output.velocities = true"),
+  EXPECT_NE(message_of<FileError>([&] {
+              read_frame(scratch / "still.h5", 0);
+            }).find("has no bodies/u: run the scene with output.velocities = true"),
             std::string::npos);
   EXPECT_EQ(read_frame(scratch / "still.h5", 0, FrameParts::places).x, three_grains().x);
   ResultsWriter(scratch / "flat.h5", {"bottom", "left"}, graph::one_rank(), {.contact_geometry = false})
       .append(three_grains());
-  EXPECT_NE(message_of<FileError>([&] { read_frame(scratch / "flat.h5", 0); })
-                .find("has no contacts/point: run the scene with output.contact_geometry = true"),
+  EXPECT_NE(message_of<FileError>([&] {
+              read_frame(scratch / "flat.h5", 0);
+            }).find("has no contacts/point: run the scene with output.contact_geometry = true"),
             std::string::npos);
 }
 
