@@ -110,12 +110,15 @@ void make_arch(SceneBench& bench) {
     x += 2 * r * std::cos(angle);
     z += 2 * r * std::sin(angle);
   }
-  const double lean = rise * draws.between(0.7, 1.2), c = std::cos(lean), s = std::sin(lean);
+  double lean = rise * draws.between(0.7, 1.2);
   const Vec3 first = bench.made.grains.x.front(), last = bench.made.grains.x.back();
+  const double middle = 0.5 * (first[0] + last[0]);
+  // Under a high arch of few grains leaning walls may meet above the floor, where loose grains lie.
+  while ((Vec3(middle, 0, 0.5 * r) - first).dot(Vec3(std::cos(lean), 0, std::sin(lean))) < -r) lean *= 0.9;
+  const double c = std::cos(lean), s = std::sin(lean);
   bench.add_wall("left", first - r * Vec3(c, 0, s), {c, 0, s});
   bench.add_wall("right", last - r * Vec3(-c, 0, s), {-c, 0, s});
   bench.add_wall("floor", Vec3::Zero(), Vec3::UnitZ());
-  const double middle = 0.5 * (first[0] + last[0]);
   const bool on_top = draws.chance(0.3);
   for (int k = 0; k < loose; ++k) {
     const double own = bench.draw_radius();
