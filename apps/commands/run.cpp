@@ -61,6 +61,7 @@ struct Prepared {
   std::vector<GivenForce> forces;
   Recordings recordings;
   std::vector<std::string> warnings;
+  std::optional<std::size_t> bodies;  ///< that a run which goes on began with, where that is known
   std::string directory;
   std::string resolved;  ///< the scene as it was loaded
   double wall_mass = 0;
@@ -106,6 +107,8 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
     compare_scenes(run.scene, run.resolved, *run.point);
     if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
     take_over(*run.point, run.scene);
+    run.warnings = earlier.warnings;
+    run.bodies = earlier.bodies;
   } else if (earlier.complete) {
     run.nothing_left = earlier.exit_code;
   }
@@ -248,7 +251,7 @@ int run_scene(const RunOptions& options, const graph::Communicator& ranks, Termi
                              ranks,        terminal,      run.point ? &*run.point : nullptr,
                              run.resolved, run.wall_mass, began,
                              run.granted,  run.directory, provenance,
-                             run.warnings};
+                             run.warnings, run.bodies};
   const io::Summary summary = simulate(prepared, std::move(run.sample), std::move(run.forces));
   if (ranks.rank() == 0) {
     print_end(terminal, summary, scene.setup.solver, run.directory);

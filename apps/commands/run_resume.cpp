@@ -109,6 +109,11 @@ EarlierRun earlier_run(const std::filesystem::path& directory) {
   const nlohmann::json& summary = read["summary"];
   run.complete = summary.value("complete", false);
   run.exit_code = summary.value("exit_code", 0);
+  if (const auto warnings = summary.find("warnings"); warnings != summary.end() && warnings->is_array())
+    for (const nlohmann::json& warning : *warnings)
+      if (warning.is_string()) run.warnings.push_back(warning.get<std::string>());
+  if (const auto bodies = summary.find("bodies"); bodies != summary.end() && bodies->is_number_unsigned())
+    run.bodies = bodies->get<std::size_t>();
   return run;
 }
 

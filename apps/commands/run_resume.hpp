@@ -37,10 +37,12 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
 /// first.
 void take_over(const ResumePoint& point, io::Scene& scene);
 
-/// What run.json in a directory says: whether the last stage of the scene has ended, and the exit code.
+/// What run.json in a directory says.
 struct EarlierRun {
-  bool complete = false;
+  bool complete = false;  ///< the last stage of the scene has ended
   int exit_code = 0;
+  std::vector<std::string> warnings;  ///< of the scene
+  std::optional<std::size_t> bodies;  ///< that the run began with
 };
 EarlierRun earlier_run(const std::filesystem::path& directory);
 

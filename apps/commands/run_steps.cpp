@@ -313,7 +313,8 @@ double grain_weight(const io::Scene& scene) {
 io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenForce> forces) {
   io::Summary summary;
   summary.bodies =
-      run.resume ? static_cast<std::size_t>(run.resume->file.state.head.size.bodies) : sample.size();
+      !run.resume ? sample.size()
+                  : run.bodies.value_or(static_cast<std::size_t>(run.resume->file.state.head.size.bodies));
   summary.warnings = run.warnings;
   // Of one rank it writes on the background thread, from where a trace must hear of no call.
   io::OutputContext context = io::output_context(run.directory, run.scene.setup,

@@ -121,8 +121,8 @@ void validate_cell(const Setup& setup) {
 void validate_coupling(const Setup& setup) {
   if (setup.decomposition.coupling != Coupling::nscdd && any_stress(setup))
     throw std::invalid_argument(
-        "a cell that follows a stress is pushed by all subdomains at once, and not in turns; take "
-        "\"nscdd\", or leave coupling out");
+        "a cell that follows a stress is coupled by \"nscdd\" alone, in which each subdomain pushes its own "
+        "share of the cell's mass; leave decomposition.coupling out, or the stress of the stages");
 }
 
 void validate_correction(const Setup& setup) {

@@ -202,6 +202,15 @@ TEST_F(Resume, BeginsAnewWhereThereIsNoCheckpoint) {
   EXPECT_EQ(content(at("parts/notes.txt")), "mine");
 }
 
+TEST_F(Resume, KeepsWhatWasSaidOfTheSceneWhenItBegan) {
+  write(at("light.toml"), replaced(column_scene, "2600", "2.6"));
+  for (const std::string part : {"--steps 2", ""})
+    ASSERT_EQ(run("run light.toml --out parts --resume --threads 1 " + part).code, 0);
+  const auto warnings = summary(at("parts")).at("warnings");
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].get<std::string>().find("2.6 kg/m^3"), std::string::npos);
+}
+
 /// They are about the point where a wall began, wherever it has got to.
 TEST_F(Resume, GoesOnWithTheTorquesOfWallsThatMove) {
   for (const std::string moves : {"drive = \"velocity\"\nvelocity = [0.1, 0, 0]\n",
