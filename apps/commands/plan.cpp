@@ -70,9 +70,9 @@ void print_needs(const Simulation& simulation, const io::Scene& scene, int threa
        parameters.gravity.norm() > 0 ? fmt::format("{:g} m/s^2", parameters.gravity.norm()) : "none");
   const double restitution = parameters.laws.largest(&PairLaw::restitution);
   line("restitution", restitution > 0,
-       restitution > 0 ? fmt::format("e = {:g}, {} law", restitution,
-                                     parameters.reflection > 0 ? "Moreau's" : "Newton's")
-                       : "e = 0");
+       restitution > 0
+           ? fmt::format("e = {:g}, {} law", restitution, parameters.reflection > 0 ? "Moreau's" : "Newton's")
+           : "e = 0");
   const double undone = scene.setup.solver.overlap_correction;
   line("overlaps undone", undone > 0,
        undone > 0 ? fmt::format("{:g} of an overlap per step, by ten sweeps behind the others", undone)
