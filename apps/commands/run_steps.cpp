@@ -324,6 +324,7 @@ io::Summary simulate(const PreparedRun& run, Sample sample, std::vector<GivenFor
   context.load.weight = grain_weight(run.scene);
   context.tables_every = run.scene.output.tables_every;
   context.provenance = run.provenance;
+  context.begun = summary;  // a killed run leaves it to the one that goes on
   io::Recorder recorder(std::move(context), run.scene.output.sinks);
   // The first fault is what to mend.
   const auto attempt = [&](const auto& work) {

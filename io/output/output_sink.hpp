@@ -48,6 +48,7 @@ struct OutputContext {
   std::vector<std::string> grids = {};            ///< names of the fields of the setup
   std::map<std::string, int> axis_of_stage = {};  ///< 0, 1, 2: along which the strain of a stage is measured
   Provenance provenance = {};
+  Summary begun = {};                ///< what run.json says while the run goes on
   const graph::Communicator& ranks;  ///< outlives the sinks
 
   /// Whether walls.csv, triaxial.csv and cell.csv, and what is drawn from them, have a line for that step.

@@ -11,11 +11,12 @@ class RunJsonSink : public OutputSink {
   explicit RunJsonSink(const OutputContext& context)
       : path_(context.directory / "run.json"),
         provenance_(context.provenance),
+        begun_(context.begun),
         writes_(context.ranks.rank() == 0) {}
 
   void open() override {
     if (!writes_) return;
-    write_run_json(path_, provenance_, Summary{});
+    write_run_json(path_, provenance_, begun_);
     // What came of the run must find room also when its results have filled the disk.
     constexpr std::int64_t generous = 1 << 14;
     reserve(path_, generous);
@@ -25,6 +26,7 @@ class RunJsonSink : public OutputSink {
  private:
   std::filesystem::path path_;
   Provenance provenance_;
+  Summary begun_;
   bool writes_;
 };
 
