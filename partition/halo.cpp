@@ -42,10 +42,10 @@ std::vector<SubdomainId> subdomains_within(const Partition& partition, const Vec
   const Corner low = partition.frame.coordinates(point - reach),
                high = partition.frame.coordinates(point + reach);
   std::vector<SubdomainId> found;
-  if (partition.table.subdomain.empty())
-    collect(partition.tree, 0, low, high, found);
-  else
+  if (partition.by_table())
     collect(partition.table, low, high, found);
+  else
+    collect(partition.tree, 0, low, high, found);
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;

@@ -60,7 +60,7 @@ PartitionPoints candidate_points(std::span<const Vec3> x, std::span<const GrainP
 SubdomainId Partition::subdomain_of(const Vec3& point) const {
   if (subdomains == 1) return SubdomainId(0);
   const auto q = frame.coordinates(point);
-  return SubdomainId(table.subdomain.empty() ? detail::leaf_of(tree, q) : table.subdomain[table.cell_of(q)]);
+  return SubdomainId(by_table() ? table.subdomain[table.cell_of(q)] : detail::leaf_of(tree, q));
 }
 
 Partition make_partition(const PartitionPoints& points, const PartitionOptions& options,

@@ -89,6 +89,7 @@ struct Partition {
   CutTree tree;     ///< of partitioners that cut along planes
   CellTable table;  ///< of partitioners that deal out cells; else empty
 
+  bool by_table() const { return !table.subdomain.empty(); }
   /// Subdomain 0 .. subdomains - 1 of a finite point [m], inside or outside the box of the sample.
   SubdomainId subdomain_of(const Vec3& point) const;
 };

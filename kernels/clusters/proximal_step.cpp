@@ -49,7 +49,7 @@ void go_along(const std::vector<Twist>& way, const MinimumThresholds& newton, Pr
   std::vector<Twist> there;
   // force.way falls all the way: where it ends far below 0 it was 0 before.
   for (double low = 0, high = 1, part = 1; high - low > newton.line * high; part = 0.5 * (low + high)) {
-    there = sum(step.motion, part, way);
+    there = added(step.motion, part, way);
     force = step.force(there);
     const double falls = dot(force, way);
     if (falls < -small)
@@ -64,7 +64,7 @@ void go_along(const std::vector<Twist>& way, const MinimumThresholds& newton, Pr
 
 }  // namespace
 
-std::vector<Twist> sum(const std::vector<Twist>& a, double part, const std::vector<Twist>& b) {
+std::vector<Twist> added(const std::vector<Twist>& a, double part, const std::vector<Twist>& b) {
   std::vector<Twist> sum(a);
   for (std::size_t k = 0; k < a.size(); ++k) {
     sum[k].u += part * b[k].u;

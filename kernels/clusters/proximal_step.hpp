@@ -71,6 +71,6 @@ struct Minimised {
 Minimised minimise(const StepGoal& goal, const MinimumThresholds& newton, ProximalStep& step, double& work);
 
 /// a + part b, per unknown.
-std::vector<Twist> sum(const std::vector<Twist>& a, double part, const std::vector<Twist>& b);
+std::vector<Twist> added(const std::vector<Twist>& a, double part, const std::vector<Twist>& b);
 
 }  // namespace talus

@@ -67,7 +67,7 @@ Correction search_by_steps(const BodyProblem& problem, double enough, const Corr
     }
     Correction now = steps.take();
     now.rounds = k;
-    now.moved = momentum_of(problem, sum(now.motion, -1, before));
+    now.moved = momentum_of(problem, added(now.motion, -1, before));
     const bool small = now.open <= goal && now.moved <= goal && now.left <= goal;
     // Behind a firmer step a softer one changes less, which says nothing.
     const bool comparable = small && firmness >= last;

@@ -58,7 +58,7 @@ void set_slot_begins(std::span<const std::size_t> counts, Decomposition& all) {
 
 /// The subdomain that a new grain joins: before space is cut, the first one holds all.
 SubdomainId subdomain_of(const Decomposition& all, const Vec3& x) {
-  const bool cut = !all.partition.tree.cuts.empty() || !all.partition.table.subdomain.empty();
+  const bool cut = !all.partition.tree.cuts.empty() || all.partition.by_table();
   return all.several() && cut ? all.partition.subdomain_of(x) : SubdomainId(0);
 }
 

@@ -11,6 +11,7 @@
 #include "kernels/bodies/index.hpp"
 #include "runtime/step/checkpoint.hpp"
 #include "runtime/step/detail/checkpoint_columns.hpp"
+#include "runtime/step/wall_motions.hpp"
 
 namespace talus {
 
@@ -169,6 +170,7 @@ StepState restore_state(const Setup& setup, const Checkpoint& from, const graph:
   demand(from.parts.size() == all.here.size(), "subdomains");
   restore_partition(head, all);
   state.walls = setup.walls;
+  simplify_motions(state.walls);  // in their first places, as when the run began
   state.clumps = setup.clumps;
   state.domain = setup.domain;
   restore_cell(head, state.domain);

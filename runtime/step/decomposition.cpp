@@ -215,7 +215,7 @@ void cut_space(Decomposition& decomposition, const DecompositionSettings& settin
   ranks.sum(all);
   decomposition.blind = all[0] == 0;
   const Partition before = decomposition.partition;
-  const bool first = before.tree.cuts.empty() && before.table.subdomain.empty();
+  const bool first = before.tree.cuts.empty() && !before.by_table();
   PartitionOptions options = partition_options(settings, before.subdomains);
   options.previous = first ? nullptr : &before;
   options.domain = domain;

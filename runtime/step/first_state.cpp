@@ -60,11 +60,6 @@ StepState first_state(const Setup& setup, Bodies bodies, const graph::Communicat
 StepState restored_state(const Setup& setup, const Checkpoint& from, const graph::Communicator& ranks) {
   validate(setup);
   StepState state = restore_state(setup, from, ranks);
-  // Points of torques are those of walls in their first places.
-  std::vector<Wall> first = setup.walls;
-  simplify_motions(first);
-  for (std::size_t w = 0; w < first.size(); ++w) state.walls[w].torque_point = first[w].torque_point;
-  simplify_motions(state.walls);
   demand_laws(setup, state.bodies);
   for (std::size_t k = 0; k <= static_cast<std::size_t>(from.head.stage_index); ++k)
     take_loads(setup.stages.at(k), state.walls);

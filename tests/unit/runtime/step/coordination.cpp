@@ -100,6 +100,40 @@ TEST(Coordination, IsThatOfItsDefinitionInRandomNetworks) {
   }
 }
 
+/// Every other grain stands in both of two subdomains, and either copy has a part of its contacts.
+TEST(Coordination, IsThatOfAllCopiesTogether) {
+  std::mt19937 random(6);
+  constexpr Slot grains = 40;
+  std::uniform_int_distribution<Slot> any(0, grains - 1);
+  std::bernoulli_distribution coin;
+  // Of an even grain slots k and grains + k; odd ones stand in one subdomain only.
+  const auto shared = [](Slot k) { return k % 2 == 0; };
+  const auto home = [](Slot k) { return k % 4 == 1 ? 0 : 1; };
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<std::pair<Slot, Slot>> pairs, of_slots;
+    for (int k = 0; k < 60 + trial / 2; ++k) {
+      const Slot a = any(random), b = any(random);
+      if (a == b || (!shared(a) && !shared(b) && home(a) != home(b))) continue;
+      const int in = !shared(a) ? home(a) : !shared(b) ? home(b) : coin(random) ? 1 : 0;
+      pairs.push_back({a, b});
+      of_slots.push_back({static_cast<Slot>(a + in * grains), static_cast<Slot>(b + in * grains)});
+    }
+    StepState state = state_of(2 * static_cast<std::size_t>(grains), of_slots, {});
+    Decomposition& all = state.decomposition;
+    all.partition.subdomains = 2;
+    for (Slot s = 0; s < 2 * grains; ++s) {
+      const Slot k = s % grains;
+      state.bodies.id[static_cast<std::size_t>(s)] = BodyId{static_cast<std::int64_t>(k)};
+      all.multiplicity.push_back(shared(k) ? 2 : 1);
+      all.counts.push_back(s < grains ? shared(k) || home(k) == 0 : !shared(k) && home(k) == 1);
+    }
+    for (int hold = 2; hold <= 4; ++hold)
+      EXPECT_EQ(coordination(state, graph::one_rank(), hold),
+                by_definition(static_cast<std::size_t>(grains), pairs, {}, hold))
+          << trial << ' ' << hold;
+  }
+}
+
 TEST(Coordination, WeightHoldsAGrainOnThree) {
   StepParameters parameters;
   EXPECT_EQ(contacts_to_hold(parameters), 4);
