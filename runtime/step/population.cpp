@@ -8,8 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "runtime/step/places.hpp"
-
 namespace talus {
 
 namespace {
@@ -156,17 +154,32 @@ NewGrain Population::made(std::size_t i, std::int64_t number, const Vec3& x) {
   return grain;
 }
 
+/// The first of the grains that wait, as many as are tried: no more than the region has volume for, since the
+/// pairs of places that overlap grow with the square of those that are tried together.
+std::vector<Seeker> Population::seekers_of(std::size_t i) const {
+  const Bounds bounds = bounds_of(setup_.inserts[i].region);
+  const double reach = largest_radius(setup_.inserts[i].radii);  // out of a disc, which is flat
+  const double room = (bounds.high - bounds.low + Vec3::Constant(2 * reach)).prod();
+  std::vector<Seeker> seekers;
+  double volume = 0;
+  for (const std::int64_t number : waiting_[i]) {
+    if (static_cast<std::int64_t>(seekers.size()) == now_.window[i] || volume > room) break;
+    const double radius = radius_of_grain(i, number);
+    seekers.push_back({static_cast<std::uint64_t>(number), radius});
+    volume += sphere_mass(radius, 1);
+  }
+  return seekers;
+}
+
 /// Looks for room for the grains that wait. After an occasion with too little room, not many more are tried
 /// than found some, so that full regions cost little.
 void Population::place_due(std::size_t i, const StepState& state, const graph::Communicator& ranks,
                            std::vector<NewGrain>& grains) {
   const InsertRule& rule = setup_.inserts[i];
   std::vector<std::int64_t>& waiting = waiting_[i];
-  const std::size_t count = std::min(waiting.size(), static_cast<std::size_t>(now_.window[i]));
+  const std::vector<Seeker> seekers = seekers_of(i);
+  const std::size_t count = seekers.size();
   if (count == 0) return;
-  std::vector<Seeker> seekers;
-  for (std::size_t k = 0; k < count; ++k)
-    seekers.push_back({static_cast<std::uint64_t>(waiting[k]), radius_of_grain(i, waiting[k])});
   Spheres taken;
   for (const NewGrain& grain : grains) {
     taken.x.push_back(grain.grain.x);

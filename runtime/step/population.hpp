@@ -20,6 +20,7 @@
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/body_slots.hpp"
 #include "runtime/step/frame.hpp"
+#include "runtime/step/places.hpp"
 #include "runtime/step/setup.hpp"
 #include "runtime/step/state.hpp"
 
@@ -108,6 +109,7 @@ class Population {
   std::vector<std::int64_t> leave(const StepSpan& step, const StepState& state,
                                   const graph::Communicator& ranks);
   void draw_due(std::size_t rule, const StepSpan& step);
+  std::vector<Seeker> seekers_of(std::size_t rule) const;
   void place_due(std::size_t rule, const StepState& state, const graph::Communicator& ranks,
                  std::vector<NewGrain>& grains);
   NewGrain made(std::size_t rule, std::int64_t number, const Vec3& x);
