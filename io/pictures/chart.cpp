@@ -131,7 +131,10 @@ class Axis {
   }
 
   void plan_steps(double low, double high) {
-    if (high - low < 1e-12 * std::max(1.0, std::abs(high))) high = low + 1;
+    // Without an extent that numbers of this size can tell, one of a part of them: adding 1 would be lost on
+    // large ones, and hides small ones.
+    const double size = std::max(std::abs(low), std::abs(high));
+    if (high - low <= 1e-12 * size) high = low + (size > 0 ? 0.1 * size : 1);
     const std::vector<double> values = detail::nice_ticks(low, high, 6);
     low_ = values.front(), high_ = values.back();
     for (double value : values) ticks_.push_back({value, fmt::format("{:.6g}", value)});

@@ -74,6 +74,20 @@ TEST(Chart, OnePointAndNoneArePictures) {
   EXPECT_NE(draw_chart(chart).find("No data"), std::string::npos);
 }
 
+TEST(Chart, ValuesOfAnySizeHavePlacesInThePicture) {
+  Chart chart = two_curves();
+  chart.levels.clear();
+  chart.log_x = chart.log_y = false;
+  chart.series = {{"large", {{0, 1e17}, {1, 1e17}}, 0, 0}};
+  const std::string large = draw_chart(chart);
+  EXPECT_EQ(large.find("nan"), std::string::npos);
+  EXPECT_EQ(large.find("inf"), std::string::npos);
+  chart.series = {{"small", {{0, 1e-20}, {1, 3e-20}}, 0, 0}};
+  const auto small = polyline(draw_chart(chart), 0);
+  ASSERT_EQ(small.size(), 2U);
+  EXPECT_GT(small[0][1], small[1][1] + 100) << "forces between grains of a nanometre are no straight line";
+}
+
 TEST(Chart, AStaircaseHoldsItsValueUpToTheNextPoint) {
   Chart chart = two_curves();
   chart.staircase = true;
