@@ -18,6 +18,8 @@
 #include "io/scene/detail/shape_keys.hpp"
 #include "io/scene/detail/wall_conflict.hpp"
 #include "runtime/step/cell.hpp"
+#include "runtime/step/stage_loads.hpp"
+#include "runtime/step/wall_motions.hpp"
 
 namespace talus::io {
 
@@ -49,6 +51,7 @@ class SceneReader {
     read_walls();
     read_stages();
     check_motions(root_, scene_);
+    check_faces();
     read_grain_rules(root_, scene_);
     check_by_cell([&] { validate_cell(scene_.setup); });
     read_table(table_at(root_, "detection"), "detection", keys_.detection, {}, scene_.setup.detection);
@@ -122,7 +125,8 @@ class SceneReader {
         fail_at(at ? *at : root_, "wall", fault);
       }
     for (std::size_t k = 0; k < walls.size(); ++k)
-      if (walls[k].load.drive == WallDrive::pressure) require_face(k, place[k] ? *place[k] : root_, "wall");
+      if (walls[k].load.drive == WallDrive::pressure)
+        require_face(walls, k, place[k] ? *place[k] : root_, "wall");
   }
 
   void read_wall(const toml::table& table, const std::string& path, Wall& wall) {
@@ -179,9 +183,10 @@ class SceneReader {
     }
   }
 
-  void require_face(std::size_t wall, const toml::table& at, const std::string& path) {
+  void require_face(const std::vector<Wall>& walls, std::size_t wall, const toml::table& at,
+                    const std::string& path) const {
     try {
-      face_area(scene_.setup.walls, wall, scene_.setup.domain.edges());
+      face_area(walls, wall, scene_.setup.domain.edges());
     } catch (const std::invalid_argument& error) {
       fail_at(at, path, error.what());
     }
@@ -240,9 +245,23 @@ class SceneReader {
       if (load.second.drive != WallDrive::fixed && !walls[index].motion.empty())
         fail_at(named, load_path + ".wall",
                 fmt::format("wall '{}' has a motion, and that alone moves it", load.first));
-      if (load.second.drive == WallDrive::pressure) require_face(index, *entry, load_path);
+      if (load.second.drive == WallDrive::pressure) require_face(walls, index, *entry, load_path);
       in_force[index] = load.second;
       stage.loads.push_back(std::move(load));
+    }
+  }
+
+  /// Walls that come or go with stages leave no pressure without a face.
+  void check_faces() const {
+    std::vector<Wall> walls = scene_.setup.walls;
+    std::size_t k = 0;
+    for (const toml::table* table : tables_at(root_, "stage", "stage")) {
+      take_loads(scene_.setup.stages[k], walls);
+      resolve_stages(scene_.setup, k, {}, walls);
+      for (std::size_t wall = 0; wall < walls.size(); ++wall)
+        if (!walls[wall].absent && walls[wall].load.drive == WallDrive::pressure)
+          require_face(walls, wall, *table, fmt::format("stage[{}]", k));
+      ++k;
     }
   }
 

@@ -19,7 +19,7 @@ void put_load(Wall& wall, const std::vector<Wall>& walls, const Domain& domain) 
     wall.velocity = wall.velocity.dot(wall.normal) * wall.normal;
     if (wall.load.velocity != Vec3::Zero()) wall.velocity += wall.load.velocity;
   }
-  if (wall.load.drive == WallDrive::pressure)
+  if (!wall.absent && wall.load.drive == WallDrive::pressure)
     face_area(walls, static_cast<std::size_t>(&wall - walls.data()), domain.edges());
 }
 

@@ -186,5 +186,18 @@ TEST_F(WallMotions, WallsOfOtherStagesMayStandWhereGrainsAre) {
                  "no stage is named 'third'");
 }
 
+TEST_F(WallMotions, APressureNeedsAFaceInEveryStage) {
+  const auto scene = [](const std::string& lid, const std::string& side) {
+    const std::string first = "[[stage]]\nname = \"first\"\ntime_step = 1e-3\nend = { steps = 1 }\n";
+    std::string text = scene_test::scene_with("#tail", "[[wall]]\nname = \"x+\"\n" + side);
+    text = scene_test::replaced(text, "#wall\n", lid);
+    return scene_test::replaced(text, "[[stage]]\n", first + "[[stage]]\n");
+  };
+  const std::string late = "from_stage = \"press\"\n", early = "until_stage = \"press\"\n";
+  expect_refused(scene("", late), "stage[0]", "wall 'z+': no two pairs of opposite walls");
+  expect_refused(scene("", early), "stage[1]", "wall 'z+': no two pairs of opposite walls");
+  EXPECT_NO_THROW(parse(scene(late, late))) << "it has no face before it is there, and needs none";
+}
+
 }  // namespace
 }  // namespace talus::io::wall_motions_test
