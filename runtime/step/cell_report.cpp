@@ -7,6 +7,7 @@
 
 #include "runtime/step/cell_flow.hpp"
 #include "runtime/step/coordination.hpp"
+#include "runtime/step/exact_sum.hpp"
 #include "runtime/step/force_fabric.hpp"
 
 namespace talus {
@@ -22,29 +23,23 @@ std::array<double, 6> symmetric(const Mat3& m) {
 }  // namespace
 
 Mat3 kinetic_moment(const StepState& state, const Mat3& gradient, const graph::Communicator& ranks) {
-  struct Row {
-    double subdomain, moment[9];
-  };
+  // The same in any order: a run begins before its bodies are dealt out to subdomains.
   const Decomposition& all = state.decomposition;
-  std::vector<Row> rows;
-  for (const SubdomainPlace e : all.here.indices()) {
-    const SlotRange range = all.several() ? all.slots_of(e) : SlotRange{0, state.bodies.size()};
-    Mat3 sum = Mat3::Zero();
-    for (std::size_t s = range.begin; s < range.end; ++s) {
-      if (!counts(all, s)) continue;
-      const Velocity body = whole_velocity(all, state.bodies, s);
-      const Vec3 v = Eigen::Map<const Vec3>(body.u) - gradient * (state.bodies.x[s] - state.domain.low);
-      sum += v * v.transpose() / body.inv_mass;
-    }
-    Row& row = rows.emplace_back();
-    row.subdomain = all.here[e].value();
-    Eigen::Map<Mat3>(row.moment) = sum;
+  std::vector<Mat3> moments;
+  double largest[1] = {0};
+  for (std::size_t s = 0; s < state.bodies.size(); ++s) {
+    if (!counts(all, s)) continue;
+    const Velocity body = whole_velocity(all, state.bodies, s);
+    const Vec3 v = Eigen::Map<const Vec3>(body.u) - gradient * (state.bodies.x[s] - state.domain.low);
+    moments.emplace_back(v * v.transpose() / body.inv_mass);
+    largest[0] = std::max(largest[0], moments.back().trace());
   }
-  rows = ranks.gather_records(std::span<const Row>(rows));
-  std::ranges::sort(rows, {}, &Row::subdomain);
-  Mat3 sum = Mat3::Zero();
-  for (const Row& row : rows) sum += Eigen::Map<const Mat3>(row.moment);
-  return sum;
+  ranks.max(largest);
+  std::vector<ExactSum> sums(9, ExactSum(largest[0]));
+  for (const Mat3& moment : moments)
+    for (std::size_t k = 0; k < 9; ++k) sums[k].add(moment.data()[k]);
+  const std::vector<double> sum = all_over(sums, ranks);
+  return Eigen::Map<const Mat3>(sum.data());
 }
 
 double stress_ratio(const Mat3& stress) {

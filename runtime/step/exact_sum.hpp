@@ -2,7 +2,10 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "runtime/graph/communicator.hpp"
 
@@ -21,11 +24,27 @@ class ExactSum {
   /// Collective.
   double over(const graph::Communicator& ranks) {
     ranks.sum(parts_);
+    return value();
+  }
+  /// Several in one message. Collective.
+  friend std::vector<double> all_over(std::span<ExactSum> sums, const graph::Communicator& ranks) {
+    std::vector<std::int64_t> parts;
+    for (const ExactSum& sum : sums) parts.insert(parts.end(), sum.parts_.begin(), sum.parts_.end());
+    ranks.sum(parts);
+    std::vector<double> values;
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      sums[k].parts_ = {parts[2 * k], parts[2 * k + 1]};
+      values.push_back(sums[k].value());
+    }
+    return values;
+  }
+
+ private:
+  double value() const {
     if (scale_ == 0) return 0;
     return (static_cast<double>(parts_[0]) + static_cast<double>(parts_[1]) * 0x1p-31) / scale_;
   }
 
- private:
   double scale_;
   std::array<std::int64_t, 2> parts_{};
 };

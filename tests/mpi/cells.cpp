@@ -150,6 +150,15 @@ TEST_F(CellsOnRanks, FollowAStressToTheSameBitsOnAnyRanksAndBehindACheckpoint) {
   expect_same_when_stopped(8, {70, 171}, "stressed8");
 }
 
+/// Moving grains push a cell from the first step on, before they are dealt out to subdomains.
+TEST_F(CellsOnRanks, FollowAStressWithGrainsThatMoveAtFirst) {
+  std::string scene = stressed_cell;
+  scene.insert(scene.find("[[stage]]"), "velocity = [0.3, 0.7, -0.1]\n");
+  scene.replace(scene.find("steps = 150"), 11, "steps = 5");
+  write(at("scene.toml"), scene);
+  expect_same_bits(2, {{2, 1}}, "moving");
+}
+
 /// Ends that look back: they come with the same step on any ranks, and where a run was stopped before.
 TEST_F(CellsOnRanks, EndTheirStagesWithTheSameStepOnAnyRanksAndBehindACheckpoint) {
   std::string scene = stressed_cell;
