@@ -41,7 +41,7 @@ void StatusFile::begin() const {
 }
 
 void StatusFile::update(const Simulation& simulation, const Tally& tally, const CheckpointKeeper& keeper,
-                        double now) {
+                        double now, bool last) {
   const StepReport& report = simulation.report();
   const double fraction = simulation.stage_fraction();
   if (!first_step_) {
@@ -53,7 +53,7 @@ void StatusFile::update(const Simulation& simulation, const Tally& tally, const 
     stage_began_ = now;
     stage_fraction_ = fraction;
   }
-  if (now - written_ < interval) return;
+  if (!last && now - written_ < interval) return;
   written_ = now;
   nlohmann::ordered_json status{{"stage", stage_},
                                 {"stage_fraction", fraction},

@@ -12,16 +12,17 @@
 
 namespace talus {
 
-/// Written by rank 0: at the start, then at most once a second behind a step. What cannot be written is left
-/// out: a run does not end for that.
+/// Written by rank 0: at the start, then at most once a second behind a step, and behind the last one. What
+/// cannot be written is left out: a run does not end for that.
 class StatusFile {
  public:
   explicit StatusFile(const std::filesystem::path& directory);
 
   /// Before the first step: the sample is being made, or read.
   void begin() const;
-  /// `now`: clock (graph::seconds_now).
-  void update(const Simulation& simulation, const Tally& tally, const CheckpointKeeper& keeper, double now);
+  /// `now`: clock (graph::seconds_now). `last`: the run ends behind this step.
+  void update(const Simulation& simulation, const Tally& tally, const CheckpointKeeper& keeper, double now,
+              bool last);
 
  private:
   std::filesystem::path path_;

@@ -145,7 +145,7 @@ bool advance_step(Advance& all, Lines& lines, Stop& stop) {
   // Where a run stops for good; one that goes on cuts this frame off again, and its time may be up.
   const bool in_haste = stop.asked.ends() && run.granted;
   if (ends && !written && !in_haste && run.scene.output.stage_frames) all.write_frame();
-  if (all.status) all.status->update(simulation, memory.tally, keeper, now);
+  if (all.status) all.status->update(simulation, memory.tally, keeper, now, ends);
   return ends;
 }
 

@@ -59,8 +59,10 @@ ordered_json status_of(const std::filesystem::path& directory) {
   status["time"] = ended ? summary.value("time", 0.0) : beat.value("time", 0.0);
   status["missed_steps"] = ended ? summary.value("unconverged_steps", std::int64_t{0})
                                  : beat.value("missed_steps", std::int64_t{0});
-  for (const char* key : {"stage", "stage_fraction"})
-    if (beat.contains(key)) status[key] = beat[key];
+  // A run that failed gave its last sign of life up to a second, or many steps, before.
+  if (!ended || beat.value("step", std::int64_t{-1}) == status["step"])
+    for (const char* key : {"stage", "stage_fraction"})
+      if (beat.contains(key)) status[key] = beat[key];
   if (!ended)
     for (const char* key : {"steps_per_s", "stage_eta_s", "pid", "host", "heartbeat"})
       if (beat.contains(key)) status[key] = beat[key];

@@ -269,6 +269,7 @@ TEST_F(Resume, IsToldOfByStatusAndLog) {
     EXPECT_NE(log.find(words), std::string::npos) << words << " in " << log;
   const Outcome done = run("status quiet");
   EXPECT_NE(done.output.find("done"), std::string::npos) << done.output;
+  EXPECT_NE(done.output.find("stage 'shear', 100 % done"), std::string::npos) << done.output;
   EXPECT_NE(done.output.find("checkpoint_000012.h5"), std::string::npos) << done.output;
 }
 
