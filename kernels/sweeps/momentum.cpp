@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "kernels/bodies/release.hpp"
+
 namespace talus {
 
 namespace {
@@ -60,18 +62,18 @@ void allocate(AccelerationHistory& acceleration, Carry carry, const Contacts& co
               const AccelerationRoom& room) {
   const auto& [bodies, chunks, cell_copies] = room;
   const auto like = [&](auto& impulses) {
-    impulses.x.resize(contacts.rx.size());
-    impulses.y.resize(contacts.ry.size());
-    impulses.z.resize(contacts.rz.size());
-    impulses.n.resize(contacts.rn.size());
+    resize_anew(impulses.x, contacts.rx.size());
+    resize_anew(impulses.y, contacts.ry.size());
+    resize_anew(impulses.z, contacts.rz.size());
+    resize_anew(impulses.n, contacts.rn.size());
   };
-  if (bodies > 0) acceleration.last_v.resize(bodies);  // else a sweep in flight may still read it
+  if (bodies > 0) resize_anew(acceleration.last_v, bodies);  // else a sweep in flight may still read it
   acceleration.last_wall_v.resize(chunks);
   acceleration.last_cell_v.resize(cell_copies);
   if (carry == Carry::momentum) return like(acceleration.steps);
   like(acceleration.last);
   like(acceleration.step);
-  acceleration.step_v.resize(bodies);
+  resize_anew(acceleration.step_v, bodies);
   acceleration.step_wall_v.resize(chunks);
   acceleration.step_cell_v.resize(cell_copies);
 }

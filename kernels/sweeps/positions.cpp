@@ -2,11 +2,18 @@
 
 #include <algorithm>
 
+#include "kernels/bodies/release.hpp"
 #include "kernels/detection/touch.hpp"
 
 namespace talus {
 
 namespace {
+
+void exchange_rooms(const Contacts& contacts, SingleState& single, SweepSteps& steps) {
+  if (contacts.rx.empty()) return;
+  single.contacts.rn.swap(single.contacts.rx);
+  steps.n.swap(steps.x);
+}
 
 std::size_t index(std::int32_t k) {
   return static_cast<std::size_t>(k);
@@ -26,12 +33,17 @@ float along(const float (&n)[3], const SingleVelocity& body) {
 void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
                      SweepSteps& steps) {
   allocate(single, contacts, velocity.size());
-  single.contacts.rn.resize(contacts.nx.size());
-  steps.n.resize(contacts.nx.size());
+  exchange_rooms(contacts, single, steps);
+  resize_anew(single.contacts.rn, contacts.nx.size());
+  resize_anew(steps.n, contacts.nx.size());
   for (std::size_t s = 0; s < velocity.size(); ++s) {
     single.velocity[s] = {};
     single.velocity[s].inv_mass = static_cast<float>(single.contacts.unit * velocity[s].inv_mass);
   }
+}
+
+void end_positions(const Contacts& contacts, SingleState& single, SweepSteps& steps) {
+  exchange_rooms(contacts, single, steps);
 }
 
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,

@@ -19,9 +19,12 @@
 
 namespace talus {
 
-/// Sizes the arrays for the contacts and bodies: displacements are 0, masses those of `velocity`.
+/// Sizes the arrays for the contacts and bodies: displacements are 0, masses those of `velocity`. With
+/// friction the pushes take the room of the impulses along x, until end_positions gives it back: nothing else
+/// needs either at the end of a step.
 void begin_positions(const Contacts& contacts, std::span<const Velocity> velocity, SingleState& single,
                      SweepSteps& steps);
+void end_positions(const Contacts& contacts, SingleState& single, SweepSteps& steps);
 
 /// Finds normals and b of a chunk from the places of its bodies. `part`: c in [0, 1].
 void find_overlaps(const Contacts& contacts, const Chunks& chunks, std::size_t chunk, const Poses& poses,

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/bodies/release.hpp"
+
 namespace talus {
 
 double unit_of_mass(double inv_mass) {
@@ -11,13 +13,13 @@ double unit_of_mass(double inv_mass) {
 
 void allocate(SingleState& single, const Contacts& contacts, std::size_t bodies) {
   SingleContacts& c = single.contacts;
-  for (std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias}) part->resize(contacts.nx.size());
-  for (std::vector<float>* part : {&c.rx, &c.ry, &c.rz}) part->resize(contacts.rx.size());
-  c.rn.resize(contacts.rn.size());
-  c.mu.resize(contacts.mu.size());
-  for (std::vector<float>* part : {&c.vx, &c.vy, &c.vz}) part->resize(contacts.vx.size());
-  single.velocity.resize(bodies);
-  single.last_v.resize(bodies);
+  for (std::vector<float>* part : {&c.nx, &c.ny, &c.nz, &c.bias}) resize_anew(*part, contacts.nx.size());
+  for (std::vector<float>* part : {&c.rx, &c.ry, &c.rz}) resize_anew(*part, contacts.rx.size());
+  resize_anew(c.rn, contacts.rn.size());
+  resize_anew(c.mu, contacts.mu.size());
+  for (std::vector<float>* part : {&c.vx, &c.vy, &c.vz}) resize_anew(*part, contacts.vx.size());
+  resize_anew(single.velocity, bodies);
+  resize_anew(single.last_v, bodies);
 }
 
 namespace {

@@ -51,6 +51,8 @@ class ChunkWork {
   /// Per subdomain here: time of its chunks since the plan [s]; zeros unless timed.
   std::vector<double> busy() const;
   const AccelerationHistory& acceleration() const { return acceleration_; }
+  /// After the last sweep of a step, for sweeps of another kind: the next step remembers none of it.
+  AccelerationHistory& lend_acceleration() { return acceleration_; }
 
   /// Contacts of a chunk, and the bodies that it is the first to write.
   ContactRange range_of(std::size_t c) const;

@@ -24,14 +24,14 @@ struct PositionCorrectionRule {
 
 /// Work of chunks in the epochs that undo overlaps, after the iterations of a step
 /// (kernels/sweeps/positions.hpp). Displacements of bodies use the memory of the velocities in single
-/// precision, which nothing needs any more then. Displacements of walls' copies use that of their velocities,
-/// which are saved meanwhile. Displacements are glued like velocities, so that all copies of a body move
-/// alike.
+/// precision, and what their sweeps remember that of the iterations' acceleration: nothing needs either any
+/// more then. Displacements of walls' copies use that of their velocities, which are saved meanwhile.
+/// Displacements are glued like velocities, so that all copies of a body move alike.
 class PositionCorrection {
  public:
   /// Keeps references.
   PositionCorrection(StepState& state, const SolverSettings& settings, const SweepKernels& kernels,
-                     const ChunkWork& work)
+                     ChunkWork& work)
       : state_(state), settings_(settings), kernels_(kernels), work_(work) {}
 
   /// Whether the scene asks for it.
@@ -45,8 +45,6 @@ class PositionCorrection {
   void forget() { found_ = false; }
   /// At a gate, after the iterations.
   void begin();
-  /// Between steps: gives back what the next step need not find.
-  void release_room() { acceleration_ = {}; }
   /// What a chunk does in epoch number `epoch` of these, from 0.
   void run(std::size_t chunk, int epoch);
   /// At a gate, after the last sweep: gives the copies of walls their velocities back.
@@ -69,9 +67,8 @@ class PositionCorrection {
   StepState& state_;
   const SolverSettings& settings_;
   const SweepKernels& kernels_;
-  const ChunkWork& work_;
+  ChunkWork& work_;
   PositionCorrectionRule rule_;
-  AccelerationHistory acceleration_;
   std::vector<float> pushes_;  ///< per candidate, of the last step; in units of mass x m
   std::vector<WallCopy> kept_, moved_;
   bool found_ = false;

@@ -76,7 +76,6 @@ class SolverLoop {
   /// Between steps: gives back the memory that only iterations use.
   void release_room() {
     work_.release_room();
-    positions_.release_room();
     global_.release_room();
   }
 
