@@ -18,4 +18,24 @@ void permute(std::vector<T>& values, std::span<const Slot> order) {
   values.swap(moved);
 }
 
+/// The same, one entry at a time along the cycles of `order`, a permutation of 0..n-1: for arrays that memory
+/// has no room for twice.
+template <class T>
+void permute_in_place(std::vector<T>& values, std::span<const Slot> order) {
+  std::vector<bool> placed(values.size(), false);
+  for (std::size_t begin = 0; begin < values.size(); ++begin) {
+    if (placed[begin]) continue;
+    const T first = values[begin];
+    std::size_t to = begin;
+    for (auto from = static_cast<std::size_t>(order[to]); from != begin;
+         from = static_cast<std::size_t>(order[to])) {
+      values[to] = values[from];
+      placed[to] = true;
+      to = from;
+    }
+    values[to] = first;
+    placed[to] = true;
+  }
+}
+
 }  // namespace talus

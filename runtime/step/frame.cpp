@@ -202,15 +202,15 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
       });
   release(counted);
   const std::vector<Slot> by_id = ascending(std::span<const std::int64_t>(frame.id));
-  permute(frame.id, by_id);
-  permute(frame.x, by_id);
-  permute(frame.radius, by_id);
-  permute(frame.u, by_id);
-  permute(frame.omega, by_id);
-  permute(frame.orientation, by_id);
-  permute(frame.material, by_id);
+  permute_in_place(frame.id, by_id);
+  permute_in_place(frame.x, by_id);
+  permute_in_place(frame.radius, by_id);
+  permute_in_place(frame.u, by_id);
+  permute_in_place(frame.omega, by_id);
+  permute_in_place(frame.orientation, by_id);
+  permute_in_place(frame.material, by_id);
   if (!contacts) return;
-  const std::vector<Active> active = active_contacts(state);
+  std::vector<Active> active = active_contacts(state);
   const auto id_of_first = [&](std::size_t k) {
     const auto contact = static_cast<std::size_t>(active[k].contact);
     return static_cast<std::int64_t>(
@@ -228,13 +228,14 @@ void fill_frame(const StepState& state, const graph::Communicator& ranks, bool r
         frame.contact_gap.push_back(row.gap);
         frame.contact_force.push_back(vector_of(row.force));
       });
+  release(active);
   const std::vector<Slot> by_ids =
       ascending(std::span<const std::array<std::int64_t, 2>>(frame.contact_bodies));
-  permute(frame.contact_bodies, by_ids);
-  permute(frame.contact_normal, by_ids);
-  permute(frame.contact_point, by_ids);
-  permute(frame.contact_gap, by_ids);
-  permute(frame.contact_force, by_ids);
+  permute_in_place(frame.contact_bodies, by_ids);
+  permute_in_place(frame.contact_normal, by_ids);
+  permute_in_place(frame.contact_point, by_ids);
+  permute_in_place(frame.contact_gap, by_ids);
+  permute_in_place(frame.contact_force, by_ids);
 }
 
 }  // namespace talus

@@ -133,8 +133,9 @@ class Simulation {
   /// A copy of what output needs, in order of id; contacts with r_n > 0 only, `contacts` false leaves them
   /// out. Collective; each rank gets its part (frame.hpp).
   Frame frame(bool contacts = true) const;
-  /// Gives back the memory that only iterations use, some 300 bytes a grain; the next step takes it anew.
-  /// Worth it before frame() and checkpoint() of large samples, which are as large.
+  /// Gives back the memory that only steps use, some 250 bytes a grain; the next step takes it anew. Worth it
+  /// before frame() and checkpoint() of large samples, which are as large. Biases of contacts and velocities
+  /// without contacts are gone then from state().
   void release_room();
 
   /// talus::digest of all bodies. Collective.

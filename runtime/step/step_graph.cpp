@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "kernels/bodies/release.hpp"
 #include "runtime/graph/clock.hpp"
 #include "runtime/trace/task_times.hpp"
 
@@ -69,7 +70,21 @@ void StepGraph::build() {
   if (executor_.times()) executor_.times()->check(declared_tasks());
 }
 
+void StepGraph::release_room() {
+  loop_.release_room();
+  state_.free = {};
+  release(state_.contacts.bias);
+}
+
+/// The room that release_room has given back, before tasks fill it in parts.
+void StepGraph::take_room() {
+  state_.free.u.resize(state_.bodies.size());
+  state_.free.w.resize(parameters_.rotates ? state_.bodies.size() : 0);
+  state_.contacts.bias.resize(state_.contacts.nx.size());
+}
+
 void StepGraph::run() {
+  take_room();
   sums_ = {};
   ++steps_;
   // In a step whose times are given nothing else counts, not even the time to look them up.

@@ -71,8 +71,9 @@ class StepGraph {
   /// Collective.
   void restore(const Checkpoint& from);
 
-  /// Between steps: gives back the memory that only iterations use; the next step takes it anew.
-  void release_room() { loop_.release_room(); }
+  /// Between steps: gives back the memory that only detection and iterations use; the next step takes it
+  /// anew. What is read of the last step's contacts stays, but for b.
+  void release_room();
 
   const StepSums& sums() const { return sums_; }
   const SolverLoop& loop() const { return loop_; }
@@ -82,6 +83,7 @@ class StepGraph {
 
  private:
   void build();
+  void take_room();
   void predict_share(std::uint32_t share);
   void find_free_velocities(SlotRange range);
   void find_flow_escape(SlotRange range, std::uint32_t share);
