@@ -15,9 +15,9 @@
 namespace talus {
 
 /// Rows of finished steps on their way to the recorder, which runs on the executor's background thread. Rows
-/// go in batches, since a row is less work than handing it over. Frames of several ranks are written by all
-/// of them together, between two steps: messages of a background thread would need an order among those of
-/// the steps. What a write throws comes out of the executor.
+/// go in batches, since a row is less work than handing it over. A run waits for large frames. Frames of
+/// several ranks are written by all of them together, between two steps: messages of a background thread
+/// would need an order among those of the steps. What a write throws comes out of the executor.
 class RecorderFeed {
  public:
   /// All three must outlive it. The rows of `error_steps` have the errors of every check.
