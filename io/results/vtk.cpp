@@ -36,14 +36,38 @@ class VtpText {
   void array(std::string_view type, std::string_view name, int components, const std::vector<T>& part) const {
     std::int64_t length[1] = {static_cast<std::int64_t>(part.size() * sizeof(T))};
     ranks_.sum(length);
-    text(fmt::format(R"(<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="binary">)", type, name,
-                     components));
+    text(fmt::format(fmt::runtime(array_begin), type, name, components));
     Base64 base64(out_);
     if (ranks_.rank() == 0) base64.add(std::as_bytes(std::span(length)));
     ranks_.records_to_first(std::span<const T>(part),
                             [&](std::span<const T> numbers) { base64.add(std::as_bytes(numbers)); });
     if (ranks_.rank() == 0) base64.finish();
-    text("</DataArray>\n");
+    text(array_end);
+  }
+  /// Numbers that append(k, numbers) makes, `each` of entry k. One rank makes some and writes them before it
+  /// makes more: of contacts an array takes up to 70 bytes a grain.
+  template <class Append>
+  void made(std::string_view name, int components, std::size_t entries, std::size_t each,
+            const Append& append) const {
+    constexpr std::size_t piece = std::size_t{1} << 16;
+    std::vector<float> numbers;
+    if (ranks_.ranks() > 1) {
+      numbers.reserve(entries * each);
+      for (std::size_t k = 0; k < entries; ++k) append(k, numbers);
+      return floats(name, components, numbers);
+    }
+    const std::uint64_t length[1] = {entries * each * sizeof(float)};
+    text(fmt::format(fmt::runtime(array_begin), "Float32", name, components));
+    Base64 base64(out_);
+    base64.add(std::as_bytes(std::span(length)));
+    for (std::size_t k = 0; k < entries; ++k) {
+      append(k, numbers);
+      if (numbers.size() < piece && k + 1 < entries) continue;
+      base64.add(std::as_bytes(std::span(numbers)));
+      numbers.clear();
+    }
+    base64.finish();
+    text(array_end);
   }
   void floats(std::string_view name, int components, const std::vector<float>& part) const {
     array("Float32", name, components, part);
@@ -104,6 +128,10 @@ class VtpText {
   }
 
  private:
+  static constexpr fmt::string_view array_begin =
+      R"(<DataArray type="{}" Name="{}" NumberOfComponents="{}" format="binary">)";
+  static constexpr std::string_view array_end = "</DataArray>\n";
+
   const graph::Communicator& ranks_;
   const WriteText& out_;
 };
@@ -220,16 +248,13 @@ void write_forces_vtp(const Frame& part, const graph::Communicator& ranks, const
   const VtpText::Share share = file.share(contacts);
   file.begin(part.time, 2 * share.all, 0, share.all);
   file.text("<PointData Scalars=\"normal_force\">\n");
-  {
-    std::vector<float> normal_force;
-    normal_force.reserve(2 * contacts);
-    for (std::size_t k = 0; k < contacts; ++k)
-      normal_force.insert(normal_force.end(), 2,
-                          static_cast<float>(part.contact_force[k].dot(part.contact_normal[k])));
-    file.floats("normal_force", 1, normal_force);
-  }
+  file.made("normal_force", 1, contacts, 2, [&](std::size_t k, std::vector<float>& to) {
+    to.insert(to.end(), 2, static_cast<float>(part.contact_force[k].dot(part.contact_normal[k])));
+  });
   file.text("</PointData>\n<CellData>\n");
-  file.floats("force", 3, floats(part.contact_force));
+  file.made("force", 3, contacts, 3, [&](std::size_t k, std::vector<float>& to) {
+    for (const double x : part.contact_force[k]) to.push_back(static_cast<float>(x));
+  });
   file.floats("gap", 1, floats(part.contact_gap));
   {
     std::vector<std::int64_t> wall;
@@ -239,19 +264,16 @@ void write_forces_vtp(const Frame& part, const graph::Communicator& ranks, const
     file.integers("wall", wall);
   }
   file.text("</CellData>\n");
-  {
-    std::vector<float> ends;
-    ends.reserve(6 * contacts);
-    for (std::size_t k = 0; k < contacts; ++k) {
-      const auto [first, second] = part.contact_bodies[k];
-      const Vec3 begin = centres.of(first);
-      // Across a face of a periodic cell the line goes on outside.
-      for (const Vec3& end :
-           {begin, part.domain.image_near(begin, second < 0 ? part.contact_point[k] : centres.of(second))})
-        for (int axis = 0; axis < 3; ++axis) ends.push_back(static_cast<float>(end[axis]));
-    }
-    file.points(ends);
-  }
+  file.text("<Points>\n");
+  file.made("Points", 3, contacts, 6, [&](std::size_t k, std::vector<float>& to) {
+    const auto [first, second] = part.contact_bodies[k];
+    const Vec3 begin = centres.of(first);
+    // Across a face of a periodic cell the line goes on outside.
+    for (const Vec3& end :
+         {begin, part.domain.image_near(begin, second < 0 ? part.contact_point[k] : centres.of(second))})
+      for (int axis = 0; axis < 3; ++axis) to.push_back(static_cast<float>(end[axis]));
+  });
+  file.text("</Points>\n");
   file.cells("Lines", contacts, share, 2);
   file.end();
 }

@@ -18,12 +18,10 @@ class Base64 {
  public:
   explicit Base64(const WriteText& out) : out_(out) {}
   void add(std::span<const std::byte> bytes) {
-    text_.reserve((bytes.size() + 2) / 3 * 4);
-    for (const std::byte byte : bytes) {
-      group_ = group_ << 8 | std::to_integer<std::uint32_t>(byte);
-      if (++count_ == 3) put();
-    }
-    flush();
+    // The text of a large array would take more memory than the array.
+    constexpr std::size_t piece = std::size_t{3} << 16;
+    for (; bytes.size() > piece; bytes = bytes.subspan(piece)) add_piece(bytes.first(piece));
+    add_piece(bytes);
   }
   void finish() {
     if (count_ > 0) {
@@ -36,6 +34,14 @@ class Base64 {
   }
 
  private:
+  void add_piece(std::span<const std::byte> bytes) {
+    text_.reserve((bytes.size() + 2) / 3 * 4);
+    for (const std::byte byte : bytes) {
+      group_ = group_ << 8 | std::to_integer<std::uint32_t>(byte);
+      if (++count_ == 3) put();
+    }
+    flush();
+  }
   void put() {
     static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     const char four[] = {digits[group_ >> 18], digits[group_ >> 12 & 63], digits[group_ >> 6 & 63],
