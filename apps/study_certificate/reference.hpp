@@ -30,6 +30,8 @@ struct ReferenceLimits {
   int pivots = 400;         ///< smooth: changes of the set of contacts that carry, per proximal step
   int proximal_steps = 24;  ///< each begins from the impulses of the last one
   std::int64_t contact_solves = 1'000'000;  ///< friction: contacts that may be swept in all attempts
+  std::int64_t walk_solves =
+      20'000'000;  ///< friction: likewise, from the run's impulses to forces next to them
 };
 
 /// What a search has come to.

@@ -21,6 +21,18 @@ Eigen::Map<const Vec3> at(const Vector& r, std::size_t c) {
   return Eigen::Map<const Vec3>(r.data() + 3 * c);
 }
 
+Vector joined(std::span<const Vec3> impulses) {
+  Vector r(static_cast<Eigen::Index>(3 * impulses.size()));
+  for (std::size_t c = 0; c < impulses.size(); ++c) at(r, c) = impulses[c];
+  return r;
+}
+
+std::vector<Vec3> parted(const Vector& r) {
+  std::vector<Vec3> impulses(static_cast<std::size_t>(r.size() / 3));
+  for (std::size_t c = 0; c < impulses.size(); ++c) impulses[c] = at(r, c);
+  return impulses;
+}
+
 /// Projected Gauss-Seidel on vectors in the frame of the scene.
 class Sweeps {
  public:
@@ -41,11 +53,7 @@ class Sweeps {
   std::size_t contacts() const { return mobility_.size(); }
 
   /// Velocities afresh under r.
-  void begin(const Vector& r) {
-    std::vector<Vec3> impulses(contacts());
-    for (std::size_t c = 0; c < contacts(); ++c) impulses[c] = at(r, c);
-    motion_ = motion_under(problem_, impulses);
-  }
+  void begin(const Vector& r) { motion_ = motion_under(problem_, parted(r)); }
 
   /// One pass, forwards or backwards. Velocities must be those under r.
   void sweep(Vector& r, bool backwards) {
@@ -176,18 +184,55 @@ double accelerate(Sweeps& sweeps, Vector& r, std::int64_t most, double enough) {
   return least;
 }
 
-/// Forces next to the run's (ReferenceLimits::forces). False where there are none.
-bool take_forces(const FrictionNewton& newton, std::span<const Vec3> run, double unit,
-                 const ReferenceLimits& limits, Reference& reference) {
-  for (double enough = limits.forces; enough >= limits.residual; enough /= 10) {
-    std::vector<Vec3> r;
-    if (!newton.go_next_to(run, r, unit, enough)) return false;
-    if (newton.apart(r, reference.exact) > limits.forces_velocities * reference.exchanged) continue;
-    reference.r = r;
-    return true;
+/// Forces next to the run's (ReferenceLimits::forces).
+class Forces {
+ public:
+  Forces(const FrictionNewton& newton, std::span<const Vec3> run, double unit, const ReferenceLimits& limits)
+      : newton_(newton), run_(run), unit_(unit), limits_(limits) {}
+
+  /// By proximal steps, and where those fail by sweeps. False where neither finds them.
+  bool take(Sweeps& sweeps, Reference& reference) const {
+    for (double enough = limits_.forces; enough >= limits_.residual; enough /= 10) {
+      std::vector<Vec3> r;
+      if (!newton_.go_next_to(run_, r, unit_, enough)) break;
+      if (!known(r, reference)) continue;
+      reference.r = r;
+      return true;
+    }
+    return walk(sweeps, reference);
   }
-  return false;
-}
+
+ private:
+  bool known(std::span<const Vec3> r, const Reference& reference) const {
+    return newton_.apart(r, reference.exact) <= limits_.forces_velocities * reference.exchanged;
+  }
+
+  /// A heavy body on light ones moves by what the law's residual hardly shows, and no proximal step that
+  /// holds redundant contacts lets it follow. Plain sweeps bring it on, slowly, and leave those almost where
+  /// they are. What they find is taken only where it meets the law and has the exact velocities.
+  bool walk(Sweeps& sweeps, Reference& reference) const {
+    Vector swept = joined(run_);
+    std::int64_t left = limits_.walk_solves / static_cast<std::int64_t>(2 * run_.size() + 1);
+    for (std::int64_t passes = plain_passes; left > 0; passes *= 2) {
+      sweeps.begin(swept);
+      for (std::int64_t pass = 0; pass < std::min(passes, left); ++pass) {
+        sweeps.sweep(swept, false);
+        sweeps.sweep(swept, true);
+      }
+      left -= passes;
+      std::vector<Vec3> r;
+      if (!newton_.go_next_to(parted(swept), r, unit_, limits_.forces) || !known(r, reference)) continue;
+      reference.r = r;
+      return true;
+    }
+    return false;
+  }
+
+  const FrictionNewton& newton_;
+  std::span<const Vec3> run_;
+  double unit_;
+  const ReferenceLimits& limits_;
+};
 
 }  // namespace
 
@@ -200,8 +245,8 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   const FrictionNewton newton(problem, limits.speeds);
   const FrictionNewton::Goal goal{newton.unit(run), sharpness * limits.residual, limits.proximal_steps};
   const std::size_t contacts = sweeps.contacts();
-  Vector r(static_cast<Eigen::Index>(3 * contacts));
-  for (std::size_t c = 0; c < contacts; ++c) at(r, c) = run[c];
+  const Forces forces(newton, run, goal.unit, limits);
+  Vector r = joined(run);
   // Newton's method begins at the run's own impulses: where several answers stand side by side sweeps may
   // walk from one to another. It ends quickly where the right contacts slide, stick and are open; sweeps find
   // those where it falls short, each time eight times as many.
@@ -209,8 +254,7 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   for (std::int64_t passes = 0; left > 0; passes = std::max(plain_passes, 8 * passes)) {
     accelerate(sweeps, r, std::min(left, passes), limits.residual);
     left -= passes;
-    std::vector<Vec3> impulses(contacts);
-    for (std::size_t c = 0; c < contacts; ++c) impulses[c] = at(r, c);
+    std::vector<Vec3> impulses = parted(r);
     const NewtonResult result = newton.improve(impulses, goal);
     if (!(result.residual < reference.residual)) continue;
     reference.residual = result.residual;
@@ -224,12 +268,12 @@ Reference solve_frictional(const StepProblem& problem, std::span<const Vec3> run
   reference.r = reference.exact;
   const bool nearly = reference.uncertainty() <= limits.velocities && reference.residual <= limits.nearly;
   if (reference.found == Found::answer) {
-    take_forces(newton, run, goal.unit, limits, reference);
+    forces.take(sweeps, reference);
   } else if (const double approach = unavoidable_approach(problem, limits); approach > 0) {
     reference.found = Found::no_answer;
     reference.residual = approach;
     reference.why = "no velocities are admissible";
-  } else if (nearly && take_forces(newton, run, goal.unit, limits, reference)) {
+  } else if (nearly && forces.take(sweeps, reference)) {
     reference.found = Found::answer;
   } else if (nearly) {
     reference.found = Found::velocities;

@@ -165,6 +165,27 @@ TEST(CertificateAudit, OfASolverThatGoesOnFindsItNearItsAnswer) {
   EXPECT_GE(judged, 6);
 }
 
+TEST(CertificateAudit, OfAHeavyLidInAShaftTakesTheForcesNextToTheRuns) {
+  // Walls press two grains from both sides with friction, so that any share of the lid stands on the floor.
+  // The run ends a ten-thousandth from rest; the answer that Newton's method finds has another share, by 7 %,
+  // and one at rest has the run's but for 10^-4. A run whose forces are nowhere right finds none next to it.
+  const MadeScene made = make_scene("heavy", 576, {});
+  const AuditedRun run = audited(made, 19);
+  ASSERT_EQ(run.steps.size(), 19U);
+  for (const AuditedStep& step : run.steps) {
+    ASSERT_EQ(step.judged, Judged::yes) << step.step << ": " << step.why;
+    EXPECT_LT(step.errors.wall_force, step.claimed) << step.step;
+    EXPECT_LT(step.errors.contact_force, step.claimed) << step.step;
+  }
+  const AuditedRun careless = audited(made, 1, [](io::Scene& scene) {
+    scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = 1;
+    scene.setup.solver.method = SolverMethod::nlgs;
+    scene.setup.solver.max_iterations = scene.setup.solver.check_every = 2;
+  });
+  ASSERT_EQ(careless.steps.size(), 1U);
+  EXPECT_GT(careless.steps.front().errors.contact_force, 0.1);
+}
+
 TEST(CertificateStudy, WritesItsTablesPicturesPageAndWorstScenesAndTakesThemBack) {
   const test::ScratchDirectory scratch;
   StudyCertificateOptions options;
