@@ -44,11 +44,12 @@ Vec3 Draws::direction() {
   return {s * std::cos(angle), s * std::sin(angle), z};
 }
 
-SceneBench::SceneBench(std::uint64_t seed, std::uint64_t stream, int all_steps)
+SceneBench::SceneBench(std::uint64_t seed, std::uint64_t stream, const MakerSettings& settings)
     : draws(seed, stream),
       radius(draws.between_decades(1e-3, 1e-1)),
       gravity(draw_gravity(draws)),
-      steps(all_steps),
+      size(settings.size),
+      steps(settings.steps),
       spread_(draws.chance(0.3) ? 1 : draws.between(0.5, 1)) {
   made.seed = seed;
   made.scene.density = made.grains.density = density;

@@ -13,15 +13,17 @@ namespace talus::audit {
 /// step, solver, stages) is drawn before and after them.
 class SceneBench {
  public:
-  SceneBench(std::uint64_t seed, std::uint64_t stream, int steps);
+  SceneBench(std::uint64_t seed, std::uint64_t stream, const MakerSettings& settings);
 
   Draws draws;
   MadeScene made;
   double radius;     ///< [m] of a usual grain
   double gravity;    ///< [m/s^2] along -z; 0 for scenes in flight
   double speed = 0;  ///< [m/s] that grains have at the beginning
+  int size;          ///< MakerSettings::size
   int steps;
 
+  int draw_count(int low, int high) { return size * draws.from_to(low, high); }  ///< of grains
   double weight() const;  ///< [N] of a usual grain; of one under 9.81 m/s^2 without gravity
   double draw_radius();   ///< [m] of a grain of the scene's distribution
   void add(const Vec3& x, double r);

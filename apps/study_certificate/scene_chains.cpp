@@ -28,15 +28,14 @@ double some_load(SceneBench& bench) {
 void make_column(SceneBench& bench) {
   Draws& draws = bench.draws;
   bench.speed = draws.chance(0.8) ? 0 : bench.speed;
-  stack(bench, draws.from_to(1, 150), 0, 0);
+  stack(bench, bench.draw_count(1, 150), 0, 0);
   bench.add_wall("floor", Vec3::Zero(), Vec3::UnitZ());
   if (draws.chance(0.3)) bench.add_lid(some_load(bench));
 }
 
 void make_among(SceneBench& bench) {
-  Draws& draws = bench.draws;
   bench.speed = 0;
-  const int tall = draws.from_to(5, 60), singles = draws.from_to(10, 90);
+  const int tall = bench.draw_count(5, 60), singles = bench.draw_count(10, 90);
   stack(bench, tall, 0, 0);
   for (int k = 0; k < singles; ++k) {
     const double r = bench.draw_radius();
@@ -49,7 +48,7 @@ void make_chain(SceneBench& bench) {
   Draws& draws = bench.draws;
   bench.speed = 0;
   const double r = bench.radius, bend = draws.between_decades(1e-4, 0.5);
-  const int grains = draws.from_to(2, 80);
+  const int grains = bench.draw_count(2, 80);
   // Each link leans by `bend` to one side or the other of the line between the walls, so that gravity, or
   // the pushed wall, presses on a chain that is hardly bent.
   double x = r, z = 0;
@@ -82,7 +81,7 @@ void make_wedge(SceneBench& bench) {
   const double a = draws.between_decades(1e-3, 0.5), c = std::cos(a), s = std::sin(a), r = bench.radius;
   bench.add_wall("left", Vec3::Zero(), {c, 0, s});
   bench.add_wall("right", Vec3::Zero(), {-c, 0, s});
-  const int grains = draws.from_to(1, 60);
+  const int grains = bench.draw_count(1, 60);
   const double spacing = draws.chance(0.5) ? 2 * r : 4 * r, height = r / s;
   const bool stacked = draws.chance(0.3);
   for (int k = 0; k < grains; ++k) {
@@ -100,7 +99,7 @@ void make_arch(SceneBench& bench) {
   Draws& draws = bench.draws;
   bench.speed = 0;
   const double r = bench.radius, rise = draws.between(0.05, 1.2);  // half the angle that the arch spans
-  const int grains = draws.from_to(3, 40), loose = draws.from_to(0, 100);
+  const int grains = bench.draw_count(3, 40), loose = bench.draw_count(0, 100);
   const double lift = 4 * r;
   // Links turn evenly from +rise to -rise.
   double x = 0, z = lift;
@@ -133,7 +132,7 @@ void make_rows(SceneBench& bench) {
   Draws& draws = bench.draws;
   if (draws.chance(0.8)) bench.gravity = 0;
   const double speed = std::sqrt(9.81 * bench.radius) * draws.between_decades(1e-2, 10);
-  const int rows = draws.from_to(1, 8), grains = draws.from_to(2, 150 / rows);
+  const int rows = draws.from_to(1, 8), grains = bench.draw_count(2, 150 / rows);
   const double gap = draws.chance(0.7) ? 0 : bench.radius * draws.between_decades(1e-4, 0.1);
   const double lean = draws.chance(0.5) ? 0 : draws.between_decades(1e-4, 0.3);
   for (int row = 0; row < rows; ++row) {
@@ -154,7 +153,7 @@ void make_heavy(SceneBench& bench) {
   Draws& draws = bench.draws;
   bench.speed = 0;
   const double r = bench.radius, big = r * draws.between(2, 15);
-  const int across = draws.from_to(1, 4), layers = draws.from_to(1, 5);
+  const int across = draws.from_to(1, 4), layers = bench.draw_count(1, 5);
   for (int z = 0; z < layers; ++z)
     for (int y = 0; y < across; ++y)
       for (int x = 0; x < across; ++x) bench.add({(2 * x + 1) * r, (2 * y + 1) * r, (2 * z + 1) * r}, r);

@@ -104,7 +104,7 @@ MadeScene make_scene(std::string_view family, std::uint64_t seed, const MakerSet
   const auto found = std::ranges::find(families, family, &SceneFamily::name);
   if (found == families.end())
     throw std::invalid_argument(fmt::format("no family of scenes is called '{}'", family));
-  SceneBench bench(seed, static_cast<std::uint64_t>(found - families.begin()), settings.steps);
+  SceneBench bench(seed, static_cast<std::uint64_t>(found - families.begin()), settings);
   bench.made.family = family;
   found->make(bench);
   finish_scene(bench, settings);

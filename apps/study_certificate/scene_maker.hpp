@@ -46,6 +46,7 @@ struct MadeScene {
 /// What the scenes of a study have in common.
 struct MakerSettings {
   int steps = 20;           ///< in all; a change of loads comes in the middle
+  int size = 1;             ///< grains, over those that the family has for the seed
   double tolerance = 1e-3;  ///< of solver.tolerance and solver.balance_tolerance alike
   int subdomains = 1;
   Coupling coupling = Coupling::alternating;

@@ -33,12 +33,12 @@ void push(SceneBench& bench, const std::string& name, double load) {
 }  // namespace
 
 void make_deposition(SceneBench& bench) {
-  bench.add_box(deposit_grains(bench, bench.draws.from_to(5, 150)));
+  bench.add_box(deposit_grains(bench, bench.draw_count(5, 150)));
   if (bench.gravity == 0) bench.add_wall("z+", {0, 0, bench.top()}, -Vec3::UnitZ());
 }
 
 void make_press(SceneBench& bench) {
-  const double base = deposit_grains(bench, bench.draws.from_to(5, 120));
+  const double base = deposit_grains(bench, bench.draw_count(5, 120));
   bench.add_box(base);
   const double load = bench.weight() * bench.draws.between_decades(1, 1e3);
   bench.add_lid(load);
@@ -52,7 +52,7 @@ void make_flight(SceneBench& bench) {
   if (bench.speed == 0) bench.speed = std::sqrt(9.81 * bench.radius) * draws.between_decades(1e-2, 10);
   const int clusters = draws.from_to(1, 4);
   for (int k = 0; k < clusters; ++k)
-    bench.add_cluster(draws.from_to(2, 35), Vec3(25.0 * k * bench.radius, 0, 0));
+    bench.add_cluster(bench.draw_count(2, 35), Vec3(25.0 * k * bench.radius, 0, 0));
   if (draws.chance(0.3)) {
     double low = 0;
     for (std::size_t k = 0; k < bench.count(); ++k)
@@ -63,7 +63,7 @@ void make_flight(SceneBench& bench) {
 
 void make_lattice(SceneBench& bench) {
   Draws& draws = bench.draws;
-  const int nx = draws.from_to(1, 5), ny = draws.from_to(1, 5), nz = draws.from_to(1, 6);
+  const int nx = draws.from_to(1, 5), ny = draws.from_to(1, 5), nz = bench.draw_count(1, 6);
   const double r = bench.radius;
   for (int z = 0; z < nz; ++z)
     for (int y = 0; y < ny; ++y)
@@ -84,7 +84,7 @@ void make_funnel(SceneBench& bench) {
     const double angle = 2 * std::numbers::pi * k / walls;
     bench.add_wall("wall-" + std::to_string(k), Vec3::Zero(), {std::cos(angle), std::sin(angle), slope});
   }
-  const int grains = draws.from_to(1, 100);
+  const int grains = bench.draw_count(1, 100);
   const double widest = bench.radius * draws.between(0.5, 4);
   for (int k = 0; k < grains; ++k) {
     const double r = bench.draw_radius(), angle = draws.between(0, 2 * std::numbers::pi);

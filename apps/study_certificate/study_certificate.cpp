@@ -29,6 +29,9 @@ namespace fs = std::filesystem;
 using namespace audit;
 using Clock = std::chrono::steady_clock;
 
+/// Grains of larger scenes outgrow the audit's direct solves, as matrices of all their contacts.
+constexpr int most_size = 16;
+
 /// A study on its way: what has been audited, and the line that says so.
 class Progress {
  public:
@@ -95,6 +98,7 @@ void audit_made(const StudyCertificateOptions& options, const fs::path& director
     MakerSettings settings;
     settings.steps = options.steps > 0 ? options.steps : 20;
     settings.tolerance = tolerance;
+    settings.size = options.size;
     settings.subdomains = std::max(1, options.subdomains);
     if (!options.coupling.empty()) settings.coupling = couplings().named(options.coupling).kind;
     std::multimap<double, MadeScene, std::greater<>> worst;
@@ -183,6 +187,10 @@ void add_study_certificate_options(CLI::App& app, StudyCertificateOptions& optio
   app.add_option("--seed", options.seed, "seed of the first scene; the next one has the next seed")
       ->type_name("S")
       ->capture_default_str();
+  app.add_option("--size", options.size, "grains of a made scene, over the usual number (up to some 150)")
+      ->type_name("F")
+      ->capture_default_str()
+      ->check(CLI::Range(1, most_size));
   std::vector<std::string> names;
   for (const SceneFamily& family : scene_families()) names.emplace_back(family.name);
   app.add_option("--families", options.families,

@@ -14,6 +14,7 @@ namespace talus {
 struct StudyCertificateOptions {
   int scenes = 1000;                  ///< per tolerance, dealt to the families one after the other
   int steps = 0;                      ///< of a scene; 0: 20, of a file all
+  int size = 1;                       ///< grains of made scenes, over those that a family has for a seed
   std::uint64_t seed = 1;             ///< of the first scene; the next ones have seed + 1, ...
   std::vector<std::string> families;  ///< empty: all
   std::vector<double> tolerances;     ///< empty: 1e-3, of a file its own

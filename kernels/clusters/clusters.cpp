@@ -58,27 +58,42 @@ std::pair<std::vector<std::int32_t>, std::int32_t> clusters_within(const Contact
   return {std::move(number), count};
 }
 
-/// Bodies per cluster, each once.
-void count_bodies(std::span<const ContactGraph> parts, const PartLink& link, Clusters& clusters) {
+/// Bodies and joints per cluster.
+void count(std::span<const ContactGraph> parts, const PartLink& link, Clusters& clusters) {
   clusters.bodies.resize(parts.size());
+  clusters.joints.resize(parts.size());
   const auto several = at(clusters.several);
   link.each(parts.size(), [&](std::size_t p) {
     clusters.bodies[p].assign(at(clusters.count[p]), 0);
+    clusters.joints[p].assign(at(clusters.count[p]), 0);
     for (std::size_t b = 0; b < clusters.of_body[p].size(); ++b)
       if (clusters.of_body[p][b] >= 0 && parts[p].counted(b))
         ++clusters.bodies[p][at(clusters.of_body[p][b])];
+    for (const auto& [first, second] : parts[p].pairs)
+      if (second >= 0) ++clusters.joints[p][at(clusters.of_body[p][at(first)])];
   });
   if (several == 0) return;
-  const std::vector<double> sums =
-      total_of(link, parts.size(), several, [&](std::size_t p, std::span<double> row) {
-        for (std::size_t c = 0; c < clusters.bodies[p].size(); ++c)
-          if (const std::int32_t number = clusters.spanning[p][c]; number >= 0)
-            row[at(number)] += clusters.bodies[p][c];
-      });
-  for (std::size_t p = 0; p < parts.size(); ++p)
+  const auto each_spanning = [&](std::size_t p, const auto& take) {
     for (std::size_t c = 0; c < clusters.bodies[p].size(); ++c)
       if (const std::int32_t number = clusters.spanning[p][c]; number >= 0)
-        clusters.bodies[p][c] = static_cast<std::int32_t>(sums[at(number)]);
+        take(2 * at(number), clusters.bodies[p][c], clusters.joints[p][c]);
+  };
+  const std::vector<double> sums =
+      total_of(link, parts.size(), 2 * several, [&](std::size_t p, std::span<double> row) {
+        each_spanning(p, [&](std::size_t k, std::int32_t bodies, std::int32_t joints) {
+          row[k] += bodies;
+          row[k + 1] += joints;
+        });
+      });
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    each_spanning(p, [&](std::size_t k, std::int32_t& bodies, std::int32_t& joints) {
+      bodies = static_cast<std::int32_t>(sums[k]);
+      joints = static_cast<std::int32_t>(sums[k + 1]);
+    });
+}
+
+bool is_small(std::int32_t bodies, std::int32_t joints, const SmallClusters& small) {
+  return bodies <= small.bodies || (bodies <= small.chained && joints - bodies < small.loops);
 }
 
 /// Which clusters of the parts are one, through bodies that they share: numbers them.
@@ -146,17 +161,16 @@ Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link) 
     clusters.spanning[p].assign(at(clusters.count[p]), -1);
   });
   if (link.several()) join_clusters(parts, link, clusters);
-  count_bodies(parts, link, clusters);
+  count(parts, link, clusters);
   return clusters;
 }
 
-std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least,
-                                              std::int32_t most) {
+std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small) {
   std::vector<std::vector<char>> in(clusters.of_body.size());
   for (std::size_t p = 0; p < in.size(); ++p)
     for (const std::int32_t c : clusters.of_body[p])
-      in[p].push_back(c >= 0 && clusters.bodies[p][at(c)] >= least && clusters.bodies[p][at(c)] <= most ? 1
-                                                                                                        : 0);
+      in[p].push_back(c >= 0 && is_small(clusters.bodies[p][at(c)], clusters.joints[p][at(c)], small) ? 1
+                                                                                                      : 0);
   return in;
 }
 

@@ -19,7 +19,9 @@ struct Clusters {
                                                     ///< in several parts; -1: in this part only
   std::int32_t several = 0;                         ///< clusters that lie in several parts
 
-  std::vector<std::vector<std::int32_t>> bodies;  ///< per part and cluster: of all parts, each body once
+  // Per part and cluster, of all parts:
+  std::vector<std::vector<std::int32_t>> bodies;  ///< each once
+  std::vector<std::vector<std::int32_t>> joints;  ///< contacts between two of its bodies
 
   std::int32_t of_contact(std::size_t part, const ContactEquation& c) const {
     return of_body[part][static_cast<std::size_t>(c.first)];
@@ -30,9 +32,17 @@ struct Clusters {
 /// pairs of clusters that meet at a border.
 Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link);
 
-/// Per part and unknown, 1 in clusters of at least `least` and at most `most` bodies, else 0.
-std::vector<std::vector<char>> in_clusters_of(const Clusters& clusters, std::int32_t least,
-                                              std::int32_t most);
+/// Clusters that a direct solve over their bodies is cheap for: those of few bodies, and chains. In a chain,
+/// a row, an arch or a column contacts close few loops, and elimination leaves fewer bodies than twice the
+/// loops to be eliminated together, however long it is.
+struct SmallClusters {
+  std::int32_t bodies = 200;    ///< at most so many, >= 0, whatever their loops
+  std::int32_t loops = 100;     ///< of more bodies: loops at most, >= 0
+  std::int32_t chained = 5000;  ///< and bodies at most, >= `bodies`
+};
+
+/// Per part and unknown, 1 in small clusters, else 0.
+std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small);
 
 /// Rows of any lengths, one per part: padded with `filler` to the longest of all, and gathered in order of
 /// subdomain. Collective.

@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "kernels/clusters/clusters.hpp"
 #include "kernels/global/admm.hpp"
 #include "runtime/step/check_sums.hpp"
 #include "runtime/step/error_history.hpp"
@@ -54,8 +55,8 @@ struct CertificateThresholds {
   /// In large clusters velocities are checked in problems of at most so many contacts, >= 0, whatever they
   /// need.
   std::int64_t tiny = 64;
-  /// Clusters of at most so many bodies are small, >= 0: checked by a direct solve in every step.
-  int most_direct = 200;
+  /// Which clusters are checked by a direct solve in every step.
+  SmallClusters small;
   /// But not where the tolerance on the balance is below this, > 0: rounding of the direct solve may hide it.
   double finest_direct = 1e-6;
   /// Where forces fade away, velocities that rounding makes pass, but not a tolerance below this, > 0: what
@@ -169,8 +170,9 @@ class Certificate {
   bool correctable() const;
   /// They were: what follows is a new start.
   void corrected();
-  int most_direct() const {
-    return settings_.balance_tolerance < thresholds_.finest_direct ? 0 : thresholds_.most_direct;
+  SmallClusters small_clusters() const {
+    return settings_.balance_tolerance < thresholds_.finest_direct ? SmallClusters{0, 0, 0}
+                                                                   : thresholds_.small;
   }
 
   /// The impulses of the last check were replaced by those of ADMM.

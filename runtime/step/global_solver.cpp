@@ -211,15 +211,15 @@ double GlobalSolver::sweeps_needed(double spread) const {
   return estimate_stiffness(gather_graphs(), *link_);
 }
 
-void GlobalSolver::find_clusters(int most_direct) {
+void GlobalSolver::find_clusters(const SmallClusters& small) {
   small_ = false;
   large_ = true;
   // A cell that follows a stress ties all contacts together.
-  if (most_direct == 0 || state_.cell.loaded()) return;
+  if (small.bodies == 0 || state_.cell.loaded()) return;
   const Whole span(*this);
   const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);
-  in_small_ = in_clusters_of(clusters, 1, most_direct);
+  in_small_ = in_small_clusters(clusters, small);
   const std::vector<double> rows =
       rows_of(*link_, graphs.size(), 2, [&](std::size_t p, std::span<double> row) {
         for (const auto& [first, second] : graphs[p].pairs)

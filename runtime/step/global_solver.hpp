@@ -37,9 +37,9 @@ class GlobalSolver {
   /// walls, by its size. `spread`: the mass of the heaviest grain over that of the lightest.
   double sweeps_needed(double spread) const;
 
-  /// Finds the clusters of the step's contacts. Those of at most `most_direct` bodies are small;
-  /// with 0 none is, and nothing is asked.
-  void find_clusters(int most_direct);
+  /// Finds the clusters of the step's contacts, and which are small. Where `small` allows no bodies none is,
+  /// and nothing is asked.
+  void find_clusters(const SmallClusters& small);
   bool small_clusters() const { return small_; }  ///< there are some, in any part
   bool large_clusters() const { return large_; }
 

@@ -30,8 +30,7 @@ void PresentProblem::plan(const graph::Communicator& ranks) {
 }
 
 void PresentProblem::find_clusters() {
-  const int most = certificate_.most_direct();
-  if (!std::exchange(clusters_known_, true)) global_.find_clusters(most);
+  if (!std::exchange(clusters_known_, true)) global_.find_clusters(certificate_.small_clusters());
 }
 
 double PresentProblem::plain_sweeps_needed() {

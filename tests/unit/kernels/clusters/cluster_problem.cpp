@@ -138,6 +138,55 @@ TEST(ClusterProblem, IsTheSameWhereverItsContactsLie) {
       }
 }
 
+/// Grains at (x, y, z) of a cubic lattice of nx by ny by nz, which touch their neighbours along each axis;
+/// the lowest stand on wall 0.
+BodyProblem lattice(int nx, int ny, int nz) {
+  BodyProblem problem;
+  const auto at_place = [&](int x, int y, int z) { return x + nx * (y + ny * z); };
+  for (int z = 0; z < nz; ++z)
+    for (int y = 0; y < ny; ++y)
+      for (int x = 0; x < nx; ++x) cluster_makers::add_grain(problem, 2 * radius * Vec3(x, y, z), 0);
+  for (int z = 0; z < nz; ++z)
+    for (int y = 0; y < ny; ++y)
+      for (int x = 0; x < nx; ++x) {
+        const std::int32_t own = at_place(x, y, z);
+        if (x > 0) cluster_makers::add_contact(problem, own, at_place(x - 1, y, z), Vec3::UnitX(), 0);
+        if (y > 0) cluster_makers::add_contact(problem, own, at_place(x, y - 1, z), Vec3::UnitY(), 0);
+        cluster_makers::add_contact(problem, own, z > 0 ? at_place(x, y, z - 1) : -1, Vec3::UnitZ(), 0,
+                                    z > 0 ? -1 : 0);
+      }
+  return problem;
+}
+
+TEST(SmallClusters, AreThoseOfFewBodiesAndChainsHoweverTheyAreCut) {
+  constexpr SmallClusters small{.bodies = 20, .loops = 10, .chained = 300};
+  struct Case {
+    BodyProblem problem;
+    bool is_small;
+    const char* what;
+  };
+  const Case cases[] = {{lattice(1, 1, 1), true, "a grain on a floor"},
+                        {lattice(3, 3, 2), true, "few bodies, many loops"},
+                        {lattice(1, 1, 21), true, "a column: no loop"},
+                        {lattice(300, 1, 1), true, "a row on a floor: walls join nothing"},
+                        {lattice(301, 1, 1), false, "a row that is too long"},
+                        {lattice(2, 1, 11), true, "a ladder of 22: 10 loops"},
+                        {lattice(2, 1, 12), false, "a ladder of 24: 11 loops"}};
+  for (const auto& [problem, is_small, what] : cases)
+    for (const int parts : {1, 4}) {
+      const test::Cut cut(
+          problem,
+          parts == 1 ? std::vector<std::int32_t>(problem.contacts.size(), 0) : dealt(problem, parts, 3),
+          parts);
+      std::vector<ContactGraph> graphs;
+      for (const BodyProblem& part : cut.parts) graphs.push_back(graph_of(part));
+      const auto in = in_small_clusters(clusters_of(graphs, cut), small);
+      for (std::size_t p = 0; p < graphs.size(); ++p)
+        for (const auto& [first, second] : graphs[p].pairs)
+          EXPECT_EQ(in[p][at(first)] != 0, is_small) << what << ", parts " << parts;
+    }
+}
+
 TEST(ClusterProblem, HasEachBodyAndContactOnce) {
   const BodyProblem whole = heaps(6, 0.4, 30, 7);
   const test::Cut cut(whole, dealt(whole, 4, 7), 4);
