@@ -149,9 +149,11 @@ bool Certificate::balanced(WholeProblem& whole) {
     return false;
   }
   if (whole.small_clusters()) result_.unbalance = small_unbalance(whole);
-  if (!(result_.unbalance <= tolerance) && !last) return false;
-  if (whole.large_clusters()) result_.unbalance = larger(result_.unbalance, large_unbalance(whole));
-  return result_.unbalance <= tolerance;
+  const bool small_ones = result_.unbalance <= small_tolerance();
+  if (!small_ones && !last) return false;
+  const double others = whole.large_clusters() ? large_unbalance(whole) : 0;
+  result_.unbalance = larger(result_.unbalance, others);
+  return small_ones && others <= tolerance;
 }
 
 double Certificate::small_unbalance(WholeProblem& whole) {
@@ -159,7 +161,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
   if (doubts_ >= thresholds_.most_doubts && !last &&
       result_.iterations < thresholds_.doubt_growth * doubted_at_)
     return std::numeric_limits<double>::infinity();
-  return repeated(small_check_, settings_.balance_tolerance, [&](double enough) {
+  return repeated(small_check_, small_tolerance(), [&](double enough) {
     const SmallError error = whole.small_error(enough, result_.iterations);
     // Sweeps go on where others can still be put right.
     result_.jammed = error.jammed && !error.mends;
@@ -181,7 +183,7 @@ double Certificate::large_unbalance(WholeProblem& whole) {
 }
 
 bool Certificate::correctable() const {
-  return small_check_.at == result_.iterations && small_check_.error > settings_.balance_tolerance &&
+  return small_check_.at == result_.iterations && small_check_.error > small_tolerance() &&
          result_.corrections < thresholds_.most_corrections &&
          (result_.iterations > corrected_at_ ||
           small_check_.error <= thresholds_.correction_gain * corrected_from_);

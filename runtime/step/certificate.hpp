@@ -57,7 +57,8 @@ struct CertificateThresholds {
   std::int64_t tiny = 64;
   /// Which clusters are checked by a direct solve in every step.
   SmallClusters small;
-  /// But not where the tolerance on the balance is below this, > 0: rounding of the direct solve may hide it.
+  /// To the tolerance on the balance, but not below this, > 0: rounding of the direct solve may hide what is
+  /// less. Where less is asked for, the checks of large clusters look at all of them, too.
   double finest_direct = 1e-6;
   /// Where forces fade away, velocities that rounding makes pass, but not a tolerance below this, > 0: what
   /// is asked for there is less than rounding, and the step says that it was not reached.
@@ -170,9 +171,12 @@ class Certificate {
   bool correctable() const;
   /// They were: what follows is a new start.
   void corrected();
-  SmallClusters small_clusters() const {
-    return settings_.balance_tolerance < thresholds_.finest_direct ? SmallClusters{0, 0, 0}
-                                                                   : thresholds_.small;
+  const SmallClusters& small_clusters() const { return thresholds_.small; }
+  /// The checks of large clusters look at the small ones, too.
+  bool looks_twice() const { return settings_.balance_tolerance < thresholds_.finest_direct; }
+  /// On the balance of small clusters.
+  double small_tolerance() const {
+    return std::max(settings_.balance_tolerance, thresholds_.finest_direct);
   }
 
   /// The impulses of the last check were replaced by those of ADMM.

@@ -211,11 +211,11 @@ double GlobalSolver::sweeps_needed(double spread) const {
   return estimate_stiffness(gather_graphs(), *link_);
 }
 
-void GlobalSolver::find_clusters(const SmallClusters& small) {
+void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   small_ = false;
   large_ = true;
   // A cell that follows a stress ties all contacts together.
-  if (small.bodies == 0 || state_.cell.loaded()) return;
+  if (state_.cell.loaded()) return;
   const Whole span(*this);
   const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);
@@ -227,6 +227,8 @@ void GlobalSolver::find_clusters(const SmallClusters& small) {
       });
   large_ = false;
   for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
+  twice_ = twice;
+  large_ |= twice;
 }
 
 std::vector<std::unique_ptr<const StepReader>> GlobalSolver::read_checked(
@@ -257,7 +259,7 @@ std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
   std::vector<BodyProblem> problems;
   for (std::size_t p = 0; p < steps.size(); ++p) {
     std::vector<char> taken;
-    if (small_ && large_) taken = in_small_[p];
+    if (small_ && large_ && (small || !twice_)) taken = in_small_[p];
     if (!small)
       for (char& t : taken) t = t == 0 ? 1 : 0;
     problems.push_back(gather_problem(*steps[p], taken));

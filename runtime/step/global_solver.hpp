@@ -37,9 +37,9 @@ class GlobalSolver {
   /// walls, by its size. `spread`: the mass of the heaviest grain over that of the lightest.
   double sweeps_needed(double spread) const;
 
-  /// Finds the clusters of the step's contacts, and which are small. Where `small` allows no bodies none is,
-  /// and nothing is asked.
-  void find_clusters(const SmallClusters& small);
+  /// Finds the clusters of the step's contacts, and which are small. `twice`: what is asked of the large ones
+  /// is asked of all.
+  void find_clusters(const SmallClusters& small, bool twice);
   bool small_clusters() const { return small_; }  ///< there are some, in any part
   bool large_clusters() const { return large_; }
 
@@ -88,7 +88,7 @@ class GlobalSolver {
   mutable trace::Meetings rounds_;  ///< since the last span began
   std::unique_ptr<PartLink> link_;
   std::vector<std::vector<char>> in_small_;  ///< per part and unknown
-  bool small_ = false, large_ = false;
+  bool small_ = false, large_ = false, twice_ = false;
   std::vector<BodyProblem> problems_;  ///< of the last small_error
   PartImpulses change_;                ///< found there [N s]
   bool mends_ = false;
