@@ -175,9 +175,7 @@ class Certificate {
   /// The checks of large clusters look at the small ones, too.
   bool looks_twice() const { return settings_.balance_tolerance < thresholds_.finest_direct; }
   /// On the balance of small clusters.
-  double small_tolerance() const {
-    return std::max(settings_.balance_tolerance, thresholds_.finest_direct);
-  }
+  double small_tolerance() const { return std::max(settings_.balance_tolerance, thresholds_.finest_direct); }
 
   /// The impulses of the last check were replaced by those of ADMM.
   void solved_by_admm(const BodyAdmmResult& result);

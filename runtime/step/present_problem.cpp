@@ -30,7 +30,7 @@ void PresentProblem::plan(const graph::Communicator& ranks) {
 }
 
 void PresentProblem::find_clusters() {
-  if (!std::exchange(clusters_known_, true)) 
+  if (!std::exchange(clusters_known_, true))
     global_.find_clusters(certificate_.small_clusters(), certificate_.looks_twice());
 }
 

@@ -84,9 +84,11 @@ struct Outcome {
 };
 
 /// Tolerances 1e-3 on the error and 0.05 on the balance; at most 10,000 sweeps.
-Outcome judged(const Situation& given, const CertificateThresholds& thresholds = {}) {
+Outcome judged(const Situation& given, const CertificateThresholds& thresholds = {},
+               double balance_tolerance = 0.05) {
   SolverSettings settings;
   settings.max_iterations = 10000;
+  settings.balance_tolerance = balance_tolerance;
   Certificate certificate(settings, thresholds);
   certificate.begin({.rounding_velocity = 0, .wall_pushes = {0}});
   KnownProblem problem(given.plain_sweeps, given.velocity_errors, given.small_errors);
@@ -120,6 +122,24 @@ std::vector<Found> steady(double error, int to = 1000) {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
                  infinity = std::numeric_limits<double>::infinity();
+
+TEST(Certificate, AsksSmallClustersHoweverLittleMayBeLeft) {
+  // Below what a direct solve can tell the checks of large clusters decide; but what it can tell it tells.
+  constexpr double fine = 1e-8;
+  const auto verdict = [](double small, double large) {
+    Situation one{.what = "", .checks = {{0, 1}, {1000, 1e-9}}, .verdict = Verdict::solved};
+    one.plain_sweeps = 1e4;  // stiff: the large ones are asked for their velocities
+    one.small_errors = {small};
+    one.velocity_errors = {large};
+    return judged(one, {}, fine);
+  };
+  EXPECT_EQ(verdict(0, 0).verdict, Verdict::solved);
+  EXPECT_EQ(verdict(38, 0).verdict, Verdict::go_on);
+  EXPECT_EQ(verdict(1e-5, 0).verdict, Verdict::go_on);
+  EXPECT_EQ(verdict(5e-7, 0).verdict, Verdict::solved);
+  EXPECT_NEAR(verdict(5e-7, 0).result.unbalance, 5e-7, 1e-9) << "what is told apart is told";
+  EXPECT_EQ(verdict(0, 1e-6).verdict, Verdict::go_on);
+}
 
 TEST(Certificate, SaysWhatASituationIs) {
   using enum Verdict;
