@@ -42,7 +42,7 @@ TEST(GlobalSolver, MeasuresWhatSmallClustersDoToAWallByAllThatItCarries) {
   const DecompositionSettings settings;
   Gluing gluing(state, settings, ranks);
   GlobalSolver solver(state, simulation.parameters(), settings, gluing, ranks);
-  solver.find_clusters(200);
+  solver.find_clusters({}, false);
   ASSERT_TRUE(solver.small_clusters());
   state.wall_states[0].impulse.setZero();
   EXPECT_NEAR(solver.small_error(1e-6, 0, 1).relative, 0.5, 1e-3);
