@@ -92,8 +92,9 @@ void count(std::span<const ContactGraph> parts, const PartLink& link, Clusters& 
     });
 }
 
-bool is_small(std::int32_t bodies, std::int32_t joints, const SmallClusters& small) {
-  return bodies <= small.bodies || (bodies <= small.chained && joints - bodies < small.loops);
+bool is_small(std::int32_t bodies, std::int32_t joints, const SmallClusters& small, bool friction) {
+  return bodies <= (friction ? small.bodies : small.smooth) ||
+         (bodies <= small.chained && joints - bodies < small.loops);
 }
 
 /// Which clusters of the parts are one, through bodies that they share: numbers them.
@@ -165,12 +166,13 @@ Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link) 
   return clusters;
 }
 
-std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small) {
+std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small,
+                                                 bool friction) {
   std::vector<std::vector<char>> in(clusters.of_body.size());
   for (std::size_t p = 0; p < in.size(); ++p)
     for (const std::int32_t c : clusters.of_body[p])
-      in[p].push_back(c >= 0 && is_small(clusters.bodies[p][at(c)], clusters.joints[p][at(c)], small) ? 1
-                                                                                                      : 0);
+      in[p].push_back(
+          c >= 0 && is_small(clusters.bodies[p][at(c)], clusters.joints[p][at(c)], small, friction) ? 1 : 0);
   return in;
 }
 

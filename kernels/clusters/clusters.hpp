@@ -37,12 +37,14 @@ Clusters clusters_of(std::span<const ContactGraph> parts, const PartLink& link);
 /// loops to be eliminated together, however long it is.
 struct SmallClusters {
   std::int32_t bodies = 200;    ///< at most so many, >= 0, whatever their loops
+  std::int32_t smooth = 500;    ///< the same where no contact has friction, and rounds settle
   std::int32_t loops = 100;     ///< of more bodies: loops at most, >= 0
   std::int32_t chained = 5000;  ///< and bodies at most, >= `bodies`
 };
 
-/// Per part and unknown, 1 in small clusters, else 0.
-std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small);
+/// Per part and unknown, 1 in small clusters, else 0. `friction`: some contact may have it.
+std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small,
+                                                 bool friction);
 
 /// Rows of any lengths, one per part: padded with `filler` to the longest of all, and gathered in order of
 /// subdomain. Collective.

@@ -219,7 +219,7 @@ void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   const Whole span(*this);
   const std::vector<ContactGraph> graphs = gather_graphs();
   const Clusters clusters = clusters_of(graphs, *link_);
-  in_small_ = in_small_clusters(clusters, small);
+  in_small_ = in_small_clusters(clusters, small, parameters_.friction);
   const std::vector<double> rows =
       rows_of(*link_, graphs.size(), 2, [&](std::size_t p, std::span<double> row) {
         for (const auto& [first, second] : graphs[p].pairs)

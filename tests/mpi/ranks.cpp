@@ -77,8 +77,8 @@ TEST_F(Ranks, HandOnWhatOthersSayToTheBit) {
                                  "subdomains=36 --set decomposition.coupling=nscdd"}) {
     const std::string twelve = "run scene.toml --force --steps 3 --threads 1 --set decomposition." + keys;
     const Outcome one = run(1, twelve + " --out one"), other = run(ranks, twelve + " --out other");
-    ASSERT_EQ(one.code, 3) << keys << ": " << one.messages;
-    ASSERT_EQ(other.code, 3) << keys << ": " << other.messages;
+    ASSERT_TRUE(one.code == 0 || one.code == 3) << keys << ": " << one.messages;
+    ASSERT_EQ(other.code, one.code) << keys << ": " << other.messages;
     EXPECT_EQ(digest_of("other"), digest_of("one")) << keys;
     EXPECT_EQ(file("other", "walls.csv"), file("one", "walls.csv")) << keys;
   }
@@ -157,12 +157,13 @@ TEST_F(Ranks, SendOneMessagePerNeighbourOrToTheCentreAndBack) {
 }
 
 TEST_F(Ranks, BearMessagesThatComeLate) {
-  ASSERT_EQ(run(1, "run scene.toml --out one --threads 1 --steps 3").code, 3);
+  const int code = run(1, "run scene.toml --out one --threads 1 --steps 3").code;
+  ASSERT_TRUE(code == 0 || code == 3);
   for (const std::string mapping : {"block", "cyclic"}) {
     const Outcome late = run(
         2, "run scene.toml --force --out late --threads 1 --steps 3 --set decomposition.mapping=" + mapping,
         "TALUS_MESSAGE_DELAY=2e-4");
-    ASSERT_EQ(late.code, 3) << late.messages;
+    ASSERT_EQ(late.code, code) << late.messages;
     EXPECT_EQ(digest_of("late"), digest_of("one")) << mapping;
   }
 }

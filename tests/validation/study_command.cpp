@@ -88,7 +88,8 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
         EXPECT_EQ(residual.number(checks.front(), "sweeps"), 0);
         EXPECT_LE(residual.number(checks.back(), "error_rms"), 1e-4) << method << start << subdomains;
         for (std::size_t k = 1; k < checks.size(); ++k) {
-          EXPECT_GT(residual.number(checks[k], "sweeps"), residual.number(checks[k - 1], "sweeps"));
+          // A direct solve of small clusters is looked at with no sweep behind it.
+          EXPECT_GE(residual.number(checks[k], "sweeps"), residual.number(checks[k - 1], "sweeps"));
           EXPECT_GE(residual.number(checks[k], "seconds"), 0);
         }
         // The same step, so the same answer, whoever finds it.

@@ -159,7 +159,7 @@ BodyProblem lattice(int nx, int ny, int nz) {
 }
 
 TEST(SmallClusters, AreThoseOfFewBodiesAndChainsHoweverTheyAreCut) {
-  constexpr SmallClusters small{.bodies = 20, .loops = 10, .chained = 300};
+  constexpr SmallClusters small{.bodies = 20, .smooth = 30, .loops = 10, .chained = 300};
   struct Case {
     BodyProblem problem;
     bool is_small;
@@ -180,10 +180,14 @@ TEST(SmallClusters, AreThoseOfFewBodiesAndChainsHoweverTheyAreCut) {
           parts);
       std::vector<ContactGraph> graphs;
       for (const BodyProblem& part : cut.parts) graphs.push_back(graph_of(part));
-      const auto in = in_small_clusters(clusters_of(graphs, cut), small);
+      const auto in = in_small_clusters(clusters_of(graphs, cut), small, true);
       for (std::size_t p = 0; p < graphs.size(); ++p)
         for (const auto& [first, second] : graphs[p].pairs)
           EXPECT_EQ(in[p][at(first)] != 0, is_small) << what << ", parts " << parts;
+      const auto smooth = in_small_clusters(clusters_of(graphs, cut), small, false);
+      for (std::size_t p = 0; p < graphs.size(); ++p)
+        for (const auto& [first, second] : graphs[p].pairs)
+          EXPECT_EQ(smooth[p][at(first)] != 0, is_small || problem.bodies.size() <= 30) << what;
     }
 }
 
