@@ -245,7 +245,7 @@ struct DenseFlow {
 };
 
 std::vector<DenseFlow> dense_flows() {
-  talus::Setup stressed = pushed(280);  // later it is pressed to less than two diameters
+  talus::Setup stressed = pushed(280);      // later it is pressed to less than two diameters
   stressed.stages[0].stress.to[4].reset();  // beyond what friction bears it would speed up for ever
   stressed.stages[0].shear_rates = {0, 4, 0};
   talus::Setup strained = colliding(300);
