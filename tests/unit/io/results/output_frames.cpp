@@ -278,6 +278,29 @@ TEST(Vtk, ForcesRunBetweenCentresAndToTheWall) {
   EXPECT_EQ(array_of<std::int64_t>(text, "offsets"), (std::vector<std::int64_t>{2, 4}));
 }
 
+TEST(Vtk, ForcesOfManyContactsAreAllThere) {
+  // More numbers than are made, and bytes than are encoded, at a time.
+  Frame frame = three_grains();
+  constexpr std::size_t contacts = 70'001;
+  const std::array<std::int64_t, 2> bodies = frame.contact_bodies[0];
+  frame.contact_bodies.assign(contacts, bodies);
+  frame.contact_normal.assign(contacts, Vec3::UnitX());
+  frame.contact_point.assign(contacts, Vec3::Zero());
+  frame.contact_gap.assign(contacts, 0);
+  frame.contact_force.resize(contacts);
+  for (std::size_t k = 0; k < contacts; ++k) frame.contact_force[k] = Vec3(static_cast<double>(k), 0, -1);
+  const std::string text = forces_vtp(frame);
+  const auto force = array_of<float>(text, "force"), normal = array_of<float>(text, "normal_force");
+  ASSERT_EQ(force.size(), 3 * contacts);
+  ASSERT_EQ(normal.size(), 2 * contacts);
+  for (std::size_t k = 0; k < contacts; ++k) {
+    ASSERT_EQ(force[3 * k], static_cast<float>(k));
+    ASSERT_EQ(force[3 * k + 2], -1.0f);
+    ASSERT_EQ(normal[2 * k + 1], static_cast<float>(k));
+  }
+  EXPECT_EQ(array_of<float>(text, "Points").size(), 6 * contacts);
+}
+
 TEST(Vtk, GrainsTakeFieldsOfTheirOwnAndRefuseThoseThatDoNotFit) {
   const std::vector<std::int32_t> subdomain{4, -1, 2}, two{1, 2};
   const GrainField good{"subdomain", subdomain}, bad{"multiplicity", two};

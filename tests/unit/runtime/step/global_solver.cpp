@@ -50,5 +50,35 @@ TEST(GlobalSolver, MeasuresWhatSmallClustersDoToAWallByAllThatItCarries) {
   EXPECT_LT(solver.small_error(1e-6, 0, 1).relative, 0.02);
 }
 
+/// A block of 216 grains that touch along all axes: more bodies than are small with friction, fewer than are
+/// without; its loops are no chain's.
+TEST(GlobalSolver, TakesMoreBodiesForSmallWhereThereIsNoFriction) {
+  constexpr double r = 0.01;
+  constexpr int edge = 6;
+  for (const double friction : {0.0, 0.3}) {
+    talus::Setup setup = simulation_test::falling(1);
+    setup.walls.resize(1);
+    setup.stages[0].laws = laws_of_one_material(friction, friction, 0);
+    Bodies bodies;
+    for (int k = 0; k < edge * edge * edge; ++k)
+      add_sphere(bodies, BodyId{k},
+                 r * Vec3(2 * (k % edge), 2 * (k / edge % edge), 1 + 2 * (k / edge / edge)), r, 2600);
+    graph::Executor executor({.threads = 1});
+    Simulation simulation(setup, std::move(bodies), executor);
+    simulation.step();
+    StepState state = simulation.state();
+    const graph::OneRank ranks;
+    const DecompositionSettings settings;
+    Gluing gluing(state, settings, ranks);
+    GlobalSolver solver(state, simulation.parameters(), settings, gluing, ranks);
+    solver.find_clusters({}, false);
+    EXPECT_EQ(solver.small_clusters(), friction == 0);
+    EXPECT_EQ(solver.large_clusters(), friction > 0);
+    solver.find_clusters({}, true);
+    EXPECT_EQ(solver.small_clusters(), friction == 0);
+    EXPECT_TRUE(solver.large_clusters()) << "looked at twice";
+  }
+}
+
 }  // namespace
 }  // namespace talus::global_solver_test
