@@ -87,7 +87,7 @@ struct LaneSlots {
 template <class S>
 struct GapSearch {
   S space;
-  const GapRule& rule;
+  GapRule rule;  ///< a copy, so that no store of a contact can change it
 };
 
 /// Writes W pairs from place `at` of `out` on; returns the lanes whose bodies came far (came_far in

@@ -119,22 +119,34 @@ template <class V, class Only>
           load<V>(c.of.nz + c.k, at, only)};
 }
 
-/// Without drift, velocities of bodies are those of their records.
+/// Without drift, velocities of bodies are those of their records, and those of walls are theirs.
 struct NoDrift {
-  NoDrift from(std::size_t) const { return {}; }
+  [[gnu::always_inline]] NoDrift from(std::size_t) const { return {}; }
+  template <class V, class Only>
+  [[gnu::always_inline]] void add_to(Space<V>&, std::size_t, Only) const {}
   template <class V, class Only>
   [[gnu::always_inline]] void take(const Slice<NumberOf<V>>&, Meeting<V>&, std::size_t, Only) const {}
   template <class V, class Only>
   [[gnu::always_inline]] void give(const Slice<NumberOf<V>>&, const Space<V>&, std::size_t, Only) const {}
 };
-/// With drift, the second body of each contact stands for an image that moves against it.
+/// With drift, the second body of each contact stands for an image that moves against it, or the material of
+/// a wall moves against the wall.
 template <class Number>
 struct PairDrift {
   const Number *x, *y, *z;
   [[gnu::always_inline]] PairDrift from(std::size_t k) const { return {x + k, y + k, z + k}; }
   template <class V, class Only>
+  [[gnu::always_inline]] Space<V> velocity(std::size_t at, Only only) const {
+    return {load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)};
+  }
+  /// Makes the velocity of a wall that of its material.
+  template <class V, class Only>
+  [[gnu::always_inline]] void add_to(Space<V>& wall, std::size_t at, Only only) const {
+    wall = wall + velocity<V>(at, only);
+  }
+  template <class V, class Only>
   [[gnu::always_inline]] void take(const Slice<Number>&, Meeting<V>& m, std::size_t at, Only only) const {
-    m.du = m.du - Space<V>{load<V>(x, at, only), load<V>(y, at, only), load<V>(z, at, only)};
+    m.du = m.du - velocity<V>(at, only);
   }
   template <class V, class Only>
   [[gnu::always_inline]] void give(const Slice<Number>&, const Space<V>&, std::size_t, Only) const {}
@@ -268,16 +280,31 @@ template <class Mu>
   return {Mu{mu}, {m.x, m.y, m.z, m.n, m.beta, m.omega}, {}};
 }
 
+/// work(drift) with the drifts of contacts, or with NoDrift where they have none. Asked once for a chunk: to
+/// ask at every block of contacts takes 3 to 4 % more instructions without friction.
+template <class Number, class Work>
+[[gnu::always_inline]] inline auto with_drift(const ContactViewOf<Number>& c, const Work& work) {
+  return c.vx ? work(PairDrift<Number>{c.vx, c.vy, c.vz}) : work(NoDrift{});
+}
+/// work(rule) with the rule and these drifts.
+template <class Mu, class Start, class Number, class Work>
+[[gnu::always_inline]] inline void with_drift(const SweepRule<Mu, Start>& rule,
+                                              const ContactViewOf<Number>& c, const Work& work) {
+  with_drift(
+      c, [&](const auto& drift) __attribute__((always_inline)) {
+        work(SweepRule<Mu, Start, std::remove_cvref_t<decltype(drift)>>{rule.friction, rule.start, drift});
+      });
+}
+
 /// Sweeps grains by the rule, with their drifts where contacts have any.
 template <bool Friction, class V, class Mu, class Start, class Number>
-[[gnu::always_inline]] inline void sweep_grains_of(const SweepRule<Mu, Start>& rule,
+[[gnu::always_inline]] inline void sweep_grains_of(const SweepRule<Mu, Start>& of_chunk,
                                                    const ContactViewOf<Number>& c,
                                                    const ImpulseViewOf<Number>& r, Number* bodies) {
-  if (c.vx)
-    sweep_grains_by<Friction, V>(
-        SweepRule<Mu, Start, PairDrift<Number>>{rule.friction, rule.start, {c.vx, c.vy, c.vz}}, c, r, bodies);
-  else
-    sweep_grains_by<Friction, V>(rule, c, r, bodies);
+  with_drift(
+      of_chunk, c, [&](const auto& rule) __attribute__((always_inline)) {
+        sweep_grains_by<Friction, V>(rule, c, r, bodies);
+      });
 }
 
 template <bool Friction, int W, class Mu>

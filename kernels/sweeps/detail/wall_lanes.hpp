@@ -47,24 +47,12 @@ struct SplitWall {
   }
 };
 
-/// The copies of a wall that a block of contacts meets, and where that block begins.
+/// The copies of a wall that a block of contacts meets.
 template <class V>
 struct WallPart {
   SplitWall<V>& wall;
   std::size_t part;
-  const ContactViewOf<NumberOf<V>>& contacts;
-  std::size_t k;
 };
-
-/// Adds the velocity of a wall's material beyond that of the wall, in the lanes of contacts from `k` on; does
-/// nothing where no wall has any.
-template <class V, class Only>
-[[gnu::always_inline]] inline void add_drift(const ContactViewOf<NumberOf<V>>& c, std::size_t k, Only only,
-                                             Space<V>& velocity) {
-  if (c.vx)
-    velocity = velocity +
-               Space<V>{load<V>(c.vx + k, 0, only), load<V>(c.vy + k, 0, only), load<V>(c.vz + k, 0, only)};
-}
 
 /// A block of W grains against as many copies of a wall.
 template <bool Friction, class V, class Grains, class Rule, class Only>
@@ -73,7 +61,7 @@ template <bool Friction, class V, class Grains, class Rule, class Only>
                                                     const Rule& rule, Only only, WallPart<V> at) {
   Meeting<V> m = gather<Friction, false>(a, a, V{});
   Space<V> wall = at.wall.velocity + at.wall.gained[at.part];
-  add_drift<V>(at.contacts, at.k, only, wall);
+  rule.drift.add_to(wall, 0, only);
   m.du = m.du - wall;
   Approach<V> contact = approach_of<Friction>(c, 0, only, m);
   contact.w_nn = contact.w_nn + at.wall.inv_mass;
@@ -94,31 +82,42 @@ template <bool Friction, class V, class Rule, class Number>
   std::size_t k = c.begin, part = 0;
   for (; k + W <= c.end; k += W, part = (part + 1) % (wall_lanes / W))
     sweep_wall_block<Friction, V>({c, k}, {r, k}, first_of(c, k, bodies), rule.from(k), AllLanes{},
-                                  {split, part, c, k});
+                                  {split, part});
   if (k < c.end) {
     SpareGrains<V> spare;
     const FewRecords<Number, W> a(first_of(c, k, bodies), c.end - k, spare);
-    sweep_wall_block<Friction, V>({c, k}, {r, k}, a, rule.from(k), FirstLanes{c.end - k},
-                                  {split, part, c, k});
+    sweep_wall_block<Friction, V>({c, k}, {r, k}, a, rule.from(k), FirstLanes{c.end - k}, {split, part});
   }
   split.glue(wall);
 }
 
+/// Sweeps grains at a wall by the rule, with the drifts of the wall's material where it has any.
+template <bool Friction, class V, class Mu, class Start, class Number>
+[[gnu::always_inline]] inline void sweep_wall_of(const SweepRule<Mu, Start>& of_chunk,
+                                                 const ContactViewOf<Number>& c,
+                                                 const ImpulseViewOf<Number>& r, Number* bodies,
+                                                 const WallView& wall) {
+  with_drift(
+      of_chunk, c, [&](const auto& rule) __attribute__((always_inline)) {
+        sweep_wall_by<Friction, V>(rule, c, r, bodies, wall);
+      });
+}
+
 template <bool Friction, int W, class Mu>
 void sweep_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu, const WallView& wall) {
-  sweep_wall_by<Friction, Lanes<W>>(plain_rule<Mu>(mu), c, r, bodies, wall);
+  sweep_wall_of<Friction, Lanes<W>>(plain_rule<Mu>(mu), c, r, bodies, wall);
 }
 
 template <bool Friction, int W, class Mu>
 void momentum_wall(const ContactView& c, const ImpulseView& r, double* bodies, double mu,
                    const WallView& wall, const MomentumView& momentum) {
-  sweep_wall_by<Friction, Lanes<W>>(momentum_rule<Mu>(mu, momentum), c, r, bodies, wall);
+  sweep_wall_of<Friction, Lanes<W>>(momentum_rule<Mu>(mu, momentum), c, r, bodies, wall);
 }
 
 template <bool Friction, class V, class Mu>
 void single_wall(const SingleContactView& c, const SingleImpulseView& r, float* bodies, double mu,
                  const WallView& wall, const MomentumView& momentum) {
-  sweep_wall_by<Friction, V>(momentum_rule<Mu>(mu, momentum), c, r, bodies, wall);
+  sweep_wall_of<Friction, V>(momentum_rule<Mu>(mu, momentum), c, r, bodies, wall);
 }
 
 template <bool Friction, int W>
