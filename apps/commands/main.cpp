@@ -119,10 +119,12 @@ void occupy_closed_streams() {
 
 /// Arrays go back to the system when they are freed. glibc does so with large ones until one is freed; from
 /// then on it keeps all up to that size, of 32 MB at most, and the gaps between them: of 10^6 grains 160 MB
-/// more than the arrays that there were.
+/// more than the arrays that there were. Smaller arrays are reused in place: each page that the system gives
+/// is a fault and is cleared. Given back from 256 kB on, as the arrays of 16,000 grains are, that took 5 %
+/// of a step.
 void give_back_arrays() {
 #ifdef __GLIBC__
-  constexpr int array = 1 << 18;  // smaller ones are reused in place, without asking the system for pages
+  constexpr int array = 1 << 21;  // with 4 MB a run of 10^6 grains takes 4 % more memory than with 256 kB
   ::mallopt(M_MMAP_THRESHOLD, array);
   ::mallopt(M_TRIM_THRESHOLD, 8 * array);
 #endif
