@@ -147,6 +147,25 @@ def test_what_is_missing_is_said(heap_run):
         heap_run.frame(-1).rows(np.array([-1]))
 
 
+@pytest.mark.parametrize("content", [b'{"summary": {"status": "do', b"", b"[1, 2]", b"\xff\xfe{}", b'{"summary": 3}'])
+def test_a_damaged_file_is_named(heap_run, tmp_path, content):
+    other = tmp_path / "run"
+    shutil.copytree(heap_run.directory, other)
+    (other / "run.json").write_bytes(content)
+    with pytest.raises(talus.DamagedFile, match="run/run.json: "):
+        talus.open(other).status
+    if content != b'{"summary": 3}':
+        for name in ("status.json", "columns.json", "scene.resolved.toml"):
+            (other / name).write_bytes(content)
+        damaged = talus.open(other)
+        for name, ask in (("status.json", lambda: damaged.progress), ("columns.json", lambda: damaged.units("steps"))):
+            with pytest.raises(talus.DamagedFile, match=f"run/{name}: is damaged"):
+                ask()
+    (other / "scene.resolved.toml").write_bytes(b"seed = \n")
+    with pytest.raises(talus.DamagedFile, match="scene.resolved.toml: is damaged"):
+        talus.open(other).scene
+
+
 def test_other_formats_are_refused(heap_run, tmp_path):
     other = tmp_path / "run"
     shutil.copytree(heap_run.directory, other)

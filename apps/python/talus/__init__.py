@@ -16,7 +16,7 @@
 from .command import RunError, Stopped, find_program, run
 from .frame import Frame, MissingData
 from .parameter_sweep import Sweep, sweep
-from .results import NotARun, Run, open_run
+from .results import DamagedFile, NotARun, Run, open_run
 from .scene import Scene, SceneError
 from .statistics import anisotropy, fabric_tensor, force_distribution, pair_correlation
 from .tables import read_table
@@ -25,7 +25,7 @@ open = open_run  # `talus.open`; inside this package the name would hide the bui
 
 __version__ = "0.1.0"
 __all__ = [
-    "Frame", "MissingData", "NotARun", "Run", "RunError", "Scene", "SceneError", "Stopped", "Sweep",
+    "DamagedFile", "Frame", "MissingData", "NotARun", "Run", "RunError", "Scene", "SceneError", "Stopped", "Sweep",
     "anisotropy", "fabric_tensor", "find_program", "force_distribution", "open", "open_run",
     "pair_correlation", "read_table", "run", "sweep",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, overload
 
@@ -19,10 +19,15 @@ class NotARun(ValueError):
     """A directory that no run of Talus was begun in."""
 
 
+class DamagedFile(ValueError):
+    """A file of a run that does not hold what the program writes into it; the message names it."""
+
+
 def open_run(directory: str | os.PathLike[str]) -> Run:
     """The run in a directory, which may still go on, have been stopped or failed.
 
-    Raises FileNotFoundError where there is no directory, NotARun where no run was begun in it.
+    Raises FileNotFoundError where there is no directory, NotARun where no run was begun in it. What is asked of the run
+    raises DamagedFile where a file that tells it is damaged.
     """
     return Run(directory)
 
@@ -57,12 +62,12 @@ class Run:
     @property
     def summary(self) -> dict[str, Any]:
         """`summary` of run.json: status, steps, digest, converged_steps, worst errors, wall_s [s], ... (docs/formats.md)."""
-        return self.json.get("summary", {})
+        return self._part_of_json("summary")
 
     @property
     def provenance(self) -> dict[str, Any]:
         """`provenance` of run.json: version, git_hash, host, threads, command_line, seed, ..."""
-        return self.json.get("provenance", {})
+        return self._part_of_json("provenance")
 
     @property
     def progress(self) -> dict[str, Any]:
@@ -85,7 +90,7 @@ class Run:
         """The scene as it was run, with every default spelled out (scene.resolved.toml)."""
         import tomllib
 
-        return tomllib.loads((self.directory / "scene.resolved.toml").read_text(encoding="utf-8"))
+        return _parsed(self.directory / "scene.resolved.toml", tomllib.loads)
 
     # ---- tables
 
@@ -134,11 +139,17 @@ class Run:
 
     # ---- files that change
 
+    def _part_of_json(self, name: str) -> dict[str, Any]:
+        part = self.json.get(name, {})
+        if not isinstance(part, dict):
+            raise DamagedFile(f"{self.directory / 'run.json'}: `{name}` is no table of names and values")
+        return part
+
     def _json(self, name: str) -> dict[str, Any]:
         path = self.directory / name
         if not path.exists():
             return {}
-        return self._read(path, lambda path: json.loads(path.read_text(encoding="utf-8")))
+        return self._read(path, lambda path: _parsed(path, json.loads))
 
     def _read(self, path: Path, read: Any) -> Any:
         """What `read(path)` returns, kept until the file changes."""
@@ -179,6 +190,18 @@ class Frames(Sequence[Frame]):
 
     def __iter__(self) -> Iterator[Frame]:
         return (self[k] for k in range(len(self)))
+
+
+def _parsed(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
+    """The names and values in a text file; raises DamagedFile where it holds none."""
+    try:
+        content = parse(path.read_text(encoding="utf-8"))
+    except ValueError as error:  # also what is no UTF-8
+        raise DamagedFile(f"{path}: is damaged: {error}; `talus run ... --resume` writes it anew from a checkpoint, where "
+                          "there is one") from error
+    if not isinstance(content, dict):
+        raise DamagedFile(f"{path}: is damaged: it holds no table of names and values")
+    return content
 
 
 def _list_frames(path: Path) -> list[tuple[int, float, str]]:
