@@ -52,12 +52,15 @@ double automatic_position(const Wall& wall, int axis, const std::vector<SampleSp
 
 /// How deep a centre lies in what is solid behind a wall [m]; 0 or less elsewhere.
 double depth_behind(const Wall& wall, const Vec3& x) {
-  if (wall.surface() == nullptr) return wall.normal.dot((wall.point - x));
-  std::vector<SurfacePoint> points;
-  wall.surface()->collide(x, 0, points);
-  double depth = 0;
-  for (const SurfacePoint& point : points) depth = std::max(depth, -point.distance);
-  return depth;
+  return wall.surface() == nullptr ? wall.normal.dot(wall.point - x) : wall.surface()->depth(x);
+}
+
+/// What to do about a grain there.
+std::string remedy_for(const Wall& wall) {
+  if (wall.surface() == nullptr) return "move the grain, or the wall";
+  return "the solid is there: move the grain out of it, or say with `inside` of the wall on which side of "
+         "its "
+         "surface the grains are";
 }
 
 void give_mass(WallLoad& load, double mass) {
@@ -132,8 +135,8 @@ void place_walls(Scene& scene, const Sample& grains) {
   for (const Wall& wall : walls)
     for (std::size_t k = 0; stands_at_first(scene.setup, wall) && k < grains.size(); ++k)
       if (const double depth = depth_behind(wall, grains.x[k]); depth > 0)
-        refuse(fmt::format("the centre of grain {} lies {} m behind wall '{}'",
-                           static_cast<std::int64_t>(grains.id_of(k)), depth, wall.name));
+        refuse(fmt::format("the centre of grain {} lies {:.6g} m behind wall '{}'; {}",
+                           static_cast<std::int64_t>(grains.id_of(k)), depth, wall.name, remedy_for(wall)));
   try {
     validate(scene.setup);
   } catch (const std::invalid_argument& error) {

@@ -18,13 +18,13 @@ inline SurfacePoint wall_point(const Wall& wall, const Vec3& x, std::int32_t fea
   return {0, wall.normal.dot(domain.separation(x, wall.point)), wall.normal};
 }
 
-/// Whether a sphere overlaps a wall that is there, or lies behind a plane.
+/// Whether a sphere overlaps a wall that is there, or lies behind a plane or deep in a solid.
 inline bool meets_wall(const Wall& wall, const Vec3& x, double radius, const Domain& domain = {}) {
   if (wall.absent) return false;
   if (wall.surface() == nullptr) return wall_point(wall, x, 0, domain).distance < radius;
   std::vector<SurfacePoint> points;
   collide(wall, x, radius, points);
-  return !points.empty();
+  return !points.empty() || wall.surface()->depth(wall.pose.back(x)) > 0;
 }
 
 /// Order by (wall, body, feature).

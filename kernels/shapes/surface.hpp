@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -56,6 +57,10 @@ class Surface {
   virtual void collide(const Vec3& centre, double reach, std::vector<SurfacePoint>& points) const {
     if (const SurfacePoint point = at(centre, 0); point.distance < reach) points.push_back(point);
   }
+  /// How deep a centre lies in what is solid [m]; 0 elsewhere, and for what is thin. Asked where a grain is
+  /// to be placed: `collide` of a surface that grains touch from one side says nothing of what lies behind
+  /// it.
+  virtual double depth(const Vec3& centre) const { return std::max(0.0, -at(centre, 0).distance); }
 };
 
 }  // namespace talus

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -52,9 +53,28 @@ double six_volumes(const std::vector<Triangle>& triangles) {
   return sum;
 }
 
+/// Whether the ray from p towards +axis goes through a triangle. A ray through an edge or a corner goes
+/// through an odd number of the triangles there if it goes through the surface, else an even number: what
+/// counts of an edge is computed from its lower end, hence alike for both of its triangles.
+bool pierces(const Vec3& p, Eigen::Index axis, const Triangle& triangle) {
+  const Eigen::Index u = (axis + 1) % 3, v = (axis + 2) % 3;
+  bool within = false;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 *low = &triangle[k], *high = &triangle[(k + 1) % 3];
+    if ((*low)[v] > (*high)[v]) std::swap(low, high);
+    if (((*low)[v] > p[v]) == ((*high)[v] > p[v])) continue;
+    const double part = (p[v] - (*low)[v]) / ((*high)[v] - (*low)[v]);
+    if (p[u] < (*low)[u] + part * ((*high)[u] - (*low)[u])) within = !within;
+  }
+  if (!within) return false;
+  const auto& [a, b, c] = triangle;
+  const Vec3 normal = (b - a).cross(c - a);
+  return ((a - p).dot(normal) > 0) == (normal[axis] > 0);
+}
+
 class Mesh final : public Surface {
  public:
-  Mesh(std::vector<Triangle> triangles, bool inside) : triangles_(std::move(triangles)) {
+  Mesh(std::vector<Triangle> triangles, bool inside) : triangles_(std::move(triangles)), inside_(inside) {
     box_ = {triangles_[0][0], triangles_[0][0]};
     for (const Triangle& triangle : triangles_) {
       for (const Vec3& p : triangle) box_ = {box_.low.cwiseMin(p), box_.high.cwiseMax(p)};
@@ -114,6 +134,14 @@ class Mesh final : public Surface {
     }
   }
 
+  double depth(const Vec3& centre) const override {
+    if (encloses(centre) == inside_) return 0;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Triangle& triangle : triangles_)
+      nearest = std::min(nearest, (centre - nearest_point(triangle, centre)).norm());
+    return nearest;
+  }
+
  private:
   /// The nearest point of a triangle.
   struct Meeting {
@@ -122,6 +150,22 @@ class Mesh final : public Surface {
     Vec3 point;
     bool in_front;
   };
+
+  /// Whether the surface is around a point. Rounding may mislead a ray along a triangle that it grazes, so
+  /// the rays along three axes vote.
+  bool encloses(const Vec3& p) const {
+    if (!(p.array() >= box_.low.array()).all() || !(p.array() <= box_.high.array()).all()) return false;
+    int votes = 0;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      Vec3 end = p;
+      end[axis] = box_.high[axis];
+      const std::vector<std::int32_t> met = within(p, end);
+      const auto pierced = std::ranges::count_if(
+          met, [&](std::int32_t t) { return pierces(p, axis, triangles_[static_cast<std::size_t>(t)]); });
+      votes += pierced % 2 != 0 ? 1 : 0;
+    }
+    return votes >= 2;
+  }
 
   bool before(const Vec3& d, std::int32_t triangle) const {
     return d.dot(normal_[static_cast<std::size_t>(triangle)]) >= 0;
@@ -182,10 +226,14 @@ class Mesh final : public Surface {
 
   /// The triangles in cells within reach, ascending, each once.
   std::vector<std::int32_t> around(const Vec3& centre, double reach) const {
-    std::vector<std::int32_t> found;
-    if (!box_.near(centre, reach)) return found;
+    if (!box_.near(centre, reach)) return {};
     const Vec3 half = Vec3::Constant(reach);
-    for_cells(centre - half, centre + half, [&](std::size_t cell) {
+    return within(centre - half, centre + half);
+  }
+  /// The triangles in the cells that a box meets, ascending, each once.
+  std::vector<std::int32_t> within(const Vec3& low, const Vec3& high) const {
+    std::vector<std::int32_t> found;
+    for_cells(low, high, [&](std::size_t cell) {
       found.insert(found.end(), in_cell_.begin() + static_cast<std::ptrdiff_t>(begin_[cell]),
                    in_cell_.begin() + static_cast<std::ptrdiff_t>(begin_[cell + 1]));
     });
@@ -196,6 +244,7 @@ class Mesh final : public Surface {
 
   std::vector<Triangle> triangles_;
   std::vector<Vec3> normal_;  ///< per triangle, unit, to the grains
+  bool inside_;               ///< the grains are
   Bounds box_;
   std::array<std::size_t, 3> cells_{};  ///< along x, y and z
   Vec3 size_;                           ///< of a cell [m]

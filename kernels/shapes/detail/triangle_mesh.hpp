@@ -16,7 +16,8 @@ namespace talus::detail {
 /// corner touches it once, and a sphere in an inward edge touches the two faces and not the edge. Of points
 /// that coincide the triangle of the lowest number keeps one. That is decided by places, not by names of
 /// edges, so that a corner of one triangle may stand in the middle of another's edge. What a sphere touches
-/// from behind does not count: a wall may be thinner than a grain.
+/// from behind does not count: a wall may be thinner than a grain. So a sphere deep in the solid touches
+/// nothing, and only depth() tells that it is there.
 ///
 /// Candidates come from a uniform grid over the triangles, with about as many cells as these.
 ///

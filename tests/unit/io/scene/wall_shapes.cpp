@@ -5,10 +5,13 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include "io/scene/scene.hpp"
 #include "kernels/samples/sample.hpp"
 #include "tests/unit/io/scene/scene_text.hpp"
+#include "tests/unit/mesh_makers.hpp"
+#include "tests/unit/stl_text.hpp"
 
 namespace talus::io {
 namespace {
@@ -90,6 +93,36 @@ TEST(WallShapes, AGrainInsideASolidIsRefused) {
   EXPECT_THROW(place_walls(scene, sample), SceneError);
   sample.x = {Vec3(0.6, 0, 0)};
   EXPECT_NO_THROW(place_walls(scene, sample));
+}
+
+TEST(WallShapes, AGrainDeepInTheSolidOfAMeshIsRefusedAndOneOnTheRightSideIsNot) {
+  const std::string path = (std::filesystem::temp_directory_path() / "talus_wall_shapes_box.stl").string();
+  std::ofstream(path) << test::stl_text(test::box_mesh({0, 0, 0}, {1, 1, 1}, 2));
+  const std::string mesh = "shape = \"mesh\"\nfile = \"" + path + "\"\n";
+  Sample sample;
+  sample.density = 2600;
+  sample.radius = {0.01};
+  const auto refusal = [&](const std::string& inside, const Vec3& x) -> std::string {
+    Scene scene = parse_scene(scene_with_wall(mesh + "inside = " + inside), "test.toml", {});
+    sample.x = {x};
+    try {
+      place_walls(scene, sample);
+    } catch (const SceneError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const Vec3 in(0.5, 0.25, 0.4), out(0.5, 0.25, 1.4);
+  EXPECT_EQ(refusal("true", in), "");
+  EXPECT_EQ(refusal("false", out), "");
+  for (const auto& [inside, x] : {std::pair{"false", in}, std::pair{"true", out}}) {
+    const std::string said = refusal(inside, x);
+    EXPECT_NE(said.find("test.toml"), std::string::npos) << said;
+    EXPECT_NE(said.find("the centre of grain 0 lies"), std::string::npos) << said;
+    EXPECT_NE(said.find("behind wall 'w'"), std::string::npos) << said;
+    EXPECT_NE(said.find("`inside`"), std::string::npos) << said;
+  }
+  std::filesystem::remove(path);
 }
 
 TEST(WallShapes, AMeshIsReadFromItsFileAndRefusedByItsName) {

@@ -7,6 +7,8 @@
 
 #include "kernels/detection/broad_phase.hpp"
 #include "kernels/detection/wall_pairs.hpp"
+#include "kernels/shapes/detail/triangle_mesh.hpp"
+#include "tests/unit/mesh_makers.hpp"
 
 namespace talus::meets_any_test {
 namespace {
@@ -45,6 +47,18 @@ TEST(MeetsWall, BehindAPlaneNothingHasRoom) {
   EXPECT_TRUE(meets_wall(floor, {0, 0, 0.09}, 0.1));
   EXPECT_TRUE(meets_wall(floor, {0, 0, -5}, 0.1));
   EXPECT_FALSE(meets_wall(floor, {0, 0, 0.11}, 0.1));
+}
+
+TEST(MeetsWall, DeepInTheSolidOfAMeshNothingHasRoom) {
+  for (const bool inside : {false, true}) {
+    Wall box;
+    box.shape.surface = detail::make_mesh(test::box_mesh({0, 0, 0}, {1, 1, 1}, 3), inside);
+    box.pose.moved = true;
+    box.pose.shift = Vec3(5, 0, 0);
+    EXPECT_EQ(meets_wall(box, {5.5, 0.5, 0.5}, 0.1), !inside);
+    EXPECT_EQ(meets_wall(box, {8, 0.5, 0.5}, 0.1), inside);
+    EXPECT_TRUE(meets_wall(box, {5.5, 0.5, 0.05}, 0.1));
+  }
 }
 
 }  // namespace

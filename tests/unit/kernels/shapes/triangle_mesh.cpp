@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -116,6 +117,55 @@ TEST(TriangleMesh, IsNotTouchedFromBehindAThinWall) {
   const auto points = touched(*sheet, {0.1, 0.2, 0.3}, 0.4);
   ASSERT_EQ(points.size(), 1u) << "the lower face is nearer than the reach";
   EXPECT_NEAR(points[0].distance, 0.3, 1e-15);
+}
+
+/// Signed: 1 within a closed surface, 0 without (van Oosterom and Strackee 1983).
+double winding(const std::vector<Triangle>& triangles, const Vec3& p) {
+  double angle = 0;
+  for (const Triangle& triangle : triangles) {
+    const Vec3 a = triangle[0] - p, b = triangle[1] - p, c = triangle[2] - p;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    angle += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return angle / (4 * 3.14159265358979324);
+}
+
+TEST(TriangleMesh, KnowsHowDeepACentreLiesInTheSolidOnBothSidesOfItsSurface) {
+  const std::vector<Triangle> triangles = test::funnel_mesh(0.2, 1, 1.5, 0.1, 24);
+  const auto funnel = make_mesh(triangles, false), around = make_mesh(triangles, true);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> number(-1.2, 1.2);
+  int solid = 0;
+  for (int k = 0; k < 4000; ++k) {
+    Vec3 x(number(random), number(random), number(random) + 0.75);
+    if (k % 4 == 0) x[1] = 0;  // in the plane of edges and corners
+    if (k % 8 == 0) x[0] = std::round(4 * x[0]) / 4;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Triangle& triangle : triangles)
+      nearest = std::min(nearest, (x - detail::nearest_point(triangle, x)).norm());
+    if (nearest < 1e-9) continue;
+    const bool in = winding(triangles, x) > 0.5;
+    EXPECT_EQ(funnel->depth(x), in ? nearest : 0) << x.transpose();
+    EXPECT_EQ(around->depth(x), in ? 0 : nearest) << x.transpose();
+    solid += in ? 1 : 0;
+  }
+  EXPECT_GT(solid, 200);
+}
+
+/// A lattice of grains in a box of cells as wide as the lattice: every ray goes through edges and corners.
+TEST(TriangleMesh, KnowsItsInsideWhereRaysMeetEdgesAndCorners) {
+  constexpr int n = 4;
+  const auto room = make_mesh(box_mesh({0, 0, 0}, {1, 1, 1}, n), true);
+  for (int x = -n; x <= 2 * n; ++x)
+    for (int y = -n; y <= 2 * n; ++y)
+      for (int z = -n; z <= 2 * n; ++z) {
+        const auto strictly = [](int from, int to) { return [=](int i) { return from < i && i < to; }; };
+        const bool in = std::ranges::all_of(std::array{x, y, z}, strictly(0, n));
+        const bool out = !std::ranges::all_of(std::array{x, y, z}, strictly(-1, n + 1));
+        const double depth = room->depth(Vec3(x, y, z) / n);
+        if (in) EXPECT_EQ(depth, 0) << x << ' ' << y << ' ' << z;
+        if (out) EXPECT_GE(depth, 1.0 / n) << x << ' ' << y << ' ' << z;
+      }
 }
 
 TEST(TriangleMesh, RefusalsNameTheTriangle) {
