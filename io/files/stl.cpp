@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cctype>
 #include <cerrno>
@@ -47,6 +48,22 @@ std::vector<Triangle> read_binary(const std::string& path, const std::string& by
   return triangles;
 }
 
+/// Whether a word is this keyword, which is given in small letters. Some programs write capitals.
+bool is_keyword(std::string_view word, std::string_view keyword) {
+  return std::ranges::equal(word, keyword, {}, [](char letter) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
+  });
+}
+
+/// What editors of Windows put before a text in UTF-8.
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
+/// A file of text without its byte order mark.
+std::string_view text_of(std::string_view bytes) {
+  if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
+  return bytes;
+}
+
 /// The words of a text file, with the line of the last one.
 class Words {
  public:
@@ -61,7 +78,7 @@ class Words {
     return text_.substr(from, at_ - from);
   }
   void expect(std::string_view wanted) {
-    if (const std::string_view word = next(); word != wanted) fail(wanted, word);
+    if (const std::string_view word = next(); !is_keyword(word, wanted)) fail(wanted, word);
   }
   double number() {
     std::string_view word = next();
@@ -87,13 +104,13 @@ class Words {
   std::size_t at_ = 0, line_ = 1;
 };
 
-std::vector<Triangle> read_text(const std::string& path, const std::string& text) {
+std::vector<Triangle> read_text(const std::string& path, std::string_view text) {
   Words words(path, text);
   words.expect("solid");
   words.skip_line();  // its name
   std::vector<Triangle> triangles;
-  for (std::string_view word = words.next(); word != "endsolid"; word = words.next()) {
-    if (word != "facet") words.fail("facet or endsolid", word);
+  for (std::string_view word = words.next(); !is_keyword(word, "endsolid"); word = words.next()) {
+    if (!is_keyword(word, "facet")) words.fail("facet or endsolid", word);
     words.expect("normal");
     for (int k = 0; k < 3; ++k) words.next();
     words.expect("outer");
@@ -120,7 +137,8 @@ std::vector<Triangle> read_stl(const std::string& path) {
   const std::string bytes = std::move(held).str();
   const std::uint64_t wanted = head + std::uint64_t{count_of(bytes)} * record;
   if (bytes.size() >= head && bytes.size() == wanted) return read_binary(path, bytes);
-  if (bytes.starts_with("solid")) return read_text(path, bytes);
+  const std::string_view text = text_of(bytes);
+  if (is_keyword(Words(path, text).next(), "solid")) return read_text(path, text);
   if (bytes.size() < head)
     throw FileError(
         path, fmt::format("is no STL file: it has {} bytes and does not begin with 'solid'", bytes.size()));

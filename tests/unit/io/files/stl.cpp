@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -69,6 +71,23 @@ TEST_F(Stl, TextTrianglesAreThoseWritten) {
   write(one_facet);
   const std::vector<Triangle> expected = {{Vec3(0, 0, 0.5), Vec3(1, 0, 0.5), Vec3(0, 1, 0.5)}};
   EXPECT_EQ(read_stl(path_), expected);
+}
+
+TEST_F(Stl, TextOfOtherProgramsIsTheSameText) {
+  write(one_facet);
+  const std::vector<Triangle> expected = read_stl(path_);
+  std::string capitals = one_facet, windows;
+  std::ranges::transform(capitals, capitals.begin(), [](unsigned char c) { return std::toupper(c); });
+  for (const char c : std::string(one_facet)) windows += c == '\n' ? "\r\n" : std::string(1, c);
+  const std::string mark = "\xEF\xBB\xBF";
+  for (const std::string& text :
+       {capitals, windows, mark + one_facet, mark + windows, "\n  " + std::string(one_facet)}) {
+    write(text);
+    EXPECT_EQ(refusal(), "") << text;
+    EXPECT_EQ(read_stl(path_), expected);
+  }
+  write(windows.replace(windows.find("1e0"), 3, "one"));
+  EXPECT_EQ(refusal(), path_ + ": line 5: expected a finite number, got 'one'");
 }
 
 TEST_F(Stl, RefusalsNameFileAndLineOrTriangle) {
