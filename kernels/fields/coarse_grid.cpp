@@ -8,24 +8,55 @@ namespace talus {
 
 namespace {
 
+/// Centres that are visited beyond a grid to sum the weights of one grain or contact. A grain whose cutoff is
+/// a dozen cells has fewer. Where a grain flew through a plane wall its contact has a branch as long as its
+/// way, and the box around that holds any number of centres.
+constexpr double most_beyond = 1e5;
+
+/// Centres of the cells of a grid that lie in a box; the grid is continued without end.
+struct CentreRange {
+  Vec3 from, to;  ///< whole numbers, both ends included; of any size, hence no integers
+
+  CentreRange(const Grid& grid, const Vec3& low, const Vec3& high) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      from[axis] = std::ceil((low[axis] - grid.low[axis]) / grid.spacing[axis] - 0.5);
+      to[axis] = std::floor((high[axis] - grid.low[axis]) / grid.spacing[axis] - 0.5);
+    }
+  }
+  /// False for ends that are no numbers.
+  bool meets(const Vec3& last) const {
+    return (from.array() <= last.array()).all() && (to.array() >= 0).all();
+  }
+  /// 0 where an end comes before its beginning, as in a box that lies between two centres.
+  double count() const { return ((to - from).array() + 1).cwiseMax(0.0).prod(); }
+  void cut(const Vec3& last) {
+    from = from.cwiseMax(0.0);
+    to = to.cwiseMin(last);
+  }
+};
+
 /// Calls add(weight, numbers of the cell) for the cells of the grid whose centre lies in the box, with the
 /// weights weight_at(centre), or nothing where these are 0 everywhere.
 template <class WeightAt, class Add>
 void spread(const Grid& grid, const Vec3& low, const Vec3& high, GridSums& sums, const WeightAt& weight_at,
             const Add& add) {
-  std::array<std::int64_t, 3> from{}, to{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto axis = static_cast<Eigen::Index>(k);
-    from[k] = static_cast<std::int64_t>(std::ceil((low[axis] - grid.low[axis]) / grid.spacing[axis] - 0.5));
-    to[k] = static_cast<std::int64_t>(std::floor((high[axis] - grid.low[axis]) / grid.spacing[axis] - 0.5));
-    if (from[k] >= grid.cells[k] || to[k] < 0) return;
-  }
+  const Vec3 last(static_cast<double>(grid.cells[0] - 1), static_cast<double>(grid.cells[1] - 1),
+                  static_cast<double>(grid.cells[2] - 1));
+  CentreRange range(grid, low, high);
+  if (!range.meets(last)) return;
+  CentreRange held = range;
+  held.cut(last);
+  // Too many to visit: so many weights add up to what their integral says, 1, wherever the centres lie.
+  const bool summed = range.count() - held.count() <= most_beyond;
+  if (!summed) range = held;
+
   struct Weight {
     std::size_t cell;
     double weight;
   };
   std::vector<Weight> weights;
   double sum = 0;
+  const auto from = range.from.cast<std::int64_t>().eval(), to = range.to.cast<std::int64_t>().eval();
   for (std::int64_t z = from[2]; z <= to[2]; ++z)
     for (std::int64_t y = from[1]; y <= to[1]; ++y)
       for (std::int64_t x = from[0]; x <= to[0]; ++x) {
@@ -40,7 +71,7 @@ void spread(const Grid& grid, const Vec3& low, const Vec3& high, GridSums& sums,
           weights.push_back({static_cast<std::size_t>((z * grid.cells[1] + y) * grid.cells[0] + x), weight});
       }
   if (sum == 0) return;
-  const double unit = 1 / (sum * grid.cell_volume());
+  const double unit = summed ? 1 / (sum * grid.cell_volume()) : 1;
   for (const auto& [cell, weight] : weights) add(weight * unit, &sums.numbers[cell * GridSums::width]);
 }
 

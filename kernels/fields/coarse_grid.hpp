@@ -51,7 +51,9 @@ struct SpreadContact {
 
 /// Adds to `sums`, which has size() x width numbers. What a grain or contact adds is divided by the sum of
 /// its weights over the centres of the grid continued without end: the sums over the cells of a grid that
-/// holds all of it are then its own mass, momentum and moment to rounding, whatever the spacing.
+/// holds all of it are then its own mass, momentum and moment to rounding, whatever the spacing. Where more
+/// than 1e5 of these centres lie beyond the grid it is divided by the integral of the weights instead, so
+/// that a branch of any length costs no more than 1e5 centres and the cells of the grid.
 void add_grain(const Grid& grid, const Lucy& lucy, const SpreadGrain& grain, GridSums& sums);
 void add_contact(const Grid& grid, const Lucy& lucy, const SpreadContact& contact, GridSums& sums);
 

@@ -107,6 +107,24 @@ TEST(CoarseGrid, LeavesOutWhatLiesBeyondIt) {
   EXPECT_NEAR(sum_of(part, half, 0), 2.5, 1e4 * epsilon);
 }
 
+/// A grain that flew through a plane wall has its contact there as far behind it as it came. Its branch here
+/// goes along x through all of a row of cells, so these hold their share of the moment: their length over
+/// that of the branch.
+TEST(CoarseGrid, ABranchOfAnyLengthCostsNoMoreThanTheGridAndLeavesItsShareThere) {
+  const Grid of{{-0.1, -0.1, -0.1}, {0.01, 0.01, 0.01}, {20, 20, 20}};
+  const Lucy lucy(width);
+  for (const double length : {1e4, 1e8, 1e13}) {
+    GridSums sums = no_sums(of);
+    add_contact(of, lucy, {{-1, 0.001, 0.002}, {length - 1, 0.001, 0.002}, length * Mat3::Identity()}, sums);
+    // A Riemann sum of a polynomial over eight cells of the cutoff.
+    for (const std::size_t diagonal : {0U, 4U, 8U})
+      EXPECT_NEAR(sum_of(sums, of, GridSums::contact + diagonal), 0.2, 0.002) << length;
+  }
+  GridSums none = no_sums(of);
+  add_contact(of, lucy, {{0, 0, 0}, {std::nan(""), 0, 0}, Mat3::Identity()}, none);
+  EXPECT_EQ(sum_of(none, of, GridSums::contact), 0);
+}
+
 TEST(CoarseGrid, OneVelocityIsThatOfEveryCellAndHasNoTemperature) {
   const Grid of = grid();
   GridSums sums = no_sums(of);
