@@ -17,7 +17,13 @@ bool names_task(const Trace& trace, Kind kind) {
   return false;
 }
 
-void resize_checks(StepIndex::Rank& rank, std::size_t epochs) {
+/// Makes room up to this epoch. Nodes and checks both call it: the nodes of a step without contacts leave no
+/// record when all subdomains are on one rank, and its check is then all that tells how many epochs it had.
+void reach_epoch(StepIndex::Rank& rank, std::size_t epoch) {
+  const std::size_t epochs = epoch + 1;
+  if (rank.epochs >= epochs) return;
+  rank.epochs = epochs;
+  rank.node.resize(epochs * rank.nodes);
   rank.check.resize(epochs);
   rank.awaited.resize(epochs, 0);
   rank.settled.resize(epochs, 0);
@@ -121,7 +127,7 @@ void Timeline::add(const Track& track, std::uint32_t number, StepIndex& index) c
       }
     } else if (kind == kind_check) {
       const auto epoch = static_cast<std::size_t>(it->epoch);
-      if (rank.check.size() <= epoch) resize_checks(rank, epoch + 1);
+      reach_epoch(rank, epoch);
       rank.check[epoch] = last_check = place;
       rank.settled[epoch] = it->node == check_settles ? 1 : 0;
     } else if (it->epoch >= 0) {
@@ -129,10 +135,7 @@ void Timeline::add(const Track& track, std::uint32_t number, StepIndex& index) c
         throw TraceError(fmt::format("step {}: node {} of a plan of {} on rank {}", index.step, it->node,
                                      rank.nodes, track.rank));
       const auto epoch = static_cast<std::size_t>(it->epoch);
-      if (rank.epochs <= epoch) {
-        rank.epochs = epoch + 1;
-        rank.node.resize(rank.epochs * rank.nodes);
-      }
+      reach_epoch(rank, epoch);
       rank.node[epoch * rank.nodes + it->node] = place;
     } else if (it->node < tasks.size() && tasks[it->node].kind == kind && !tasks[it->node].team) {
       rank.task[it->node] = last_task = place;
@@ -163,7 +166,6 @@ StepIndex Timeline::index(std::uint32_t step) const {
   for (std::uint32_t k = 0; k < trace_.tracks.size(); ++k) add(trace_.tracks[k], k, index);
   for (int r = 0; r < trace_.ranks; ++r) {
     StepIndex::Rank& rank = index.ranks[static_cast<std::size_t>(r)];
-    resize_checks(rank, rank.epochs);
     const auto incomplete = [&](const std::string& what) {
       throw TraceError(fmt::format(
           "step {} was recorded in part: {} of rank {} is missing. Choose whole steps, or record anew", step,

@@ -72,6 +72,36 @@ TEST_F(TraceCommand, AFolderIsAnsweredWithTheTraceInIt) {
   for (const Outcome* each : {&bare, &full}) EXPECT_EQ(each->messages.find("errno"), std::string::npos);
 }
 
+TEST_F(TraceCommand, ShowsAndReplaysStepsInWhichNothingTouches) {
+  write(folder_ / "falling.toml", R"(time_step = 1e-3
+gravity = [0, 0, -9.81]
+[material]
+density = 2600
+[sample]
+kind = "body"
+name = "b"
+radius = 0.01
+position = [0, 0, 0.015]
+[[wall]]
+name = "z-"
+position = 0
+[[stage]]
+end = { steps = 40 }
+[decomposition]
+subdomains = 5
+)");
+  ASSERT_EQ(talus("run falling.toml --out falling --trace").code, 0);
+  const Table steps = read_table(folder_ / "falling/steps.csv");
+  ASSERT_EQ(steps.number(0, "contacts"), 0);
+  ASSERT_GT(steps.number(steps.rows.size() - 1, "contacts"), 0);
+  const Outcome show = talus("trace show falling/trace.h5");
+  EXPECT_EQ(show.code, 0) << show.messages;
+  for (const char* ranks : {"1", "5"}) {
+    const Outcome replay = talus(fmt::format("replay falling/trace.h5 --ranks {}", ranks));
+    EXPECT_EQ(replay.code, 0) << replay.messages;
+  }
+}
+
 TEST_F(TraceCommand, RecordsShowsExportsAndReplays) {
   const std::string trace = recorded("out", 2);
   const Outcome show = talus("trace show " + trace);

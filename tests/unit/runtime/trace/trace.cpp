@@ -230,6 +230,19 @@ TEST(Timelines, RefuseAStepThatWasRecordedInPart) {
   EXPECT_THROW(timeline.index(1), TraceError);
 }
 
+/// Where all subdomains are on one rank and nothing touches, no node of the loop does anything: its check is
+/// all that is recorded of it.
+TEST(Timelines, AStepWhoseNodesDidNothingHasTheEpochsOfItsChecks) {
+  Trace trace = test::two_subdomains(1);
+  trace.plans[0] = test::PlanBuilder().plan(0);
+  std::erase_if(trace.tracks[0].records,
+                [](const Record& r) { return r.epoch >= 0 && r.kind() != kind_check; });
+  const Timeline timeline(trace);
+  const StepIndex step = timeline.index(1);
+  EXPECT_EQ(step.ranks[0].epochs, 2U);
+  EXPECT_TRUE(step.ranks[0].check.back().exists());
+}
+
 TEST(Timelines, TimeWithinATaskIsNotCountedTwice) {
   Trace trace = test::two_subdomains(1);
   trace.tracks[0].records = {{0, 100, 0, 0, pack(1, test::sweep)},
