@@ -1,5 +1,7 @@
 #include "runtime/step/population.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,6 +19,9 @@ constexpr double rounding = 1e-9;
 /// Streams of insertions lie behind those of samples.
 constexpr std::uint32_t first_stream = 0x8000;
 constexpr std::int64_t all_at_once = std::int64_t{1} << 40, fewest_at_once = 16;
+/// Grains of a rule that may wait for room, whose numbers every rank keeps. A rate that is a slip of the pen
+/// would fill all memory within a step.
+constexpr std::size_t most_waiting = std::size_t{1} << 24;
 
 /// Time on the clock of a rule.
 double rule_time(const RuleTimes& times, const StepSpan& step, double time) {
@@ -131,6 +136,11 @@ void Population::draw_due(std::size_t i, const StepSpan& step) {
     const double mass = mass_of_grain(i, now_.drawn[i]), all = now_.drawn_mass[i] + mass;
     if ((rule.mass && !within(all, *rule.mass)) || (rule.mass_rate && !within(all, *rule.mass_rate * time)))
       return;
+    if (waiting_[i].size() == most_waiting)
+      throw std::runtime_error(fmt::format(
+          "insert '{}': more than {} grains are due and wait for room. Give a lower `count`, `mass` "
+          "or rate, or a larger region",
+          rule.name, most_waiting));
     waiting_[i].push_back(now_.drawn[i]++);
     now_.drawn_mass[i] = all;
   }
