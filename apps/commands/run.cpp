@@ -99,6 +99,19 @@ void read_recordings(const RunOptions& options, const graph::Communicator& ranks
         std::make_unique<trace::TaskTimes>(io::read_trace(options.task_times), ranks.ranks(), ranks.rank());
 }
 
+/// The sample, on rank 0, and the walls that are placed by it.
+void place_sample(Prepared& run) {
+  if (run.scene.from_state()) {
+    StateSample state = read_state(run.scene);
+    run.sample = build_sample(run.scene, std::move(state.sample));
+    run.forces = std::move(state.forces);
+    place_walls_of(state.walls, run.scene);
+  } else {
+    run.sample = build_sample(run.scene);
+  }
+  io::place_walls(run.scene, run.sample);
+}
+
 /// Where the run goes on, if it does. Collective, but for what it throws.
 void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& terminal, Prepared& run) {
   run.point = find_resume_point(run.directory, run.scene, ranks, terminal);
@@ -111,20 +124,15 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
     run.bodies = earlier.bodies;
   } else if (earlier.complete) {
     run.nothing_left = earlier.exit_code;
+    if (ranks.rank() != 0) return;
+    place_sample(run);  // scene.resolved.toml says where its walls stood
+    demand_scene_of_done_run(run.directory, io::resolved_scene(run.scene));
   }
 }
 
 /// The sample, on rank 0, and what is to be said of it.
 void make_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
-  if (run.scene.from_state()) {
-    StateSample state = read_state(run.scene);
-    run.sample = build_sample(run.scene, std::move(state.sample));
-    run.forces = std::move(state.forces);
-    place_walls_of(state.walls, run.scene);
-  } else {
-    run.sample = build_sample(run.scene);
-  }
-  io::place_walls(run.scene, run.sample);
+  place_sample(run);
   run.wall_mass = io::automatic_wall_mass(run.sample);
   run.warnings = scene_warnings(run.scene, run.sample);
   for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);

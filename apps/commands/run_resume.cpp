@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <sstream>
@@ -94,6 +95,25 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
       point.path.string(), fmt::join(refused, "; ")));
 }
 
+void demand_scene_of_done_run(const std::filesystem::path& directory, const std::string& resolved) {
+  const std::filesystem::path path = directory / "scene.resolved.toml";
+  std::ifstream file(path, std::ios::binary);
+  const std::string then(std::istreambuf_iterator<char>(file), {});
+  if (then.empty())
+    throw std::invalid_argument(fmt::format(
+        "{}: cannot be read, so that nobody knows of which scene the run there was. Begin a run in another "
+        "directory",
+        path.string()));
+  std::vector<std::string> differences;
+  for (const io::SceneChange& change : io::scene_changes(then, resolved))
+    differences.push_back(io::describe(change));
+  if (differences.empty()) return;
+  throw std::invalid_argument(fmt::format(
+      "the run in {} is done, left no checkpoint to go on from, and was of another scene: {}. Begin "
+      "a run in another directory",
+      directory.string(), fmt::join(differences, "; ")));
+}
+
 void take_over(const ResumePoint& point, io::Scene& scene) {
   DecompositionSettings& decomposition = scene.setup.decomposition;
   if (decomposition.subdomains == 0)
@@ -105,10 +125,12 @@ EarlierRun earlier_run(const std::filesystem::path& directory) {
   EarlierRun run;
   std::ifstream file(directory / "run.json");
   const nlohmann::json read = nlohmann::json::parse(file, nullptr, false);
-  if (!read.is_object() || !read.contains("summary")) return run;
+  if (!read.is_object() || !read.contains("summary") || !read["summary"].is_object()) return run;
   const nlohmann::json& summary = read["summary"];
-  run.complete = summary.value("complete", false);
-  run.exit_code = summary.value("exit_code", 0);
+  if (const auto complete = summary.find("complete"); complete != summary.end() && complete->is_boolean())
+    run.complete = complete->get<bool>();
+  if (const auto code = summary.find("exit_code"); code != summary.end() && code->is_number_integer())
+    run.exit_code = code->get<int>();
   if (const auto warnings = summary.find("warnings"); warnings != summary.end() && warnings->is_array())
     for (const nlohmann::json& warning : *warnings)
       if (warning.is_string()) run.warnings.push_back(warning.get<std::string>());

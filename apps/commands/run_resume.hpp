@@ -33,6 +33,10 @@ std::optional<ResumePoint> find_resume_point(const std::filesystem::path& direct
 /// std::invalid_argument naming what differs and may not, an input file that has changed included.
 void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumePoint& point);
 
+/// Of a run that is done and left no checkpoint: throws std::invalid_argument naming what differs between its
+/// scene and `resolved`, that of now with its walls placed. Such a run cannot go on under another scene.
+void demand_scene_of_done_run(const std::filesystem::path& directory, const std::string& resolved);
+
 /// Completes the scene with what the checkpoint knows: how many subdomains, and where the walls stood at
 /// first.
 void take_over(const ResumePoint& point, io::Scene& scene);

@@ -45,7 +45,15 @@ void collect(const toml::node& node, const std::string& path, Leaves& leaves) {
   }
   const toml::array* array = node.as_array();
   if (array != nullptr && !array->empty() && array->front().is_table()) {
-    for (std::size_t k = 0; k < array->size(); ++k) collect((*array)[k], below(name_in(*array, k)), leaves);
+    std::string order;
+    for (std::size_t k = 0; k < array->size(); ++k) {
+      const std::string name = name_in(*array, k);
+      collect((*array)[k], below(name), leaves);
+      order += (k > 0 ? ", " : "") + name;
+    }
+    // By it checkpoints tell which wall, stage, rule or material is meant; loads of a stage go by their
+    // walls.
+    if (path.find('.') == std::string::npos) leaves["order of " + path] = order;
     return;
   }
   leaves[path] = text_of(node);

@@ -173,6 +173,42 @@ TEST_F(Resume, IsRefusedForAnotherScene) {
   EXPECT_EQ(run("run scene.toml --out parts --resume --force").code, 2);
 }
 
+/// A short run takes no checkpoint by itself, so that its results are all that tells of its scene.
+TEST_F(Resume, OfADoneRunWithoutCheckpointIsRefusedForAnotherScene) {
+  ASSERT_EQ(run("run scene.toml --out out --threads 1").code, 0);
+  ASSERT_EQ(checkpoints("out"), 0U);
+  const auto before = files_below(at("out"));
+  for (const char* change : {"wall.x+.position=0.2", "seed=2", "stage.shear.end.steps=9"}) {
+    const Outcome other = run(std::string("run scene.toml --out out --threads 1 --resume --set ") + change);
+    EXPECT_EQ(other.code, 2) << change << other.messages;
+    const std::string key = std::string(change).substr(0, std::string(change).find('='));
+    EXPECT_NE(other.messages.find(key + " was "), std::string::npos) << other.messages;
+  }
+  const Outcome same = run("run scene.toml --out out --threads 1 --resume");
+  EXPECT_EQ(same.code, 0) << same.messages;
+  EXPECT_NE(same.messages.find("is done"), std::string::npos) << same.messages;
+  EXPECT_EQ(files_below(at("out")), before);
+}
+
+TEST_F(Resume, IsRefusedForAnotherOrderOfWallsOrStages) {
+  const auto swapped = [](std::string text, const std::string& a, const std::string& b) {
+    const std::size_t first = text.find(a), second = text.find(b);
+    text.replace(second, b.size(), a);
+    return text.replace(first, a.size(), b);
+  };
+  const std::string wall = "[[wall]]\nname = \"x-\"\n", more = "[[wall]]\nname = \"x+\"\n";
+  const std::string scene =
+      test::replaced(pressed_box, "[[stage]]\nname = \"press\"", wall + more + "[[stage]]\nname = \"press\"");
+  write(at("scene.toml"), scene);
+  ASSERT_EQ(run("run scene.toml --out out --threads 1 --resume --steps 3").code, 0);
+  write(at("scene.toml"), swapped(scene, wall, more));
+  const Outcome other = run("run scene.toml --out out --threads 1 --resume");
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.messages.find("order of wall was"), std::string::npos) << other.messages;
+  write(at("scene.toml"), scene);
+  EXPECT_EQ(run("run scene.toml --out out --threads 1 --resume").code, 0);
+}
+
 TEST_F(Resume, GoesBackToTheCheckpointBeforeADamagedOne) {
   ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
   const std::string line = "run scene.toml --out parts --resume --threads 1 --set checkpoint.every_steps=2";

@@ -47,5 +47,29 @@ TEST(SceneChanges, AreNamedAsSetNamesThem) {
                       "wall.z+.pressure was 10000 and is 20000"}));
 }
 
+/// A checkpoint has walls, stages and rules by their places in the scene.
+TEST(SceneChanges, OfTheOrderOfWallsOrStagesAreRefused) {
+  const auto scene = [](const std::string& walls, const std::string& stages) {
+    return io::resolved_scene(io::parse_scene(
+        "time_step = 1e-3\n[material]\ndensity = 2600\n[sample]\nkind = \"lattice\"\ncells = [2, 2, 2]\n"
+        "radius = 0.01\n" +
+            walls + stages,
+        "scene.toml", {}));
+  };
+  const std::string low = "[[wall]]\nname = \"z-\"\n", high = "[[wall]]\nname = \"z+\"\n",
+                    press = "[[stage]]\nname = \"press\"\nend = { steps = 4 }\n",
+                    shear = "[[stage]]\nname = \"shear\"\nend = { steps = 4 }\n";
+  const std::string was = scene(low + high, press + shear);
+  const auto said = [&](const std::string& is) {
+    std::string all;
+    for (const io::SceneChange& change : io::scene_changes(was, is))
+      all += (change.allowed ? "" : "refused: ") + io::describe(change);
+    return all;
+  };
+  EXPECT_EQ(said(scene(high + low, press + shear)), "refused: order of wall was z-, z+ and is z+, z-");
+  EXPECT_EQ(said(scene(low + high, shear + press)),
+            "refused: order of stage was press, shear and is shear, press");
+}
+
 }  // namespace
 }  // namespace talus::scene_change_test
