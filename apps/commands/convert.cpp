@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <vector>
 
+#include "apps/report/run_folder.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
 #include "io/files/error.hpp"
@@ -37,7 +39,9 @@ Conversion conversion_of(const ConvertOptions& options) {
                                                                                     : todo.results.string()));
   const char* name = options.format == "lammps" ? "grains.lammpstrj" : "grains.vtkhdf";
   todo.out = options.out.empty() ? todo.results.parent_path() / name : fs::path(options.out);
-  io::check_output_files({todo.results.string()}, {todo.out.string()}, options.force);
+  std::vector<fs::path> sources = sources_in(fs::absolute(todo.results).parent_path());
+  sources.push_back(todo.results);  // whatever its name
+  io::check_output_files(sources, {todo.out}, options.force);
   todo.frames = io::demand_frames(todo.results);
   return todo;
 }

@@ -4,13 +4,13 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
+#include "apps/shared/run_json_files.hpp"
 #include "io/checkpoint/checkpoint_folder.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
@@ -22,12 +22,6 @@ namespace {
 
 using nlohmann::json;
 using nlohmann::ordered_json;
-
-json read_json(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  json read = json::parse(file, nullptr, false);
-  return read.is_object() ? read : json::object();
-}
 
 /// A run holds its directory locked; where locks do not reach (another machine), its process and its
 /// heartbeat tell. "alive", "dead" or "silent": nothing was heard for a minute, from another machine.
@@ -45,7 +39,7 @@ std::string life_of(const std::filesystem::path& directory, const json& beat) {
 }
 
 ordered_json status_of(const std::filesystem::path& directory) {
-  const json run = read_json(directory / "run.json"), beat = read_json(directory / "status.json");
+  const json run = read_run_json(directory), beat = read_status_json(directory);
   const json summary = run.value("summary", json::object());
   ordered_json status;
   std::string state = summary.value("status", "running");
@@ -116,11 +110,19 @@ int status_command(const StatusOptions& options) {
     print_error("talus: error: {}: no run was begun there\n", options.directory);
     return exit_bad_input;
   }
-  const ordered_json status = status_of(directory);
-  if (options.json)
-    print_out("{}\n", status.dump(2, ' ', false, ordered_json::error_handler_t::replace));
-  else
-    print(status);
+  try {
+    const ordered_json status = status_of(directory);
+    if (options.json)
+      print_out("{}\n", status.dump(2, ' ', false, ordered_json::error_handler_t::replace));
+    else
+      print(status);
+  } catch (const json::exception& error) {
+    print_error("talus: error: {}\n", damaged_value(directory, error));
+    return exit_bad_input;
+  } catch (const io::FileError& error) {
+    print_error("talus: error: {}\n", error.what());
+    return exit_bad_input;
+  }
   return exit_done;
 }
 

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <system_error>
 #include <vector>
 
 #include "apps/report/run_folder.hpp"
@@ -72,8 +75,9 @@ class Viewed {
     view_.range = range;
   }
 
-  void write(const Frame& frame, const fs::path& path) const {
-    io::write_whole(path, io::png_bytes(io::render_view(frame, walls_, triangles(frame), view_)));
+  std::string image(std::size_t k) const {
+    const Frame shown = frame(k);
+    return io::png_bytes(io::render_view(shown, walls_, triangles(shown), view_));
   }
   std::string scale() const {
     return view_.range ? fmt::format("{} from {:.3g} to {:.3g}", io::label_of(view_.colour), view_.range->low,
@@ -97,6 +101,22 @@ std::string image_name(std::size_t frame) {
   return fmt::format("frame_{:06}.png", frame);
 }
 
+/// Throws io::FileError where the images cannot be meant to be written.
+void check_images(const std::vector<fs::path>& images, const fs::path& out,
+                  const ViewCommandOptions& options) {
+  fs::path above = fs::absolute(out);
+  while (!fs::exists(above)) above = above.parent_path();
+  if (!fs::is_directory(above))
+    throw io::FileError(above.string(), "is a file, not a folder; give another name with --out");
+  if (fs::exists(out)) io::check_output_files(sources_in(options.run), images, options.force);
+}
+
+void make_folder(const fs::path& out) {
+  std::error_code error;
+  fs::create_directories(out, error);
+  if (error) throw io::FileError(out.string(), "cannot make this folder: " + error.message());
+}
+
 /// Pages of a film have even edges. Says what it could not do: images are there without it.
 void join_images(const fs::path& out, const ViewCommandOptions& options) {
   if (!program_exists("ffmpeg")) {
@@ -118,16 +138,22 @@ void join_images(const fs::path& out, const ViewCommandOptions& options) {
 
 int view_command(const ViewCommandOptions& options) {
   const fs::path out = options.out.empty() ? fs::path(options.run) / "view.png" : fs::path(options.out);
+  std::string image;
   try {
     const Viewed viewed(options);
     const int frames = static_cast<int>(viewed.frames());
     const int k = options.frame < 0 ? frames + options.frame : options.frame;
     if (k < 0 || k >= frames)
       throw std::invalid_argument(fmt::format("--frame is {}, there are {} frames", options.frame, frames));
-    io::check_output_files({}, {out}, options.force);
-    viewed.write(viewed.frame(static_cast<std::size_t>(k)), out);
+    io::check_output_files(sources_in(options.run), {out}, options.force);
+    image = viewed.image(static_cast<std::size_t>(k));
   } catch (const std::exception& error) {
     return refuse(error, exit_bad_input);
+  }
+  try {
+    io::write_whole(out, image);
+  } catch (const std::exception& error) {
+    return refuse(error, exit_failure);
   }
   print_error("talus: {} written\n", out.string());
   return exit_done;
@@ -135,18 +161,23 @@ int view_command(const ViewCommandOptions& options) {
 
 int movie_command(const ViewCommandOptions& options) {
   const fs::path out = options.out.empty() ? fs::path(options.run) / "movie" : fs::path(options.out);
+  std::optional<Viewed> viewed;
+  std::vector<fs::path> images{out / "movie.mp4"};
   try {
-    Viewed viewed(options);
-    std::vector<fs::path> images{out / "movie.mp4"};
-    for (std::size_t k = 0; k < viewed.frames(); ++k) images.push_back(out / image_name(k));
-    if (fs::exists(out)) io::check_output_files({}, images, options.force);
-    viewed.fit();
-    fs::create_directories(out);
-    for (std::size_t k = 0; k < viewed.frames(); ++k) viewed.write(viewed.frame(k), images[k + 1]);
-    print_error("talus: {} images in {}, coloured by {}\n", viewed.frames(), out.string(), viewed.scale());
-    join_images(out, options);
+    viewed.emplace(options);
+    for (std::size_t k = 0; k < viewed->frames(); ++k) images.push_back(out / image_name(k));
+    check_images(images, out, options);
+    viewed->fit();
   } catch (const std::exception& error) {
     return refuse(error, exit_bad_input);
+  }
+  try {
+    make_folder(out);
+    for (std::size_t k = 0; k < viewed->frames(); ++k) io::write_whole(images[k + 1], viewed->image(k));
+    print_error("talus: {} images in {}, coloured by {}\n", viewed->frames(), out.string(), viewed->scale());
+    join_images(out, options);
+  } catch (const std::exception& error) {
+    return refuse(error, exit_failure);
   }
   return exit_done;
 }

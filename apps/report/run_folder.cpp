@@ -6,29 +6,29 @@
 #include <iterator>
 #include <stdexcept>
 
-namespace talus {
+#include "apps/shared/run_json_files.hpp"
 
-namespace {
+namespace talus {
 
 using nlohmann::json;
 
-json read_object(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  json read = json::parse(file, nullptr, false);
-  return read.is_object() ? read : json::object();
+std::vector<std::filesystem::path> sources_in(const std::filesystem::path& directory) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(directory))
+    for (const char* kind : {".h5", ".json", ".csv", ".toml"})
+      if (entry.path().extension() == kind) files.push_back(entry.path());
+  return files;
 }
-
-}  // namespace
 
 RunFolder read_run_folder(const std::filesystem::path& directory) {
   if (!std::filesystem::exists(directory / "run.json"))
     throw std::invalid_argument(fmt::format("{}: no run was begun there", directory.string()));
   RunFolder run;
   run.directory = directory;
-  const json all = read_object(directory / "run.json");
+  const json all = read_run_json(directory);
   run.provenance = all.value("provenance", json::object());
   run.summary = all.value("summary", json::object());
-  run.status = read_object(directory / "status.json");
+  run.status = read_status_json(directory);
   std::ifstream file(directory / "scene.resolved.toml", std::ios::binary);
   run.resolved.assign(std::istreambuf_iterator<char>(file), {});
   try {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "io/results/csv_reader.hpp"
 #include "io/scene/scene.hpp"
@@ -21,7 +22,11 @@ struct RunFolder {
   io::TableColumns steps;              ///< what sections ask of steps.csv
 };
 
-/// Throws std::invalid_argument where no run was begun, io::FileError where a table is not as Talus wrote it.
+/// The files of a run that pictures, pages and other formats are made from, which none of them may replace.
+std::vector<std::filesystem::path> sources_in(const std::filesystem::path& directory);
+
+/// Throws std::invalid_argument where no run was begun, io::FileError where run.json or a table is not as
+/// Talus wrote it.
 RunFolder read_run_folder(const std::filesystem::path& directory);
 
 }  // namespace talus

@@ -7,6 +7,7 @@
 #include "apps/report/sections.hpp"
 #include "apps/shared/exit_codes.hpp"
 #include "apps/shared/print.hpp"
+#include "apps/shared/run_json_files.hpp"
 #include "io/files/output_directory.hpp"
 
 namespace talus {
@@ -38,16 +39,19 @@ io::HtmlNotice notice_of(const RunFolder& run) {
           "The run goes on, or was killed: `talus status` tells." + where + " So far: " + certificate};
 }
 
-}  // namespace
-
-std::string run_report(const std::filesystem::path& directory) {
-  const RunFolder run = read_run_folder(directory);
+std::string page_of(const RunFolder& run) {
   HtmlSections sections;
   for (const auto section : {scene_section, view_section, certificate_section, experiment_sections,
                              picture_section, time_section, left_out_section, repeat_section})
     for (io::HtmlSection& part : section(run)) sections.push_back(std::move(part));
-  const std::string name = run.scene ? run.scene->name : directory.filename().string();
+  const std::string name = run.scene ? run.scene->name : run.directory.filename().string();
   return io::html_page(name, run.scene ? run.scene->description : "", sections, notice_of(run));
+}
+
+}  // namespace
+
+std::string run_report(const std::filesystem::path& directory) {
+  return page_of(read_run_folder(directory));
 }
 
 int report_command(const ReportOptions& options) {
@@ -56,7 +60,12 @@ int report_command(const ReportOptions& options) {
                                         ? std::filesystem::path(options.directory) / "report.html"
                                         : std::filesystem::path(options.out);
   try {
-    page = run_report(options.directory);
+    const RunFolder run = read_run_folder(options.directory);
+    io::check_output_files(sources_in(options.directory), {out}, true);
+    page = page_of(run);
+  } catch (const nlohmann::json::exception& error) {
+    print_error("talus: error: {}\n", damaged_value(options.directory, error));
+    return exit_bad_input;
   } catch (const std::exception& error) {
     print_error("talus: error: {}\n", error.what());
     return exit_bad_input;

@@ -64,6 +64,65 @@ TEST(Options, OfOtherProgramsAreAnsweredWithWhatThereIsHere) {
   EXPECT_NE(misspelt.messages.find("did you mean '--threads'?"), std::string::npos) << misspelt.messages;
 }
 
+/// A run whose results other commands draw and convert.
+class ResultsOfARun : public CommandTest {
+ protected:
+  void SetUp() override {
+    write(at("scene.toml"), pressed_box);
+    ASSERT_EQ(run("run scene.toml --out out --steps 2 --quiet --threads 1").code, 0);
+  }
+  void expect_refused(const std::string& arguments, int code, const std::string& named) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, code) << arguments << "\n" << outcome.messages;
+    EXPECT_NE(outcome.messages.find("talus: error: "), std::string::npos) << arguments;
+    EXPECT_NE(outcome.messages.find(named), std::string::npos) << arguments << "\n" << outcome.messages;
+  }
+};
+
+TEST_F(ResultsOfARun, ThatCannotBeWrittenEndWithOneCodeWhateverTheCommand) {
+  // Tests run as root, too, who may write anywhere: a folder with the name of the unfinished file is in the
+  // way.
+  for (const char* name : {"page.html", "image.png", "film/frame_000000.png", "dump.txt", "grains.vtkhdf"}) {
+    fs::create_directories(at(std::string(name) + ".part/keep"));
+  }
+  expect_refused("report out --out page.html", 1, "page.html.part");
+  expect_refused("view out --width 64 --out image.png", 1, "image.png.part");
+  expect_refused("movie out --width 64 --out film", 1, "frame_000000.png.part");
+  expect_refused("movie out --width 64 --out /proc/film", 1, "/proc/film");
+  expect_refused("convert out --to lammps --out dump.txt", 1, "dump.txt.part");
+  expect_refused("convert out --to vtkhdf --out grains.vtkhdf", 1, "grains.vtkhdf.part");
+}
+
+TEST_F(ResultsOfARun, AreNotWrittenWhereThereIsNoFolderWhateverTheCommand) {
+  write(at("file"), "mine");
+  expect_refused("report out --out file/page.html", 2, "file/page.html");
+  expect_refused("view out --width 64 --out file/image.png", 2, "file/image.png");
+  expect_refused("movie out --width 64 --out file/film", 2, "file");
+  expect_refused("movie out --width 64 --out file", 2, "file");
+  expect_refused("convert out --to lammps --out file/dump.txt", 2, "file/dump.txt");
+  EXPECT_EQ(content(at("file")), "mine");
+}
+
+TEST_F(ResultsOfARun, AreNotReplacedByWhatIsMadeOfThem) {
+  const auto before = files_below(at("out"));
+  for (const char* name : {"results.h5", "run.json", "steps.csv", "scene.resolved.toml"}) {
+    const std::string out = std::string(" --out out/") + name;
+    expect_refused("report out" + out, 2, name);
+    expect_refused("view out --width 64 --force" + out, 2, name);
+    expect_refused("convert out --to lammps --force" + out, 2, name);
+  }
+  EXPECT_EQ(files_below(at("out")), before);
+}
+
+TEST_F(ResultsOfARun, WhoseRunJsonIsDamagedAreRefusedByItsName) {
+  for (const char* damage : {"{\"summary\": ", "", "[]", "{\"summary\": 3}", "{\"provenance\": []}",
+                             "{\"summary\": {\"status\": 3}}"}) {
+    write(at("out/run.json"), damage);
+    for (const char* command : {"report out", "status out", "status out --json"})
+      expect_refused(command, 2, "run.json");
+  }
+}
+
 TEST(ViewCommand, DrawsOneFrameOrAllAndRefusesWhatThereIsNot) {
   const ScratchDirectory scratch;
   write(scratch / "scene.toml", pressed_box);
