@@ -16,6 +16,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "io/files/detail/utf8_mark.hpp"
 #include "io/files/error.hpp"
 
 namespace talus::io {
@@ -53,15 +54,6 @@ bool is_keyword(std::string_view word, std::string_view keyword) {
   return std::ranges::equal(word, keyword, {}, [](char letter) {
     return static_cast<char>(std::tolower(static_cast<unsigned char>(letter)));
   });
-}
-
-/// What editors of Windows put before a text in UTF-8.
-constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-
-/// A file of text without its byte order mark.
-std::string_view text_of(std::string_view bytes) {
-  if (bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
-  return bytes;
 }
 
 /// The words of a text file, with the line of the last one.
@@ -137,7 +129,7 @@ std::vector<Triangle> read_stl(const std::string& path) {
   const std::string bytes = std::move(held).str();
   const std::uint64_t wanted = head + std::uint64_t{count_of(bytes)} * record;
   if (bytes.size() >= head && bytes.size() == wanted) return read_binary(path, bytes);
-  const std::string_view text = text_of(bytes);
+  const std::string_view text = std::string_view(bytes).substr(detail::utf8_mark_of(bytes));
   if (is_keyword(Words(path, text).next(), "solid")) return read_text(path, text);
   if (bytes.size() < head)
     throw FileError(

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "io/files/detail/csv_cell.hpp"
+#include "io/files/detail/utf8_mark.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/scene/detail/csv_fields.hpp"
 
@@ -14,7 +15,7 @@ namespace talus::io {
 
 namespace {
 
-using detail::CsvPlace, detail::drop_utf8_mark, detail::number_in, detail::split, detail::trimmed;
+using detail::CsvPlace, detail::number_in, detail::split, detail::trimmed;
 
 constexpr std::array<std::string_view, 11> columns = {"id", "x",  "y",  "z",  "radius", "vx",
                                                       "vy", "vz", "wx", "wy", "wz"};
@@ -66,7 +67,7 @@ Sample read_bodies(const std::string& path, double density, bool rotates,
   CsvPlace place{path, 0};
   for (std::string text; std::getline(in, text);) {
     ++place.line;
-    if (place.line == 1) drop_utf8_mark(text);
+    if (place.line == 1) text.erase(0, detail::utf8_mark_of(text));
     const std::string_view line = trimmed(text);
     if (line.empty() || line.front() == '#') continue;
     if (header.numbers == 0) {

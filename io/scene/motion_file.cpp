@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/files/detail/utf8_mark.hpp"
 #include "io/scene/detail/csv_fields.hpp"
 
 namespace talus::io {
@@ -70,7 +71,7 @@ MotionTable read_motion(const std::string& path) {
   CsvPlace place{path, 0};
   for (std::string text; std::getline(in, text);) {
     ++place.line;
-    if (place.line == 1) detail::drop_utf8_mark(text);
+    if (place.line == 1) text.erase(0, detail::utf8_mark_of(text));
     const std::string_view line = detail::trimmed(text);
     if (line.empty() || line.front() == '#') continue;
     if (columns.names.empty()) {

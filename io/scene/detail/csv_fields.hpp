@@ -35,12 +35,6 @@ std::size_t split(std::string_view line, std::array<std::string_view, most>& fie
   return count;
 }
 
-/// Spreadsheets mark a text as UTF-8 by three bytes before it.
-inline void drop_utf8_mark(std::string& first_line) {
-  constexpr std::string_view mark = "\xef\xbb\xbf";
-  if (first_line.starts_with(mark)) first_line.erase(0, mark.size());
-}
-
 /// A line of the file being read, with what an error needs to say where it is.
 struct CsvPlace {
   const std::string& file;

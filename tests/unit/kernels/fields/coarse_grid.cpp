@@ -120,9 +120,6 @@ TEST(CoarseGrid, ABranchOfAnyLengthCostsNoMoreThanTheGridAndLeavesItsShareThere)
     for (const std::size_t diagonal : {0U, 4U, 8U})
       EXPECT_NEAR(sum_of(sums, of, GridSums::contact + diagonal), 0.2, 0.002) << length;
   }
-  GridSums none = no_sums(of);
-  add_contact(of, lucy, {{0, 0, 0}, {std::nan(""), 0, 0}, Mat3::Identity()}, none);
-  EXPECT_EQ(sum_of(none, of, GridSums::contact), 0);
 }
 
 TEST(CoarseGrid, OneVelocityIsThatOfEveryCellAndHasNoTemperature) {
