@@ -6,10 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <optional>
 #include <set>
-#include <string>
 #include <utility>
 
 #include "runtime/graph/one_rank.hpp"
@@ -396,23 +394,6 @@ TEST(Population, ImpulsesOfThoseThatStayAreKept) {
       EXPECT_LE(report.iterations, before + 10);
     }
     simulation.begin_next_stage();
-  }
-}
-
-/// A slip of the pen in a rate, which otherwise fills all memory in a step.
-TEST(Population, MoreGrainsThanCanEverWaitAreRefusedByTheNameOfTheirRule) {
-  talus::Setup setup = floor_setup(5);
-  setup.inserts.push_back(rain(0));
-  setup.inserts.front().rate = 1e12;
-  graph::Executor executor({.threads = 1});
-  Simulation simulation(setup, Bodies{}, executor);
-  try {
-    simulation.step();
-    FAIL() << "a billion grains wait";
-  } catch (const std::exception& error) {
-    EXPECT_NE(std::string(error.what()).find("insert '" + setup.inserts.front().name + "': more than"),
-              std::string::npos)
-        << error.what();
   }
 }
 

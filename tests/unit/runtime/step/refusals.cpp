@@ -57,6 +57,26 @@ std::string runaway_message(const Setup& setup, Bodies bodies, int threads) {
   return "no error";
 }
 
+/// A slip of the pen in a rate, which would fill all memory within a step.
+TEST(Simulation, RefusesMoreGrainsThanCanEverWaitByTheNameOfTheirRule) {
+  talus::Setup setup = falling(5);
+  InsertRule rule;
+  rule.name = "rain";
+  rule.region.high = Vec3(0.1, 0.1, 0.1);
+  rule.radii.max = 0.01;
+  rule.density = 2500;
+  rule.rate = 1e12;
+  setup.inserts.push_back(rule);
+  graph::Executor executor({.threads = 1});
+  Simulation simulation(setup, Bodies{}, executor);
+  try {
+    simulation.step();
+    FAIL() << "a billion grains wait";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("insert 'rain': more than"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Simulation, RefusesABodyThatIsNotFinite) {
   graph::Executor executor({.threads = 1});
   Bodies bodies = loose_sample(4, 4, 4, 1);
