@@ -78,13 +78,14 @@ template <class V, class Mu>
   return {choose(edge.x, z.x), choose(edge.y, z.y), choose(edge.z, z.z)};
 }
 
-/// How far a contact is from its law. All but r_n in m^2/s^2.
+/// How far a contact is from its law. All but r_n and work in m^2/s^2.
 template <class V>
 struct LawError {
   V residual2;  ///< |natural map|^2 times W_nn^2
   V impulse2;   ///< (W_nn |r|)^2
   V velocity2;  ///< |v + b n|^2 where the contact carries or closes, else 0
   V r_n;        ///< [N s]
+  V work;       ///< r_n times the root of residual2 [J]
 };
 
 /// Natural map of the De Saxce form, r - P_Kmu(r - rho (v + (b + mu |v_t|) n)) with rho = 1/W_nn.
@@ -96,15 +97,17 @@ template <class V, class Mu>
   const V v_t2 = fused_dot(v_t, v_t);
   const Space<V> v_hat = add_scaled(fused(V{} + mu, root(v_t2), v_n), n, v_t);
   const Space<V> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
-  const V r_n = fused_dot(r, n);
-  return {fused_dot(miss, miss), fused_dot(p, p), ((r_n > 0) | (v_n < 0)) ? fused(v_n, v_n, v_t2) : V{}, r_n};
+  const V r_n = fused_dot(r, n), residual2 = fused_dot(miss, miss);
+  return {residual2, fused_dot(p, p), ((r_n > 0) | (v_n < 0)) ? fused(v_n, v_n, v_t2) : V{}, r_n,
+          r_n * root(residual2)};
 }
 
 /// The same without friction; `closing` is v_n + b [m/s].
 template <class V>
 [[gnu::always_inline]] inline LawError<V> error_of_law(V r_n, V closing, V w_nn) {
   const V p = w_nn * r_n, miss = p - positive_part(p - closing);
-  return {miss * miss, p * p, ((r_n > 0) | (closing < 0)) ? closing * closing : V{}, r_n};
+  return {miss * miss, p * p, ((r_n > 0) | (closing < 0)) ? closing * closing : V{}, r_n,
+          r_n * absolute(miss)};
 }
 
 }  // namespace

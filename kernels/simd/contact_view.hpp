@@ -46,7 +46,7 @@ struct MomentumView {
 
 /// Sums of the error as in `ErrorSums`.
 struct ErrorTotals {
-  double residual2, residual_max2, impulse2, velocity2;
+  double residual2, residual_max2, impulse2, velocity2, work;
   double wall_impulse[3];
   std::int64_t active;
 };

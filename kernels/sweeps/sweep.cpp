@@ -12,6 +12,7 @@ void ErrorSums::add(const ErrorSums& other) {
   residual_max2 = std::max(residual_max2, other.residual_max2);
   impulse2 += other.impulse2;
   velocity2 += other.velocity2;
+  work += other.work;
   for (int c = 0; c < 3; ++c) wall_impulse[c] += other.wall_impulse[c];
   contacts += other.contacts;
   active += other.active;

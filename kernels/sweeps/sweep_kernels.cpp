@@ -85,6 +85,7 @@ ErrorSums sums_of(const ErrorTotals& totals, ContactRange range) {
   sums.residual_max2 = totals.residual_max2;
   sums.impulse2 = totals.impulse2;
   sums.velocity2 = totals.velocity2;
+  sums.work = totals.work;
   std::copy_n(totals.wall_impulse, 3, sums.wall_impulse);
   sums.contacts = static_cast<std::int64_t>(range.end - range.begin);
   sums.active = totals.active;

@@ -13,6 +13,7 @@
 #include "runtime/step/check_sums.hpp"
 #include "runtime/step/error_history.hpp"
 #include "runtime/step/setup.hpp"
+#include "runtime/step/velocity_error_memory.hpp"
 #include "runtime/step/worst_errors.hpp"
 
 namespace talus {
@@ -29,6 +30,9 @@ struct IterationResult {
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
   int corrections = 0;  ///< times that small clusters were put right
+  /// Work of the contacts' errors over the energy that contacts exchange: Certificate::by_work.
+  double error_work = 0;
+  double exchanged = 0;  ///< that energy [J]
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;   ///< the error grows without bound
@@ -67,6 +71,10 @@ struct CertificateThresholds {
   double velocity_check_cost = 100;
   /// And at least so many plain sweeps per contact, >= 0: that is stiff for a problem of its size.
   double stiff_per_contact = 0.1;
+  /// Elsewhere too, where the work of the contacts' errors leaves it in doubt (VelocityErrorMemory) and so
+  /// many sweeps of this step have not mended that, > 0; again when they have grown by the factor, > 1.
+  int doubtful = 400;
+  double doubt_again = 2;
   /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
   int settling = 50;
   /// Small clusters are put right so often in a step, at most, >= 0: sweeps for others may carry them off
@@ -112,6 +120,8 @@ class WholeProblem {
   /// What small clusters may cost grows with `sweeps`, done in this step.
   virtual SmallError small_error(double enough, int sweeps) = 0;
   virtual double large_error(double enough) = 0;
+  /// What is known of the errors of velocities in large clusters from earlier checks of them.
+  virtual VelocityErrorMemory& velocity_errors() = 0;
   /// The residual that a share `part` of all contacts does not exceed (kernels/global/residuals.hpp).
   virtual double quantile_error(double part) = 0;
   virtual WorstErrors worst_errors() = 0;
@@ -162,6 +172,9 @@ class Certificate {
   /// This step's velocities are checked as a whole: where that costs less than the sweeps that it may save,
   /// in problems that are stiff for their size; and in tiny ones. Collective.
   bool checks_velocities(WholeProblem& whole) const;
+  /// A check in this step has found the velocities of large clusters wrong, though their stiffness promised
+  /// better.
+  bool found_wrong() const { return asked_error_ > settings_.balance_tolerance; }
   /// More plain sweeps than a problem of so many contacts should take.
   double stiff_for(std::int64_t contacts) const {
     return thresholds_.stiff_per_contact * static_cast<double>(contacts);
@@ -219,10 +232,13 @@ class Certificate {
   bool even(WholeProblem& whole);
   double small_unbalance(WholeProblem& whole);
   double large_unbalance(WholeProblem& whole);
+  double by_work(WholeProblem& whole);
 
   WholeCheck small_check_, large_check_, quantile_check_;
   double corrected_from_ = 0;  ///< error before small clusters were last put right in this step
   int corrected_at_ = -1;      ///< sweeps done then
+  int asked_at_ = 0;           ///< sweeps done in this step when by_work last asked for a check of velocities
+  double asked_error_ = 0;     ///< what that found
   int doubts_ = 0;             ///< times in this step that no answer was found
   int doubted_at_ = 0;         ///< sweeps done when that was so last
 };

@@ -10,7 +10,8 @@ namespace {
 
 /// Head of a row as it is sent, all doubles; the vectors of impulses follow it.
 struct CheckRow {
-  double subdomain, residual2, residual_max2, impulse2, velocity2, contacts, active, jump2, jump_velocity2;
+  double subdomain, residual2, residual_max2, impulse2, velocity2, contacts, active, jump2, jump_velocity2,
+      work, exchanged, mass;
 };
 struct NumberRow {
   double subdomain, number;
@@ -30,6 +31,24 @@ Row read_row(const double* from) {
   Row row;
   std::memcpy(&row, from, sizeof row);
   return row;
+}
+
+/// Of the bodies of a subdomain.
+Exchanged exchanged_in(const StepState& state, SubdomainPlace place) {
+  Exchanged sum;
+  const Decomposition& all = state.decomposition;
+  const auto [begin, end] = all.several() ? all.slots_of(place) : SlotRange{0, state.bodies.size()};
+  for (std::size_t s = begin; s < end; ++s) {
+    const Velocity& v = state.bodies.velocity[s];
+    if (v.inv_mass == 0) continue;
+    const double mass = 1 / v.inv_mass;
+    double change2 = 0;
+    for (std::size_t c = 0; c < 3; ++c)
+      change2 += (v.u[c] - state.free.u[s][c]) * (v.u[c] - state.free.u[s][c]);
+    sum.energy += 0.5 * mass * change2;
+    sum.mass += mass;
+  }
+  return sum;
 }
 
 /// Where the row of each subdomain begins; a row's first number is its subdomain.
@@ -71,6 +90,7 @@ std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors
   for (std::size_t e = 0; e < here.size(); ++e) {
     const JumpSums jump = jumps.empty() ? JumpSums{} : jumps[e];
     const ErrorSums& own = added[e];
+    const Exchanged exchanged = exchanged_in(state, SubdomainPlace(e));
     write_row(CheckRow{.subdomain = static_cast<double>(here[SubdomainPlace(e)].value()),
                        .residual2 = own.residual2,
                        .residual_max2 = own.residual_max2,
@@ -79,7 +99,10 @@ std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors
                        .contacts = static_cast<double>(own.contacts),
                        .active = static_cast<double>(own.active),
                        .jump2 = jump.jump2,
-                       .jump_velocity2 = jump.velocity2},
+                       .jump_velocity2 = jump.velocity2,
+                       .work = own.work,
+                       .exchanged = exchanged.energy,
+                       .mass = exchanged.mass},
               &rows[e * width]);
   }
   return rows;
@@ -96,12 +119,15 @@ CheckSums add_check_rows(std::span<const double> rows, std::size_t vectors, std:
     part.residual_max2 = row.residual_max2;
     part.impulse2 = row.impulse2;
     part.velocity2 = row.velocity2;
+    part.work = row.work;
     part.contacts = static_cast<std::int64_t>(row.contacts);
     part.active = static_cast<std::int64_t>(row.active);
     all.error.add(part);
     fullest = std::max(fullest, part.contacts);
     all.jump.jump2 += row.jump2;
     all.jump.velocity2 += row.jump_velocity2;
+    all.exchanged.energy += row.exchanged;
+    all.exchanged.mass += row.mass;
     for (std::size_t w = 0; w < vectors; ++w)
       all.wall_impulse[w] += Eigen::Map<const Vec3>(from + width_of<CheckRow> + 3 * w);
   }

@@ -21,6 +21,7 @@
 #include "runtime/step/state.hpp"
 #include "runtime/step/stiffness_memory.hpp"
 #include "runtime/step/time_step.hpp"
+#include "runtime/step/velocity_error_memory.hpp"
 
 namespace talus {
 
@@ -152,6 +153,7 @@ struct CheckpointHead {
   double imbalance_before = 0;
   double farthest = 0;
   StiffnessMemory stiffness;
+  VelocityErrorMemory velocity_errors;
 };
 
 /// visit(name, member) for each member of a head that is a number, a text, a Vec3, or a vector of numbers.
@@ -220,6 +222,7 @@ void each_member(Head& head, const Visit& visit) {
   visit("imbalance_before", head.imbalance_before);
   visit("farthest", head.farthest);
   StiffnessMemory::each_number(head.stiffness, visit);
+  VelocityErrorMemory::each_number(head.velocity_errors, visit);
 }
 
 struct Checkpoint {

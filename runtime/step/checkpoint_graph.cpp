@@ -18,6 +18,7 @@ void StepGraph::save(Checkpoint& to) const {
   head.imbalance_before = imbalance_before_;
   head.farthest = loop_.problem().farthest();
   head.stiffness = loop_.problem().stiffness();
+  head.velocity_errors = loop_.problem().velocity_errors();
   const std::vector<float>& pushes = loop_.positions().pushes();
   if (pushes.empty() || !state_.candidates_valid) return;
   for (std::size_t c = 0; c < state_.chunks.size(); ++c) {
@@ -56,7 +57,7 @@ void StepGraph::restore(const Checkpoint& from) {
     }
     if (any) loop_.positions().go_on_from(std::move(pushes));
   }
-  loop_.problem().go_on_from(head.stiffness, head.farthest);
+  loop_.problem().go_on_from(head.stiffness, head.velocity_errors, head.farthest);
 }
 
 }  // namespace talus

@@ -4,6 +4,7 @@
 #include "runtime/step/courses.hpp"
 #include "runtime/step/global_solver.hpp"
 #include "runtime/step/stiffness_memory.hpp"
+#include "runtime/step/velocity_error_memory.hpp"
 
 namespace talus {
 
@@ -23,6 +24,9 @@ class PresentProblem final : public WholeProblem {
     clusters_known_ = false;
   }
 
+  /// The step has ended.
+  void end() { velocity_errors_.swept(certificate_.result().iterations); }
+
   double plain_sweeps_needed() override;
   double speed() const override { return speed_of(courses_.now().plan); }
   bool small_clusters() override {
@@ -37,16 +41,20 @@ class PresentProblem final : public WholeProblem {
     return global_.small_error(enough, sweeps, farthest_);
   }
   double large_error(double enough) override { return global_.large_error(enough); }
+  VelocityErrorMemory& velocity_errors() override { return velocity_errors_; }
   double quantile_error(double part) override { return global_.quantile_error(part); }
   WorstErrors worst_errors() override { return global_.worst_errors(); }
 
   bool grains_alike() const { return stiffness_.grains_alike(); }
   const StiffnessMemory& stiffness() const { return stiffness_; }
+  const VelocityErrorMemory& velocity_errors() const { return velocity_errors_; }
   /// As of the last plan() [m].
   double farthest() const { return farthest_; }
   /// What was learned of earlier problems; behind plan() where there is one.
-  void go_on_from(const StiffnessMemory& stiffness, double farthest) {
+  void go_on_from(const StiffnessMemory& stiffness, const VelocityErrorMemory& velocity_errors,
+                  double farthest) {
     stiffness_ = stiffness;
+    velocity_errors_ = velocity_errors;
     farthest_ = farthest;
   }
   double candidates() const { return candidates_; }  ///< of all ranks
@@ -61,6 +69,7 @@ class PresentProblem final : public WholeProblem {
   const Courses& courses_;
   const Certificate& certificate_;
   StiffnessMemory stiffness_;
+  VelocityErrorMemory velocity_errors_;
   bool clusters_known_ = false;  ///< of this step
   double candidates_ = 0;
   double farthest_ = 0;  ///< largest coordinate of a body [m]

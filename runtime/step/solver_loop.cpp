@@ -72,7 +72,9 @@ class StepView final : public MethodView {
   }
   int admm_calls() const override { return certificate_.result().stiff_calls; }
   double sweeps_needed() override { return problem_.sweeps_needed(); }
-  bool checks_velocities() override { return certificate_.checks_velocities(problem_); }
+  bool checks_velocities() override {
+    return certificate_.found_wrong() || certificate_.checks_velocities(problem_);
+  }
   bool balanced() override { return certificate_.balanced(problem_); }
 
  private:
@@ -233,6 +235,7 @@ std::optional<std::size_t> SolverLoop::subdomain_of(std::uint32_t node) const {
 
 bool SolverLoop::decide(int epoch) {
   if (goes_on(epoch)) return true;
+  problem_.end();
   if (state_.cell.loaded()) settle_cell();
   return false;
 }

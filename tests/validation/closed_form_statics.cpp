@@ -50,6 +50,45 @@ TEST(Tower, EachContactCarriesWhatStandsOnIt) {
   }
 }
 
+/// Grains of which each rests on the four below it, between smooth planes: `layers` of `edge` x `edge` and of
+/// (edge - 1) x (edge - 1) in turn. More than are solved directly.
+Scene pyramids(int edge, int layers) {
+  Scene scene(h);
+  scene.slope(0);
+  const double width = 2 * radius * edge;
+  scene.wall("x-", Vec3::Zero(), Vec3::UnitX());
+  scene.wall("x+", {width, 0, 0}, -Vec3::UnitX());
+  scene.wall("y-", Vec3::Zero(), Vec3::UnitY());
+  scene.wall("y+", {0, width, 0}, -Vec3::UnitY());
+  for (int k = 0; k < layers; ++k)
+    for (int i = 0; i < edge - k % 2; ++i)
+      for (int j = 0; j < edge - k % 2; ++j)
+        scene.sphere(radius * Vec3(2 * i + 1 + k % 2, 2 * j + 1 + k % 2, 1 + std::sqrt(2.0) * k), radius,
+                     mass);
+  scene.setup.solver.max_iterations = 20000;
+  return scene;
+}
+
+// Contacts deep in a heap carry hundreds of times what moves it: small residuals there are large motions. The
+// answer is rest.
+TEST(Heap, ThatIsCertifiedHardlyMoves) {
+  for (const double tolerance : {1e-2, 1e-3}) {
+    Scene scene = pyramids(7, 16);
+    scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = tolerance;
+    const auto count = static_cast<double>(scene.bodies.size());
+    Experiment run(std::move(scene));
+    for (int step = 1; step <= 3; ++step) {
+      EXPECT_TRUE(run.step().converged) << "step " << step;
+      double sum = 0;
+      for (const Velocity& v : run.simulation().state().bodies.velocity)
+        sum += Vec3(v.u[0], v.u[1], v.u[2]).norm();
+      EXPECT_LE(sum, 2 * tolerance * count * g_earth * h) << "step " << step;
+      std::printf("step %d tol %g: %g its %d\n", step, tolerance, sum / (count * g_earth * h),
+                  run.simulation().report().iterations);
+    }
+  }
+}
+
 // Each grain begins 1 % of its radius in the one below: that is undone, and is no motion.
 TEST(Column, ComesToRestWhileItsOverlapsAreUndone) {
   const int count = 30;

@@ -14,7 +14,7 @@ namespace {
 
 template <class V>
 struct ErrorLanes {
-  V residual2{}, residual_max2{}, impulse2{}, velocity2{};
+  V residual2{}, residual_max2{}, impulse2{}, velocity2{}, work{};
   Space<V> wall_impulse{};
   V active{};
 };
@@ -24,6 +24,7 @@ template <class V>
   sums.impulse2 += error.impulse2;
   sums.velocity2 += error.velocity2;
   sums.residual2 += error.residual2;
+  sums.work += error.work;
   sums.residual_max2 = sums.residual_max2 < error.residual2 ? error.residual2 : sums.residual_max2;
   sums.active += error.r_n > 0 ? V{} + 1.0 : V{};
 }
@@ -69,6 +70,7 @@ ErrorTotals add_lanes(const ErrorLanes<Lanes<W>> (&sums)[8 / W]) {
           total.residual_max2 < part.residual_max2[l] ? part.residual_max2[l] : total.residual_max2;
       total.impulse2 += part.impulse2[l];
       total.velocity2 += part.velocity2[l];
+      total.work += part.work[l];
       total.wall_impulse[0] += part.wall_impulse.x[l];
       total.wall_impulse[1] += part.wall_impulse.y[l];
       total.wall_impulse[2] += part.wall_impulse.z[l];

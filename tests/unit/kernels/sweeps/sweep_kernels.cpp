@@ -29,8 +29,8 @@ bool same_bits(const ErrorSums& a, const ErrorSums& b) {
   return std::memcmp(&a.residual2, &b.residual2, 8) == 0 &&
          std::memcmp(&a.residual_max2, &b.residual_max2, 8) == 0 &&
          std::memcmp(&a.impulse2, &b.impulse2, 8) == 0 && std::memcmp(&a.velocity2, &b.velocity2, 8) == 0 &&
-         std::memcmp(a.wall_impulse, b.wall_impulse, 24) == 0 && a.contacts == b.contacts &&
-         a.active == b.active;
+         std::memcmp(&a.work, &b.work, 8) == 0 && std::memcmp(a.wall_impulse, b.wall_impulse, 24) == 0 &&
+         a.contacts == b.contacts && a.active == b.active;
 }
 
 /// All that the kernels leave behind.

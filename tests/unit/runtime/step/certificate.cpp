@@ -35,6 +35,7 @@ class KnownProblem : public WholeProblem {
     const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
     return std::max(enough, velocity_errors_[which]);
   }
+  VelocityErrorMemory& velocity_errors() override { return memory_; }
   double quantile_error(double) override { return 0; }
   WorstErrors worst_errors() override { return {}; }
   std::size_t asked() const { return asked_; }
@@ -44,13 +45,15 @@ class KnownProblem : public WholeProblem {
   double plain_sweeps_;
   std::vector<double> velocity_errors_, small_errors_;
   std::size_t asked_ = 0, small_asked_ = 0;
+  VelocityErrorMemory memory_;
 };
 
-/// What a check finds: the relative error, and the impulse of the one wall [N s].
+/// What a check finds: the relative error, the impulse of the one wall [N s], and the work of errors [J].
 struct Found {
   int iterations;
   double error;
   double wall = 1;
+  double work = 0;  ///< of the contacts' errors, where contacts exchange 1 J
 };
 
 struct Situation {
@@ -72,6 +75,8 @@ CheckSums sums_of(const Found& found, std::int64_t contacts) {
   sums.error.impulse2 = 1;
   sums.error.residual2 = found.error * found.error;
   sums.error.contacts = contacts;
+  sums.error.work = found.work;
+  sums.exchanged = {.energy = 1, .mass = 1};
   sums.wall_impulse = {Vec3(found.wall, 0, 0)};
   return sums;
 }
@@ -188,6 +193,22 @@ TEST(Certificate, SaysWhatASituationIs) {
        .small_errors = {1},
        .jammed = true,
        .mends = true},
+      {.what = "small errors under large forces, and velocities far from the answer",
+       .checks = {{0, 1}, {10, 1e-4, 1, 0.02}},
+       .verdict = go_on,
+       .velocity_errors = {0.5}},
+      {.what = "velocities near it",
+       .checks = {{0, 1}, {10, 1e-4, 1, 0.02}},
+       .verdict = solved,
+       .velocity_errors = {0.01}},
+      {.what = "small errors where they do little work",
+       .checks = {{0, 1}, {10, 1e-4, 1, 0.004}},
+       .verdict = solved,
+       .velocity_errors = {0.5}},
+      {.what = "much more work than velocities seem to need",
+       .checks = {{0, 1}, {10, 1e-4, 1, 0.6}},
+       .verdict = go_on,
+       .velocity_errors = {0}},
       {.what = "velocities near it, whatever walls do",
        .checks = {{0, 1, 1}, {10, 1e-4, 2}},
        .verdict = solved,
@@ -265,6 +286,18 @@ TEST(Certificate, EveryThresholdDecidesASituation) {
         .plain_sweeps = 1e4},
        [](T& t) { t.velocity_resolution = 1.1; },
        go_on},
+      {{.what = "sweeps in doubt",
+        .checks = {{0, 1}, {10, 1e-4, 1, 0.1}, {400, 1e-4, 1, 0.1}},
+        .verdict = solved,
+        .velocity_errors = {1, 0.01}},
+       [](T& t) { t.doubtful = 401; },
+       go_on},
+      {{.what = "growth between doubts about velocities",
+        .checks = {{0, 1}, {300, 1e-4, 1, 0.1}, {600, 1e-4, 1, 0.1}},
+        .verdict = solved,
+        .velocity_errors = {1, 0.01}},
+       [](T& t) { t.doubt_again = 2.1; },
+       go_on},
       {{.what = "growth between velocity checks",
         .checks = {{0, 1}, {100, 1e-4}, {125, 1e-4}},
         .verdict = go_on,
@@ -300,6 +333,19 @@ TEST(Certificate, VelocitiesAreCheckedOnlyWhereTheStepMayEnd) {
       .what = "", .checks = {{0, 1}, {10, 0.1}, {20, 0.01}}, .verdict = Verdict::go_on, .plain_sweeps = 1e4};
   EXPECT_EQ(judged(given).velocity_checks, 0u);
   given.checks.push_back({30, 1e-4});
+  EXPECT_EQ(judged(given).velocity_checks, 1u);
+}
+
+TEST(Certificate, RemembersWhatAWorkOfErrorsIsWorth) {
+  // 0.2 for 0.04: the next 0.008 are taken for twice 0.04, and 0.004 for 0.04, without another check.
+  Situation given{.what = "",
+                  .checks = {{0, 1}, {10, 1e-4, 1, 0.04}, {20, 1e-4, 1, 0.008}},
+                  .verdict = Verdict::go_on,
+                  .velocity_errors = {0.2}};
+  EXPECT_EQ(judged(given).verdict, Verdict::go_on);
+  EXPECT_NEAR(judged(given).result.unbalance, 0.08, 1e-12);
+  given.checks.push_back({30, 1e-4, 1, 0.0045});
+  EXPECT_EQ(judged(given).verdict, Verdict::solved);
   EXPECT_EQ(judged(given).velocity_checks, 1u);
 }
 
