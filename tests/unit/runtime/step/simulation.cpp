@@ -212,7 +212,8 @@ TEST(Simulation, AsksAgainHowStiffItIsOnlyWhereNewNeighboursCouldMatter) {
   EXPECT_GE(looks, 1);
   EXPECT_LE(looks, 1 + renewals / 10);
   const auto [heavy_looks, heavy_renewals] = looks_and_renewals(400);
-  EXPECT_EQ(heavy_looks, heavy_renewals);
+  EXPECT_GE(heavy_looks, heavy_renewals);
+  EXPECT_LE(heavy_looks, heavy_renewals + 1) << "velocities were in doubt once";
 }
 
 TEST(Simulation, OfAPerfectlyElasticBallKeepsItsEnergy) {

@@ -1,0 +1,87 @@
+/// Heaps too large to be solved directly: what a certified step may be wrong by, found by solving it again
+/// from the same state nearly exactly. Without friction velocities are unique.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/validation/experiment.hpp"
+
+namespace talus::validation::certified_heaps_test {
+namespace {
+
+constexpr double h = 1e-3, radius = 0.05, mass = 0.8;
+
+/// Smooth grains of 35 to 50 mm above a floor between planes, on a lattice that lets them fall apart.
+Scene loose_grains(int edge, int layers) {
+  Scene scene(h);
+  scene.slope(0);
+  const double spacing = 2.05 * radius;
+  scene.wall("x-", Vec3::Zero(), Vec3::UnitX());
+  scene.wall("x+", {edge * spacing, 0, 0}, -Vec3::UnitX());
+  scene.wall("y-", Vec3::Zero(), Vec3::UnitY());
+  scene.wall("y+", {0, edge * spacing, 0}, -Vec3::UnitY());
+  unsigned random = 1;
+  const auto some = [&](double most) {
+    random = random * 1664525u + 1013904223u;
+    return most * (random >> 8) / double{1u << 24};
+  };
+  for (int k = 0; k < edge * edge * layers; ++k) {
+    const Vec3 site(k % edge + 0.5, k / edge % edge + 0.5, k / (edge * edge) + 0.5);
+    const double r = radius * (1 - some(0.3));
+    scene.sphere(spacing * site + radius * 0.02 * Vec3(some(1), some(1), some(1)), r,
+                 mass * std::pow(r / radius, 3));
+  }
+  return scene;
+}
+
+Vec3 momentum_change(const Bodies& bodies, std::size_t slot, const Velocity& from) {
+  const Velocity& v = bodies.velocity[slot];
+  return Vec3(v.u[0] - from.u[0], v.u[1] - from.u[1], v.u[2] - from.u[2]) / v.inv_mass;
+}
+
+/// Sum m |u - u*| over sum m |u* - u_free| of one step from `before`.
+double true_error(const Setup& setup, const Bodies& before, const Bodies& after) {
+  Scene exact(h);
+  exact.setup.walls = setup.walls;
+  exact.setup.stages = setup.stages;
+  exact.bodies = before;
+  Experiment run(std::move(exact));
+  run.step();
+  const Bodies& answer = run.simulation().state().bodies;
+  double error = 0, exchanged = 0;
+  for (std::size_t s = 0; s < after.size(); ++s) {
+    const std::size_t a = run.slot(static_cast<std::int64_t>(after.id[s]));
+    error += momentum_change(after, s, answer.velocity[a]).norm();
+    Velocity free = before.velocity[static_cast<std::size_t>(std::ranges::find(before.id, after.id[s]) -
+                                                             before.id.begin())];
+    free.u[2] -= h * g_earth;
+    exchanged += momentum_change(answer, a, free).norm();
+  }
+  return error / exchanged;
+}
+
+// Grains that have come to rest with the impulses of the step before: residuals are small against the forces
+// deep in the heap from the first sweep on, and large against what a step's weight moves.
+TEST(LargeHeap, OfSmoothGrainsHasTheVelocitiesThatItIsCertifiedToHave) {
+  for (const double tolerance : {1e-2, 1e-3}) {
+    Scene scene = loose_grains(7, 13);
+    scene.setup.solver.tolerance = scene.setup.solver.balance_tolerance = tolerance;
+    const talus::Setup setup = scene.setup;
+    Experiment run(std::move(scene));
+    run.steps(699);
+    for (int k = 700; k <= 1000; ++k) {
+      const Bodies before = run.simulation().state().bodies;
+      const StepReport& report = run.step();
+      if (k % 50 != 0) continue;
+      ASSERT_TRUE(report.converged) << "step " << k;
+      EXPECT_LE(true_error(setup, before, run.simulation().state().bodies),
+                2 * std::max({tolerance, report.error_rms, report.balance}))
+          << "step " << k << " at " << tolerance;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace talus::validation::certified_heaps_test
