@@ -35,10 +35,26 @@ void Certificate::measure(const CheckSums& sums) {
   result_.error_rms = scale2_ != 0 ? std::sqrt(error.residual2 / scale2_) : 0;
   result_.error_max = scale2_ != 0 ? std::sqrt(error.residual_max2 * count / scale2_) : 0;
   result_.jump = sums.jump.velocity2 > 0 ? std::sqrt(sums.jump.jump2 / sums.jump.velocity2) : 0;
-  result_.exchanged = larger(sums.exchanged.energy, 0.5 * sums.exchanged.mass * rounding * rounding);
+  result_.exchanged = exchanged(sums, rounding);
   result_.error_work = error.work > 0 ? error.work / result_.exchanged : 0;
   result_.contacts = error.contacts;
   result_.active = error.active;
+}
+
+/// The energy that contacts exchange, of grains and walls of finite mass [J]: no less than that of grains
+/// which follow the fastest wall, move as fast as rounding makes them, or have a part of the impulse at a
+/// wall. A wall lighter than the grains counts with their mass: it gains much energy by little momentum.
+double Certificate::exchanged(const CheckSums& sums, double rounding) const {
+  const double mass = sums.exchanged.mass;
+  double energy = sums.exchanged.energy, pressed = 0;
+  for (std::size_t w = 0; w < scales_.wall_inv_masses.size(); ++w) {
+    const double impulse = sums.wall_impulse[w].norm(), inv_mass = scales_.wall_inv_masses[w];
+    energy += 0.5 * impulse * impulse * (mass > 0 ? std::min(inv_mass, 1 / mass) : inv_mass);
+    pressed = std::max(pressed, impulse);
+  }
+  const double given = mass > 0 ? thresholds_.interest * pressed / mass : 0;
+  const double speed = larger(larger(scales_.drive, rounding), given);
+  return larger(energy, 0.5 * mass * speed * speed);
 }
 
 Verdict Certificate::judge(const CheckSums& sums, const Check& check, WholeProblem& whole) {

@@ -74,6 +74,8 @@ struct CertificateThresholds {
   /// Elsewhere too, where the work of the contacts' errors leaves it in doubt (VelocityErrorMemory) and so
   /// many sweeps of this step have not mended that, > 0; again when they have grown by the factor, > 1.
   int doubtful = 400;
+  /// Part of the impulse at the most pressed wall, in (0, 1), that grains exchange at least.
+  double interest = 1e-2;
   double doubt_again = 2;
   /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
   int settling = 50;
@@ -152,6 +154,8 @@ class Certificate {
   struct Scales {
     double rounding_velocity = 0;     ///< that rounding makes in gaps, over a step [m/s]
     std::vector<double> wall_pushes;  ///< per wall: the impulse that it is pushed with along its normal [N s]
+    std::vector<double> wall_inv_masses = {};  ///< per wall [1/kg]; 0: it is driven or fixed
+    double drive = 0;                          ///< the largest speed of these [m/s]
   };
   struct Check {
     int iterations = 0;       ///< sweeps done
@@ -209,6 +213,7 @@ class Certificate {
  private:
   Verdict verdict_on(const CheckSums& sums, const Check& check, WholeProblem& whole);
   void measure(const CheckSums& sums);
+  double exchanged(const CheckSums& sums, double rounding) const;
   double drift() const;
   double wall_scale() const;
   double largest_change(std::size_t from, std::size_t to) const;

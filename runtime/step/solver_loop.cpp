@@ -144,6 +144,11 @@ void SolverLoop::begin() {
   for (std::size_t w = state_.walls.size(), k = 0; w < pushed_vectors(state_); ++w, k += 3)
     scales.wall_pushes.push_back(state_.cell.loaded() ? Eigen::Map<const Vec3>(&state_.cell.push[k]).norm()
                                                       : 0);
+  for (std::size_t w = 0; w < state_.walls.size(); ++w) {
+    scales.wall_inv_masses.push_back(state_.walls[w].inv_mass());
+    if (scales.wall_inv_masses[w] == 0)
+      scales.drive = std::max(scales.drive, state_.wall_states[w].free_velocity.norm());
+  }
   certificate_.begin(std::move(scales));
   problem_.begin();
   pending_.reset();
