@@ -152,10 +152,11 @@ class Certificate {
  public:
   /// Sizes of a step that residuals and changes are compared with.
   struct Scales {
-    double rounding_velocity = 0;     ///< that rounding makes in gaps, over a step [m/s]
-    std::vector<double> wall_pushes;  ///< per wall: the impulse that it is pushed with along its normal [N s]
-    std::vector<double> wall_inv_masses = {};  ///< per wall [1/kg]; 0: it is driven or fixed
-    double drive = 0;                          ///< the largest speed of these [m/s]
+    double rounding_velocity = 0;  ///< that rounding makes in gaps, over a step [m/s]
+    /// Per wall, then per half of a periodic cell: the impulse that it is pushed with [N s].
+    std::vector<double> wall_pushes;
+    std::vector<double> wall_inv_masses = {};  ///< like these [1/kg]; 0: it is driven or fixed
+    double drive = 0;                          ///< the largest speed of a driven wall [m/s]
   };
   struct Check {
     int iterations = 0;       ///< sweeps done

@@ -149,6 +149,7 @@ void SolverLoop::begin() {
     if (scales.wall_inv_masses[w] == 0)
       scales.drive = std::max(scales.drive, state_.wall_states[w].free_velocity.norm());
   }
+  scales.wall_inv_masses.resize(pushed_vectors(state_), state_.cell.loaded() ? 1 / state_.cell.mass : 0);
   certificate_.begin(std::move(scales));
   problem_.begin();
   pending_.reset();
