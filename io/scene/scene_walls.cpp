@@ -59,8 +59,7 @@ double depth_behind(const Wall& wall, const Vec3& x) {
 std::string remedy_for(const Wall& wall) {
   if (wall.surface() == nullptr) return "move the grain, or the wall";
   return "the solid is there: move the grain out of it, or say with `inside` of the wall on which side of "
-         "its "
-         "surface the grains are";
+         "its surface the grains are";
 }
 
 void give_mass(WallLoad& load, double mass) {

@@ -30,6 +30,12 @@ void free_velocities(SlotRange range, std::span<const Velocity> velocity, double
 /// V = free velocity for the given grains.
 void reset_to_free(std::span<const Slot> slots, const FreeVelocity& free, std::span<Velocity> velocity);
 
+/// What contacts have done to grains.
+struct Exchanged {
+  double energy = 0;  ///< sum of m |u - u_free|^2 / 2 [J]
+  double mass = 0;    ///< of the grains [kg]
+};
+
 /// Sums over grains; add them in a fixed order only.
 struct MotionSums {
   KineticEnergy energy;         ///< at the end of the step [J]

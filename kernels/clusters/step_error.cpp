@@ -20,7 +20,19 @@ double most_momentum(double mass, double energy) {
 }
 
 /// What a cluster, or all of them, is measured by.
-enum Measure { mass, incoming, gained, pressed, sums, drive = sums, fastest, largest, measures };
+enum Measure {
+  mass,
+  incoming,
+  gained,
+  pressed,
+  grains,
+  energy,
+  sums,
+  drive = sums,
+  fastest,
+  largest,
+  measures
+};
 
 using Measures = std::array<double, measures>;
 
@@ -36,6 +48,9 @@ Measures measures_of(const BodyProblem& problem) {
     row[mass] += body.mass;
     row[incoming] += kinetic2(body, body.free.u, body.free.w);
     row[gained] += body.mass * (V[b].u - body.free.u).norm() + body.spin_mass * (V[b].w - body.free.w).norm();
+    if (body.wall || body.cell) continue;
+    row[grains] += body.mass;
+    row[energy] += 0.5 * body.mass * (V[b].u - body.free.u).squaredNorm();
   }
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
@@ -74,6 +89,7 @@ class Answers {
     std::vector<Measures> rows(clusters_.size());
     each([&](std::size_t c) { rows[c] = measures_of(clusters_[c].problem); });
     const Measures all = total(rows);
+    exchanged_ = {all[energy], all[grains]};
     const double everywhere = scale_of(all, thresholds_);
     each([&](std::size_t c) {
       const double share = all[mass] > 0 ? rows[c][mass] / all[mass] : 0;
@@ -104,6 +120,7 @@ class Answers {
     error.solved = !any(&ClusterAnswer::solved, false);
     error.jammed = any(&ClusterAnswer::jammed, true);
     error.change = changes();
+    error.exchanged = exchanged_;
     return error;
   }
 
@@ -203,6 +220,7 @@ class Answers {
   std::vector<std::vector<std::size_t>> own_;  ///< per part: clusters that it answers for
   std::vector<ClusterAnswer> answers_;
   std::vector<double> scales_;  ///< [N s]
+  Exchanged exchanged_;         ///< by all of them
 };
 
 }  // namespace

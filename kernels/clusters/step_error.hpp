@@ -34,6 +34,7 @@ struct StepError {
   bool mends = false;   ///< of clusters that are wrong by more than what is asked for it mends some
   bool solved = true;   ///< of all of those an answer was found
   bool jammed = false;  ///< of one of them there is none: walls close on grains that cannot get away
+  Exchanged exchanged;  ///< by the contacts of all clusters
 
   /// The worst of all, NaN where one is.
   double relative() const { return larger(larger(velocity, wall), contact); }

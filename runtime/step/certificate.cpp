@@ -18,6 +18,7 @@ void Certificate::begin(Scales scales) {
   small_check_ = large_check_ = quantile_check_ = {};
   corrected_from_ = std::numeric_limits<double>::infinity();
   corrected_at_ = -1;
+  exchanged_by_small_ = {};
   asked_at_ = 0;
   asked_error_ = 0;
   doubts_ = 0;
@@ -35,26 +36,11 @@ void Certificate::measure(const CheckSums& sums) {
   result_.error_rms = scale2_ != 0 ? std::sqrt(error.residual2 / scale2_) : 0;
   result_.error_max = scale2_ != 0 ? std::sqrt(error.residual_max2 * count / scale2_) : 0;
   result_.jump = sums.jump.velocity2 > 0 ? std::sqrt(sums.jump.jump2 / sums.jump.velocity2) : 0;
-  result_.exchanged = exchanged(sums, rounding);
-  result_.error_work = error.work > 0 ? error.work / result_.exchanged : 0;
+  work_ = error.work;
+  exchanged_ = sums.exchanged;
+  rounding_ = rounding;
   result_.contacts = error.contacts;
   result_.active = error.active;
-}
-
-/// The energy that contacts exchange, of grains and walls of finite mass [J]: no less than that of grains
-/// which follow the fastest wall, move as fast as rounding makes them, or have a part of the impulse at a
-/// wall. A wall lighter than the grains counts with their mass: it gains much energy by little momentum.
-double Certificate::exchanged(const CheckSums& sums, double rounding) const {
-  const double mass = sums.exchanged.mass;
-  double energy = sums.exchanged.energy, pressed = 0;
-  for (std::size_t w = 0; w < scales_.wall_inv_masses.size(); ++w) {
-    const double impulse = sums.wall_impulse[w].norm(), inv_mass = scales_.wall_inv_masses[w];
-    energy += 0.5 * impulse * impulse * (mass > 0 ? std::min(inv_mass, 1 / mass) : inv_mass);
-    pressed = std::max(pressed, impulse);
-  }
-  const double given = mass > 0 ? thresholds_.interest * pressed / mass : 0;
-  const double speed = larger(larger(scales_.drive, rounding), given);
-  return larger(energy, 0.5 * mass * speed * speed);
 }
 
 Verdict Certificate::judge(const CheckSums& sums, const Check& check, WholeProblem& whole) {
@@ -183,6 +169,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
     return std::numeric_limits<double>::infinity();
   return repeated(small_check_, small_tolerance(), [&](double enough) {
     const SmallError error = whole.small_error(enough, result_.iterations);
+    exchanged_by_small_ = error.exchanged;
     // Sweeps go on where others can still be put right.
     result_.jammed = error.jammed && !error.mends;
     if (!error.solved) {
@@ -203,16 +190,36 @@ double Certificate::large_unbalance(WholeProblem& whole) {
   return drifting <= settings_.balance_tolerance ? larger(drifting, by_work(whole)) : drifting;
 }
 
+/// The energy that the contacts of large clusters exchange, of grains and walls of finite mass [J]. No less
+/// than that of their grains if they follow the fastest wall, move as fast as rounding makes them, or as a
+/// part of the impulse at a wall makes all. A wall lighter than the grains counts with their mass: it gains
+/// much energy by little momentum. Walls serve small clusters, too, and count by the share of the mass.
+double Certificate::exchanged_by_large() const {
+  const double all = exchanged_.mass;
+  if (!(all > 0)) return 0;
+  const double mass = std::max(0.0, all - exchanged_by_small_.mass);
+  double of_walls = 0, pressed = 0;
+  for (std::size_t w = 0; w < scales_.wall_inv_masses.size(); ++w) {
+    const double impulse = wall_impulses()[w].norm();
+    of_walls += 0.5 * impulse * impulse * std::min(scales_.wall_inv_masses[w], 1 / all);
+    pressed = std::max(pressed, impulse);
+  }
+  const double speed = std::max({scales_.drive, rounding_, thresholds_.interest * pressed / all});
+  return std::max(exchanged_.energy - exchanged_by_small_.energy + of_walls * mass / all,
+                  0.5 * mass * speed * speed);
+}
+
 /// Slow modes of a large cluster leave small residuals at every contact and still much momentum to be
 /// exchanged. The work of those residuals shows it: for the error e of the velocities sum r . H^T e is M (V -
 /// V_free) . e. What it is worth in velocities a check of these tells, now and then, and is remembered.
 double Certificate::by_work(WholeProblem& whole) {
-  const double tolerance = settings_.balance_tolerance, work = result_.error_work;
+  const double tolerance = settings_.balance_tolerance, exchanged = exchanged_by_large();
+  const double work = work_ > 0 ? work_ / exchanged : 0;
   VelocityErrorMemory& memory = whole.velocity_errors();
   if (memory.reuse().most * work <= tolerance) return memory.reuse().most * work;
   const int done = result_.iterations;
   if (asked_at_ == done) return asked_error_;
-  const VelocityErrorMemory::Problem problem{result_.contacts, result_.exchanged};
+  const VelocityErrorMemory::Problem problem{result_.contacts, exchanged};
   const double expected = memory.per_work(problem) * work;
   // At the end of a step that is missed anyhow nothing more is asked.
   const bool stuck = (done >= settings_.max_iterations && result_.error_rms <= settings_.tolerance) ||

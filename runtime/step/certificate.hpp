@@ -30,9 +30,6 @@ struct IterationResult {
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
   int corrections = 0;  ///< times that small clusters were put right
-  /// Work of the contacts' errors over the energy that contacts exchange: Certificate::by_work.
-  double error_work = 0;
-  double exchanged = 0;  ///< that energy [J]
   std::int64_t contacts = 0, active = 0;
   bool converged = false;
   bool diverged = false;   ///< the error grows without bound
@@ -102,6 +99,7 @@ struct SmallError {
   bool solved = true;   ///< answers were found for all that are wrong by more than what was asked for
   bool mends = false;   ///< of these some can be put right
   bool jammed = false;  ///< one has none: no velocities keep its contacts from approaching
+  Exchanged exchanged;  ///< by the contacts of all small clusters
 };
 
 /// Answers about the problem as a whole. Each costs about as much as ten to a hundred sweeps, and is asked
@@ -154,7 +152,7 @@ class Certificate {
   struct Scales {
     double rounding_velocity = 0;  ///< that rounding makes in gaps, over a step [m/s]
     /// Per wall, then per half of a periodic cell: the impulse that it is pushed with [N s].
-    std::vector<double> wall_pushes;
+    std::vector<double> wall_pushes = {};
     std::vector<double> wall_inv_masses = {};  ///< like these [1/kg]; 0: it is driven or fixed
     double drive = 0;                          ///< the largest speed of a driven wall [m/s]
   };
@@ -214,7 +212,7 @@ class Certificate {
  private:
   Verdict verdict_on(const CheckSums& sums, const Check& check, WholeProblem& whole);
   void measure(const CheckSums& sums);
-  double exchanged(const CheckSums& sums, double rounding) const;
+  double exchanged_by_large() const;
   double drift() const;
   double wall_scale() const;
   double largest_change(std::size_t from, std::size_t to) const;
@@ -227,6 +225,11 @@ class Certificate {
   std::vector<std::vector<Vec3>> wall_impulses_;  ///< like the history: per wall [N s]
   double residual2_ = 0;                          ///< at the last check [m^2/s^2]
   double scale2_ = 0;                             ///< what it is compared with [m^2/s^2]
+  /// Likewise: the work of the contacts' errors [J]; what contacts exchange, and of that those of small
+  /// clusters, as of the last answer about them; velocities that rounding makes pass [m/s].
+  double work_ = 0;
+  Exchanged exchanged_, exchanged_by_small_;
+  double rounding_ = 0;
   /// Of the first check of the step, or the first since ADMM, or since sweeps became plain [m^2/s^2].
   double first_residual2_ = 0;
   /// The last answer about the whole problem.

@@ -12,17 +12,11 @@
 
 namespace talus {
 
-/// What contacts have done to the grains; copies of a body count by their masses.
-struct Exchanged {
-  double energy = 0;  ///< sum of m |u - u_free|^2 / 2 [J]
-  double mass = 0;    ///< of the grains [kg]
-};
-
 /// What a check has measured, of all subdomains.
 struct CheckSums {
   ErrorSums error;  ///< all but its wall_impulse
   JumpSums jump;
-  Exchanged exchanged;
+  Exchanged exchanged;  ///< copies of a body count by their masses; nothing with friction
   /// Impulse of each wall on the grains [N s]; then, in a periodic cell, the two halves of the impulse of the
   /// contacts on it (kernels/bodies/cell_velocity.hpp), whose faces carry forces as walls would.
   std::vector<Vec3> wall_impulse;

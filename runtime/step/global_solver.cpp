@@ -280,7 +280,7 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   // For `correct` the contacts and their impulses are enough.
   if (!mends_) problems_ = {};
   for (BodyProblem& problem : problems_) problem.bodies = {};
-  return {error.relative(), error.solved, error.mends, error.jammed};
+  return {error.relative(), error.solved, error.mends, error.jammed, error.exchanged};
 }
 
 double GlobalSolver::large_error(double enough) const {

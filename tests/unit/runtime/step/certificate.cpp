@@ -29,7 +29,8 @@ class KnownProblem : public WholeProblem {
   bool large_clusters() override { return true; }
   SmallError small_error(double enough, int) override {
     const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
-    return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error), mends, jammed};
+    return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error), mends, jammed,
+            exchanged};
   }
   double large_error(double enough) override {
     const std::size_t which = std::min(asked_++, velocity_errors_.size() - 1);
@@ -40,6 +41,7 @@ class KnownProblem : public WholeProblem {
   WorstErrors worst_errors() override { return {}; }
   std::size_t asked() const { return asked_; }
   bool jammed = false, mends = false;  ///< what small clusters are besides
+  Exchanged exchanged;                 ///< by them
 
  private:
   double plain_sweeps_;
@@ -347,6 +349,38 @@ TEST(Certificate, RemembersWhatAWorkOfErrorsIsWorth) {
   given.checks.push_back({30, 1e-4, 1, 0.0045});
   EXPECT_EQ(judged(given).verdict, Verdict::solved);
   EXPECT_EQ(judged(given).velocity_checks, 1u);
+}
+
+/// Verdict on a work of errors of 0.02 J where grains of 1 kg exchange 1 J, velocities being wrong.
+Verdict doubted(Certificate::Scales scales, std::vector<double> impulses, Exchanged by_small = {}) {
+  SolverSettings settings;
+  settings.balance_tolerance = 0.05;
+  Certificate certificate(settings);
+  scales.wall_pushes.assign(impulses.size(), 0);
+  certificate.begin(std::move(scales));
+  KnownProblem problem(1, {0.5}, {0});
+  problem.exchanged = by_small;
+  Verdict verdict = Verdict::go_on;
+  for (const Found& found : {Found{0, 1}, Found{10, 1e-4, 1, 0.02}}) {
+    CheckSums sums = sums_of(found, 1000);
+    sums.wall_impulse.clear();
+    for (const double impulse : impulses) sums.wall_impulse.emplace_back(impulse, 0, 0);
+    verdict = certificate.judge(sums, {.iterations = found.iterations}, problem);
+  }
+  return verdict;
+}
+
+TEST(Certificate, ComparesTheWorkOfErrorsWithAllThatLargeClustersExchange) {
+  using enum Verdict;
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}}, {5}), go_on);
+  EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}), solved) << "a pushed wall of 4 kg: 25/8 J more";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0.1}}, {5}), go_on) << "of 10 kg: 25/20 J";
+  EXPECT_EQ(doubted({.wall_inv_masses = {1e6}}, {2}), go_on) << "a light one: 2 J, not 2e6";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}, .drive = 3}, {5}), solved) << "grains that follow a driven wall";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}, .drive = 1}, {5}), go_on);
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}}, {300}), solved) << "a hundredth of what presses: 3 m/s";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}, {.energy = 0.9, .mass = 0.5}), go_on)
+      << "what small clusters exchange is none of it";
 }
 
 TEST(Certificate, AResidualThatHasFallenFarPromisesABalanceThatIsChecked) {

@@ -32,9 +32,10 @@ struct Outcome {
   std::vector<double> reports;  ///< error and kinetic energy of each step
 };
 
-/// Runs `steps` steps, or to the end, from a checkpoint or from the beginning, on pretended ranks.
+/// Runs `steps` steps, or to the end, from a checkpoint or from the beginning, with edge^3 grains on
+/// pretended ranks.
 Outcome run(const talus::Setup& setup, int ranks, int threads, std::optional<int> steps,
-            const Whole* from = nullptr) {
+            const Whole* from = nullptr, int edge = 6) {
   Outcome outcome;
   std::mutex adding;
   graph::on_pretend_ranks(ranks, [&](const graph::Communicator& world) {
@@ -50,7 +51,7 @@ Outcome run(const talus::Setup& setup, int ranks, int threads, std::optional<int
       }
       simulation.emplace(setup, own, executor, world);
     } else {
-      simulation.emplace(setup, world.rank() == 0 ? test::jittered_lattice(6, 4, 0.1) : Bodies{}, executor,
+      simulation.emplace(setup, world.rank() == 0 ? test::jittered_lattice(edge, 4, 0.1) : Bodies{}, executor,
                          world);
     }
     std::vector<double> reports;
@@ -167,6 +168,24 @@ void spoil(bool wanted, std::vector<Row>& column) {
     std::swap(column.front(), column.back());
 }
 // A column that could be left out, or be wrong, without anybody's notice would not be worth its bytes.
+TEST(Checkpoints, KnowWhatAVelocityCheckHasFound) {
+  talus::Setup setup = test::pressed_setup(test::box_of_walls(-0.5, 8.5), 0, 20, 1e4, 1e4);
+  setup.detection.alert = 0.02;
+  setup.decomposition.subdomains = 3;
+  const auto numbers = [](const Whole& whole) {
+    std::vector<double> all;
+    VelocityErrorMemory::each_number(whole.head.velocity_errors, [&](const char*, const auto& number) {
+      all.push_back(static_cast<double>(number));
+    });
+    return all;
+  };
+  const Outcome half = run(setup, 1, 1, 10, nullptr, 9), whole = run(setup, 1, 1, {}, nullptr, 9);
+  ASSERT_GT(numbers(half.whole).back(), 0) << "velocities were checked, and sweeps counted since";
+  const Outcome resumed = run(setup, 2, 1, {}, &half.whole);
+  EXPECT_EQ(numbers(resumed.whole), numbers(whole.whole));
+  EXPECT_EQ(resumed.digest, whole.digest);
+}
+
 TEST(Checkpoints, ColumnsMatterToTheDigest) {
   talus::Setup setup = pressed(4);
   setup.solver.overlap_correction = 0.3;
