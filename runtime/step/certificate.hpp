@@ -99,7 +99,7 @@ struct SmallError {
   bool solved = true;   ///< answers were found for all that are wrong by more than what was asked for
   bool mends = false;   ///< of these some can be put right
   bool jammed = false;  ///< one has none: no velocities keep its contacts from approaching
-  Exchanged exchanged;  ///< by the contacts of all small clusters
+  Exchanged exchanged;  ///< by the contacts of small clusters that nothing else is asked of
 };
 
 /// Answers about the problem as a whole. Each costs about as much as ten to a hundred sweeps, and is asked
