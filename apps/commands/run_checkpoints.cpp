@@ -35,6 +35,7 @@ void each_number_of(Memory& memory, const Visit& visit) {
   visit("iterations", tally.iterations);
   visit("worst_error", tally.worst_error);
   visit("worst_balance", tally.worst_balance);
+  visit("worst_velocity", tally.worst_velocity);
   visit("worst_penetration", tally.worst_penetration);
   visit("worst_overlap", tally.worst_overlap);
   visit("last_overlap", tally.last_overlap);

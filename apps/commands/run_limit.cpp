@@ -46,7 +46,8 @@ double parse_duration(const std::string& text) {
   if (parts.size() == 2) parts.insert(parts.begin(), 0);
   seconds += parts[0];
   for (const std::size_t k : {1U, 2U}) {
-    if (parts[k] >= 60 && parts[0] > 0) refuse();
+    // 90:00 is an hour and a half, 0:99 a minute and some; 1:99 is neither.
+    if (parts[k] >= 60 && seconds > 0) refuse();
     seconds = 60 * seconds + parts[k];
   }
   if (seconds == 0) refuse();

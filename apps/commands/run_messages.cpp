@@ -25,6 +25,7 @@ void Tally::add(const Simulation& simulation) {
   if (simulation.iterations().jammed) ++jammed;
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
+  worst_velocity = larger(worst_velocity, report.velocity_error);
   worst_penetration = larger(worst_penetration, report.penetration_max);
   if (report.worst.contact_error > furthest.worst.contact_error) furthest = report;
   add_overlap(simulation);
@@ -54,6 +55,7 @@ void Tally::sum_up(const StepReport& last, io::Summary& summary) const {
   summary.converged_steps = last.step - unconverged;
   summary.worst_error_rms = worst_error;
   summary.worst_balance = worst_balance;
+  summary.worst_velocity_error = worst_velocity;
   summary.worst_penetration = worst_penetration;
   summary.overlapping_steps = overlapped;
   summary.worst_overlap = worst_overlap;
@@ -198,6 +200,11 @@ void print_end(const Terminal& terminal, const io::Summary& summary, const Solve
         "true",
         summary.unconverged_steps, summary.steps, summary.worst_error_rms, solver.tolerance,
         summary.worst_balance, solver.balance_tolerance, summary.worst_overlap, solver.overlap_tolerance);
+  if (summary.worst_velocity_error > solver.balance_tolerance)
+    terminal.say(
+        "velocities of clusters too large for a direct solve: within {:.2g} of what their contacts exchange "
+        "(`velocity_error` in steps.csv); solver.velocity_tolerance bounds it",
+        summary.worst_velocity_error);
   terminal.say("results in {}", directory);
 }
 

@@ -63,6 +63,14 @@ std::string verdict(const RunFolder& run, std::size_t steps, std::size_t missed)
          "bodies.";
 }
 
+/// The loosest bound of any stage; 0: not known.
+double velocity_allowed(const RunFolder& run) {
+  if (!run.scene) return 0;
+  const Setup& setup = run.scene->setup;
+  return setup.solver.velocity_allowed(std::ranges::any_of(
+      setup.stages, [](const Stage& stage) { return stage.laws.largest(&PairLaw::friction) > 0; }));
+}
+
 }  // namespace
 
 HtmlSections certificate_section(const RunFolder& run) {
@@ -91,6 +99,13 @@ HtmlSections certificate_section(const RunFolder& run) {
                            "Largest overlap at the end of the step, beyond those that the sample began with, "
                            "over the smaller "
                            "radius of the pair."})};
+  const auto& velocity_error = run.steps["velocity_error"];
+  if (std::ranges::any_of(velocity_error, [](double e) { return e > 0; }))
+    section.figures.push_back(bounded_figure(
+        run,
+        {"Error of velocities", "velocity_error", "velocity_error", velocity_allowed(run),
+         "In clusters of contacts that are too large for a direct solve: estimated momentum of the errors "
+         "of velocities, over what these contacts exchange."}));
   return {section};
 }
 

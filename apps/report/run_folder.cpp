@@ -39,7 +39,7 @@ RunFolder read_run_folder(const std::filesystem::path& directory) {
   run.steps = io::read_columns(
       directory / "steps.csv",
       {"step", "time", "time_step", "contacts", "active", "iterations", "error_rms", "error_max", "balance",
-       "overlap", "kinetic_translation", "kinetic_rotation", "wall_s", "converged"});
+       "velocity_error", "overlap", "kinetic_translation", "kinetic_rotation", "wall_s", "converged"});
   return run;
 }
 

@@ -103,7 +103,7 @@ AuditedRun audit_run(const io::Scene& scene, const Bodies& bodies, const AuditPl
       step.error_rms = report.error_rms;
       step.balance = report.balance;
       step.iterations = report.iterations;
-      step.claimed = std::max({report.error_rms, report.balance, solver.tolerance});
+      step.claimed = std::max({report.error_rms, report.balance, report.velocity_error, solver.tolerance});
       step.asked = std::max(solver.tolerance, solver.balance_tolerance);
       const auto audit_start = Clock::now();
       const Frame after = simulation.frame();

@@ -83,8 +83,9 @@ class EnergyLedger {
 };
 
 bool finite(const StepReport& report, const Frame& frame) {
-  for (double value : {report.error_rms, report.error_max, report.balance, report.penetration_mean,
-                       report.penetration_max, report.kinetic_translation, report.kinetic_rotation})
+  for (double value :
+       {report.error_rms, report.error_max, report.balance, report.velocity_error, report.penetration_mean,
+        report.penetration_max, report.kinetic_translation, report.kinetic_rotation})
     if (!std::isfinite(value)) return false;
   const auto all_finite = [](const std::vector<Vec3>& values) {
     return std::all_of(values.begin(), values.end(), [](const Vec3& v) { return v.allFinite(); });
@@ -164,7 +165,8 @@ void run_steps(const Problem& problem, double seconds, Outcome& outcome) {
     const StepView view{simulation, saved, before, after};
     std::optional<double> error;
     if (truth.error && (truth.from == TruthFrom::any_state || outcome.missed == 0)) error = truth.error(view);
-    double bound = problem.allowed > 0 ? problem.allowed : 2 * std::max(certified, tolerance);
+    double bound =
+        problem.allowed > 0 ? problem.allowed : 2 * std::max({certified, report.velocity_error, tolerance});
     if (truth.from == TruthFrom::rest) bound += distance_from_start(problem, view, at_start);
     const double share = error ? *error / bound : 0;
     if (!any_truth || !(share <= worst)) {

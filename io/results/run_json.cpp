@@ -100,6 +100,7 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"unconverged_steps", s.unconverged_steps},
       {"worst_error_rms", s.worst_error_rms},
       {"worst_balance", s.worst_balance},
+      {"worst_velocity_error", s.worst_velocity_error},
       {"worst_penetration", s.worst_penetration},
       {"overlapping_steps", s.overlapping_steps},
       {"worst_overlap", s.worst_overlap},

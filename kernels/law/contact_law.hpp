@@ -85,7 +85,7 @@ struct LawError {
   V impulse2;   ///< (W_nn |r|)^2
   V velocity2;  ///< |v + b n|^2 where the contact carries or closes, else 0
   V r_n;        ///< [N s]
-  V work;       ///< without friction: r_n times the root of residual2 [J]; else 0
+  V work;       ///< r_n times the root of residual2 [J]
 };
 
 /// Natural map of the De Saxce form, r - P_Kmu(r - rho (v + (b + mu |v_t|) n)) with rho = 1/W_nn.
@@ -97,9 +97,9 @@ template <class V, class Mu>
   const V v_t2 = fused_dot(v_t, v_t);
   const Space<V> v_hat = add_scaled(fused(V{} + mu, root(v_t2), v_n), n, v_t);
   const Space<V> p = w_nn * r, miss = p - project_on_cone(p - v_hat, n, mu);
-  const V r_n = fused_dot(r, n);
-  return {fused_dot(miss, miss), fused_dot(p, p), ((r_n > 0) | (v_n < 0)) ? fused(v_n, v_n, v_t2) : V{}, r_n,
-          V{}};
+  const V r_n = fused_dot(r, n), residual2 = fused_dot(miss, miss);
+  return {residual2, fused_dot(p, p), ((r_n > 0) | (v_n < 0)) ? fused(v_n, v_n, v_t2) : V{}, r_n,
+          r_n * root(residual2)};
 }
 
 /// The same without friction; `closing` is v_n + b [m/s].

@@ -118,6 +118,7 @@ ErrorSums error_blocks(const Contacts& contacts, ContactRange range, std::span<c
     sums.residual_max2 = std::max(sums.residual_max2, error.residual2);
     sums.impulse2 += error.impulse2;
     sums.velocity2 += error.velocity2;
+    sums.work += error.work;
     sums.active += error.r_n > 0 ? 1 : 0;
     ++sums.contacts;
     if (wall != nullptr) Map(sums.wall_impulse) += r;

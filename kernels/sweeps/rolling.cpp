@@ -113,6 +113,7 @@ void add_error_of_moments(const Contacts& contacts, ContactRange range, std::spa
     sums.residual_max2 = std::max(sums.residual_max2, error * error);
     const double carried = lever * contact.mobility * moment.norm();
     sums.impulse2 += carried * carried;
+    sums.work += moment.norm() * std::abs(error) / lever;
   }
 }
 

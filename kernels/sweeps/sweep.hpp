@@ -45,7 +45,7 @@ struct ErrorSums {
   double residual_max2 = 0;  ///< max of e^2 [m^2/s^2]
   double impulse2 = 0;       ///< sum of (|r|/rho)^2 [m^2/s^2]
   double velocity2 = 0;      ///< sum of |v + b n|^2 over contacts that carry or close [m^2/s^2]
-  double work = 0;           ///< without friction: sum of r_n |e| [J]; else 0
+  double work = 0;           ///< sum of r_n |e| [J]
   double wall_impulse[3]{};  ///< sum of r at a wall, on the grains [N s]
   std::int64_t contacts = 0;
   std::int64_t active = 0;  ///< r_n > 0

@@ -146,7 +146,7 @@ bool Certificate::even(WholeProblem& whole) {
 
 bool Certificate::balanced(WholeProblem& whole) {
   const double tolerance = settings_.balance_tolerance;
-  result_.unbalance = 0;
+  result_.unbalance = result_.velocity_error = 0;
   if (result_.contacts == 0) return true;
   const bool last = result_.iterations >= settings_.max_iterations;
   const int since = result_.iterations - started_at();
@@ -159,7 +159,7 @@ bool Certificate::balanced(WholeProblem& whole) {
   if (!small_ones && !last) return false;
   const double others = whole.large_clusters() ? large_unbalance(whole) : 0;
   result_.unbalance = larger(result_.unbalance, others);
-  return small_ones && others <= tolerance;
+  return small_ones && others <= tolerance && result_.velocity_error <= velocity_tolerance();
 }
 
 double Certificate::small_unbalance(WholeProblem& whole) {
@@ -181,13 +181,18 @@ double Certificate::small_unbalance(WholeProblem& whole) {
 }
 
 double Certificate::large_unbalance(WholeProblem& whole) {
-  if (checks_velocities(whole))
-    return repeated(large_check_, settings_.balance_tolerance,
-                    [&](double enough) { return whole.large_error(enough); });
+  if (checks_velocities(whole)) {
+    const double error = repeated(large_check_, settings_.balance_tolerance,
+                                  [&](double enough) { return whole.large_error(enough); });
+    result_.velocity_error =
+        larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work());
+    return error;
+  }
   if (!(result_.drift <= settings_.balance_tolerance)) return result_.drift;
   const double drifting =
       result_.drift > 0 ? unbalance(result_.drift, result_.iterations, whole.sweeps_needed()) : 0;
-  return drifting <= settings_.balance_tolerance ? larger(drifting, by_work(whole)) : drifting;
+  if (drifting <= settings_.balance_tolerance) result_.velocity_error = by_work(whole);
+  return drifting;
 }
 
 /// The energy that the contacts of large clusters exchange, of grains and walls of finite mass [J]. No less
@@ -213,14 +218,13 @@ double Certificate::exchanged_by_large() const {
 /// exchanged. The work of those residuals shows it: for the error e of the velocities sum r . H^T e is M (V -
 /// V_free) . e. What it is worth in velocities a check of these tells, now and then, and is remembered.
 double Certificate::by_work(WholeProblem& whole) {
-  const double tolerance = settings_.balance_tolerance, exchanged = exchanged_by_large();
-  const double work = work_ > 0 ? work_ / exchanged : 0;
+  const double tolerance = velocity_tolerance(), work = relative_work();
   VelocityErrorMemory& memory = whole.velocity_errors();
   if (memory.reuse().most * work <= tolerance) return memory.reuse().most * work;
   const int done = result_.iterations;
   if (asked_at_ == done) return asked_error_;
-  const VelocityErrorMemory::Problem problem{result_.contacts, exchanged};
-  const double expected = memory.per_work(problem) * work;
+  const VelocityErrorMemory::Problem problem{result_.contacts, exchanged_by_large()};
+  const double expected = memory.per_work(problem, scales_.friction) * work;
   // At the end of a step that is missed anyhow nothing more is asked.
   const bool stuck = (done >= settings_.max_iterations && result_.error_rms <= settings_.tolerance) ||
                      done >= std::max<double>(thresholds_.doubtful, thresholds_.doubt_again * asked_at_);
@@ -228,7 +232,7 @@ double Certificate::by_work(WholeProblem& whole) {
   asked_at_ = done;
   asked_error_ = whole.large_error(thresholds_.velocity_resolution * tolerance);
   memory.found(problem, asked_error_, work);
-  asked_error_ = larger(asked_error_, memory.reuse().credible * work);
+  asked_error_ = larger(asked_error_, memory.credible(scales_.friction) * work);
   return asked_error_;
 }
 

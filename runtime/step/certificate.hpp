@@ -27,6 +27,9 @@ struct IterationResult {
   double drift =
       0;  ///< relative change of the wall impulses over the second half of the sweeps, or since ADMM
   double unbalance = 0;  ///< estimate of the relative error of the forces: Certificate::balanced
+  /// Estimate of the relative error of velocities in large clusters; 0 where the step ended before it was
+  /// asked for.
+  double velocity_error = 0;
   BodyAdmmResult stiff;  ///< of the last call of ADMM in this step
   int stiff_calls = 0;
   int corrections = 0;  ///< times that small clusters were put right
@@ -155,6 +158,7 @@ class Certificate {
     std::vector<double> wall_pushes = {};
     std::vector<double> wall_inv_masses = {};  ///< like these [1/kg]; 0: it is driven or fixed
     double drive = 0;                          ///< the largest speed of a driven wall [m/s]
+    bool friction = false;                     ///< some contact has it
   };
   struct Check {
     int iterations = 0;       ///< sweeps done
@@ -177,7 +181,7 @@ class Certificate {
   bool checks_velocities(WholeProblem& whole) const;
   /// A check in this step has found the velocities of large clusters wrong, though their stiffness promised
   /// better.
-  bool found_wrong() const { return asked_error_ > settings_.balance_tolerance; }
+  bool found_wrong() const { return asked_error_ > velocity_tolerance(); }
   /// More plain sweeps than a problem of so many contacts should take.
   double stiff_for(std::int64_t contacts) const {
     return thresholds_.stiff_per_contact * static_cast<double>(contacts);
@@ -212,7 +216,9 @@ class Certificate {
  private:
   Verdict verdict_on(const CheckSums& sums, const Check& check, WholeProblem& whole);
   void measure(const CheckSums& sums);
+  double velocity_tolerance() const { return settings_.velocity_allowed(scales_.friction); }
   double exchanged_by_large() const;
+  double relative_work() const { return work_ > 0 ? work_ / exchanged_by_large() : 0; }
   double drift() const;
   double wall_scale() const;
   double largest_change(std::size_t from, std::size_t to) const;

@@ -31,7 +31,9 @@ struct StepReport {
   double error_quantile = 0;            ///< SolverSettings::quantile of them, where that has a tolerance
   WorstErrors worst = {};               ///< of a step whose iterations did not converge
   double balance = 0;  ///< estimated error of the forces, or momentum defect of the sample, the larger
-  double jump = 0;     ///< interface jump (several subdomains)
+  double velocity_error =
+      0;  ///< estimated error of velocities in clusters that no direct solve takes, over what they exchange
+  double jump = 0;                                   ///< interface jump (several subdomains)
   double penetration_mean = 0, penetration_max = 0;  ///< over smallest radius, at the end of the step
   double overlap = 0;  ///< largest that the run has made, over the pair's smaller radius (overlap.hpp)
   std::optional<BodyPair> overlapping = {};              ///< that pair, where it is beyond the tolerance
@@ -62,6 +64,7 @@ void each_number(Report& report, const Visit& visit) {
   visit("report_error_max", report.error_max);
   visit("report_error_quantile", report.error_quantile);
   visit("report_balance", report.balance);
+  visit("report_velocity_error", report.velocity_error);
   visit("report_jump", report.jump);
   visit("report_penetration_mean", report.penetration_mean);
   visit("report_penetration_max", report.penetration_max);

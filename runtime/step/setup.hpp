@@ -150,6 +150,14 @@ struct SolverSettings {
   double quantile = 0.99;  ///< in (0, 1]
   double balance_tolerance =
       5e-2;  ///< on balance: estimated error of wall forces and momentum (kernels/global/balance.hpp)
+  /// On velocity_error, of clusters that no direct solve takes; 0: balance_tolerance, with friction
+  /// sliding_over_balance times that (docs/decisions/0030-work-of-errors.md).
+  double velocity_tolerance = 0;
+  static constexpr double sliding_over_balance = 10;
+  double velocity_allowed(bool friction) const {
+    if (velocity_tolerance > 0) return velocity_tolerance;
+    return (friction ? sliding_over_balance : 1) * balance_tolerance;
+  }
   /// On overlap: depth of a pair at the end of a step, beyond what it was given, over the smaller radius.
   double overlap_tolerance = 0.05;
   int max_iterations = 2000;  ///< sweeps per step, >= 1

@@ -139,6 +139,7 @@ void add_error(ErrorSums& sums, const V3<double>& n, const V3<double>& r, const 
   sums.residual_max2 = std::max(sums.residual_max2, miss.dot(miss));
   sums.impulse2 += p.dot(p);
   if (r_n > 0 || v_n < 0) sums.velocity2 += std::fma(v_n, v_n, v_t2);
+  sums.work += r_n * std::sqrt(miss.dot(miss));
   sums.active += r_n > 0;
 }
 

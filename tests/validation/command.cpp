@@ -211,7 +211,7 @@ TEST_F(Command, WritesEveryFileOfItsPageAndTheyRead) {
   const Table steps = read_table(at("results/steps.csv"));
   EXPECT_EQ(steps.header,
             "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,error_quantile,"
-            "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,jump,"
+            "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,velocity_error,jump,"
             "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
             "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged");
   ASSERT_EQ(steps.rows.size(), 12U);

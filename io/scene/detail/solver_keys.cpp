@@ -52,6 +52,12 @@ Section<SolverSettings> solver_keys() {
               "Bound on the estimated error of the forces and on the momentum defect (balance).",
               &SolverSettings::balance_tolerance),
           key<SolverSettings>(
+              "velocity_tolerance", "", positive,
+              "Bound on the estimated error of the velocities in clusters of contacts that are "
+              "too large for a direct solve, over what these exchange (velocity_error).",
+              &SolverSettings::velocity_tolerance)
+              .or_auto(0, "`balance_tolerance`; in stages with friction ten times that"),
+          key<SolverSettings>(
               "overlap_tolerance", "", positive,
               "Bound on what two bodies, or a body and a wall, end a step in by, over the smaller radius and "
               "beyond what the sample began with (overlap).",

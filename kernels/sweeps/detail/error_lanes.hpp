@@ -24,6 +24,7 @@ template <class V>
   sums.impulse2 += error.impulse2;
   sums.velocity2 += error.velocity2;
   sums.residual2 += error.residual2;
+  sums.work += error.work;
   sums.residual_max2 = sums.residual_max2 < error.residual2 ? error.residual2 : sums.residual_max2;
   sums.active += error.r_n > 0 ? V{} + 1.0 : V{};
 }
@@ -105,16 +106,14 @@ template <bool Friction, bool AtWall, int W, class Rule, class Only, class Grain
   // Not approach_of, which needs w_tt and therefore gathers the spins: errors need neither.
   const Approach<V> contact{n, relative_velocity<Friction>(m, n), load<V>(c.of.bias + c.k, 0, only), m.w_nn,
                             V{}};
-  if constexpr (Friction) {
+  if constexpr (Friction)
     add_error(
         error_of_law(load_impulse<true, V>(c, 0, only, n), contact, rule.friction.template of<V>(c, 0, only)),
         sums);
-  } else {
-    const LawError<V> error =
-        error_of_law(load<V>(c.of.rn + c.k, 0, only), fused_dot(contact.v, n) + contact.bias, contact.w_nn);
-    add_error(error, sums);
-    sums.work += error.work;
-  }
+  else
+    add_error(
+        error_of_law(load<V>(c.of.rn + c.k, 0, only), fused_dot(contact.v, n) + contact.bias, contact.w_nn),
+        sums);
 }
 
 /// A function of its own for each kind of drift: together in one the registers of either are dealt worse, 4 %

@@ -11,8 +11,9 @@ TEST(WallLimit, ReadsTimesAsBatchSystemsWriteThem) {
   EXPECT_EQ(parse_duration("3:50:00"), 13800);
   EXPECT_EQ(parse_duration("50:30"), 3030);
   EXPECT_EQ(parse_duration("90:00"), 5400);
+  EXPECT_EQ(parse_duration("0:99"), 99);
   EXPECT_EQ(parse_duration("1-02:00:00"), 93600);
-  for (const char* text : {"", "60", "a:b", "1:2:3:4", "0:00", "2:60:00", "1-2", "-1:00", "1:00 "})
+  for (const char* text : {"", "60", "a:b", "1:2:3:4", "0:00", "2:60:00", "1:99", "1-2", "-1:00", "1:00 "})
     EXPECT_THROW(parse_duration(text), std::invalid_argument) << text;
 }
 

@@ -178,7 +178,7 @@ TEST(WholeFile, KeepsTheOldContentWhenTheNewDoesNotFit) {
 TEST(Csv, HeadersAreThosePromised) {
   EXPECT_EQ(steps_csv_header(),
             "step,time,time_step,candidates,contacts,active,iterations,error_rms,error_max,error_quantile,"
-            "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,jump,"
+            "worst_contact_body,worst_contact_with,worst_body,worst_body_error,balance,velocity_error,jump,"
             "penetration_mean,penetration_max,overlap,overlap_body,overlap_with,kinetic_translation,"
             "kinetic_rotation,solid_fraction,equilibrium,migrants,imbalance,wall_s,converged\n");
   EXPECT_EQ(walls_csv_header(),
@@ -191,14 +191,15 @@ TEST(Csv, HeadersAreThosePromised) {
 }
 
 TEST(Csv, StepsRowHoldsEveryValueInItsColumn) {
-  StepReport r{1,    2.5,  0.25, 3,    4,    5,  6,    7.5,  8.5,  8.75, {0.5, {2, 9}, 0.625, 3},
-               9.5,  10.5, 11.5, 12.5, 0.75, {}, 13.5, 14.5, 15.5, 19.5, 16,
-               17.5, 18.5, true};
+  StepReport r{1,   2.5,  0.25, 3,    4,    5,    6,  7.5,  8.5,  8.75, {0.5, {2, 9}, 0.625, 3},
+               9.5, 9.75, 10.5, 11.5, 12.5, 0.75, {}, 13.5, 14.5, 15.5, 19.5,
+               16,  17.5, 18.5, true};
   std::string row;
   append_steps_row(row, r);
-  EXPECT_EQ(row,
-            "1,2.5,0.25,3,4,5,6,7.5,8.5,8.75,2,9,3,0.625,9.5,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,"
-            "16,17.5,18.5,1\n");
+  EXPECT_EQ(
+      row,
+      "1,2.5,0.25,3,4,5,6,7.5,8.5,8.75,2,9,3,0.625,9.5,9.75,10.5,11.5,12.5,0.75,-1,-1,13.5,14.5,15.5,19.5,"
+      "16,17.5,18.5,1\n");
   r.overlapping = {7, -2};
   row.clear();
   append_steps_row(row, r);

@@ -60,8 +60,11 @@ TEST(Samples, OneSampleIsResolvedWithoutTheKeysOfSeveral) {
   const Scene scene = parse_scene(
       before + "[sample]\nkind = \"lattice\"\ncells = [2, 2, 2]\nradius = 0.01\n" + after, "s.toml");
   const std::string text = resolved_scene(scene);
-  for (const char* key : {"origin", "velocity", "[[sample]]", "name = \"\""})
-    EXPECT_EQ(text.find(key, text.find("[sample]")), std::string::npos) << key << " in\n" << text;
+  const std::size_t begin = text.find("[sample]");
+  const std::string sample = text.substr(begin, text.find("\n[", begin) - begin);
+  for (const char* key : {"origin", "velocity", "name = \"\""})
+    EXPECT_EQ(sample.find(key), std::string::npos) << key << " in\n" << sample;
+  EXPECT_EQ(text.find("[[sample]]"), std::string::npos);
 }
 
 TEST(Samples, OverridesNameOneOfSeveral) {

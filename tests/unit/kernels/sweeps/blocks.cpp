@@ -163,6 +163,7 @@ TEST(Blocks, OfSpheresAreSweptAsSpheresAre) {
                     spheres = kernels.error_grains<true>(sphere.contacts, {0, 1}, sphere.velocity, 0.4);
     EXPECT_NEAR(blocks.impulse2, spheres.impulse2, 1e-11);
     EXPECT_NEAR(blocks.velocity2, spheres.velocity2, 1e-11);
+    EXPECT_NEAR(blocks.work, spheres.work, 1e-11);
   }
 }
 

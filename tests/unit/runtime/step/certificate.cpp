@@ -345,16 +345,15 @@ TEST(Certificate, RemembersWhatAWorkOfErrorsIsWorth) {
                   .verdict = Verdict::go_on,
                   .velocity_errors = {0.2}};
   EXPECT_EQ(judged(given).verdict, Verdict::go_on);
-  EXPECT_NEAR(judged(given).result.unbalance, 0.08, 1e-12);
+  EXPECT_NEAR(judged(given).result.velocity_error, 0.08, 1e-12);
   given.checks.push_back({30, 1e-4, 1, 0.0045});
   EXPECT_EQ(judged(given).verdict, Verdict::solved);
   EXPECT_EQ(judged(given).velocity_checks, 1u);
 }
 
 /// Verdict on a work of errors of 0.02 J where grains of 1 kg exchange 1 J, velocities being wrong.
-Verdict doubted(Certificate::Scales scales, std::vector<double> impulses, Exchanged by_small = {}) {
-  SolverSettings settings;
-  settings.balance_tolerance = 0.05;
+Verdict doubted(Certificate::Scales scales, std::vector<double> impulses, Exchanged by_small = {},
+                SolverSettings settings = {.balance_tolerance = 0.05}) {
   Certificate certificate(settings);
   scales.wall_pushes.assign(impulses.size(), 0);
   certificate.begin(std::move(scales));
@@ -381,6 +380,15 @@ TEST(Certificate, ComparesTheWorkOfErrorsWithAllThatLargeClustersExchange) {
   EXPECT_EQ(doubted({.wall_inv_masses = {0}}, {300}), solved) << "a hundredth of what presses: 3 m/s";
   EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}, {.energy = 0.9, .mass = 0.5}), go_on)
       << "what small clusters exchange is none of it";
+}
+
+TEST(Certificate, BoundsVelocitiesMoreLooselyWithFrictionOrAsTheUserSays) {
+  using enum Verdict;
+  // A work of 0.02 is taken for an error of 0.2.
+  EXPECT_EQ(doubted({}, {}), go_on);
+  EXPECT_EQ(doubted({.friction = true}, {}), solved) << "ten times the bound of 0.05";
+  EXPECT_EQ(doubted({.friction = true}, {}, {}, {.velocity_tolerance = 0.1}), go_on);
+  EXPECT_EQ(doubted({}, {}, {}, {.velocity_tolerance = 0.3}), solved);
 }
 
 TEST(Certificate, AResidualThatHasFallenFarPromisesABalanceThatIsChecked) {
