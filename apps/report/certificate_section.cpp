@@ -103,7 +103,7 @@ HtmlSections certificate_section(const RunFolder& run) {
   if (std::ranges::any_of(velocity_error, [](double e) { return e > 0; }))
     section.figures.push_back(bounded_figure(
         run,
-        {"Error of velocities", "velocity_error", "velocity_error", velocity_allowed(run),
+        {"Error of velocities", "error, velocities", "velocity_error", velocity_allowed(run),
          "In clusters of contacts that are too large for a direct solve: estimated momentum of the errors "
          "of velocities, over what these contacts exchange."}));
   return {section};

@@ -7,6 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <map>
+#include <regex>
+#include <set>
 
 #include "tests/unit/io/results/output_helpers.hpp"
 #include "tests/validation/command_helpers.hpp"
@@ -105,6 +108,38 @@ TEST_F(StudyError, OneStepIsSolvedInEveryWayUntilItsTolerance) {
   const std::string page = content(at("s/report.html"));
   EXPECT_NE(page.find("<svg"), std::string::npos);
   EXPECT_NE(page.find("not unique"), std::string::npos) << "the page says what the reference is worth";
+}
+
+/// Colours of the lines in the legends of all pictures in a folder, per name up to a comma.
+std::map<std::string, std::set<std::string>> colours_in(const fs::path& folder) {
+  static const std::regex entry(
+      "<line [^>]*stroke=\"(#[0-9a-f]+)\"[^>]*/>\\s*<text [^>]*>([^<,]+)[^<]*</text>");
+  std::map<std::string, std::set<std::string>> colours;
+  for (const auto& file : fs::directory_iterator(folder)) {
+    if (file.path().extension() != ".svg") continue;
+    const std::string picture = content(file.path());
+    for (std::sregex_iterator found(picture.begin(), picture.end(), entry), end; found != end; ++found)
+      colours[(*found)[2]].insert((*found)[1]);
+  }
+  return colours;
+}
+
+TEST_F(StudyError, AMethodHasTheSameColourInEveryPictureOfEveryStudy) {
+  const std::string step = "study error scene.toml --threads 1 --only step --at-step 3 --tolerances 1e-2 ";
+  ASSERT_EQ(run(step + "--out all --methods auto,nlgs,nncg").code, 0);
+  ASSERT_EQ(run(step + "--out one --methods nncg,nlgs").code, 0);
+  const auto all = colours_in(at("all")), one = colours_in(at("one"));
+  std::set<std::string> different;
+  for (const std::string method : {"auto", "nlgs", "nncg"}) {
+    ASSERT_EQ(all.count(method), 1U) << method;
+    EXPECT_EQ(all.at(method).size(), 1U) << method;
+    different.insert(*all.at(method).begin());
+  }
+  for (const std::string method : {"nlgs", "nncg"}) {
+    ASSERT_EQ(one.count(method), 1U) << method;
+    EXPECT_EQ(one.at(method), all.at(method)) << method;
+  }
+  EXPECT_EQ(different.size(), 3U);
 }
 
 /// The residual of a long column is small long before anything is carried: `auto`, which the reference tries
