@@ -25,7 +25,7 @@ void Tally::add(const Simulation& simulation) {
   if (simulation.iterations().jammed) ++jammed;
   worst_error = larger(worst_error, report.error_rms);
   worst_balance = larger(worst_balance, report.balance);
-  worst_velocity = larger(worst_velocity, report.velocity_error);
+  if (report.converged) worst_velocity = larger(worst_velocity, report.velocity_error);
   worst_penetration = larger(worst_penetration, report.penetration_max);
   if (report.worst.contact_error > furthest.worst.contact_error) furthest = report;
   add_overlap(simulation);

@@ -25,7 +25,7 @@ struct Tally {
   std::int64_t iterations = 0;
   double worst_error = 0;
   double worst_balance = 0;
-  double worst_velocity = 0;
+  double worst_velocity = 0;                   ///< of the steps that are certified
   double worst_penetration = 0;                ///< [smallest radius]
   double worst_overlap = 0, last_overlap = 0;  ///< [smaller radius of a pair]: of all steps, of the last
   std::int64_t overlapped = 0;                 ///< steps that ended with an overlap beyond its tolerance

@@ -61,7 +61,7 @@ struct Summary {
   std::int64_t unconverged_steps = 0;
   double worst_error_rms = 0;                  ///< over all steps
   double worst_balance = 0;                    ///< over all steps
-  double worst_velocity_error = 0;             ///< over all steps
+  double worst_velocity_error = 0;             ///< over the certified steps
   double worst_penetration = 0;                ///< over all steps, in smallest radii
   std::int64_t overlapping_steps = 0;          ///< that ended with an overlap beyond its tolerance
   double worst_overlap = 0;                    ///< over all steps, in smaller radii of a pair

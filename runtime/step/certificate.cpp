@@ -64,6 +64,7 @@ Verdict Certificate::verdict_on(const CheckSums& sums, const Check& check, Whole
       judged && result_.error_rms <= settings_.tolerance && result_.error_max <= settings_.worst_allowed();
   const bool last = check.iterations >= settings_.max_iterations;
   result_.unbalance = result_.drift;
+  result_.velocity_error = 0;
   // Only a step that may end pays for an answer about the whole problem.
   const bool balance = (small || last) && balanced(whole);
   result_.converged = ((small && balance) || last) && even(whole) && small && balance;
@@ -182,7 +183,7 @@ double Certificate::small_unbalance(WholeProblem& whole) {
 
 double Certificate::large_unbalance(WholeProblem& whole) {
   if (checks_velocities(whole)) {
-    const double error = repeated(large_check_, settings_.balance_tolerance,
+    const double error = repeated(large_check_, std::min(settings_.balance_tolerance, velocity_tolerance()),
                                   [&](double enough) { return whole.large_error(enough); });
     result_.velocity_error =
         larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work());

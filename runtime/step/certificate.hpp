@@ -158,7 +158,7 @@ class Certificate {
     std::vector<double> wall_pushes = {};
     std::vector<double> wall_inv_masses = {};  ///< like these [1/kg]; 0: it is driven or fixed
     double drive = 0;                          ///< the largest speed of a driven wall [m/s]
-    bool friction = false;                     ///< some contact has it
+    bool friction = false;                     ///< a coefficient is > 0
   };
   struct Check {
     int iterations = 0;       ///< sweeps done

@@ -90,7 +90,7 @@ std::vector<double> check_rows(const StepState& state, const ChunkErrors& errors
   for (std::size_t e = 0; e < here.size(); ++e) {
     const JumpSums jump = jumps.empty() ? JumpSums{} : jumps[e];
     const ErrorSums& own = added[e];
-    const Exchanged exchanged = own.work > 0 ? exchanged_in(state, SubdomainPlace(e)) : Exchanged{};
+    const Exchanged exchanged = exchanged_in(state, SubdomainPlace(e));
     write_row(CheckRow{.subdomain = static_cast<double>(here[SubdomainPlace(e)].value()),
                        .residual2 = own.residual2,
                        .residual_max2 = own.residual_max2,

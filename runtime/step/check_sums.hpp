@@ -16,7 +16,7 @@ namespace talus {
 struct CheckSums {
   ErrorSums error;  ///< all but its wall_impulse
   JumpSums jump;
-  Exchanged exchanged;  ///< copies of a body count by their masses; of subdomains whose errors do work
+  Exchanged exchanged;  ///< copies of a body count by their masses
   /// Impulse of each wall on the grains [N s]; then, in a periodic cell, the two halves of the impulse of the
   /// contacts on it (kernels/bodies/cell_velocity.hpp), whose faces carry forces as walls would.
   std::vector<Vec3> wall_impulse;

@@ -280,8 +280,11 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
   // For `correct` the contacts and their impulses are enough.
   if (!mends_) problems_ = {};
   for (BodyProblem& problem : problems_) problem.bodies = {};
-  // What is asked of the large clusters is asked of small ones, too, where these are looked at twice.
-  return {error.relative(), error.solved, error.mends, error.jammed, twice_ ? Exchanged{} : error.exchanged};
+  // What is asked of the large clusters is asked of small ones, too, where these are looked at twice. Where
+  // more than r is known of contacts, the free velocities of clusters hold it, and those of all bodies do
+  // not.
+  const bool apart = !twice_ && !knows_more(parameters_);
+  return {error.relative(), error.solved, error.mends, error.jammed, apart ? error.exchanged : Exchanged{}};
 }
 
 double GlobalSolver::large_error(double enough) const {

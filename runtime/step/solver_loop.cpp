@@ -150,7 +150,7 @@ void SolverLoop::begin() {
       scales.drive = std::max(scales.drive, state_.wall_states[w].free_velocity.norm());
   }
   scales.wall_inv_masses.resize(pushed_vectors(state_), state_.cell.loaded() ? 1 / state_.cell.mass : 0);
-  scales.friction = parameters_.friction;
+  scales.friction = parameters_.laws.largest(&PairLaw::friction) > 0;
   certificate_.begin(std::move(scales));
   problem_.begin();
   pending_.reset();

@@ -145,7 +145,7 @@ int standing_steps(double angle) {
 // fall, and every contact is nearly right then.
 TEST(LargeVault, WithFrictionMovesNoMoreThanItIsCertifiedTo) {
   standing_steps(0.003);
-  standing_steps(0.1);
+  EXPECT_GT(standing_steps(0.1), 0) << "not all is missed";
   EXPECT_EQ(standing_steps(0.8), 6) << "a steep one stands";
 }
 
