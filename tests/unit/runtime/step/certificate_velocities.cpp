@@ -1,0 +1,67 @@
+// What a certificate says of the velocities of large clusters, from the work of the contacts' errors.
+
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+#include "tests/unit/runtime/step/known_problem.hpp"
+
+namespace talus::certificate_test {
+namespace {
+
+TEST(Certificate, RemembersWhatAWorkOfErrorsIsWorth) {
+  // 0.2 for 0.04: the next 0.008 are taken for twice 0.04, and 0.004 for 0.04, without another check.
+  Situation given{.what = "",
+                  .checks = {{0, 1}, {10, 1e-4, 1, 0.04}, {20, 1e-4, 1, 0.008}},
+                  .verdict = Verdict::go_on,
+                  .velocity_errors = {0.2}};
+  EXPECT_EQ(judged(given).verdict, Verdict::go_on);
+  EXPECT_NEAR(judged(given).result.velocity_error, 0.08, 1e-12);
+  given.checks.push_back({30, 1e-4, 1, 0.0045});
+  EXPECT_EQ(judged(given).verdict, Verdict::solved);
+  EXPECT_EQ(judged(given).velocity_checks, 1u);
+}
+
+/// Verdict on a work of errors of 0.02 J where grains of 1 kg exchange 1 J, velocities being wrong.
+Verdict doubted(Certificate::Scales scales, std::vector<double> impulses, Exchanged by_small = {},
+                SolverSettings settings = {.balance_tolerance = 0.05}) {
+  Certificate certificate(settings);
+  scales.wall_pushes.assign(impulses.size(), 0);
+  certificate.begin(std::move(scales));
+  KnownProblem problem(1, {0.5}, {0});
+  problem.exchanged = by_small;
+  Verdict verdict = Verdict::go_on;
+  for (const Found& found : {Found{0, 1}, Found{10, 1e-4, 1, 0.02}}) {
+    CheckSums sums = sums_of(found, 1000);
+    sums.wall_impulse.clear();
+    for (const double impulse : impulses) sums.wall_impulse.emplace_back(impulse, 0, 0);
+    verdict = certificate.judge(sums, {.iterations = found.iterations}, problem);
+  }
+  return verdict;
+}
+
+TEST(Certificate, ComparesTheWorkOfErrorsWithAllThatLargeClustersExchange) {
+  using enum Verdict;
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}}, {5}), go_on);
+  EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}), solved) << "a pushed wall of 4 kg: 25/8 J more";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0.1}}, {5}), go_on) << "of 10 kg: 25/20 J";
+  EXPECT_EQ(doubted({.wall_inv_masses = {1e6}}, {2}), go_on) << "a light one: 2 J, not 2e6";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}, .drive = 3}, {5}), solved) << "grains that follow a driven wall";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}, .drive = 1}, {5}), go_on);
+  EXPECT_EQ(doubted({.wall_inv_masses = {0}}, {300}), solved) << "a hundredth of what presses: 3 m/s";
+  EXPECT_EQ(doubted({.wall_inv_masses = {0.25}}, {5}, {.energy = 0.9, .mass = 0.5}), go_on)
+      << "what small clusters exchange is none of it";
+}
+
+TEST(Certificate, BoundsVelocitiesMoreLooselyWithFrictionOrAsTheUserSays) {
+  using enum Verdict;
+  // A work of 0.02 is taken for an error of 0.2.
+  EXPECT_EQ(doubted({}, {}), go_on);
+  EXPECT_EQ(doubted({.friction = true}, {}), solved) << "ten times the bound of 0.05";
+  EXPECT_EQ(doubted({.friction = true}, {}, {}, {.velocity_tolerance = 0.1}), go_on);
+  EXPECT_EQ(doubted({}, {}, {}, {.velocity_tolerance = 0.3}), solved);
+}
+
+}  // namespace
+}  // namespace talus::certificate_test
