@@ -26,6 +26,7 @@
 #include "apps/shared/scene_warnings.hpp"
 #include "apps/shared/state_sample.hpp"
 #include "apps/shared/trace_feed.hpp"
+#include "io/files/crc.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
@@ -118,15 +119,13 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
   const EarlierRun earlier = earlier_run(run.directory);
   if (run.point) {
     compare_scenes(run.scene, run.resolved, *run.point);
+    if (ranks.rank() == 0) demand_files_of_run(run.directory, run.point->memory.mark);
     if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
     take_over(*run.point, run.scene);
     run.warnings = earlier.warnings;
     run.bodies = earlier.bodies;
   } else if (earlier.complete) {
     run.nothing_left = earlier.exit_code;
-    if (ranks.rank() != 0) return;
-    place_sample(run);  // scene.resolved.toml says where its walls stood
-    demand_scene_of_done_run(run.directory, io::resolved_scene(run.scene));
   }
 }
 
@@ -170,9 +169,15 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
   });
   if (!loaded) return false;
   if (options.resume && !agreed([&] { look_for_checkpoint(ranks, terminal, run); })) return false;
-  if (run.point || run.nothing_left) return true;
+  if (run.point) return true;
   return agreed([&] {
-    if (ranks.rank() == 0) make_sample(options, terminal, run);
+    if (ranks.rank() != 0) return;
+    if (run.nothing_left)
+      place_sample(run);  // scene.resolved.toml says where its walls stood
+    else
+      make_sample(options, terminal, run);
+    if (options.resume && std::filesystem::is_directory(run.directory))
+      demand_results_of_scene(run.directory, run.scene, run.nothing_left.has_value());
   });
 }
 
@@ -182,8 +187,8 @@ bool take_directory(const RunOptions& options, const graph::Communicator& ranks,
   if (ranks.rank() == 0 && !run.point) {
     try {
       run.lock.reset();
-      run.lock.emplace(
-          io::prepare_output_directory(run.directory, options.force || options.resume, io::is_output_name));
+      run.lock.emplace(io::prepare_output_directory(run.directory, options.force || options.resume,
+                                                    io::is_output_name, resolved_text));
     } catch (const io::FileError& error) {
       refused = error.what();
     }
@@ -200,6 +205,8 @@ io::Provenance provenance_of(const RunOptions& options, const graph::Communicato
   provenance.command_line = options.command_line;
   provenance.seed = scene.setup.seed;
   provenance.scene_file = scene.source_file;
+  for (const std::string& file : io::input_files(scene))
+    provenance.input_files.push_back({file, io::crc_of_file(file)});
   if (!run.point) return provenance;
   provenance.resumed = io::resumptions_in(run.directory + "/run.json");
   io::Resumption now{provenance.date_utc,

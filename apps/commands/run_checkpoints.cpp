@@ -70,13 +70,15 @@ std::string text_of(const RunMemory& memory) {
   const BodyPair& furthest = memory.tally.furthest.worst.contact;
   write("furthest_pair", std::vector<std::int64_t>{furthest.body, furthest.with});
   std::vector<std::string> files;
-  std::vector<std::int64_t> bytes;
-  for (const auto& [file, length] : memory.mark.bytes) {
+  std::vector<std::int64_t> bytes, crcs;
+  for (const auto& [file, mark] : memory.mark.files) {
     files.push_back(file);
-    bytes.push_back(length);
+    bytes.push_back(mark.bytes);
+    crcs.push_back(mark.crc);
   }
   write("files", files);
   write("bytes", bytes);
+  write("crcs", crcs);
   return write.text();
 }
 
@@ -84,18 +86,21 @@ RunMemory read_memory(const std::string& text, const std::string& file) {
   const io::NumberReader read(text, file);
   RunMemory memory;
   each_number_of(memory, read);
-  if (read.has("jammed")) read("jammed", memory.tally.jammed);  // checkpoints before 26 November 2026 lack it
-  std::vector<std::int64_t> deepest, furthest, bytes;
+  read("jammed", memory.tally.jammed);
+  std::vector<std::int64_t> deepest, furthest, bytes, crcs;
   std::vector<std::string> files;
   read("deepest_pair", deepest);
   read("furthest_pair", furthest);
   read("files", files);
   read("bytes", bytes);
-  if (deepest.size() != 2 || furthest.size() != 2 || files.size() != bytes.size())
+  read("crcs", crcs);
+  if (deepest.size() != 2 || furthest.size() != 2 || files.size() != bytes.size() ||
+      files.size() != crcs.size())
     throw io::FileError(file, "is damaged");
   if (deepest[0] >= 0) memory.tally.deepest.overlapping = BodyPair{deepest[0], deepest[1]};
   memory.tally.furthest.worst.contact = {furthest[0], furthest[1]};
-  for (std::size_t k = 0; k < files.size(); ++k) memory.mark.bytes[files[k]] = bytes[k];
+  for (std::size_t k = 0; k < files.size(); ++k)
+    memory.mark.files[files[k]] = {bytes[k], static_cast<std::uint32_t>(crcs[k])};
   return memory;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,10 @@
 #include <utility>
 
 #include "io/checkpoint/checkpoint_folder.hpp"
+#include "io/files/crc.hpp"
+#include "io/files/output_directory.hpp"
+#include "io/output/sinks.hpp"
+#include "io/results/run_json.hpp"
 #include "runtime/step/decomposition.hpp"
 
 namespace talus {
@@ -95,22 +100,41 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
       point.path.string(), fmt::join(refused, "; ")));
 }
 
-void demand_scene_of_done_run(const std::filesystem::path& directory, const std::string& resolved) {
-  const std::filesystem::path path = directory / "scene.resolved.toml";
-  std::ifstream file(path, std::ios::binary);
+void demand_files_of_run(const std::filesystem::path& directory, const io::OutputMark& mark) {
+  for (const auto& [name, known] : mark.files) {
+    const std::filesystem::path path = directory / name;
+    if (!std::filesystem::exists(path) || io::crc_of_file(path, known.bytes) == known.crc) continue;
+    throw std::invalid_argument(
+        fmt::format("{}: the run wrote {} bytes until the checkpoint, and these are others. Put the file "
+                    "back, or begin a "
+                    "run in another directory, from this state if you like ([sample] kind = \"state\")",
+                    path.string(), known.bytes));
+  }
+}
+
+void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
+  std::ifstream file(directory / resolved_text, std::ios::binary);
   const std::string then(std::istreambuf_iterator<char>(file), {});
-  if (then.empty())
-    throw std::invalid_argument(fmt::format(
-        "{}: cannot be read, so that nobody knows of which scene the run there was. Begin a run in another "
-        "directory",
-        path.string()));
+  if (then.empty()) {
+    for (const std::filesystem::path& path : io::outputs_in(directory, io::is_output_name))
+      if (path != "run.log" && path.stem() != resolved_text && path != resolved_text)
+        throw std::invalid_argument(fmt::format(
+            "{}: no {} beside it says of which scene it is, and --resume would replace it. Begin a run in "
+            "another directory, or give --force in place of --resume",
+            (directory / path).string(), resolved_text));
+    return;
+  }
   std::vector<std::string> differences;
-  for (const io::SceneChange& change : io::scene_changes(then, resolved))
-    differences.push_back(io::describe(change));
+  for (const io::SceneChange& change : io::scene_changes(then, io::resolved_scene(scene)))
+    if (done || !change.allowed) differences.push_back(io::describe(change));
+  const std::vector<std::string> inputs = io::input_files(scene);
+  for (const auto& [path, crc] : io::input_files_in(directory / "run.json"))
+    if (std::ranges::find(inputs, path) != inputs.end() && io::crc_of_file(path) != crc)
+      differences.push_back(path + " has changed");
   if (differences.empty()) return;
   throw std::invalid_argument(fmt::format(
-      "the run in {} is done, left no checkpoint to go on from, and was of another scene: {}. Begin "
-      "a run in another directory",
+      "the run in {} left no checkpoint to go on from, and was of another scene: {}. Begin a run in another "
+      "directory, or replace its results by --force in place of --resume",
       directory.string(), fmt::join(differences, "; ")));
 }
 

@@ -33,9 +33,14 @@ std::optional<ResumePoint> find_resume_point(const std::filesystem::path& direct
 /// std::invalid_argument naming what differs and may not, an input file that has changed included.
 void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumePoint& point);
 
-/// Of a run that is done and left no checkpoint: throws std::invalid_argument naming what differs between its
-/// scene and `resolved`, that of now with its walls placed. Such a run cannot go on under another scene.
-void demand_scene_of_done_run(const std::filesystem::path& directory, const std::string& resolved);
+/// Throws std::invalid_argument naming a file of the directory that is not the one which the run wrote until
+/// the checkpoint, so that it could not go on in it. What is not there is not looked at.
+void demand_files_of_run(const std::filesystem::path& directory, const io::OutputMark& mark);
+
+/// Of a directory without a checkpoint: throws std::invalid_argument unless the results in it, if there are
+/// any, are those of this scene, whose walls have been placed. Of a run that is done nothing may differ, of
+/// another one what a checkpoint would let change.
+void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done);
 
 /// Completes the scene with what the checkpoint knows: how many subdomains, and where the walls stood at
 /// first.

@@ -29,7 +29,7 @@ using detail::Place;
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they stand in memory");
 
-constexpr std::int64_t format_version = 6;
+constexpr std::int64_t format_version = 7;
 
 /// 64 bits of every byte and its place; no cryptography, but any flipped bit shows.
 std::uint64_t checksum(std::span<const std::byte> bytes) {

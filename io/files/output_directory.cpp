@@ -32,20 +32,6 @@ std::string whole_name(std::string name) {
   return name;
 }
 
-/// Regular files of a former run, relative names. Symbolic links are the user's and are not in the list.
-std::vector<fs::path> former_outputs(const fs::path& directory, IsOutputName is_ours) {
-  std::vector<fs::path> found;
-  for (const fs::path& folder : {directory, directory / "fields", directory / "traces"}) {
-    if (!fs::is_directory(folder) || (folder != directory && fs::is_symlink(folder))) continue;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      if (entry.is_symlink() || !entry.is_regular_file()) continue;
-      const fs::path relative = entry.path().lexically_relative(directory);
-      if (is_ours(whole_name(relative.generic_string()))) found.push_back(relative);
-    }
-  }
-  return found;
-}
-
 /// A symbolic link in the place of a file or folder that a run may write, relative; empty: there is none.
 /// Files are opened by name, so that results would go where it leads.
 fs::path link_in_the_way(const fs::path& directory, IsOutputName is_ours) {
@@ -85,7 +71,21 @@ DirectoryLock::~DirectoryLock() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-DirectoryLock prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours) {
+std::vector<fs::path> outputs_in(const fs::path& directory, IsOutputName is_ours) {
+  std::vector<fs::path> found;
+  for (const fs::path& folder : {directory, directory / "fields", directory / "traces"}) {
+    if (!fs::is_directory(folder) || (folder != directory && fs::is_symlink(folder))) continue;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (entry.is_symlink() || !entry.is_regular_file()) continue;
+      const fs::path relative = entry.path().lexically_relative(directory);
+      if (is_ours(whole_name(relative.generic_string()))) found.push_back(relative);
+    }
+  }
+  return found;
+}
+
+DirectoryLock prepare_output_directory(const fs::path& directory, bool force, IsOutputName is_ours,
+                                       const fs::path& last) {
   try {
     if (fs::exists(directory) && !fs::is_directory(directory)) {
       throw FileError(directory.string(), "is a file, not a directory; give another name with --out");
@@ -103,7 +103,9 @@ DirectoryLock prepare_output_directory(const fs::path& directory, bool force, Is
         throw FileError((directory / link).string(),
                         "is a symbolic link, and results would be written where it leads; remove it, or "
                         "choose another directory with --out");
-      for (const fs::path& relative : former_outputs(directory, is_ours)) fs::remove(directory / relative);
+      for (const fs::path& relative : outputs_in(directory, is_ours))
+        if (relative != last) fs::remove(directory / relative);
+      if (!last.empty() && is_ours(last.string())) fs::remove(directory / last);
     }
     // Asked before the run starts, not an hour later when the first file is written.
     if (::access(directory.c_str(), W_OK | X_OK) != 0)

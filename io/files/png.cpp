@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "io/files/crc.hpp"
+
 namespace talus::io {
 namespace {
 
@@ -17,8 +19,7 @@ void append_chunk(std::string& file, std::string_view name, const std::string& c
   append_number(file, static_cast<std::uint32_t>(content.size()));
   const std::string checked = std::string(name) + content;
   file += checked;
-  append_number(file, static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(checked.data()),
-                                                       static_cast<uInt>(checked.size()))));
+  append_number(file, crc_of(checked));
 }
 
 /// Each row behind the number of its filter: 1, differences from the pixel before.

@@ -25,6 +25,7 @@
 #include <string>
 #include <vector>
 
+#include "io/files/crc.hpp"
 #include "io/pictures/picture.hpp"
 #include "io/results/results.hpp"
 #include "io/results/run_json.hpp"
@@ -70,8 +71,8 @@ struct StepRecord {
 
 /// How far the files of a run are: a checkpoint keeps it.
 struct OutputMark {
-  std::map<std::string, std::int64_t> bytes = {};  ///< of files that grow, by their names in the directory
-  std::vector<double> frame_times = {};            ///< [s] of the frames
+  std::map<std::string, FileMark> files = {};  ///< that grow, by their names in the directory
+  std::vector<double> frame_times = {};        ///< [s] of the frames
 };
 
 class OutputSink {

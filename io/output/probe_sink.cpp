@@ -18,14 +18,14 @@ class ProbeSink : public OutputSink {
 
   void resume(const OutputMark& mark) override {
     if (!writes_) return;
-    const auto known = mark.bytes.find(probes_name);
-    if (known != mark.bytes.end())
+    const auto known = mark.files.find(probes_name);
+    if (known != mark.files.end())
       file_.emplace(path_, known->second);
     else
       std::filesystem::remove(path_);
   }
   void mark(OutputMark& mark) override {
-    if (file_) mark.bytes[probes_name] = file_->sync();
+    if (file_) mark.files[probes_name] = file_->sync();
   }
   void step(const StepRecord& record) override {
     for (const ProbeReport& report : record.probes) {

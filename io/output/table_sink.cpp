@@ -38,9 +38,9 @@ class TableSink : public OutputSink {
   void resume(const OutputMark& mark) override {
     if (!writes_) return;
     for (std::size_t k = 0; k < names.size(); ++k) {
-      const auto known = mark.bytes.find(std::string(names[k]));
+      const auto known = mark.files.find(std::string(names[k]));
       const std::filesystem::path path = directory_ / names[k];
-      if (known != mark.bytes.end())
+      if (known != mark.files.end())
         table_[k].emplace(path, known->second);
       else
         std::filesystem::remove(path);
@@ -48,7 +48,7 @@ class TableSink : public OutputSink {
   }
   void mark(OutputMark& mark) override {
     for (std::size_t k = 0; k < names.size(); ++k)
-      if (table_[k]) mark.bytes[std::string(names[k])] = table_[k]->sync();
+      if (table_[k]) mark.files[std::string(names[k])] = table_[k]->sync();
   }
 
   /// All but steps.csv and walls.csv appear with their first line.

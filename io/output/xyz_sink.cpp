@@ -64,11 +64,11 @@ class XyzSink : public OutputSink {
   }
 
   void resume(const OutputMark& mark) override {
-    const auto known = mark.bytes.find("frames.xyz");
-    if (known == mark.bytes.end()) return open();  // asked for with the resumption
+    const auto known = mark.files.find("frames.xyz");
+    if (known == mark.files.end()) return open();  // asked for with the resumption
     if (ranks_.rank() == 0) file_.emplace(path_, known->second);
   }
-  void mark(OutputMark& mark) override { mark.bytes["frames.xyz"] = file_->sync(); }
+  void mark(OutputMark& mark) override { mark.files["frames.xyz"] = file_->sync(); }
   void close() override { file_->close(); }
 
  private:

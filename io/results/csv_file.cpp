@@ -12,9 +12,9 @@ CsvFile::CsvFile(const std::filesystem::path& path, std::string_view header)
   flush();
 }
 
-CsvFile::CsvFile(const std::filesystem::path& path, std::int64_t bytes)
-    : file_(path, O_WRONLY | O_APPEND), bytes_(bytes) {
-  file_.cut(bytes);
+CsvFile::CsvFile(const std::filesystem::path& path, const FileMark& mark)
+    : file_(path, O_WRONLY | O_APPEND), written_(mark) {
+  file_.cut(mark.bytes);
 }
 
 CsvFile::~CsvFile() {
@@ -30,13 +30,14 @@ void CsvFile::flush() {
   // Emptied first: lines that failed are not tried again, lest half of them appear twice.
   const std::string lines = std::exchange(pending_, {});
   file_.write(lines);
-  bytes_ += static_cast<std::int64_t>(lines.size());
+  written_.bytes += static_cast<std::int64_t>(lines.size());
+  written_.crc = crc_of(lines, written_.crc);
 }
 
-std::int64_t CsvFile::sync() {
+FileMark CsvFile::sync() {
   flush();
   file_.sync();
-  return bytes_;
+  return written_;
 }
 
 void CsvFile::close() {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "io/files/crc.hpp"
 #include "io/files/detail/descriptor.hpp"
 #include "io/results/column_dictionary.hpp"
 #include "runtime/step/error_history.hpp"
@@ -45,9 +46,9 @@ class CsvFile {
  public:
   /// Replaces a file of that name; the header is on disk when this returns. Throws FileError.
   CsvFile(const std::filesystem::path& path, std::string_view header);
-  /// Goes on behind the first `bytes` of a file that is there; what it has more is cut off. Throws FileError,
-  /// also when it has less.
-  CsvFile(const std::filesystem::path& path, std::int64_t bytes);
+  /// Goes on behind the mark of a file that is there; what it has more is cut off. Throws FileError, also
+  /// when it has less.
+  CsvFile(const std::filesystem::path& path, const FileMark& mark);
   /// Writes what is left. A destructor cannot report a failure: call close() to be told of one.
   ~CsvFile();
 
@@ -55,15 +56,16 @@ class CsvFile {
   std::string& pending() { return pending_; }
   /// Hands the pending lines to the system. Throws FileError.
   void flush();
-  /// The same, and waits until the disk has them. Returns the bytes of the file. Throws FileError.
-  std::int64_t sync();
+  /// The same, and waits until the disk has them. Returns how far the file has come. Throws
+  /// FileError.
+  FileMark sync();
   /// Flushes and closes. Throws FileError.
   void close();
 
  private:
   detail::Descriptor file_;
   std::string pending_;
-  std::int64_t bytes_ = 0;  ///< handed to the system
+  FileMark written_;  ///< handed to the system
 };
 
 }  // namespace talus::io

@@ -29,6 +29,14 @@ int allowed_cores() {
   return ::sched_getaffinity(0, sizeof(set), &set) == 0 ? CPU_COUNT(&set) : 0;
 }
 
+/// A list of the provenance in a run.json; empty where there is none.
+nlohmann::json provenance_list(const std::filesystem::path& path, const char* name) {
+  std::ifstream file(path);
+  const nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
+  if (!root.is_object() || !root.contains("provenance")) return nlohmann::json::array();
+  return root["provenance"].value(name, nlohmann::json::array());
+}
+
 }  // namespace
 
 std::string host_name() {
@@ -77,6 +85,8 @@ std::string run_json(const Provenance& p, const Summary& s) {
       {"seed", p.seed},
       {"scene_file", p.scene_file},
   };
+  for (const auto& [path, crc] : p.input_files)
+    root["provenance"]["input_files"].push_back({{"path", path}, {"crc32", fmt::format("{:08x}", crc)}});
   for (const Resumption& resumed : p.resumed)
     root["provenance"]["resumed"].push_back({{"date_utc", resumed.date_utc},
                                              {"host", resumed.host},
@@ -118,14 +128,18 @@ std::string run_json(const Provenance& p, const Summary& s) {
 
 std::vector<Resumption> resumptions_in(const std::filesystem::path& path) {
   std::vector<Resumption> all;
-  std::ifstream file(path);
-  const nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-  if (!root.is_object() || !root.contains("provenance")) return all;
-  const auto list = root["provenance"].value("resumed", nlohmann::json::array());
-  for (const nlohmann::json& entry : list)
+  for (const nlohmann::json& entry : provenance_list(path, "resumed"))
     all.push_back({entry.value("date_utc", ""), entry.value("host", ""), entry.value("ranks", 1),
                    entry.value("threads", 1), entry.value("step", std::int64_t{0}),
                    entry.value("changes", std::vector<std::string>())});
+  return all;
+}
+
+std::vector<InputFile> input_files_in(const std::filesystem::path& path) {
+  std::vector<InputFile> all;
+  for (const nlohmann::json& entry : provenance_list(path, "input_files"))
+    all.push_back({entry.value("path", ""),
+                   static_cast<std::uint32_t>(std::strtoul(entry.value("crc32", "").c_str(), nullptr, 16))});
   return all;
 }
 

@@ -18,6 +18,12 @@ struct Resumption {
   std::vector<std::string> changes;  ///< of the scene since the checkpoint, as sentences
 };
 
+/// A file that the scene reads, as it was.
+struct InputFile {
+  std::string path;
+  std::uint32_t crc = 0;  ///< crc_of_file
+};
+
 /// Everything that is needed to repeat a run, or to understand why a repetition differs.
 struct Provenance {
   std::string version;     ///< release of Talus
@@ -37,7 +43,8 @@ struct Provenance {
   std::vector<std::string> command_line;
   std::uint64_t seed = 0;
   std::string scene_file;
-  std::vector<Resumption> resumed = {};  ///< in their order
+  std::vector<InputFile> input_files = {};  ///< that the scene reads
+  std::vector<Resumption> resumed = {};     ///< in their order
 };
 
 /// Of this machine; "unknown" where the system does not say.
@@ -79,6 +86,7 @@ std::string run_json(const Provenance& provenance, const Summary& summary);
 
 /// Those that a run.json names; none where there is no such file.
 std::vector<Resumption> resumptions_in(const std::filesystem::path& path);
+std::vector<InputFile> input_files_in(const std::filesystem::path& path);
 
 /// Writes run.json whole (write_whole). Throws FileError.
 void write_run_json(const std::filesystem::path& path, const Provenance& provenance, const Summary& summary);

@@ -94,9 +94,9 @@ void narrow_grains(const ChunkPhase& phase, InstructionSet set, Contacts& contac
   if (!detail::repair_groups(places)) detail::deal_groups(places);
   if (!in.domain.flows) return;
   for (std::size_t k = begin; k < begin + at(contacts.count[chunk]); ++k) {
-    const Vec3 &first = in.x[at(contacts.first[k])], &second = in.x[at(contacts.second[k])];
-    set_drift(contacts, k, in.domain.image_drift(first, second));
-    if (in.cell_length > 0) contacts.reach[k] = in.domain.separation(first, second).norm() / in.cell_length;
+    const Vec3 &x = in.x[at(contacts.first[k])], &other = in.x[at(contacts.second[k])];
+    set_drift(contacts, k, in.domain.image_drift(x, other));
+    if (in.cell_length > 0) contacts.reach[k] = in.domain.separation(x, other).norm() / in.cell_length;
   }
 }
 

@@ -51,64 +51,70 @@ class GivenFile {
       "/talus-fuzz-" + std::to_string(::getpid());
 };
 
+/// False where the reader throws what it is to say of a file that it refuses.
 template <class Error, class Read>
-void expect_only(const Read& read) {
+bool reads(const Read& read) {
   try {
     read();
+    return true;
   } catch (const Error&) {
-    // What a reader is to say of such a file.
+    return false;
   }
 }
 
 }  // namespace
 
-void read_scene(Bytes bytes) {
+bool read_scene(Bytes bytes) {
   const std::string text(bytes.begin(), bytes.end());
-  expect_only<io::SceneError>([&] {
+  return reads<io::SceneError>([&] {
     const io::Scene scene = io::parse_scene(text, "fuzz.toml");
     // What is said of a scene is a scene again.
     io::parse_scene(io::resolved_scene(scene), "fuzz.toml");
   });
 }
 
-void read_bodies(Bytes bytes) {
+bool read_bodies(Bytes bytes) {
   const GivenFile file(bytes);
-  expect_only<io::SceneError>([&] { io::read_bodies(file.path(), 2600); });
+  return reads<io::SceneError>([&] { io::read_bodies(file.path(), 2600); });
 }
 
-void read_mesh(Bytes bytes) {
+bool read_mesh(Bytes bytes) {
   const GivenFile file(bytes);
-  expect_only<io::FileError>([&] { io::read_stl(file.path()); });
+  return reads<io::FileError>([&] { io::read_stl(file.path()); });
 }
 
-void read_fclib(Bytes bytes) {
+bool read_fclib(Bytes bytes) {
   const GivenFile file(bytes);
-  expect_only<io::FileError>([&] { io::read_fclib_problem(file.path()); });
+  const bool read = reads<io::FileError>([&] { io::read_fclib_problem(file.path()); });
   forget_open_files();
+  return read;
 }
 
-void read_results(Bytes bytes) {
+bool read_results(Bytes bytes) {
   const GivenFile file(bytes);
-  expect_only<io::FileError>([&] {
+  const bool read = reads<io::FileError>([&] {
     const std::size_t frames = io::frame_count(file.path());
     for (std::size_t k = 0; k < frames && k < 4; ++k) io::read_frame(file.path(), k);
   });
   forget_open_files();
+  return read;
 }
 
-void read_checkpoint(Bytes bytes) {
+bool read_checkpoint(Bytes bytes) {
   const GivenFile file(bytes);
-  expect_only<io::FileError>([&] {
+  const bool read = reads<io::FileError>([&] {
     io::read_checkpoint_head(file.path());
     io::read_checkpoint_parts(file.path(), {0});
   });
   forget_open_files();
+  return read;
 }
 
-void read_trace(Bytes bytes) {
+bool read_trace(Bytes bytes) {
   const GivenFile file(bytes);
-  expect_only<io::FileError>([&] { io::read_trace(file.path()); });
+  const bool read = reads<io::FileError>([&] { io::read_trace(file.path()); });
   forget_open_files();
+  return read;
 }
 
 }  // namespace talus::fuzz

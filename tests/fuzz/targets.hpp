@@ -12,17 +12,18 @@ namespace talus::fuzz {
 
 using Bytes = std::span<const std::uint8_t>;
 
-void read_scene(Bytes bytes);
-void read_bodies(Bytes bytes);
-void read_mesh(Bytes bytes);
-void read_fclib(Bytes bytes);
-void read_results(Bytes bytes);
-void read_checkpoint(Bytes bytes);
-void read_trace(Bytes bytes);
+/// All return whether the bytes were read; false: they were refused.
+bool read_scene(Bytes bytes);
+bool read_bodies(Bytes bytes);
+bool read_mesh(Bytes bytes);
+bool read_fclib(Bytes bytes);
+bool read_results(Bytes bytes);
+bool read_checkpoint(Bytes bytes);
+bool read_trace(Bytes bytes);
 
 struct Target {
   std::string_view name;  ///< that of its folder in tests/fuzz/corpus
-  void (*read)(Bytes);
+  bool (*read)(Bytes);
 };
 inline constexpr Target targets[] = {
     {"scene", read_scene},     {"bodies", read_bodies},         {"mesh", read_mesh},   {"fclib", read_fclib},

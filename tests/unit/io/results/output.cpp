@@ -5,6 +5,7 @@
 #include <bit>
 #include <nlohmann/json.hpp>
 
+#include "io/files/crc.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
 #include "io/output/sinks.hpp"
@@ -255,6 +256,26 @@ TEST(Csv, OnDiskAreWholeLinesAtAnyMoment) {
   }
   file.close();
   EXPECT_EQ(occurrences(content_of(scratch / "steps.csv"), "\n"), 5001u);
+}
+
+TEST(Csv, IsMarkedByTheBytesThatStandInTheFile) {
+  const ScratchDirectory scratch;
+  const fs::path path = scratch / "steps.csv";
+  CsvFile file(path, "step\n");
+  file.pending() += "1\n2\n";
+  const FileMark mark = file.sync();
+  EXPECT_EQ(mark.bytes, 9);
+  EXPECT_EQ(mark.crc, crc_of("step\n1\n2\n"));
+  EXPECT_EQ(crc_of("123456789"), 0xcbf43926U) << "the check value of CRC-32";
+  file.pending() += "3\n";
+  file.close();
+  EXPECT_EQ(crc_of_file(path, mark.bytes), mark.crc);
+  EXPECT_NE(crc_of_file(path), mark.crc);
+  CsvFile again(path, mark);
+  again.pending() += "4\n";
+  const FileMark end = again.sync();
+  EXPECT_EQ(content_of(path), "step\n1\n2\n4\n");
+  EXPECT_EQ(end.crc, crc_of_file(path));
 }
 
 TEST(RunJson, SaysWhatWasRunAndWhatCameOfIt) {
