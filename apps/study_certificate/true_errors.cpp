@@ -17,6 +17,7 @@ struct Floors {
   double contact = 1e-3;   ///< likewise: least contact impulse
   double load = 1e-2;      ///< of a cluster's weight in a step: least momentum it exchanges
   double cluster = 1e-3;   ///< of a cluster's own momentum, likewise: grains that graze one another
+  double rounding = 5;     ///< speeds that rounding of a position makes: a row adds up those of its grains
 };
 constexpr Floors floors;
 
@@ -39,17 +40,17 @@ struct Momenta {
   double all_exchanged() const { return std::accumulate(exchanged.begin(), exchanged.end(), 0.0); }
 };
 
-/// What is left of an error beyond what rounding of positions makes of it.
-double beyond_rounding(const StepProblem& problem, double mass, double error) {
-  return std::max(0.0, error - mass * problem.rounding_speed);
+/// What is left of an error beyond what rounding of positions makes of it, so many times over.
+double beyond_rounding(const StepProblem& problem, double mass, double error, double times = 1) {
+  return std::max(0.0, error - times * mass * problem.rounding_speed);
 }
 
 Momenta momenta(const StepProblem& problem, const Reference& reference, const StepEnd& end) {
   Momenta found;
   const Motion &exact = reference.motion, &free = problem.free;
   for (std::size_t k = 0; k < problem.mass.size(); ++k) {
-    found.wrong.push_back(
-        beyond_rounding(problem, problem.mass[k], problem.mass[k] * (end.after.u[k] - exact.u[k]).norm()));
+    found.wrong.push_back(beyond_rounding(
+        problem, problem.mass[k], problem.mass[k] * (end.after.u[k] - exact.u[k]).norm(), floors.rounding));
     found.exchanged.push_back(problem.mass[k] * (exact.u[k] - free.u[k]).norm());
   }
   for (std::size_t w = 0; w < problem.wall_normal.size(); ++w) {

@@ -15,7 +15,11 @@ namespace talus::io {
 namespace {
 
 using Colour = std::array<double, 3>;
-using Tint = std::array<float, 3>;  ///< of a sample: there are millions
+using Tint = std::array<std::uint8_t, 3>;  ///< of a sample: there are millions
+
+std::uint8_t tone(double part) {
+  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(part, 0.0, 1.0)));
+}
 
 constexpr std::size_t samples = 2;  // per pixel and direction
 constexpr Colour edge_colour{0.35, 0.4, 0.45};
@@ -69,7 +73,7 @@ class Canvas {
   explicit Canvas(const Projection& view)
       : width_(static_cast<std::size_t>(view.width)),
         height_(static_cast<std::size_t>(view.height)),
-        colour_(width_ * height_, Tint{1, 1, 1}),
+        colour_(width_ * height_, Tint{255, 255, 255}),
         depth_(width_ * height_, empty) {}
 
   std::size_t width() const { return width_; }
@@ -122,21 +126,24 @@ class Canvas {
   }
 
   /// Darkens grains that lie deeper than those around them within `reach` samples (after Luft, Colditz and
-  /// Deussen 2006): gaps look deep. What is drawn later is left as it is.
+  /// Deussen 2006): gaps look deep. What is drawn later is left as it is. The depth around is that of pixels.
   void darken_gaps(double reach) {
-    std::vector<float> around(depth_.size(), 0.0F), weight(depth_.size(), 0.0F);
+    const std::size_t width = width_ / samples, height = height_ / samples;
+    const auto pixel = [&](std::size_t k) { return k / width_ / samples * width + k % width_ / samples; };
+    std::vector<float> around(width * height, 0.0F), weight(width * height, 0.0F);
     for (std::size_t k = 0; k < depth_.size(); ++k)
-      if (depth_[k] > empty) around[k] = depth_[k], weight[k] = 1;
-    const auto radius = static_cast<std::size_t>(std::clamp(reach, 1.0, 60.0));
+      if (depth_[k] > empty) around[pixel(k)] += depth_[k], weight[pixel(k)] += 1;
+    const auto radius = static_cast<std::size_t>(std::clamp(reach / samples, 1.0, 30.0));
     for (int pass = 0; pass < 2; ++pass)
       for (std::vector<float>* of : {&around, &weight}) {
-        blur(*of, width_, height_, 1, width_, radius);
-        blur(*of, height_, width_, width_, 1, radius);
+        blur(*of, width, height, 1, width, radius);
+        blur(*of, height, width, width, 1, radius);
       }
     for (std::size_t k = 0; k < depth_.size(); ++k) {
       if (depth_[k] == empty) continue;
-      const double deep = std::clamp(double{around[k] / weight[k] - depth_[k]} / (2 * reach), 0.0, 1.0);
-      for (float& c : colour_[k]) c *= static_cast<float>(1 - 0.6 * deep);
+      const double near = double{around[pixel(k)]} / weight[pixel(k)];
+      const double deep = std::clamp((near - depth_[k]) / (2 * reach), 0.0, 1.0);
+      for (std::uint8_t& c : colour_[k]) c = static_cast<std::uint8_t>(std::lround(c * (1 - 0.6 * deep)));
     }
   }
 
@@ -149,9 +156,8 @@ class Canvas {
           double sum = 0;
           for (std::size_t v = 0; v < samples; ++v)
             for (std::size_t u = 0; u < samples; ++u)
-              sum += double{colour_[(y * samples + v) * width_ + x * samples + u][c]};
-          out.rgb.push_back(
-              static_cast<std::uint8_t>(std::lround(255 * std::clamp(sum / (samples * samples), 0.0, 1.0))));
+              sum += colour_[(y * samples + v) * width_ + x * samples + u][c];
+          out.rgb.push_back(static_cast<std::uint8_t>(std::lround(sum / (samples * samples))));
         }
     return out;
   }
@@ -183,7 +189,7 @@ class Canvas {
     if (hidden(x, y, depth)) return;
     const std::size_t k = y * width_ + x;
     depth_[k] = static_cast<float>(depth);
-    for (std::size_t c = 0; c < 3; ++c) colour_[k][c] = static_cast<float>(colour[c]);
+    for (std::size_t c = 0; c < 3; ++c) colour_[k][c] = tone(colour[c]);
   }
   /// Mean over 2 radius + 1 neighbours along lines of `length` values, `step` apart; `lines` of them.
   static void blur(std::vector<float>& values, std::size_t length, std::size_t lines, std::size_t step,

@@ -176,6 +176,45 @@ std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const
   return in;
 }
 
+BodyGroups large_clusters_of(const Clusters& clusters, const std::vector<std::vector<char>>& in_small,
+                             std::span<const ContactGraph> parts, const PartLink& link) {
+  // Per part and cluster: of those that are large.
+  std::vector<std::vector<char>> large(parts.size());
+  link.each(parts.size(), [&](std::size_t p) {
+    large[p].assign(at(clusters.count[p]), 0);
+    for (const auto& [first, second] : parts[p].pairs)
+      if (in_small[p][at(first)] == 0) large[p][at(clusters.of_body[p][at(first)])] = 1;
+  });
+  // A row: how many lie in this part only, and which of those that lie in several have contacts here.
+  const std::size_t width = 1 + at(clusters.several);
+  const std::vector<double> rows =
+      rows_of(link, parts.size(), width, [&](std::size_t p, std::span<double> row) {
+        for (std::size_t c = 0; c < large[p].size(); ++c)
+          if (large[p][c] != 0) row[at(clusters.spanning[p][c] + 1)] += 1;
+      });
+  BodyGroups groups{.of_body = {}, .count = 0};
+  std::vector<std::int32_t> of_spanning(at(clusters.several), -1);
+  for (std::size_t s = 0; s < of_spanning.size(); ++s)
+    for (std::size_t row = 0; row < rows.size() && of_spanning[s] < 0; row += width)
+      if (rows[row + 1 + s] > 0) of_spanning[s] = groups.count++;
+  std::vector<std::int32_t> first;  // per subdomain
+  for (std::size_t row = 0; row < rows.size(); row += width) {
+    first.push_back(groups.count);
+    groups.count += static_cast<std::int32_t>(rows[row]);
+  }
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    std::vector<std::int32_t> number(large[p].size(), -1);
+    std::int32_t next = first[at(parts[p].subdomain)];
+    for (std::size_t c = 0; c < number.size(); ++c) {
+      const std::int32_t spans = clusters.spanning[p][c];
+      number[c] = spans >= 0 ? of_spanning[at(spans)] : large[p][c] != 0 ? next++ : -1;
+    }
+    std::vector<std::int32_t>& of_body = groups.of_body.emplace_back();
+    for (const std::int32_t c : clusters.of_body[p]) of_body.push_back(c < 0 ? -1 : number[at(c)]);
+  }
+  return groups;
+}
+
 std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,
                                   double filler) {
   const std::vector<double> lengths =

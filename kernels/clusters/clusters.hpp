@@ -46,6 +46,11 @@ struct SmallClusters {
 std::vector<std::vector<char>> in_small_clusters(const Clusters& clusters, const SmallClusters& small,
                                                  bool friction);
 
+/// The clusters that are not small, numbered alike in all parts; without contacts count is 0. Collective: one
+/// gather.
+BodyGroups large_clusters_of(const Clusters& clusters, const std::vector<std::vector<char>>& in_small,
+                             std::span<const ContactGraph> parts, const PartLink& link);
+
 /// Rows of any lengths, one per part: padded with `filler` to the longest of all, and gathered in order of
 /// subdomain. Collective.
 std::vector<double> gather_padded(const PartLink& link, const std::vector<std::vector<double>>& rows,

@@ -1,10 +1,11 @@
 #include "kernels/global/balance.hpp"
 
-#include <array>
+#include <algorithm>
 #include <bit>
 #include <limits>
 #include <vector>
 
+#include "kernels/bodies/larger.hpp"
 #include "kernels/global/body_solver.hpp"
 #include "kernels/global/natural_map.hpp"
 #include "kernels/global/stiffness.hpp"
@@ -19,24 +20,38 @@ struct Wishes {
   std::vector<Vec3> change;  ///< of the relative velocity, y - v [m/s], in order of contact
   std::vector<ContactEquation> open;
   std::vector<double> gap;  ///< of the open ones: v_n, >= 0 [m/s]
-  double drive = 0;         ///< fastest drive among those that carry [m/s]
-  double fastest = 0;       ///< drive, gap to close or rebound [m/s]
-  double pressed = 0;       ///< sum of the impulses at walls [N s]
+  // Per group:
+  std::vector<double> drive;    ///< fastest drive among those that carry [m/s]
+  std::vector<double> fastest;  ///< drive, gap to close or rebound [m/s]
+  std::vector<double> pressed;  ///< sum of the impulses at walls [N s]
+};
+
+/// Of one part.
+struct PartGroups {
+  std::size_t number;
+  const BodyGroups& groups;
+  std::size_t group(const ContactEquation& c) const { return group(static_cast<std::size_t>(c.first)); }
+  std::size_t group(std::size_t body) const { return static_cast<std::size_t>(groups.of(number, body)); }
+  bool counts(std::size_t body) const { return groups.of(number, body) >= 0; }
 };
 
 /// Finds the wishes of `problem`, which keeps only the contacts that carry.
-Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceThresholds& thresholds) {
+Wishes wishes_of(BodyProblem& problem, const PartGroups& part, std::span<const Twist> V,
+                 const BalanceThresholds& thresholds) {
   Wishes wishes;
+  for (std::vector<double>* of : {&wishes.drive, &wishes.fastest, &wishes.pressed})
+    of->assign(part.groups.size(), 0.0);
   std::size_t kept = 0;
   for (std::size_t k = 0; k < problem.contacts.size(); ++k) {
     ContactEquation c = problem.contacts[k];
+    const std::size_t g = part.group(c);
     const Vec3 r = problem.impulse[k], v = constrained(c, relative_velocity(c, V) + c.offset);
     if (c.second < 0 || problem.bodies[static_cast<std::size_t>(c.second)].wall)
-      wishes.pressed += std::abs(c.normal.dot(r));
+      wishes.pressed[g] += std::abs(c.normal.dot(r));
     if (c.cell >= 0)  // what its faces carry, as walls would
-      wishes.pressed +=
+      wishes.pressed[g] +=
           c.reach / problem.bodies[static_cast<std::size_t>(c.cell)].radius * std::abs(c.normal.dot(r));
-    wishes.fastest = std::max(wishes.fastest, c.offset.norm());
+    wishes.fastest[g] = std::max(wishes.fastest[g], c.offset.norm());
     const auto [m, shift, aim, carried] = natural_map_of(problem, c, r, v);
     const Vec3 shifted = v + shift * c.normal;
     const Vec3 y = shifted + (carried - r) / m, slip = tangential(c, y);
@@ -50,7 +65,7 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceTh
       wishes.gap.push_back(std::max(0.0, c.normal.dot(v)));
       continue;
     }
-    wishes.drive = std::max(wishes.drive, c.drive);
+    wishes.drive[g] = std::max(wishes.drive[g], c.drive);
     wishes.change.push_back(constrained(c, change));
     problem.contacts[kept] = c;
     problem.impulse[kept++] = r;
@@ -60,16 +75,16 @@ Wishes wishes_of(BodyProblem& problem, std::span<const Twist> V, const BalanceTh
   return wishes;
 }
 
-/// Open contacts that `motion` closes and more join those that carry; they ask only to be closed. Returns sum
-/// m v_n^2 of what it pushed them in [J].
-double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& wishes) {
-  double pushed2 = 0;
+/// Open contacts that `motion` closes and more join those that carry; they ask only to be closed. Adds to
+/// `pushed2`, per group, sum m v_n^2 of what it pushed them in [J].
+void close_open(BodyProblem& problem, const PartGroups& part, std::span<const Twist> motion, Wishes& wishes,
+                std::span<double> pushed2) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < wishes.open.size(); ++k) {
     const ContactEquation c = wishes.open[k];
     const double left = wishes.gap[k] + c.normal.dot(relative_velocity(c, motion));
     if (left < 0) {
-      pushed2 += effective_mass(problem, c) * left * left;
+      pushed2[part.group(c)] += effective_mass(problem, c) * left * left;
       problem.contacts.push_back(c);
       problem.impulse.push_back(Vec3::Zero());
       wishes.change.push_back(-wishes.gap[k] * c.normal);
@@ -80,22 +95,23 @@ double close_open(BodyProblem& problem, std::span<const Twist> motion, Wishes& w
   }
   wishes.open.resize(kept);
   wishes.gap.resize(kept);
-  return pushed2;
 }
 
-/// Sum m |u| + (I/R^2) |w| of the motion [N s].
-double momentum(const BodyParts& parts, const PartField& motion) {
-  return parts.total(1, [&](std::size_t p, std::span<double> row) {
+/// Sum m |u| + (I/R^2) |w| of the motion [N s], per group.
+std::vector<double> momentum(const BodyParts& parts, const BodyGroups& groups, const PartField& motion) {
+  return parts.total(groups.size(), [&](std::size_t p, std::span<double> row) {
+    const PartGroups part{p, groups};
     for (std::size_t b = 0; b < motion[p].size(); ++b) {
-      if (!parts[p].counted(b)) continue;
+      if (!parts[p].counted(b) || !part.counts(b)) continue;
       const BodyUnknown& body = parts[p].bodies[b];
-      row[0] += body.mass * motion[p][b].u.norm() + body.spin_mass * motion[p][b].w.norm();
+      row[part.group(b)] += body.mass * motion[p][b].u.norm() + body.spin_mass * motion[p][b].w.norm();
     }
-  })[0];
+  });
 }
 
 /// The same of the difference of two motions.
-double distance(const BodyParts& parts, const PartField& motion, const PartField& from) {
+std::vector<double> distance(const BodyParts& parts, const BodyGroups& groups, const PartField& motion,
+                             const PartField& from) {
   PartField difference = motion;
   parts.each([&](std::size_t p) {
     for (std::size_t b = 0; b < motion[p].size(); ++b) {
@@ -103,145 +119,239 @@ double distance(const BodyParts& parts, const PartField& motion, const PartField
       difference[p][b].w -= from[p][b].w;
     }
   });
-  return momentum(parts, difference);
+  return momentum(parts, groups, difference);
 }
 
-/// How well a motion fits: |d|_M^2 + sum rho |H^T d - change|^2, which is to be small [J]; and the wishes
-/// that it misses, sum |H^T d - change|/W_nn [N s].
+/// How well a motion fits, per group: |d|_M^2 + sum rho |H^T d - change|^2, which is to be small [J]; and the
+/// wishes that it misses, sum |H^T d - change|/W_nn [N s].
 struct Fit {
   double cost, missed;
 };
-Fit fit_of(const BodyParts& parts, const PartField& motion, std::span<const Wishes> wishes, double kappa) {
-  const std::vector<double> sums = parts.total(2, [&](std::size_t p, std::span<double> row) {
+std::vector<Fit> fit_of(const BodyParts& parts, const BodyGroups& groups, const PartField& motion,
+                        std::span<const Wishes> wishes, double kappa) {
+  const std::vector<double> sums = parts.total(2 * groups.size(), [&](std::size_t p, std::span<double> row) {
+    const PartGroups part{p, groups};
     for (std::size_t b = 0; b < motion[p].size(); ++b)
-      if (parts[p].counted(b)) row[0] += kinetic2(parts[p].bodies[b], motion[p][b].u, motion[p][b].w);
+      if (parts[p].counted(b) && part.counts(b))
+        row[2 * part.group(b)] += kinetic2(parts[p].bodies[b], motion[p][b].u, motion[p][b].w);
     for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
       const ContactEquation& c = parts[p].contacts[k];
       const Vec3 missed = constrained(c, relative_velocity(c, motion[p])) - wishes[p].change[k];
-      row[0] += kappa * effective_mass(parts[p], c) * missed.squaredNorm();
-      row[1] += effective_mass(parts[p], c) * missed.norm();
+      const std::size_t g = part.group(c);
+      row[2 * g] += kappa * effective_mass(parts[p], c) * missed.squaredNorm();
+      row[2 * g + 1] += effective_mass(parts[p], c) * missed.norm();
     }
   });
-  return {sums[0], sums[1]};
+  std::vector<Fit> fits;
+  for (std::size_t k = 0; k < sums.size(); k += 2) fits.push_back({sums[k], sums[k + 1]});
+  return fits;
 }
 
-/// What the error of the velocities of all parts is compared with.
-struct Scales {
+/// Groups that `stop` fits better than `motion` take it.
+void begin_with_better(const BodyParts& parts, const BodyGroups& groups, std::span<const Wishes> wishes,
+                       double kappa, const PartField& stop, PartField& motion) {
+  const std::vector<Fit> stopped = fit_of(parts, groups, stop, wishes, kappa),
+                         moving = fit_of(parts, groups, motion, wishes, kappa);
+  parts.each([&](std::size_t p) {
+    const PartGroups part{p, groups};
+    for (std::size_t b = 0; b < motion[p].size(); ++b)
+      if (part.counts(b) && stopped[part.group(b)].cost < moving[part.group(b)].cost)
+        motion[p][b] = stop[p][b];
+  });
+}
+
+/// What the error of the velocities of a group is compared with.
+struct Scale {
   double contacts = 0;  ///< number, of all parts
-  double mass = 0;      ///< of all bodies [kg]
+  double mass = 0;      ///< of its bodies [kg]
   double momentum = 0;  ///< [kg m/s]; 0 where nothing moves
 
   /// The largest momentum with this energy, by Cauchy and Schwarz.
   double most(double energy) const { return std::sqrt(mass * energy); }
 };
 
-Scales scales_of(const BodyParts& parts, const std::vector<Wishes>& wishes, const PartField& V,
-                 const BalanceThresholds& thresholds) {
+std::vector<Scale> scales_of(const BodyParts& parts, const BodyGroups& groups,
+                             const std::vector<Wishes>& wishes, const PartField& V,
+                             const BalanceThresholds& thresholds) {
   enum { contacts, mass, pressed, incoming, drive, fastest, width };
-  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
-    row[contacts] = static_cast<double>(wishes[p].change.size());
+  const std::size_t all_of = width * groups.size();
+  const std::vector<double> rows = parts.rows(all_of, [&](std::size_t p, std::span<double> row) {
+    const PartGroups part{p, groups};
+    for (std::size_t k = 0; k < wishes[p].change.size(); ++k)
+      row[width * part.group(parts[p].contacts[k]) + contacts] += 1;
     for (std::size_t b = 0; b < parts[p].bodies.size(); ++b) {
-      if (!parts[p].counted(b)) continue;
+      if (!parts[p].counted(b) || !part.counts(b)) continue;
       const BodyUnknown& body = parts[p].bodies[b];
-      row[mass] += body.mass;
-      row[incoming] += kinetic2(body, body.free.u, body.free.w);
+      row[width * part.group(b) + mass] += body.mass;
+      row[width * part.group(b) + incoming] += kinetic2(body, body.free.u, body.free.w);
     }
-    row[pressed] = wishes[p].pressed;
-    row[drive] = wishes[p].drive;
-    row[fastest] = wishes[p].fastest;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      row[width * g + pressed] = wishes[p].pressed[g];
+      row[width * g + drive] = wishes[p].drive[g];
+      row[width * g + fastest] = wishes[p].fastest[g];
+    }
   });
-  std::array<double, width> all{};
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    all[k % width] = k % width >= drive ? std::max(all[k % width], rows[k]) : all[k % width] + rows[k];
-  Scales scales{all[contacts], all[mass]};
+  std::vector<double> all(all_of, 0.0);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    double& sum = all[k % all_of];
+    sum = k % width >= drive ? std::max(sum, rows[k]) : sum + rows[k];
+  }
   PartField free = parts.field();
   parts.each([&](std::size_t p) {
     for (std::size_t b = 0; b < free[p].size(); ++b) free[p][b] = parts[p].bodies[b].free;
   });
-  // Contacts change no more than the momentum that comes in and what drives, gaps and restitution ask for.
-  const double sound = scales.most(all[incoming]) + all[mass] * all[fastest];
-  scales.momentum = std::max({std::min(distance(parts, V, free), sound),
-                              all[drive] > 0 ? all[mass] * all[drive] : thresholds.interest * all[pressed],
-                              thresholds.rounding * scales.most(all[incoming])});
+  const std::vector<double> exchanged = distance(parts, groups, V, free);
+  std::vector<Scale> scales;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const double* of = all.data() + width * g;
+    Scale& scale = scales.emplace_back(Scale{of[contacts], of[mass]});
+    // Contacts change no more than the momentum that comes in and what drives, gaps and restitution ask for.
+    const double sound = scale.most(of[incoming]) + of[mass] * of[fastest];
+    scale.momentum = std::max({std::min(exchanged[g], sound),
+                               of[drive] > 0 ? of[mass] * of[drive] : thresholds.interest * of[pressed],
+                               thresholds.rounding * scale.most(of[incoming])});
+  }
   return scales;
 }
+
+/// The linear solve of velocity_error, round after round.
+class VelocitySolve {
+ public:
+  VelocitySolve(std::span<BodyProblem> problems, const PartLink& link, double enough,
+                const BodyGroups& groups, const BalanceThresholds& thresholds)
+      : problems_(problems),
+        parts_(problems, link),
+        enough_(enough),
+        groups_(groups),
+        thresholds_(thresholds),
+        kappa_(thresholds.firmness * estimate_stiffness(parts_)),
+        V_(velocities_of(parts_)),
+        wishes_(parts_.size()),
+        left_(groups.size(), 0.0),
+        found_(groups.size(), 0.0) {
+    parts_.each([&](std::size_t p) {
+      wishes_[p] = wishes_of(problems_[p], {p, groups_}, V_[p], thresholds_);
+    });
+    scales_ = scales_of(parts_, groups_, wishes_, V_, thresholds_);
+  }
+
+  VelocityError error() {
+    if (std::ranges::all_of(scales_, [](const Scale& scale) { return scale.contacts == 0; })) return {};
+    VelocityError error;
+    if (std::ranges::any_of(scales_, [](const Scale& scale) { return scale.momentum == 0; })) {
+      // Nothing moves there: overlaps may still ask for it.
+      const std::vector<Fit> still = fit_of(parts_, groups_, parts_.field(), wishes_, kappa_);
+      for (std::size_t g = 0; g < scales_.size(); ++g)
+        if (scales_[g].momentum == 0 && still[g].missed > 0)
+          error.relative = std::numeric_limits<double>::infinity();
+      const auto moves = [](const Scale& scale) { return scale.momentum > 0; };
+      if (error.relative > 0 || std::ranges::none_of(scales_, moves)) return error;
+    }
+    // Two motions to start from: none; and the one that stops everything, the answer of a sample at rest.
+    PartField motion = parts_.field(), stop = V_;
+    parts_.each([&](std::size_t p) {
+      for (Twist& v : stop[p]) v = {-v.u, -v.w};
+    });
+    std::vector<Fit> fits;
+    for (int round = 0; round < thresholds_.most_rounds; ++round) {
+      const PartField began = motion;
+      begin_with_better(parts_, groups_, wishes_, kappa_, stop, motion);
+      error.linear_iterations += solve(motion);
+      fits = fit_of(parts_, groups_, motion, wishes_, kappa_);
+      const std::vector<double> pushed2 =
+          parts_.total(groups_.size(), [&](std::size_t p, std::span<double> row) {
+            close_open(problems_[p], {p, groups_}, motion[p], wishes_[p], row);
+          });
+      const auto pushed = [&](std::size_t g) { return scales_[g].most(kappa_ * pushed2[g]); };
+      if (small(pushed)) break;
+      if (round == 0) continue;
+      const std::vector<double> change = distance(parts_, groups_, motion, began);
+      if (small([&](std::size_t g) { return change[g]; })) break;
+    }
+    for (std::size_t g = 0; g < scales_.size(); ++g)
+      if (scales_[g].momentum > 0)
+        error.relative =
+            larger(error.relative, (found_[g] + fits[g].missed + left_[g]) / scales_[g].momentum);
+    return error;
+  }
+
+ private:
+  /// part(group) is small in each group that moves [N s].
+  template <class Parts>
+  bool small(const Parts& part) const {
+    for (std::size_t g = 0; g < scales_.size(); ++g) {
+      const double scale = scales_[g].momentum;
+      if (scale > 0 && !(part(g) <= thresholds_.linear_tolerance * std::max(found_[g], enough_ * scale)))
+        return false;
+    }
+    return true;
+  }
+
+  /// The motion that fits best, by conjugate gradients from the one given. Returns their number.
+  int solve(PartField& motion) {
+    std::vector<std::vector<double>> rho(parts_.size());
+    PartField force = parts_.field();
+    parts_.each([&](std::size_t p) {
+      for (std::size_t k = 0; k < wishes_[p].change.size(); ++k) {
+        const ContactEquation& c = parts_[p].contacts[k];
+        rho[p].push_back(kappa_ * effective_mass(parts_[p], c));
+        add_force(c, rho[p][k] * wishes_[p].change[k], force[p]);
+      }
+    });
+    parts_.link().sum_copies(force);
+    parts_.each([&](std::size_t p) {
+      for (std::size_t b = 0; b < force[p].size(); ++b)
+        restrict_to_freedoms(parts_[p].bodies[b], force[p][b]);
+    });
+    BodySolver solver(parts_, rho);
+    PartField then = motion;
+    double energy = solver.begin(force, motion);
+    const auto bound = [&](std::size_t g) { return thresholds_.caution * scales_[g].most(energy); };
+    const auto left = [&](std::size_t g) { return left_[g]; };
+    for (std::size_t g = 0; g < left_.size(); ++g) left_[g] = bound(g);
+    found_ = momentum(parts_, groups_, motion);
+    // The bound counts light bodies with the mass of all. Beside a heavy body the changes over the last half
+    // of the iterations and the quarter before it show better what is left.
+    std::vector<double> before(groups_.size(), std::numeric_limits<double>::infinity());
+    int done = 0;
+    while (done < thresholds_.most_linear && !small(left)) {
+      energy = solver.iterate(motion);
+      ++done;
+      if (!std::has_single_bit(static_cast<unsigned>(done)) && !small(bound)) continue;
+      found_ = momentum(parts_, groups_, motion);
+      const std::vector<double> change = distance(parts_, groups_, motion, then);
+      for (std::size_t g = 0; g < left_.size(); ++g)
+        left_[g] = done < thresholds_.few_linear
+                       ? bound(g)
+                       : std::min(bound(g), left_over(change[g], before[g], thresholds_.unsettled));
+      before = change;
+      then = motion;
+    }
+    return done;
+  }
+
+  std::span<BodyProblem> problems_;
+  BodyParts parts_;
+  double enough_;
+  const BodyGroups& groups_;
+  BalanceThresholds thresholds_;
+  double kappa_;
+  PartField V_;
+  std::vector<Wishes> wishes_;
+  std::vector<Scale> scales_;
+  std::vector<double> left_, found_;  ///< per group [N s]: what the last solve has left and found
+};
 
 }  // namespace
 
 VelocityError velocity_error(std::span<BodyProblem> problems, const PartLink& link, double enough,
-                             const BalanceThresholds& thresholds) {
-  const BodyParts parts(problems, link);
-  const double kappa = thresholds.firmness * estimate_stiffness(parts);
-  const PartField V = velocities_of(parts);
-  std::vector<Wishes> wishes(parts.size());
-  parts.each([&](std::size_t p) { wishes[p] = wishes_of(problems[p], V[p], thresholds); });
-
-  const Scales scales = scales_of(parts, wishes, V, thresholds);
-  if (scales.contacts == 0) return {};
-  const double scale = scales.momentum;
-  VelocityError error;
-  if (scale == 0) {  // nothing moves: overlaps may still ask for it
-    if (fit_of(parts, parts.field(), wishes, kappa).missed > 0)
-      error.relative = std::numeric_limits<double>::infinity();
-    return error;
-  }
-
-  // Two motions to start from: none; and the one that stops everything, the answer of a sample at rest.
-  PartField motion = parts.field(), stop = V;
-  parts.each([&](std::size_t p) {
-    for (Twist& v : stop[p]) v = {-v.u, -v.w};
-  });
-  double left = 0, found = 0, missed = 0;
-  const auto small = [&](double part) {
-    return part <= thresholds.linear_tolerance * std::max(found, enough * scale);
-  };
-  for (int round = 0; round < thresholds.most_rounds; ++round) {
-    std::vector<std::vector<double>> rho(parts.size());
-    PartField force = parts.field();
-    parts.each([&](std::size_t p) {
-      for (std::size_t k = 0; k < wishes[p].change.size(); ++k) {
-        const ContactEquation& c = parts[p].contacts[k];
-        rho[p].push_back(kappa * effective_mass(parts[p], c));
-        add_force(c, rho[p][k] * wishes[p].change[k], force[p]);
-      }
-    });
-    link.sum_copies(force);
-    parts.each([&](std::size_t p) {
-      for (std::size_t b = 0; b < force[p].size(); ++b) restrict_to_freedoms(parts[p].bodies[b], force[p][b]);
-    });
-    const PartField began = motion;
-    if (fit_of(parts, stop, wishes, kappa).cost < fit_of(parts, motion, wishes, kappa).cost) motion = stop;
-    BodySolver solver(parts, rho);
-    PartField then = motion;
-    left = thresholds.caution * scales.most(solver.begin(force, motion));
-    found = momentum(parts, motion);
-    // The bound counts light bodies with the mass of all. Beside a heavy body the changes over the last half
-    // of the iterations and the quarter before it show better what is left.
-    double before = std::numeric_limits<double>::infinity();
-    for (int k = 1; k <= thresholds.most_linear && !small(left); ++k) {
-      const double bound = thresholds.caution * scales.most(solver.iterate(motion));
-      ++error.linear_iterations;
-      if (!std::has_single_bit(static_cast<unsigned>(k)) && !small(bound)) continue;
-      found = momentum(parts, motion);
-      const double change = distance(parts, motion, then);
-      left = k < thresholds.few_linear ? bound
-                                       : std::min(bound, left_over(change, before, thresholds.unsettled));
-      before = change;
-      then = motion;
-    }
-    missed = fit_of(parts, motion, wishes, kappa).missed;
-    const double pushed2 = parts.total(1, [&](std::size_t p, std::span<double> row) {
-      row[0] = close_open(problems[p], motion[p], wishes[p]);
-    })[0];
-    if (small(scales.most(kappa * pushed2)) || (round > 0 && small(distance(parts, motion, began)))) break;
-  }
-  error.relative = (found + missed + left) / scale;
-  return error;
+                             const BodyGroups& groups, const BalanceThresholds& thresholds) {
+  return VelocitySolve(problems, link, enough, groups, thresholds).error();
 }
 
 VelocityError velocity_error(BodyProblem problem, double enough, const BalanceThresholds& thresholds) {
   const PartLink alone;
-  return velocity_error({&problem, 1}, alone, enough, thresholds);
+  return velocity_error({&problem, 1}, alone, enough, {}, thresholds);
 }
 
 }  // namespace talus

@@ -91,9 +91,9 @@ struct VelocityError {
 /// what comes in can explain. Second, the speed of driven walls times the whole mass; where no wall is
 /// driven, a hundredth (BalanceThresholds::interest) of the impulses at walls, as grains pressed at rest gain
 /// nothing. Third, what rounding leaves of the sample's own momentum. The estimate takes about as long as a
-/// hundred sweeps.
+/// hundred sweeps. With several groups error and scale are those of each, and the worst is returned.
 VelocityError velocity_error(std::span<BodyProblem> parts, const PartLink& link, double enough,
-                             const BalanceThresholds& thresholds = {});
+                             const BodyGroups& groups = {}, const BalanceThresholds& thresholds = {});
 /// The whole problem in one part.
 VelocityError velocity_error(BodyProblem problem, double enough, const BalanceThresholds& thresholds = {});
 

@@ -6,6 +6,7 @@
 /// added in order of subdomain.
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <vector>
@@ -16,6 +17,19 @@ namespace talus {
 
 /// Per part, a twist per unknown. Of velocities all copies of a body hold the same bits.
 using PartField = std::vector<std::vector<Twist>>;
+
+/// Bodies that no contact joins with those of other groups, over all parts: what is asked of a step is asked
+/// of each group.
+struct BodyGroups {
+  std::vector<std::vector<std::int32_t>> of_body = {};  ///< per part and unknown; -1: in none
+  std::int32_t count = 1;
+
+  /// Without a list all bodies are in the first group.
+  std::int32_t of(std::size_t part, std::size_t body) const {
+    return of_body.empty() ? 0 : of_body[part][body];
+  }
+  std::size_t size() const { return static_cast<std::size_t>(count); }
+};
 
 /// Communication interface of the solvers over parts, between those of this process and of others. Every
 /// process makes the same calls in the same order. The base class serves a single part and does nothing.

@@ -42,18 +42,14 @@ double end_of(std::size_t number) {
   return std::ldexp(edges[static_cast<std::size_t>(next % per_octave)], next / per_octave + lowest + 1);
 }
 
-/// v + b n, of which friction sees the tangential part [m/s].
-Vec3 approach(const ContactEquation& c, std::span<const Twist> V) {
-  return constrained(c, relative_velocity(c, V) + c.offset);
-}
-
 PartField field_of(const ProblemReaders& parts) {
   PartField field;
   for (const auto& part : parts) field.emplace_back(part->unknowns());
   return field;
 }
 
-/// V = V_free + M^-1 H r.
+}  // namespace
+
 PartField velocities_of(const ProblemReaders& parts, const PartLink& link) {
   PartField V = field_of(parts);
   link.each(parts.size(), [&](std::size_t p) {
@@ -66,8 +62,6 @@ PartField velocities_of(const ProblemReaders& parts, const PartLink& link) {
   return V;
 }
 
-}  // namespace
-
 Residuals residuals_of(const ProblemReaders& parts, const PartLink& link) {
   PartField V = velocities_of(parts, link), change = field_of(parts);
   Residuals out;
@@ -79,7 +73,7 @@ Residuals residuals_of(const ProblemReaders& parts, const PartLink& link) {
         const ProblemReader& problem = *parts[p];
         out.contact[p].reserve(problem.contacts());
         problem.each_contact([&](const ContactEquation& c, const Vec3& r) {
-          const Vec3 v = approach(c, V[p]);
+          const Vec3 v = constrained(c, relative_velocity(c, V[p]) + c.offset);
           const double m = effective_mass_by([&](std::size_t body) { return problem.mass(body); }, c);
           const NaturalMap map = natural_map_of(m, c, r, v);
           add_force(c, map.carried - r, change[p]);

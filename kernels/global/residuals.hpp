@@ -9,6 +9,9 @@
 
 namespace talus {
 
+/// V = V_free + M^-1 H r. Collective.
+PartField velocities_of(const ProblemReaders& parts, const PartLink& link);
+
 /// Residuals of all contacts, relative to the step's velocities.
 struct Residuals {
   /// Per part and contact: |r' - r| W_nn over `scale` [1], with r' one projection away from r (natural map,

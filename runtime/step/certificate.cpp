@@ -21,6 +21,7 @@ void Certificate::begin(Scales scales) {
   exchanged_by_small_ = {};
   asked_at_ = 0;
   asked_error_ = 0;
+  work_at_ = -1;
   doubts_ = 0;
 }
 
@@ -186,7 +187,7 @@ double Certificate::large_unbalance(WholeProblem& whole) {
     const double error = repeated(large_check_, std::min(settings_.balance_tolerance, velocity_tolerance()),
                                   [&](double enough) { return whole.large_error(enough); });
     result_.velocity_error =
-        larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work());
+        larger(error, whole.velocity_errors().credible(scales_.friction) * relative_work(whole));
     return error;
   }
   if (!(result_.drift <= settings_.balance_tolerance)) return result_.drift;
@@ -215,11 +216,21 @@ double Certificate::exchanged_by_large() const {
                   0.5 * mass * speed * speed);
 }
 
+/// What stands beside a large cluster must not hide its errors: of several the worst speaks.
+double Certificate::relative_work(WholeProblem& whole) {
+  if (!whole.several_large_clusters()) return work_ > 0 ? work_ / exchanged_by_large() : 0;
+  if (work_at_ != result_.iterations) {
+    work_at_ = result_.iterations;
+    largest_work_ = whole.large_work(rounding_, thresholds_.interest);
+  }
+  return largest_work_;
+}
+
 /// Slow modes of a large cluster leave small residuals at every contact and still much momentum to be
 /// exchanged. The work of those residuals shows it: for the error e of the velocities sum r . H^T e is M (V -
 /// V_free) . e. What it is worth in velocities a check of these tells, now and then, and is remembered.
 double Certificate::by_work(WholeProblem& whole) {
-  const double tolerance = velocity_tolerance(), work = relative_work();
+  const double tolerance = velocity_tolerance(), work = relative_work(whole);
   VelocityErrorMemory& memory = whole.velocity_errors();
   if (memory.reuse().most * work <= tolerance) return memory.reuse().most * work;
   const int done = result_.iterations;
@@ -251,6 +262,7 @@ void Certificate::corrected() {
   history_.start_anew();
   small_check_ = large_check_ = quantile_check_ = {};
   asked_at_ = 0;
+  work_at_ = -1;
 }
 
 void Certificate::solved_by_admm(const BodyAdmmResult& result) {
@@ -259,6 +271,7 @@ void Certificate::solved_by_admm(const BodyAdmmResult& result) {
   history_.start_anew();
   small_check_ = large_check_ = quantile_check_ = {};
   asked_at_ = 0;
+  work_at_ = -1;
   doubts_ = 0;
 }
 

@@ -117,12 +117,17 @@ class WholeProblem {
   /// There are clusters of contacts small enough for a direct solve; others.
   virtual bool small_clusters() = 0;
   virtual bool large_clusters() = 0;
+  virtual bool several_large_clusters() = 0;
   /// Relative error of what the impulses of the last check give; what is below `enough` is not told apart. Of
   /// the worst small cluster, in velocities and forces (kernels/clusters/step_error.hpp); of the large ones,
   /// in velocities (balance.hpp).
   /// What small clusters may cost grows with `sweeps`, done in this step.
   virtual SmallError small_error(double enough, int sweeps) = 0;
   virtual double large_error(double enough) = 0;
+  /// Of several large clusters, the relative work of the contacts' errors where it is largest
+  /// (kernels/clusters/cluster_work.hpp). Grains are at least so fast [m/s], and get at least such a part of
+  /// what presses a wall.
+  virtual double large_work(double speed, double interest) = 0;
   /// What is known of the errors of velocities in large clusters from earlier checks of them.
   virtual VelocityErrorMemory& velocity_errors() = 0;
   /// The residual that a share `part` of all contacts does not exceed (kernels/global/residuals.hpp).
@@ -218,7 +223,7 @@ class Certificate {
   void measure(const CheckSums& sums);
   double velocity_tolerance() const { return settings_.velocity_allowed(scales_.friction); }
   double exchanged_by_large() const;
-  double relative_work() const { return work_ > 0 ? work_ / exchanged_by_large() : 0; }
+  double relative_work(WholeProblem& whole);
   double drift() const;
   double wall_scale() const;
   double largest_change(std::size_t from, std::size_t to) const;
@@ -254,6 +259,8 @@ class Certificate {
   int corrected_at_ = -1;      ///< sweeps done then
   int asked_at_ = 0;           ///< sweeps done in this step when by_work last asked for a check of velocities
   double asked_error_ = 0;     ///< what that found
+  int work_at_ = -1;           ///< sweeps done when the work in several large clusters was last asked for
+  double largest_work_ = 0;    ///< relative: what that found
   int doubts_ = 0;             ///< times in this step that no answer was found
   int doubted_at_ = 0;         ///< sweeps done when that was so last
 };

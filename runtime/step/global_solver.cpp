@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "kernels/clusters/cluster_work.hpp"
 #include "kernels/clusters/clusters.hpp"
 #include "kernels/clusters/step_error.hpp"
 #include "kernels/global/balance.hpp"
@@ -214,6 +215,7 @@ double GlobalSolver::sweeps_needed(double spread) const {
 void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   small_ = false;
   large_ = true;
+  groups_ = {};
   // A cell that follows a stress ties all contacts together.
   if (state_.cell.loaded()) return;
   const Whole span(*this);
@@ -221,14 +223,20 @@ void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   const Clusters clusters = clusters_of(graphs, *link_);
   in_small_ = in_small_clusters(clusters, small, parameters_.friction);
   const std::vector<double> rows =
-      rows_of(*link_, graphs.size(), 2, [&](std::size_t p, std::span<double> row) {
+      rows_of(*link_, graphs.size(), 1, [&](std::size_t p, std::span<double> row) {
         for (const auto& [first, second] : graphs[p].pairs)
-          row[in_small_[p][static_cast<std::size_t>(first)] != 0 ? 0 : 1] = 1;
+          if (in_small_[p][static_cast<std::size_t>(first)] != 0) row[0] = 1;
       });
-  large_ = false;
-  for (std::size_t k = 0; k < rows.size(); ++k) (k % 2 == 0 ? small_ : large_) |= rows[k] > 0;
+  small_ = std::ranges::any_of(rows, [](double found) { return found > 0; });
+  groups_ = large_clusters_of(clusters, in_small_, graphs, *link_);
+  large_ = groups_.count > 0 || twice;
   twice_ = twice;
-  large_ |= twice;
+  if (!twice || !small_) return;
+  // Small ones, which have their own answers, are one group more.
+  for (std::size_t p = 0; p < groups_.of_body.size(); ++p)
+    for (std::size_t b = 0; b < groups_.of_body[p].size(); ++b)
+      if (in_small_[p][b] != 0) groups_.of_body[p][b] = groups_.count;
+  ++groups_.count;
 }
 
 std::vector<std::unique_ptr<const StepReader>> GlobalSolver::read_checked(
@@ -290,7 +298,16 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
 double GlobalSolver::large_error(double enough) const {
   const Whole span(*this);
   std::vector<BodyProblem> problems = checked(false);
-  return velocity_error(problems, *link_, enough).relative;
+  return velocity_error(problems, *link_, enough, several_large_clusters() ? groups_ : BodyGroups{}).relative;
+}
+
+double GlobalSolver::large_work(double speed, double interest) const {
+  const Whole span(*this);
+  const std::vector<WallMotion> walls = motions_of(state_);
+  std::vector<double> wall_inv_masses;
+  for (const WallMotion& wall : walls) wall_inv_masses.push_back(wall.inv_mass);
+  const ProblemReaders problems = read_all_checked(source_of(state_, parameters_, walls));
+  return largest_work(problems, groups_, *link_, {speed, interest, wall_inv_masses});
 }
 
 double GlobalSolver::quantile_error(double part) const {

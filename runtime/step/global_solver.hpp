@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/global/admm.hpp"
+#include "kernels/global/body_parts.hpp"
 #include "kernels/global/step_reader.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/graph/crew.hpp"
@@ -42,6 +43,7 @@ class GlobalSolver {
   void find_clusters(const SmallClusters& small, bool twice);
   bool small_clusters() const { return small_; }  ///< there are some, in any part
   bool large_clusters() const { return large_; }
+  bool several_large_clusters() const { return groups_.count > 1; }
 
   /// Relative error of what the impulses of the last check give, with several ranks those that the candidates
   /// keep; what is below `enough` is not told apart. `sweeps`: done in this step. `farthest`: largest
@@ -50,6 +52,8 @@ class GlobalSolver {
   /// velocities (balance.hpp).
   SmallError small_error(double enough, int sweeps, double farthest);
   double large_error(double enough) const;
+  /// Of several large clusters, and the same impulses: kernels/clusters/cluster_work.hpp.
+  double large_work(double speed, double interest) const;
   /// Of the same impulses: the residual that a share `part` of all contacts does not exceed, and what is
   /// furthest from its law (kernels/global/residuals.hpp).
   double quantile_error(double part) const;
@@ -88,6 +92,7 @@ class GlobalSolver {
   mutable trace::Meetings rounds_;  ///< since the last span began
   std::unique_ptr<PartLink> link_;
   std::vector<std::vector<char>> in_small_;  ///< per part and unknown
+  BodyGroups groups_;                        ///< the large clusters
   bool small_ = false, large_ = false, twice_ = false;
   std::vector<BodyProblem> problems_;  ///< of the last small_error
   PartImpulses change_;                ///< found there [N s]

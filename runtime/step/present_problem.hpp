@@ -37,6 +37,11 @@ class PresentProblem final : public WholeProblem {
     find_clusters();
     return global_.large_clusters();
   }
+  bool several_large_clusters() override {
+    find_clusters();
+    return global_.several_large_clusters();
+  }
+  double large_work(double speed, double interest) override { return global_.large_work(speed, interest); }
   SmallError small_error(double enough, int sweeps) override {
     return global_.small_error(enough, sweeps, farthest_);
   }

@@ -95,6 +95,24 @@ TEST(LargeHeap, BesideABoulderIsJudgedByItself) {
   expect_certified_velocities(std::move(scene), 1e-2);
 }
 
+// Nor what a lift gives to another heap as large: the fastest wall is not theirs.
+TEST(LargeHeap, BesideOneThatIsLiftedIsJudgedByItself) {
+  Scene scene = loose_grains(7, 13);
+  const double apart = 0.2, far = apart + 7 * 2.05 * radius;
+  std::erase_if(scene.setup.walls, [](const Wall& wall) { return wall.name == "x-"; });
+  scene.wall("far", {-far, 0, 0}, Vec3::UnitX());
+  for (const double x : {0.0, -apart})
+    scene.surface("rectangle", {{"corner", {x, -1, -1}}, {"edge_a", {0, 3, 0}}, {"edge_b", {0, 0, 5}}});
+  scene.surface("rectangle", {{"corner", {-2, -1, 0}}, {"edge_a", {2 - apart, 0, 0}}, {"edge_b", {0, 3, 0}}});
+  scene.setup.walls.back().name = "lift";
+  scene.setup.walls.back().motion = {MotionPart{.velocity = {0, 0, 0.5}}};
+  for (const Scene other = loose_grains(7, 13); const Vec3& x : other.bodies.x) {
+    const std::size_t slot = scene.bodies.size() - other.bodies.size();
+    scene.sphere(x + Vec3(-far, 0, 0.06), other.bodies.radius[slot], other.bodies.mass(slot));
+  }
+  expect_certified_velocities(std::move(scene), 1e-2);
+}
+
 /// Rows of grains with friction side by side, each an arch of half angle `angle` between walls that its
 /// thrust meets at a right angle.
 Scene vault(int span, int rows, double angle) {

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <random>
 #include <vector>
 
 #include "tests/unit/kernels/global/cut_problem.hpp"
+#include "tests/unit/kernels/global/held_problem.hpp"
 
 namespace talus {
 namespace {
@@ -16,27 +16,8 @@ namespace {
 using test::block;
 using test::Cut;
 
-/// A problem that lies in memory.
-class Held final : public ProblemReader {
- public:
-  explicit Held(const BodyProblem& problem) : problem_(problem) {}
-  std::size_t unknowns() const override { return problem_.bodies.size(); }
-  BodyUnknown unknown(std::size_t body) const override { return problem_.bodies[body]; }
-  double mass(std::size_t body) const override { return problem_.bodies[body].mass; }
-  bool counted(std::size_t body) const override { return problem_.counted(body); }
-  std::size_t contacts() const override { return problem_.contacts.size(); }
-  void each_contact(const Visit& visit) const override {
-    for (std::size_t k = 0; k < contacts(); ++k) visit(problem_.contacts[k], problem_.impulse[k]);
-  }
-
- private:
-  const BodyProblem& problem_;
-};
-
 Residuals residuals_of_parts(const std::vector<BodyProblem>& parts, const PartLink& link) {
-  ProblemReaders readers;
-  for (const BodyProblem& part : parts) readers.push_back(std::make_unique<Held>(part));
-  return residuals_of(readers, link);
+  return residuals_of(test::readers_of(parts), link);
 }
 
 Residuals residuals_of_whole(const BodyProblem& problem) {

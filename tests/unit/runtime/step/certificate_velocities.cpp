@@ -54,6 +54,21 @@ TEST(Certificate, ComparesTheWorkOfErrorsWithAllThatLargeClustersExchange) {
       << "what small clusters exchange is none of it";
 }
 
+// A work that is nothing to all may be much to one.
+TEST(Certificate, BelievesTheWorstOfSeveralLargeClusters) {
+  SolverSettings settings{.balance_tolerance = 0.05};
+  Certificate certificate(settings);
+  certificate.begin({.wall_pushes = {0}});
+  KnownProblem problem(1, {0.5});
+  problem.largest_work = 0.02;
+  certificate.judge(sums_of({0, 1}, 1000), {.iterations = 0}, problem);
+  const Found nearly_right{10, 1e-4, 1, 1e-9};
+  EXPECT_EQ(certificate.judge(sums_of(nearly_right, 1000), {.iterations = 10}, problem), Verdict::go_on);
+  EXPECT_NEAR(certificate.result().velocity_error, 0.5, 1e-12) << "what a check finds for it";
+  problem.largest_work.reset();
+  EXPECT_EQ(certificate.judge(sums_of(nearly_right, 1000), {.iterations = 20}, problem), Verdict::solved);
+}
+
 TEST(Certificate, BoundsVelocitiesMoreLooselyWithFrictionOrAsTheUserSays) {
   using enum Verdict;
   // A work of 0.02 is taken for an error of 0.2.

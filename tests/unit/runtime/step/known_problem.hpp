@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -27,6 +28,8 @@ class KnownProblem : public WholeProblem {
   double speed() const override { return 1; }
   bool small_clusters() override { return !small_errors_.empty(); }
   bool large_clusters() override { return true; }
+  bool several_large_clusters() override { return largest_work.has_value(); }
+  double large_work(double, double) override { return *largest_work; }
   SmallError small_error(double enough, int) override {
     const double error = small_errors_[std::min(small_asked_++, small_errors_.size() - 1)];
     return {std::isnan(error) ? error : std::max(enough, error), !std::isinf(error), mends, jammed,
@@ -42,6 +45,7 @@ class KnownProblem : public WholeProblem {
   std::size_t asked() const { return asked_; }
   bool jammed = false, mends = false;  ///< what small clusters are besides
   Exchanged exchanged;                 ///< by them
+  std::optional<double> largest_work;  ///< of several large clusters, where there are any
 
  private:
   double plain_sweeps_;
