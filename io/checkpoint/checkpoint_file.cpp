@@ -165,7 +165,7 @@ std::vector<std::int64_t> lay_out(const std::string& path, const CheckpointFile&
                                   const std::vector<RowCount>& rows) {
   demand_disk(path, expected_bytes(content, rows));
   const detail::QuietHdf5 quiet;
-  const Hdf5Object access = detail::file_access(path);
+  const Hdf5Object access = detail::checked_file_access(path);
   Hdf5Object file =
       hold(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose, path, "creating it");
   std::vector<std::int64_t> begin;
@@ -256,7 +256,7 @@ std::int64_t write_checkpoint(const std::filesystem::path& path, const Checkpoin
 namespace {
 
 Hdf5Object open_checkpoint(const std::string& path) {
-  Hdf5Object file = detail::open_file(path);
+  Hdf5Object file = detail::open_checked_file(path);
   if (H5Aexists(file.id(), "talus_checkpoint") <= 0) throw FileError(path, "is no checkpoint of Talus");
   const std::int64_t version = detail::read_integer({file.id(), path}, "talus_checkpoint");
   if (version != format_version)

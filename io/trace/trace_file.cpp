@@ -38,7 +38,7 @@ using detail::write_machine;
 using detail::write_plan;
 using detail::write_tasks;
 
-constexpr std::int64_t format_version = 5;  // 4: texts of variable length
+constexpr std::int64_t format_version = 6;  // 4: texts of variable length; 5: no checksums
 
 /// A trace file, opened and known to be one.
 Hdf5Object open_trace(const std::string& path) {
@@ -49,7 +49,7 @@ Hdf5Object open_trace(const std::string& path) {
                                              : "is a folder without a trace.h5; `talus run --trace` writes "
                                                "one");
   }
-  Hdf5Object file = detail::open_file(path);
+  Hdf5Object file = detail::open_checked_file(path);
   const std::string format = detail::read_text({file.id(), path}, "format");
   if (format != "talus-trace")
     throw FileError(
@@ -147,7 +147,7 @@ TraceWriter::TraceWriter(const fs::path& path, int ranks, int threads, bool pred
                          const std::optional<trace::Machine>& machine)
     : path_(path.string()) {
   const detail::QuietHdf5 quiet;
-  const Hdf5Object access = detail::file_access(path_);
+  const Hdf5Object access = detail::checked_file_access(path_);
   Hdf5Object file = hold(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.id()), H5Fclose, path_,
                          "creating the file");
   {
@@ -169,7 +169,7 @@ TraceWriter::TraceWriter(const fs::path& path, int ranks, int threads, bool pred
 template <class Write>
 void TraceWriter::add(const char* group, std::size_t index, Write write) {
   const detail::QuietHdf5 quiet;
-  const Hdf5Object access = detail::file_access(path_);
+  const Hdf5Object access = detail::checked_file_access(path_);
   Hdf5Object file =
       hold(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path_, "opening the file");
   {

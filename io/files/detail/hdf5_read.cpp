@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
 
 #include "io/files/error.hpp"
 
@@ -14,6 +18,22 @@ Hdf5Object open_file(const std::string& path) {
   const Hdf5Object access = hold(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path, "preparing HDF5");
   demand(H5Pset_file_locking(access.id(), false, true), path, "preparing HDF5");
   return hold(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.id()), H5Fclose, path, "opening as HDF5");
+}
+
+Hdf5Object open_checked_file(const std::string& path) {
+  constexpr std::string_view signature = "\x89HDF\r\n\x1a\n";
+  constexpr char checked = 2;  // the first version of HDF5's head that has a checksum
+  std::error_code unknown;
+  std::ifstream file;
+  if (std::filesystem::is_regular_file(path, unknown)) file.open(path, std::ios::binary);
+  if (!file.is_open()) return open_file(path);  // which says why not
+  std::array<char, signature.size() + 1> head{};
+  file.read(head.data(), head.size());
+  if (std::string_view(head.data(), signature.size()) != signature)
+    throw FileError(path, "is no HDF5 file, or its beginning is damaged");
+  if (head.back() < checked)
+    throw FileError(path, "has no checksums: it was written by Talus before 27 November 2026, or is damaged");
+  return open_file(path);
 }
 
 namespace {

@@ -14,6 +14,10 @@ namespace talus::io::detail {
 /// Opens a file for reading, without locking it.
 Hdf5Object open_file(const std::string& path);
 
+/// The same for a file that was written with `checked_file_access`. Throws FileError for another one, before
+/// HDF5 looks at what is in it.
+Hdf5Object open_checked_file(const std::string& path);
+
 /// Length of the first dimension, after a check of the others: `columns` numbers a row. Throws FileError also
 /// where the rows are more than the file can hold, so that a damaged length does not become memory.
 std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& path, const std::string& name);

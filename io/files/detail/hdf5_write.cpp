@@ -24,6 +24,12 @@ Hdf5Object file_access(const std::string& file) {
   return access;
 }
 
+Hdf5Object checked_file_access(const std::string& file) {
+  Hdf5Object access = file_access(file);
+  demand(H5Pset_libver_bounds(access.id(), H5F_LIBVER_V18, H5F_LIBVER_V18), file, "preparing HDF5");
+  return access;
+}
+
 namespace {
 
 void write_attribute(Place place, const char* name, hid_t file_type, hid_t memory_type, const void* value) {

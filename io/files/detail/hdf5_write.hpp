@@ -15,6 +15,10 @@ namespace talus::io::detail {
 /// the disk when it is closed and not before, so that a kill in between finds it as it was.
 Hdf5Object file_access(const std::string& file);
 
+/// The same for a file whose directory has checksums (formats of HDF5 1.8): HDF5 refuses one that is damaged,
+/// and without them follows what it finds there out of its own memory.
+Hdf5Object checked_file_access(const std::string& file);
+
 /// The group and the file that every write or read needs.
 struct Place {
   hid_t group;
