@@ -120,6 +120,27 @@ TEST(CheckpointFiles, OfOtherKindsAreRefused) {
   EXPECT_THROW(io::read_checkpoint_head(folder / "checkpoint_000001.h5"), io::FileError);
 }
 
+// HDF5 follows what a damaged directory says out of its own memory, unless checksums tell.
+TEST(CheckpointFiles, WithoutChecksumsOfTheirDirectoryAreNotGivenToHdf5) {
+  const test::ScratchDirectory folder;
+  const std::string path = (folder / "checkpoint_000001.h5").string();
+  const auto refusal = [&] {
+    return test::message_of<io::FileError>([&] { io::read_checkpoint_head(path); });
+  };
+  H5Fclose(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+  EXPECT_NE(refusal().find("has no checksums"), std::string::npos) << refusal();
+  io::write_checkpoint(path, small_file({0, 1, 2}), graph::one_rank());
+  EXPECT_NO_THROW(io::read_checkpoint_head(path));
+  for (const std::size_t place : {0U, 8U, 20U}) {  // signature, version, the head's own checksum
+    std::string bytes = test::content_of(path);
+    bytes[place] = static_cast<char>(bytes[place] ^ 1);
+    std::ofstream(path, std::ios::binary) << bytes;
+    EXPECT_NE(refusal(), "") << place;
+    bytes[place] = static_cast<char>(bytes[place] ^ 1);
+    std::ofstream(path, std::ios::binary) << bytes;
+  }
+}
+
 // Version 4 did not know what the ends of stages remember.
 TEST(CheckpointFiles, OfEarlierVersionsAreRefusedByTheirNumber) {
   const test::ScratchDirectory folder;
