@@ -10,7 +10,7 @@ namespace talus {
 namespace {
 
 /// The shared grains of an interface in order of id, with their owners and hubs.
-void list_shared(SubdomainInterface& here, const BodySubdomains& standings, std::span<const BodyId> id,
+void list_shared(SubdomainInterface& here, const BodySubdomains& incidences, std::span<const BodyId> id,
                  std::int32_t hub_multiplicity) {
   for (std::size_t k = 0; k < here.bodies.size(); ++k)
     if (here.multiplicity[k] > 1) here.shared.push_back(static_cast<std::int32_t>(k));
@@ -19,20 +19,20 @@ void list_shared(SubdomainInterface& here, const BodySubdomains& standings, std:
             [&](std::int32_t a, std::int32_t b) { return id_of(a) < id_of(b); });
   for (std::size_t s = 0; s < here.shared.size(); ++s) {
     const std::int32_t k = here.shared[s];
-    here.owner.push_back(standings.of(at(here.bodies[at(k)])).front());
+    here.owner.push_back(incidences.of(at(here.bodies[at(k)])).front());
     if (here.multiplicity[at(k)] >= hub_multiplicity) here.hubs.push_back(static_cast<std::int32_t>(s));
   }
 }
 
 /// Exchange lists of all neighbours, and where the copies come from. A grain's place in the list of E with F
 /// is its place in the list of F with E, as both hold the same grains in the same order.
-void list_exchanges(SubdomainInterface& here, const BodySubdomains& standings,
+void list_exchanges(SubdomainInterface& here, const BodySubdomains& incidences,
                     std::int32_t hub_multiplicity) {
   std::vector<std::pair<SubdomainId, std::int32_t>> ties;  // (other subdomain, index into shared)
   for (std::size_t s = 0; s < here.shared.size(); ++s) {
     const std::int32_t k = here.shared[s];
     if (here.multiplicity[at(k)] >= hub_multiplicity) continue;
-    for (const SubdomainId other : standings.of(at(here.bodies[at(k)])))
+    for (const SubdomainId other : incidences.of(at(here.bodies[at(k)])))
       if (other != here.subdomain) ties.emplace_back(other, static_cast<std::int32_t>(s));
   }
   std::sort(ties.begin(), ties.end());
@@ -70,13 +70,13 @@ void list_exchanges(SubdomainInterface& here, const BodySubdomains& standings,
 
 }  // namespace
 
-BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> standings) {
+BodySubdomains collect_incidences(std::size_t bodies, std::span<const BodyIncidence> incidences) {
   std::vector<std::int32_t> begin(bodies + 1, 0);
-  for (const Standing& standing : standings) ++begin[at(standing.body) + 1];
+  for (const BodyIncidence& incidence : incidences) ++begin[at(incidence.body) + 1];
   for (std::size_t k = 0; k < bodies; ++k) begin[k + 1] += begin[k];
-  std::vector<SubdomainId> all(standings.size());
+  std::vector<SubdomainId> all(incidences.size());
   std::vector<std::int32_t> next(begin.begin(), begin.end() - 1);
-  for (const Standing& standing : standings) all[at(next[at(standing.body)]++)] = standing.subdomain;
+  for (const BodyIncidence& incidence : incidences) all[at(next[at(incidence.body)]++)] = incidence.subdomain;
 
   BodySubdomains result;
   result.begin.assign(bodies + 1, 0);
@@ -92,15 +92,15 @@ BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> s
 BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> grain_pairs,
                                 std::span<const WallPair> wall_pairs, std::span<const SubdomainId> subdomain,
                                 std::span<const SubdomainId> home) {
-  // Most grains stand in one subdomain: repetitions of its first standing are not listed.
-  std::vector<Standing> standings;
-  standings.reserve(grains);
+  // Most grains stand in one subdomain: repetitions of its first incidence are not listed.
+  std::vector<BodyIncidence> incidences;
+  incidences.reserve(grains);
   std::vector<SubdomainId> first(grains);
   const auto stands = [&](Slot body, SubdomainId in) {
     SubdomainId& seen = first[at(body)];
     if (seen == in) return;
     if (seen.none()) seen = in;
-    standings.push_back({body, in});
+    incidences.push_back({body, in});
   };
   for (std::size_t k = 0; k < grain_pairs.size(); ++k) {
     stands(grain_pairs[k].first, subdomain[k]);
@@ -109,18 +109,19 @@ BodySubdomains grain_subdomains(std::size_t grains, std::span<const GrainPair> g
   for (std::size_t k = 0; k < wall_pairs.size(); ++k)
     stands(wall_pairs[k].body, subdomain[grain_pairs.size() + k]);
   for (std::size_t k = 0; k < home.size(); ++k)
-    if (first[k].none()) standings.push_back({static_cast<Slot>(k), home[k]});
-  return collect_standings(grains, standings);
+    if (first[k].none()) incidences.push_back({static_cast<Slot>(k), home[k]});
+  return collect_incidences(grains, incidences);
 }
 
 BodySubdomains wall_subdomains(std::size_t walls, std::span<const WallPair> wall_pairs,
                                std::span<const SubdomainId> subdomain) {
-  std::vector<Standing> standings;
-  for (std::size_t k = 0; k < wall_pairs.size(); ++k) standings.push_back({wall_pairs[k].wall, subdomain[k]});
-  return collect_standings(walls, standings);
+  std::vector<BodyIncidence> incidences;
+  for (std::size_t k = 0; k < wall_pairs.size(); ++k)
+    incidences.push_back({wall_pairs[k].wall, subdomain[k]});
+  return collect_incidences(walls, incidences);
 }
 
-std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& standings, std::span<const BodyId> id,
+std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& incidences, std::span<const BodyId> id,
                                                  std::span<const SubdomainId> here,
                                                  std::int32_t hub_multiplicity) {
   std::vector<SubdomainInterface> interfaces(here.size());
@@ -129,22 +130,22 @@ std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& standings
     interfaces[k].subdomain = here[k];
     place.emplace(here[k], k);
   }
-  for (std::size_t body = 0; body < standings.bodies(); ++body)
-    for (const SubdomainId subdomain : standings.of(body)) {
+  for (std::size_t body = 0; body < incidences.bodies(); ++body)
+    for (const SubdomainId subdomain : incidences.of(body)) {
       const auto found = place.find(subdomain);
       if (found == place.end()) continue;
       interfaces[found->second].bodies.push_back(static_cast<Slot>(body));
-      interfaces[found->second].multiplicity.push_back(standings.multiplicity(body));
+      interfaces[found->second].multiplicity.push_back(incidences.multiplicity(body));
     }
   for (SubdomainInterface& interface : interfaces) {
-    list_shared(interface, standings, id, hub_multiplicity);
-    list_exchanges(interface, standings, hub_multiplicity);
+    list_shared(interface, incidences, id, hub_multiplicity);
+    list_exchanges(interface, incidences, hub_multiplicity);
   }
   return interfaces;
 }
 
-std::size_t memory_used(const BodySubdomains& standings) {
-  return (standings.begin.size() + standings.subdomain.size()) * sizeof(std::int32_t);
+std::size_t memory_used(const BodySubdomains& incidences) {
+  return (incidences.begin.size() + incidences.subdomain.size()) * sizeof(std::int32_t);
 }
 
 std::size_t memory_used(const SubdomainInterface& interface) {

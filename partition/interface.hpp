@@ -16,10 +16,10 @@ namespace talus {
 
 /// States that a body (a grain's slot, or the index of a wall) stands in a subdomain: one of its candidates
 /// lies there.
-struct Standing {
+struct BodyIncidence {
   std::int32_t body;
   SubdomainId subdomain;
-  bool operator==(const Standing&) const = default;
+  bool operator==(const BodyIncidence&) const = default;
 };
 
 /// Per body the subdomains it stands in, ascending, each once; their number is its multiplicity m_i.
@@ -38,9 +38,9 @@ struct BodySubdomains {
   bool operator==(const BodySubdomains&) const = default;
 };
 
-/// From any list of standings, in any order and with repetitions: those of the candidates found here, and
+/// From any list of incidences, in any order and with repetitions: those of the candidates found here, and
 /// those that other ranks sent. 0 <= body < bodies.
-BodySubdomains collect_standings(std::size_t bodies, std::span<const Standing> standings);
+BodySubdomains collect_incidences(std::size_t bodies, std::span<const BodyIncidence> incidences);
 
 /// Grains of these candidates, which are in `subdomain` (grain pairs first, then wall pairs). The answer is
 /// complete for a grain when all its candidates are given, whichever subdomain they are in; a subdomain is a
@@ -96,15 +96,15 @@ struct SubdomainInterface {
   std::vector<std::int32_t> hubs;
 };
 
-/// Interfaces of the subdomains `here` (ascending). `standings` must be complete for every grain that stands
+/// Interfaces of the subdomains `here` (ascending). `incidences` must be complete for every grain that stands
 /// in one of them. `id` has one entry per grain. hub_multiplicity >= 3; the default lets eight boxes that
 /// meet in a corner exchange directly. Walls are not among the bodies: a wall that k subdomains touch is a
 /// reduction over its `wall_subdomains`.
-std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& standings, std::span<const BodyId> id,
+std::vector<SubdomainInterface> build_interfaces(const BodySubdomains& incidences, std::span<const BodyId> id,
                                                  std::span<const SubdomainId> here,
                                                  std::int32_t hub_multiplicity = 9);
 
-std::size_t memory_used(const BodySubdomains& standings);
+std::size_t memory_used(const BodySubdomains& incidences);
 std::size_t memory_used(const SubdomainInterface& interface);
 
 }  // namespace talus

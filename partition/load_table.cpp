@@ -43,7 +43,7 @@ LoadTable measure_load(std::int32_t subdomains, std::span<const SubdomainInterfa
   for (const SubdomainId subdomain : contacts) ++table.contacts[subdomain.at()];
   for (const SubdomainInterface& interface : interfaces) {
     const std::size_t e = interface.subdomain.at();
-    // Neighbours are counted from the standings, not from the exchange lists, which leave out the subdomains
+    // Neighbours are counted from the incidences, not from the exchange lists, which leave out the subdomains
     // of a hub.
     std::set<SubdomainId> others;
     for (std::int32_t k : interface.shared) {

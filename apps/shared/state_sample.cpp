@@ -76,7 +76,7 @@ void add_forces(const io::Scene& scene, const io::CheckpointFile& file, const Ch
       if (wall < 0) {
         const auto& [first, second] = part.grain_pairs.at(grain++);
         force = {id(first), id(second)};
-        normal = (centre(first) - centre(second)).normalized();
+        normal = state.domain.separation(centre(first), centre(second)).normalized();
       } else {
         const auto& [of, body, feature] = part.wall_pairs.at(at_wall++);
         force = {id(body), wall_in(scene, -1 - of, state.walls), feature};

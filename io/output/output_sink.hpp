@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "io/files/crc.hpp"
-#include "io/pictures/picture.hpp"
+#include "io/results/grain_load.hpp"
 #include "io/results/results.hpp"
 #include "io/results/run_json.hpp"
 #include "runtime/graph/communicator.hpp"

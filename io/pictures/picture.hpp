@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "io/results/grain_load.hpp"
 #include "kernels/shapes/walls.hpp"
 #include "runtime/graph/communicator.hpp"
 #include "runtime/step/frame.hpp"
@@ -23,12 +24,6 @@ struct TriaxialPicture {
 /// Steps that missed their tolerance are marked, and are no peak. Rows with a value that is not finite are
 /// left out; without any row the picture says so.
 std::string draw_triaxial(std::span<const TriaxialReport> reports, const TriaxialPicture& options);
-
-/// What a scene loads its grains with; 0 where it does not.
-struct GrainLoad {
-  double pressure = 0;  ///< [Pa] the largest on a wall, in any stage
-  double weight = 0;    ///< [N/m^3] density of the heaviest grains times gravity
-};
 
 /// All grains of a sample, of which pictures show a slab.
 struct SampleExtent {

@@ -63,12 +63,19 @@ Hdf5Object open_trace(const std::string& path) {
   return file;
 }
 
-/// Turns the records of a rank to the clock of rank 0: the offset changes evenly between the two comparisons.
-void turn_clock(const RankClock& clock, trace::Track& track) {
+/// Brings the records of a rank to the clock of rank 0: the offset changes evenly between the two
+/// comparisons.
+void correct_clock(const std::string& file, const RankClock& clock, trace::Track& track) {
+  constexpr double longest = 0x1p62;  // [ns]: sums of two are no overflow
   const ClockOffset &first = clock.offsets[0], &last = clock.offsets[1];
   const double drift = last.time > first.time ? (last.offset - first.offset) / (last.time - first.time) : 0;
-  for (trace::Record& record : track.records)
-    record.begin += std::llround(first.offset + drift * (static_cast<double>(record.begin) - first.time));
+  for (trace::Record& record : track.records) {
+    const auto begin = static_cast<double>(record.begin);
+    const double offset = first.offset + drift * (begin - first.time);
+    if (!(std::abs(begin) < longest && std::abs(offset) < longest))
+      damaged_trace(file, fmt::format("a task that begins at {} ns, by a clock {} ns off", begin, offset));
+    record.begin += std::llround(offset);
+  }
 }
 
 /// What a trace says before its blocks, with tracks for these.
@@ -278,7 +285,7 @@ trace::Trace read_trace(const fs::path& path) {
   for (const std::string& of_rank : clocks) {
     const RankClock clock = read_clock(root, "/clocks/" + of_rank);
     for (std::int32_t thread = 0; thread < trace.threads; ++thread)
-      turn_clock(clock, track_of(name, trace, clock.rank, thread));
+      correct_clock(name, clock, track_of(name, trace, clock.rank, thread));
   }
   if (cut) drop_cut_steps(name, trace);
   try {

@@ -54,12 +54,12 @@ BlockElimination::BlockElimination(const Freedoms& freedoms, const Eigen::Vector
   order(pairs);
   find_pattern(pairs);
   const auto area = static_cast<std::size_t>(size_ * size_);
-  diagonal_.assign(area * turn_.size(), 0);
+  diagonal_.assign(area * pivot_.size(), 0);
   below_.assign(area * later_.size(), 0);
   above_.assign(area * later_.size(), 0);
-  for (std::size_t b = 0; b < turn_.size(); ++b)
+  for (std::size_t b = 0; b < pivot_.size(); ++b)
     for (Eigen::Index k = 0; k < size_; ++k)
-      diagonal_[at(turn_[b]) * area + static_cast<std::size_t>(k * (size_ + 1))] =
+      diagonal_[at(pivot_[b]) * area + static_cast<std::size_t>(k * (size_ + 1))] =
           k < freedoms.count(b) ? diagonal[freedoms.begin(b) + k] : 1;
 }
 
@@ -73,19 +73,19 @@ void BlockElimination::order(std::span<const Pair> pairs) {
   }
   Eigen::SparseMatrix<double> touch(n, n);
   touch.setFromTriplets(entries.begin(), entries.end());
-  Eigen::AMDOrdering<int>::PermutationType body_of_turn;
-  Eigen::AMDOrdering<int>()(touch, body_of_turn);
-  turn_.resize(freedoms_.bodies());
-  for (Eigen::Index k = 0; k < n; ++k) turn_[at(body_of_turn.indices()[k])] = static_cast<std::int32_t>(k);
+  Eigen::AMDOrdering<int>::PermutationType body_of_pivot;
+  Eigen::AMDOrdering<int>()(touch, body_of_pivot);
+  pivot_.resize(freedoms_.bodies());
+  for (Eigen::Index k = 0; k < n; ++k) pivot_[at(body_of_pivot.indices()[k])] = static_cast<std::int32_t>(k);
 }
 
 /// A body that goes couples all those that are still coupled to it: to hand them to the first of these is
 /// enough, as it hands them on.
 void BlockElimination::find_pattern(std::span<const Pair> pairs) {
-  std::vector<std::vector<std::int32_t>> later(turn_.size());
+  std::vector<std::vector<std::int32_t>> later(pivot_.size());
   for (const auto& [a, b] : pairs) {
-    const std::int32_t first = std::min(turn_[at(a)], turn_[at(b)]),
-                       second = std::max(turn_[at(a)], turn_[at(b)]);
+    const std::int32_t first = std::min(pivot_[at(a)], pivot_[at(b)]),
+                       second = std::max(pivot_[at(a)], pivot_[at(b)]);
     if (first != second) later[at(first)].push_back(second);
   }
   begin_.push_back(0);
@@ -104,7 +104,7 @@ void BlockElimination::find_pattern(std::span<const Pair> pairs) {
   }
 }
 
-/// Of the block of two bodies, by their turns, the earlier first: in `later_`.
+/// Of the block of two bodies, by their pivots, the earlier first: in `later_`.
 std::size_t BlockElimination::place(std::int32_t first, std::int32_t second) const {
   const auto from = later_.begin() + static_cast<std::ptrdiff_t>(begin_[at(first)]),
              to = later_.begin() + static_cast<std::ptrdiff_t>(begin_[at(first) + 1]);
@@ -112,7 +112,7 @@ std::size_t BlockElimination::place(std::int32_t first, std::int32_t second) con
 }
 
 void BlockElimination::add(std::int32_t row, std::int32_t column, const Eigen::Matrix<double, 6, 6>& block) {
-  const std::int32_t i = turn_[at(row)], j = turn_[at(column)];
+  const std::int32_t i = pivot_[at(row)], j = pivot_[at(column)];
   const auto area = static_cast<std::size_t>(size_ * size_);
   double* const entries = i == j  ? &diagonal_[at(i) * area]
                           : i > j ? &below_[place(j, i) * area]
@@ -125,8 +125,8 @@ void BlockElimination::add(std::int32_t row, std::int32_t column, const Eigen::M
 template <int size>
 void BlockElimination::eliminate() {
   constexpr std::size_t area = size * size;
-  rows_.resize(size * turn_.size());
-  for (std::size_t k = 0; k < turn_.size(); ++k) {
+  rows_.resize(size * pivot_.size());
+  for (std::size_t k = 0; k < pivot_.size(); ++k) {
     Block<size> diagonal(&diagonal_[k * area]);
     int* const rows = &rows_[k * size];
     const Eigen::PartialPivLU<Eigen::Matrix<double, size, size>> lu(diagonal);
@@ -157,18 +157,18 @@ void BlockElimination::factorise() {
   size_ == 3 ? eliminate<3>() : eliminate<6>();
 }
 
-/// `x`: blocks by turns.
+/// `x`: blocks by pivots.
 template <int size>
 void BlockElimination::substitute(Eigen::VectorXd& x) const {
   constexpr std::size_t area = size * size;
   const auto part = [&](std::size_t k) { return x.segment<size>(static_cast<Eigen::Index>(k) * size); };
   const auto factors = [&](std::size_t k) { return ConstBlock<size>(&diagonal_[k * area]); };
-  for (std::size_t k = 0; k < turn_.size(); ++k) {
+  for (std::size_t k = 0; k < pivot_.size(); ++k) {
     divide_by_lower<size>(factors(k), &rows_[k * size], part(k));
     for (std::size_t a = begin_[k]; a < begin_[k + 1]; ++a)
       part(at(later_[a])) -= ConstBlock<size>(&below_[a * area]) * part(k);
   }
-  for (std::size_t k = turn_.size(); k-- > 0;) {
+  for (std::size_t k = pivot_.size(); k-- > 0;) {
     for (std::size_t a = begin_[k]; a < begin_[k + 1]; ++a)
       part(k) -= ConstBlock<size>(&above_[a * area]) * part(at(later_[a]));
     divide_by_upper<size>(factors(k), part(k));
@@ -176,14 +176,14 @@ void BlockElimination::substitute(Eigen::VectorXd& x) const {
 }
 
 Eigen::VectorXd BlockElimination::solve(const Eigen::VectorXd& f) const {
-  Eigen::VectorXd x = Eigen::VectorXd::Zero(size_ * static_cast<Eigen::Index>(turn_.size()));
-  for (std::size_t b = 0; b < turn_.size(); ++b)
-    x.segment(size_ * turn_[b], freedoms_.count(b)) = f.segment(freedoms_.begin(b), freedoms_.count(b));
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(size_ * static_cast<Eigen::Index>(pivot_.size()));
+  for (std::size_t b = 0; b < pivot_.size(); ++b)
+    x.segment(size_ * pivot_[b], freedoms_.count(b)) = f.segment(freedoms_.begin(b), freedoms_.count(b));
   size_ == 3 ? substitute<3>(x) : substitute<6>(x);
   Eigen::VectorXd solution(freedoms_.size());
-  for (std::size_t b = 0; b < turn_.size(); ++b)
+  for (std::size_t b = 0; b < pivot_.size(); ++b)
     solution.segment(freedoms_.begin(b), freedoms_.count(b)) =
-        x.segment(size_ * turn_[b], freedoms_.count(b));
+        x.segment(size_ * pivot_[b], freedoms_.count(b));
   return solution;
 }
 

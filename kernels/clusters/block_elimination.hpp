@@ -51,11 +51,11 @@ class BlockElimination {
 
   const Freedoms& freedoms_;
   Eigen::Index size_ = 3;              ///< of a block
-  std::vector<std::int32_t> turn_;     ///< per body: when it is eliminated
-  std::vector<std::size_t> begin_;     ///< per turn: its first in `later_`; and the number of all
-  std::vector<std::int32_t> later_;    ///< turns of the bodies that are still coupled to one, ascending
-  std::vector<double> diagonal_;       ///< per turn: its block; its factors L and U behind `factorise`
-  std::vector<int> rows_;              ///< per turn, so many as a block has: which row of the block is where
+  std::vector<std::int32_t> pivot_;    ///< per body: when it is eliminated
+  std::vector<std::size_t> begin_;     ///< per pivot: its first in `later_`; and the number of all
+  std::vector<std::int32_t> later_;    ///< pivots of the bodies that are still coupled to one, ascending
+  std::vector<double> diagonal_;       ///< per pivot: its block; its factors L and U behind `factorise`
+  std::vector<int> rows_;              ///< per pivot, so many as a block has: which row of the block is where
   std::vector<double> below_, above_;  ///< per entry of `later_`: block in its row, in its column; behind
                                        ///< `factorise` over U, and L^-1 times it
   double work_ = 0;

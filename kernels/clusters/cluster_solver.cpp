@@ -128,13 +128,13 @@ ClusterAnswer answer_of(const BodyProblem& from, const BodyProblem& now, const C
 void solve_by_matrix(const BodyProblem& problem, double enough, double work,
                      const ClusterThresholds& thresholds, ClusterAnswer& answer) {
   ContactMatrix matrix = matrix_of(problem);
-  for (const ClusterThresholds::Turn& turn : thresholds.turns) {
+  for (const ClusterThresholds::Handover& handover : thresholds.handovers) {
     if (work <= 0) break;
-    const DelassusGoal goal{.tolerance = turn.residual,
+    const DelassusGoal goal{.tolerance = handover.residual,
                             .measure = ErrorMeasure::scaled,
-                            .max_iterations = turn.most_iterations,
+                            .max_iterations = handover.most_iterations,
                             .most_work = work};
-    const bool last = &turn == &thresholds.turns.back();
+    const bool last = &handover == &thresholds.handovers.back();
     const DelassusReport report = solve_auto(matrix.problem, goal, {}, matrix.r);
     work -= report.work;
     if (report.iterations == 0 && !last) continue;

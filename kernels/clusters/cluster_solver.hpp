@@ -35,11 +35,11 @@ struct ClusterThresholds {
   double same_velocities = 0.1, same_law = 1e-3;
   /// Scaled errors (kernels/delassus/delassus.hpp) at which the solver with the stored matrix hands over to
   /// Newton rounds again, > 0, falling; and its iterations until then, at most, >= 1.
-  struct Turn {
+  struct Handover {
     double residual;
     std::int64_t most_iterations;
   };
-  std::array<Turn, 3> turns{{{1e-6, 300}, {1e-8, 1000}, {1e-11, 3000}}};
+  std::array<Handover, 3> handovers{{{1e-6, 300}, {1e-8, 1000}, {1e-11, 3000}}};
 };
 
 /// What a cluster's impulses have to change by. Momenta are sum m |u| + (I/R^2) |w| [N s].

@@ -104,7 +104,7 @@ struct DelassusGoal {
   double tolerance = 1e-4;  ///< on the measure; 0 runs until a limit
   ErrorMeasure measure = ErrorMeasure::larger;
   std::int64_t max_iterations = 10'000'000;  ///< of the method, >= 0
-  /// Multiplications (DelassusReport::work) after which solve_auto begins no other turn, > 0.
+  /// Multiplications (DelassusReport::work) after which solve_auto begins no other slice, > 0.
   double most_work = std::numeric_limits<double>::infinity();
   /// Asked after every iteration; true ends the solve. For time limits: kernels own no clock.
   std::function<bool()> stop = {};

@@ -44,7 +44,7 @@ class Portfolio {
       if (!runner.own) begin(next);
       const double part = next == momentum ? settings_.still_sweeps : settings_.still;
       if (stands_still(next, part)) begin_anew(next);
-      const double until = runner.own->work() + settings_.turn * work(momentum);
+      const double until = runner.own->work() + settings_.slice * work(momentum);
       do runner.iterate();
       while (!answer_.over() && usable(next) && runner.own->work() < until);
     }

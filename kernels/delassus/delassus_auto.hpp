@@ -21,14 +21,14 @@ struct AutoSettings {
   double newton_steps = 4;   ///< that Newton is expected to need before anything is known
   double admm_decade = 25;   ///< iterations of ADMM for a digit, likewise
   double sweeps_first = 30;  ///< sweeps before anything is said of them
-  double turn = 0.05;        ///< work of a turn, of what the sweeps with momentum have had
+  double slice = 0.05;       ///< work of a slice, of what the sweeps with momentum have had
 };
 
-/// Sweeps with momentum, conjugate sweeps, Newton and ADMM in turn, each going on where its own last turn
+/// Sweeps with momentum, conjugate sweeps, Newton and ADMM in turn, each going on where its own last slice
 /// ended, until one of them reaches the goal. Sweeps with momentum are never denied two fifths of the work
 /// for long, because they are the best method of most problems; the rest goes to the method that is expected
 /// to be through soonest: by how its own error has fallen, or, before that is known, by what such a method
-/// usually takes. The others begin where the best answer is. One that stands still loses its turns to the
+/// usually takes. The others begin where the best answer is. One that stands still loses its slices to the
 /// others, but none is given up while the goal lets the solve go on. All is decided by errors and counted
 /// multiplications: the same input gives the same bits, but for where goal.stop ends it.
 DelassusReport solve_auto(const DelassusProblem& problem, const DelassusGoal& goal,

@@ -7,11 +7,11 @@
 
 namespace talus::graph {
 
-BackgroundLane::BackgroundLane(std::size_t capacity) : capacity_(capacity) {
+BackgroundThread::BackgroundThread(std::size_t capacity) : capacity_(capacity) {
   if (capacity == 0) throw std::invalid_argument("a background thread needs room for at least one task");
 }
 
-BackgroundLane::~BackgroundLane() {
+BackgroundThread::~BackgroundThread() {
   {
     const std::lock_guard lock(mutex_);
     closing_ = true;
@@ -20,7 +20,7 @@ BackgroundLane::~BackgroundLane() {
   if (thread_.joinable()) thread_.join();
 }
 
-void BackgroundLane::submit(std::string name, std::function<void()> work) {
+void BackgroundThread::submit(std::string name, std::function<void()> work) {
   if (!work) throw std::invalid_argument("background task '" + name + "' has no work");
   {
     std::unique_lock lock(mutex_);
@@ -32,17 +32,17 @@ void BackgroundLane::submit(std::string name, std::function<void()> work) {
   changed_.notify_all();
 }
 
-void BackgroundLane::drain() {
+void BackgroundThread::drain() {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return queue_.empty(); });
   report_failure();
 }
 
-void BackgroundLane::report_failure() {
+void BackgroundThread::report_failure() {
   if (failure_) rethrow_as_task_error(std::exchange(failed_, {}), std::exchange(failure_, nullptr));
 }
 
-void BackgroundLane::serve() {
+void BackgroundThread::serve() {
   std::unique_lock lock(mutex_);
   for (;;) {
     changed_.wait(lock, [&] { return closing_ || !queue_.empty(); });

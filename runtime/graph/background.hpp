@@ -14,14 +14,14 @@ namespace talus::graph {
 /// One thread that runs tasks in order of submission beside everything else: files are written while the next
 /// steps are computed. Tasks own what they write (plain copies), so no result can depend on when they run.
 /// The queue is bounded: a slow disk holds the simulation back instead of filling the memory.
-class BackgroundLane {
+class BackgroundThread {
  public:
   /// At most `capacity` >= 1 tasks wait or run at a time.
-  explicit BackgroundLane(std::size_t capacity);
+  explicit BackgroundThread(std::size_t capacity);
   /// Runs what is outstanding; a failure that was not reported yet is lost, so call drain() first.
-  ~BackgroundLane();
-  BackgroundLane(const BackgroundLane&) = delete;
-  BackgroundLane& operator=(const BackgroundLane&) = delete;
+  ~BackgroundThread();
+  BackgroundThread(const BackgroundThread&) = delete;
+  BackgroundThread& operator=(const BackgroundThread&) = delete;
 
   /// Queues a task; blocks while `capacity` tasks are outstanding. The first call starts the thread. Throws
   /// TaskError, and queues nothing, if an earlier task has failed since the last report. A task of this lane

@@ -59,10 +59,10 @@ class Executor {
   /// tasks. Called by one thread at a time.
   void run(const Graph& graph);
 
-  /// Queues work for the background thread, see BackgroundLane::submit. Its thread starts with the first
+  /// Queues work for the background thread, see BackgroundThread::submit. Its thread starts with the first
   /// call.
   void submit_background(std::string name, std::function<void()> work);
-  /// Waits for the background thread, see BackgroundLane::drain. Returns at once if it was never used.
+  /// Waits for the background thread, see BackgroundThread::drain. Returns at once if it was never used.
   void drain();
 
  private:
@@ -100,7 +100,7 @@ class Executor {
   /// that spin before they block. Relaxed: what has changed is read under the mutex afterwards.
   alignas(cache_line) std::atomic<std::uint64_t> changes_{0};
 
-  BackgroundLane background_;
+  BackgroundThread background_;
 };
 
 }  // namespace talus::graph

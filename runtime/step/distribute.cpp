@@ -100,12 +100,12 @@ struct OwnCandidates {
 };
 
 OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& found,
-                       std::span<const SubdomainId> subdomain, const BodySubdomains& standings,
+                       std::span<const SubdomainId> subdomain, const BodySubdomains& incidences,
                        std::span<const char> glued) {
   const std::size_t grains = found.grain_pairs.size(), here = decomposition.here.size();
   Per<SubdomainId, SubdomainPlace> place_of(at(decomposition.partition.subdomains));
   for (const SubdomainPlace e : decomposition.here.indices()) place_of[decomposition.here[e]] = e;
-  const auto shared = [&](Slot body) { return standings.multiplicity(at(body)) > 1; };
+  const auto shared = [&](Slot body) { return incidences.multiplicity(at(body)) > 1; };
   std::vector<std::int32_t> group(found.size(), -1);
   OwnCandidates own;
   own.begin.assign(2 * here * (glued.size() + 1) + 1, 0);
@@ -130,15 +130,15 @@ OwnCandidates sort_own(const Decomposition& decomposition, const Candidates& fou
 
 /// The subdomain colours, none where there is a hub. Collective.
 void settle_colours(Decomposition& decomposition, const graph::Communicator& ranks,
-                    const BodySubdomains& standings, std::int32_t hubs) {
+                    const BodySubdomains& incidences, std::int32_t hubs) {
   const auto is_here = [&](SubdomainId e) { return decomposition.rank_of[e] == ranks.rank(); };
   std::map<std::pair<SubdomainId, SubdomainId>, std::int32_t> shared;
   double hub[1] = {0};
-  for (std::size_t b = 0; b < standings.bodies(); ++b) {
-    const auto stands = standings.of(b);
+  for (std::size_t b = 0; b < incidences.bodies(); ++b) {
+    const auto stands = incidences.of(b);
     for (const SubdomainId e : stands) {
       if (stands.size() == 1 || !is_here(e)) continue;
-      if (standings.multiplicity(b) >= hubs) hub[0] = 1;
+      if (incidences.multiplicity(b) >= hubs) hub[0] = 1;
       for (const SubdomainId other : stands)
         if (other != e && hub[0] == 0) ++shared[{e, other}];
     }
@@ -155,7 +155,7 @@ void settle_colours(Decomposition& decomposition, const graph::Communicator& ran
 /// comes first: a later subdomain colour then has its walls swept, and can tell, before it takes over what
 /// others did to its grains. Collective: impulses of what goes to another rank follow.
 void move_wall_contacts(const Decomposition& decomposition, const graph::Communicator& ranks,
-                        const BodySubdomains& standings, const Surroundings& around, FoundCandidates& among,
+                        const BodySubdomains& incidences, const Surroundings& around, FoundCandidates& among,
                         std::vector<SubdomainId>& subdomain) {
   Candidates& found = among.candidates;
   const std::size_t grains = found.grain_pairs.size();
@@ -163,7 +163,7 @@ void move_wall_contacts(const Decomposition& decomposition, const graph::Communi
   for (std::size_t k = grains; k < found.size(); ++k) {
     const WallPair& pair = found.wall_pairs[k - grains];
     if (among.glued[at(pair.wall)] == 0) continue;
-    const auto stands = standings.of(at(pair.body));
+    const auto stands = incidences.of(at(pair.body));
     const SubdomainId first = *std::ranges::min_element(
         stands, {}, [&](SubdomainId e) { return decomposition.subdomain_colour_of(e); });
     const SubdomainId before = subdomain[k];
@@ -273,21 +273,21 @@ std::vector<CandidateGroup> distribute(Decomposition& decomposition, const Decom
     const auto stand = [&] {
       return grain_subdomains(around.bodies.size(), found.grain_pairs, found.wall_pairs, subdomain, home);
     };
-    BodySubdomains standings = stand();
+    BodySubdomains incidences = stand();
     const std::int32_t hubs = detail::hubs_from(settings);
     if (settings.coupling == Coupling::alternating) {
-      settle_colours(decomposition, ranks, standings, hubs);
+      settle_colours(decomposition, ranks, incidences, hubs);
       if (decomposition.in_colours() && std::ranges::find(among.glued, 1) != among.glued.end()) {
-        move_wall_contacts(decomposition, ranks, standings, around, among, subdomain);
-        standings = stand();
+        move_wall_contacts(decomposition, ranks, incidences, around, among, subdomain);
+        incidences = stand();
       }
     }
     std::vector<SubdomainInterface> interfaces =
-        build_interfaces(standings, around.bodies.id, decomposition.here, hubs);
+        build_interfaces(incidences, around.bodies.id, decomposition.here, hubs);
     decomposition.interfaces.assign(std::move_iterator(interfaces.begin()),
                                     std::move_iterator(interfaces.end()));
-    detail::list_copies(decomposition, settings.coupling, standings, around.bodies.id, hubs);
-    own = sort_own(decomposition, found, subdomain, standings, among.glued);
+    detail::list_copies(decomposition, settings.coupling, incidences, around.bodies.id, hubs);
+    own = sort_own(decomposition, found, subdomain, incidences, among.glued);
     for (std::int32_t k : own.candidate) ++load[subdomain[at(k)]];
   }
   ranks.sum(load);

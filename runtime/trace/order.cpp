@@ -71,17 +71,17 @@ bool Order::begin_step(std::uint32_t step) {
         fmt::format("step {} has another loop than the recorded one: the scene, the subdomains or the number "
                     "of threads differ",
                     step));
-  turn_.store(0, std::memory_order_relaxed);
+  next_.store(0, std::memory_order_relaxed);
   return true;
 }
 
-std::optional<std::size_t> Order::place(int thread, std::size_t done, Turn turn, bool works) const {
+std::optional<std::size_t> Order::place(int thread, std::size_t done, Visit visit, bool works) const {
   const std::vector<Placed>& own = current_->threads[static_cast<std::size_t>(thread)];
-  const bool recorded = done < own.size() && own[done].turn == turn;
+  const bool recorded = done < own.size() && own[done].visit == visit;
   if (recorded != works)
     throw TraceError(fmt::format(
         "in step {}, epoch {}, node {} {} and the recorded one {}: the run has other settings", number_,
-        turn.epoch, turn.node, works ? "works" : "does not work", recorded ? "did" : "did not"));
+        visit.epoch, visit.node, works ? "works" : "does not work", recorded ? "did" : "did not"));
   return recorded ? std::optional(own[done].place) : std::nullopt;
 }
 

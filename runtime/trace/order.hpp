@@ -20,10 +20,10 @@ namespace talus::trace {
 class Order {
  public:
   /// A node in an epoch.
-  struct Turn {
+  struct Visit {
     std::int32_t epoch;
     std::uint32_t node;
-    bool operator==(const Turn&) const = default;
+    bool operator==(const Visit&) const = default;
   };
 
   /// Keeps what it needs of the trace. Throws TraceError when a thread of it did not walk its nodes by
@@ -41,7 +41,7 @@ class Order {
   /// The place in the recorded order of the `done`-th node of a thread in this step. Called for each node
   /// that the thread comes to; none when the node does nothing, neither in the run (`works`) nor in the
   /// recording. Throws TraceError where the two differ: other nodes would wait for ever for that place.
-  std::optional<std::size_t> place(int thread, std::size_t done, Turn turn, bool works) const;
+  std::optional<std::size_t> place(int thread, std::size_t done, Visit visit, bool works) const;
   /// Throws TraceError when the run decides after an epoch and the recording did not: its order may mix nodes
   /// of before and after the decision.
   void check_gate(int epoch) const;
@@ -49,15 +49,15 @@ class Order {
   /// until true.
   bool take(std::size_t place) {
     // Relaxed: the order of beginnings is all it says; what nodes share is guarded by the loop itself.
-    if (turn_.load(std::memory_order_relaxed) != place) return false;
-    turn_.store(place + 1, std::memory_order_relaxed);
+    if (next_.load(std::memory_order_relaxed) != place) return false;
+    next_.store(place + 1, std::memory_order_relaxed);
     return true;
   }
 
  private:
   /// A node of a thread, and its place among those of all.
   struct Placed {
-    Turn turn;
+    Visit visit;
     std::size_t place;
   };
   struct Step {
@@ -72,7 +72,7 @@ class Order {
   std::optional<Plan> plan_;             ///< the run's
   std::uint32_t number_ = 0;             ///< of the step
   const Step* current_ = nullptr;
-  std::atomic<std::size_t> turn_{0};  ///< written by the thread whose turn it is, read by all
+  std::atomic<std::size_t> next_{0};  ///< written by the thread that is to go on, read by all
 };
 
 /// One thread's view of a program of the epoch loop whose nodes wait for their place in the recorded order.
@@ -101,7 +101,7 @@ class Ordered : public View<Program> {
   using View<Program>::program_;
   Order& order_;
   const graph::Worker& me_;
-  std::size_t done_ = 0;  ///< nodes that had a turn
+  std::size_t done_ = 0;  ///< nodes that were visited
 };
 
 }  // namespace talus::trace

@@ -137,19 +137,19 @@ int main(int argc, char** argv) {
       const auto subdomain = subdomains_of(regions, at.x);
       return grain_subdomains(sample.x.size(), sample.grain_pairs, sample.wall_pairs, subdomain);
     };
-    const BodySubdomains standings = standings_of(partition, points);
-    const auto interfaces = build_interfaces(standings, id, all);
+    const BodySubdomains incidences = standings_of(partition, points);
+    const auto interfaces = build_interfaces(incidences, id, all);
     const double building = seconds_since(begin);
     const auto subdomain = subdomains_of(partition, points.x);
     const auto walls =
         wall_subdomains(6, sample.wall_pairs, std::span(subdomain).subspan(sample.grain_pairs.size()));
     names.push_back(name_of(kind));
-    tables.push_back(measure_load(subdomains, interfaces, standings, walls, subdomain));
+    tables.push_back(measure_load(subdomains, interfaces, incidences, walls, subdomain));
 
     const auto migrants = [&](const BodySubdomains& now) {
       long long bodies = 0;
       for (std::size_t k = 0; k < sample.x.size(); ++k) {
-        const auto before = standings.of(k), after = now.of(k);
+        const auto before = incidences.of(k), after = now.of(k);
         bodies += !std::includes(before.begin(), before.end(), after.begin(), after.end());
       }
       return bodies;

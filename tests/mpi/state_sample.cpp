@@ -129,6 +129,48 @@ TEST_F(BegunInACell, GrainsGoOnWithTheFlowAndNotTwiceAsFast) {
   }
 }
 
+// A contact across a face of the cell presses as it did: from a frame, which keeps normals, and from a
+// checkpoint, where they are found again.
+TEST_F(BegunInACell, ForcesAcrossItsFacesComeAlong) {
+  const std::string squeezed = R"(time_step = 1e-4
+allow_unconverged = true
+[material]
+density = 2600
+friction = 0.3
+[cell]
+lengths = [{0}, {0}, {0}]
+[sample]
+{1}
+[[stage]]
+friction = {2}
+strain_rates = [-5.0, -5.0, -5.0]
+end = {{ steps = {3} }}
+[solver]
+tolerance = 1e-6
+[output]
+every_steps = 500
+pictures = false
+[checkpoint]
+every_steps = 425
+)";
+  write(at("press.toml"), fmt::format(fmt::runtime(squeezed), 0.0094,
+                                      "kind = \"random\"\ncount = 60\nradius_distribution = \"uniform\"\n"
+                                      "radius_min = 0.0009\nradius_max = 0.0011",
+                                      0, 425));
+  ASSERT_EQ(run(1, "run press.toml --out press --threads 1").code, 0);
+  const double edge = last_frame("press").domain.cell.xx;
+  std::vector<double> errors;
+  for (const std::string from : {"results.h5", "checkpoint_000425.h5"}) {
+    write(at("go.toml"), fmt::format(fmt::runtime(squeezed), edge,
+                                     "kind = \"state\"\nfile = \"press/" + from + "\"", 0.3, 1));
+    const Outcome go = run(1, "run go.toml --out go --force --threads 1 --error-history 1");
+    ASSERT_EQ(go.code, 0) << go.messages;
+    errors.push_back(read_table(at("go/error_history.csv")).number(0, "error_rms"));
+  }
+  EXPECT_NEAR(errors[1], errors[0], 1e-6 * errors[0]);
+  EXPECT_LT(errors[0], 0.5) << "forces came along at all";
+}
+
 TEST_F(BegunInACell, AnotherCellThanThatOfTheStateIsRefused) {
   for (const std::string from : {"results.h5", "checkpoint_000015.h5"}) {
     write(at("branch.toml"),

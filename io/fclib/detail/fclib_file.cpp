@@ -31,7 +31,8 @@ std::vector<T> read_values(hid_t file, const std::string& path, const std::strin
   // A damaged extent must not become memory: no dataset is larger than the file, nor packed tighter than
   // deflate can (1032 to 1).
   const double stored = static_cast<double>(H5Dget_storage_size(dataset.id()));
-  const double claimed = static_cast<double>(size) * static_cast<double>(H5Tget_size(type.id()));
+  const auto each = static_cast<double>(std::max<std::size_t>(H5Tget_size(type.id()), 1));  // 0: damaged, too
+  const double claimed = static_cast<double>(size) * each;
   if (stored > static_cast<double>(std::filesystem::file_size(path)) || claimed > 1032 * stored)
     damaged(path, fmt::format("{} claims {} values, more than the file holds", name, size));
   std::vector<T> values(static_cast<std::size_t>(size));

@@ -46,7 +46,8 @@ void demand_stored(hid_t dataset, hsize_t elements, const std::string& path, con
   const Hdf5Object creation = hold(H5Dget_create_plist(dataset), H5Pclose, path, action);
   const double packed = H5Pget_nfilters(creation.id()) > 0 ? 1032 : 1;
   const auto stored = static_cast<double>(H5Dget_storage_size(dataset));
-  const double claimed = static_cast<double>(elements) * static_cast<double>(H5Tget_size(type.id()));
+  const auto each = static_cast<double>(std::max<std::size_t>(H5Tget_size(type.id()), 1));  // 0: damaged, too
+  const double claimed = static_cast<double>(elements) * each;
   if (stored > static_cast<double>(std::filesystem::file_size(path)) || claimed > packed * stored)
     throw FileError(
         path, fmt::format("{} says that it has {} entries, more than the file holds: it is damaged", name,

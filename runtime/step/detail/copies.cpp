@@ -17,11 +17,11 @@ namespace {
 /// two exchanges of it. With subdomain colours those are the copies of one colour; hubs, which are glued once
 /// a sweep, are divided by the number of all their copies.
 std::int32_t parts_of(const Decomposition& decomposition, Coupling coupling,
-                      std::span<const SubdomainId> standings, SubdomainId subdomain, std::int32_t hubs) {
-  const auto m = static_cast<std::int32_t>(standings.size());
+                      std::span<const SubdomainId> incidences, SubdomainId subdomain, std::int32_t hubs) {
+  const auto m = static_cast<std::int32_t>(incidences.size());
   if (coupling == Coupling::schwarz) return 1;
   if (coupling == Coupling::nscdd || m >= hubs) return m;
-  return static_cast<std::int32_t>(std::ranges::count_if(standings, [&](SubdomainId other) {
+  return static_cast<std::int32_t>(std::ranges::count_if(incidences, [&](SubdomainId other) {
     return decomposition.subdomain_colour_of(other) == decomposition.subdomain_colour_of(subdomain);
   }));
 }
@@ -33,7 +33,7 @@ std::int32_t hubs_from(const DecompositionSettings& settings) {
   return settings.coupling == Coupling::alternating ? 33 : 9;
 }
 
-void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& standings,
+void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& incidences,
                  std::span<const BodyId> id, std::int32_t hubs) {
   decomposition.slot_begin.assign(1, 0);
   decomposition.multiplicity.clear();
@@ -48,12 +48,12 @@ void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubd
         throw std::runtime_error(fmt::format("body {} stands in {} subdomains; use fewer subdomains",
                                              static_cast<std::int64_t>(id[b]), m));
       decomposition.multiplicity.push_back(static_cast<std::uint16_t>(m));
-      decomposition.counts.push_back(standings.of(b).front() == interface.subdomain ? 1 : 0);
+      decomposition.counts.push_back(incidences.of(b).front() == interface.subdomain ? 1 : 0);
       const std::int32_t parts =
-          parts_of(decomposition, coupling, standings.of(b), interface.subdomain, hubs);
+          parts_of(decomposition, coupling, incidences.of(b), interface.subdomain, hubs);
       decomposition.parts.push_back(static_cast<std::uint16_t>(parts));
       if (decomposition.subdomain_colour.empty()) continue;
-      const bool taken = m < hubs && std::ranges::any_of(standings.of(b), [&](SubdomainId other) {
+      const bool taken = m < hubs && std::ranges::any_of(incidences.of(b), [&](SubdomainId other) {
                            return decomposition.subdomain_colour_of(other) <
                                   decomposition.subdomain_colour_of(interface.subdomain);
                          });

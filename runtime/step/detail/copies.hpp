@@ -17,7 +17,7 @@ std::int32_t hubs_from(const DecompositionSettings& settings);
 /// From the interfaces, which hold the bodies of the surroundings: multiplicities of the copies, their parts
 /// of the mass, which copy counts, and where each subdomain's slots begin. `id`: of the surroundings; `hubs`:
 /// see hubs_from. Throws std::runtime_error when a body stands in more than 65535 subdomains.
-void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& standings,
+void list_copies(Decomposition& decomposition, Coupling coupling, const BodySubdomains& incidences,
                  std::span<const BodyId> id, std::int32_t hubs);
 
 /// Copies of the bodies of the interfaces, after list_copies. Goes field by field, and frees each field of

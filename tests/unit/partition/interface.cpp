@@ -72,7 +72,7 @@ std::vector<std::set<SubdomainId>> standings_by_brute_force(const Decomposed& d)
   return sets;
 }
 
-TEST(Standings, AreTheSubdomainsOfABodysCandidates) {
+TEST(BodyIncidences, AreTheSubdomainsOfABodysCandidates) {
   for (const Decomposed& d : cases()) {
     const auto expected = standings_by_brute_force(d);
     for (std::size_t body = 0; body < d.bodies.size(); ++body) {
@@ -91,7 +91,7 @@ TEST(Standings, AreTheSubdomainsOfABodysCandidates) {
   }
 }
 
-TEST(Standings, OfPiecesPutTogetherAreThoseOfTheWhole) {
+TEST(BodyIncidences, OfPiecesPutTogetherAreThoseOfTheWhole) {
   const Decomposed d = decompose(8, 12, PartitionKind::rcb);
   const std::size_t half = d.candidates.grain_pairs.size() / 2;
   const std::span pairs(d.candidates.grain_pairs);
@@ -99,14 +99,14 @@ TEST(Standings, OfPiecesPutTogetherAreThoseOfTheWhole) {
   const auto first = grain_subdomains(d.bodies.size(), pairs.first(half), {}, subdomain.first(half));
   const auto second = grain_subdomains(d.bodies.size(), pairs.subspan(half), d.candidates.wall_pairs,
                                        subdomain.subspan(half));
-  std::vector<Standing> sent;
+  std::vector<BodyIncidence> sent;
   for (const BodySubdomains* part : {&second, &first})
     for (std::size_t body = part->bodies(); body-- > 0;)
       for (const SubdomainId in : part->of(body)) sent.push_back({static_cast<Slot>(body), in});
-  EXPECT_EQ(collect_standings(d.bodies.size(), sent), d.grains);
+  EXPECT_EQ(collect_incidences(d.bodies.size(), sent), d.grains);
 }
 
-TEST(Standings, AGrainWithoutCandidatesStandsInItsHomeOnly) {
+TEST(BodyIncidences, AGrainWithoutCandidatesStandsInItsHomeOnly) {
   const std::vector<GrainPair> pairs{{0, 2}};
   const std::vector<SubdomainId> subdomain = ids({7}), home = ids({1, 2, 3, 4});
   const BodySubdomains expected{{0, 1, 2, 3, 4}, ids({7, 2, 7, 4})};
@@ -163,17 +163,17 @@ TEST(Interface, EverySubdomainSumsTheSameCopiesInTheSameOrder) {
     for (const SubdomainInterface& here : interfaces)
       for (std::size_t s = 0; s < here.shared.size(); ++s) {
         const Slot body = here.bodies[at(here.shared[s])];
-        const auto standing = d.grains.of(at(body));
+        const auto subdomains = d.grains.of(at(body));
         const auto begin = here.copies_begin[s], end = here.copies_begin[s + 1];
-        EXPECT_EQ(here.owner[s], standing.front());
-        if (standing.size() >= 9) {
+        EXPECT_EQ(here.owner[s], subdomains.front());
+        if (subdomains.size() >= 9) {
           EXPECT_EQ(begin, end);
           continue;
         }
-        ASSERT_EQ(at(end - begin), standing.size());
+        ASSERT_EQ(at(end - begin), subdomains.size());
         for (std::int32_t c = begin; c < end; ++c) {
           const CopySource& copy = here.copies[at(c)];
-          const SubdomainId expected = standing[at(c - begin)];
+          const SubdomainId expected = subdomains[at(c - begin)];
           if (copy.neighbour < 0) {
             EXPECT_EQ(expected, here.subdomain);
             continue;
@@ -191,9 +191,9 @@ TEST(Interface, EverySubdomainSumsTheSameCopiesInTheSameOrder) {
 }
 
 TEST(Interface, TheExampleOfTheHeader) {
-  const BodySubdomains standings{{0, 1, 3, 6}, ids({0, 0, 1, 0, 1, 2})};
+  const BodySubdomains incidences{{0, 1, 3, 6}, ids({0, 0, 1, 0, 1, 2})};
   const std::vector<BodyId> id{BodyId{10}, BodyId{11}, BodyId{12}};
-  const SubdomainInterface e = build_interfaces(standings, id, ids({0})).front();
+  const SubdomainInterface e = build_interfaces(incidences, id, ids({0})).front();
   EXPECT_EQ(e.bodies, (std::vector<Slot>{0, 1, 2}));
   EXPECT_EQ(e.multiplicity, (std::vector<std::int32_t>{1, 2, 3}));
   EXPECT_EQ(e.shared, (std::vector<std::int32_t>{1, 2}));
@@ -212,14 +212,14 @@ TEST(Interface, DoesNotDependOnTheOrderOfSlots) {
   std::iota(order.begin(), order.end(), 0);
   test::Random random(3);
   std::shuffle(order.begin(), order.end(), random);
-  std::vector<Standing> list;
+  std::vector<BodyIncidence> list;
   std::vector<BodyId> id;
   for (std::size_t k = 0; k < order.size(); ++k) {
     id.push_back(d.bodies.id[at(order[k])]);
     for (const SubdomainId in : d.grains.of(at(order[k]))) list.push_back({static_cast<Slot>(k), in});
   }
   const auto a = build_interfaces(d.grains, d.bodies.id, up_to(12));
-  const auto b = build_interfaces(collect_standings(order.size(), list), id, up_to(12));
+  const auto b = build_interfaces(collect_incidences(order.size(), list), id, up_to(12));
   for (std::size_t e = 0; e < 12; ++e) {
     ASSERT_EQ(a[e].exchange.size(), b[e].exchange.size());
     for (std::size_t k = 0; k < a[e].exchange.size(); ++k)
@@ -236,12 +236,12 @@ TEST(Interface, DoesNotDependOnTheOrderOfSlots) {
 }
 
 TEST(Interface, AGrainInManySubdomainsIsAHubAndInNoExchangeList) {
-  std::vector<Standing> list;
+  std::vector<BodyIncidence> list;
   for (std::int32_t e = 0; e < 20; ++e) list.push_back({0, SubdomainId(e)});
   list.push_back({1, SubdomainId(3)});
   list.push_back({1, SubdomainId(4)});
   const std::vector<BodyId> id{BodyId{0}, BodyId{1}};
-  const auto interfaces = build_interfaces(collect_standings(2, list), id, up_to(20));
+  const auto interfaces = build_interfaces(collect_incidences(2, list), id, up_to(20));
   std::size_t ties = 0;
   for (const SubdomainInterface& e : interfaces) {
     ASSERT_EQ(e.hubs.size(), 1u);

@@ -173,7 +173,7 @@ TEST(Coupling, SubdomainsSweepGluedWallsFirstAndWaitForNobodyThere) {
   }
 }
 
-/// From the standings of bodies alone: who shares one with whom, and how often a body is told.
+/// From the incidences of bodies alone: who shares one with whom, and how often a body is told.
 struct Formula {
   std::int64_t messages = 0, bytes = 0;
 };
@@ -181,14 +181,14 @@ struct Formula {
 Formula formula(const StepState& state, std::size_t numbers, std::int64_t glued_walls,
                 std::size_t hubs_from) {
   const Decomposition& all = state.decomposition;
-  std::map<BodyId, std::vector<std::size_t>> standings;
+  std::map<BodyId, std::vector<std::size_t>> incidences;
   for (std::size_t e = 0; e + 1 < all.slot_begin.size(); ++e)
     for (std::size_t s = all.slot_begin[e]; s < all.slot_begin[e + 1]; ++s)
-      standings[state.bodies.id[s]].push_back(e);
+      incidences[state.bodies.id[s]].push_back(e);
   std::set<std::pair<std::size_t, std::size_t>> pairs;
   std::set<std::size_t> to_the_root;
   std::int64_t told = 0, gathered = 0;  // bodies, over all messages between two subdomains; to the root
-  for (const auto& [id, in] : standings) {
+  for (const auto& [id, in] : incidences) {
     const std::size_t m = in.size();
     if (m < 2) continue;
     if (m >= hubs_from) {
