@@ -167,7 +167,8 @@ every_steps = 425
     ASSERT_EQ(go.code, 0) << go.messages;
     errors.push_back(read_table(at("go/error_history.csv")).number(0, "error_rms"));
   }
-  EXPECT_NEAR(errors[1], errors[0], 1e-6 * errors[0]);
+  // Normals of a frame are those of the step's beginning.
+  EXPECT_NEAR(errors[1], errors[0], 0.01 * errors[0]);
   EXPECT_LT(errors[0], 0.5) << "forces came along at all";
 }
 
