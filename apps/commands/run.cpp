@@ -61,6 +61,7 @@ struct Prepared {
   Sample sample;
   std::vector<GivenForce> forces;
   Recordings recordings;
+  std::vector<io::InputFile> input_files;  ///< rank 0's
   std::vector<std::string> warnings;
   std::optional<std::size_t> bodies;  ///< that a run which goes on began with, where that is known
   std::string directory;
@@ -119,8 +120,9 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
   const EarlierRun earlier = earlier_run(run.directory);
   if (run.point) {
     compare_scenes(run.scene, run.resolved, *run.point);
-    if (ranks.rank() == 0) demand_files_of_run(run.directory, run.point->memory.mark);
     if (earlier.complete && run.point->changes.empty()) run.nothing_left = earlier.exit_code;
+    if (ranks.rank() == 0 && !run.nothing_left)
+      demand_files_of_run(run.directory, run.scene.output, run.point->memory.mark);
     take_over(*run.point, run.scene);
     run.warnings = earlier.warnings;
     run.bodies = earlier.bodies;
@@ -129,9 +131,8 @@ void look_for_checkpoint(const graph::Communicator& ranks, const Terminal& termi
   }
 }
 
-/// The sample, on rank 0, and what is to be said of it.
-void make_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
-  place_sample(run);
+/// What is to be said of the sample.
+void speak_of_sample(const RunOptions& options, const Terminal& terminal, Prepared& run) {
   run.wall_mass = io::automatic_wall_mass(run.sample);
   run.warnings = scene_warnings(run.scene, run.sample);
   for (const std::string& warning : run.warnings) terminal.warn("warning: {}", warning);
@@ -169,15 +170,16 @@ bool prepare(const RunOptions& options, const graph::Communicator& ranks, const 
   });
   if (!loaded) return false;
   if (options.resume && !agreed([&] { look_for_checkpoint(ranks, terminal, run); })) return false;
-  if (run.point) return true;
   return agreed([&] {
     if (ranks.rank() != 0) return;
-    if (run.nothing_left)
-      place_sample(run);  // scene.resolved.toml says where its walls stood
-    else
-      make_sample(options, terminal, run);
+    for (const std::string& file : io::input_files(run.scene))
+      run.input_files.push_back({file, io::crc_of_file(file)});
+    if (run.point) return;
+    place_sample(run);
+    // scene.resolved.toml says where the walls stood
     if (options.resume && std::filesystem::is_directory(run.directory))
       demand_results_of_scene(run.directory, run.scene, run.nothing_left.has_value());
+    if (!run.nothing_left) speak_of_sample(options, terminal, run);
   });
 }
 
@@ -205,8 +207,7 @@ io::Provenance provenance_of(const RunOptions& options, const graph::Communicato
   provenance.command_line = options.command_line;
   provenance.seed = scene.setup.seed;
   provenance.scene_file = scene.source_file;
-  for (const std::string& file : io::input_files(scene))
-    provenance.input_files.push_back({file, io::crc_of_file(file)});
+  provenance.input_files = run.input_files;
   if (!run.point) return provenance;
   provenance.resumed = io::resumptions_in(run.directory + "/run.json");
   io::Resumption now{provenance.date_utc,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include <span>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "io/checkpoint/checkpoint_folder.hpp"
@@ -100,35 +102,72 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
       point.path.string(), fmt::join(refused, "; ")));
 }
 
-void demand_files_of_run(const std::filesystem::path& directory, const io::OutputMark& mark) {
+void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
+                         const io::OutputMark& mark) {
   for (const auto& [name, known] : mark.files) {
+    if (name == "frames.xyz" && !output.xyz) continue;
     const std::filesystem::path path = directory / name;
-    if (!std::filesystem::exists(path) || io::crc_of_file(path, known.bytes) == known.crc) continue;
-    throw std::invalid_argument(
-        fmt::format("{}: the run wrote {} bytes until the checkpoint, and these are others. Put the file "
-                    "back, or begin a "
-                    "run in another directory, from this state if you like ([sample] kind = \"state\")",
-                    path.string(), known.bytes));
+    const auto refuse = [&](const std::string& what) {
+      throw std::invalid_argument(fmt::format(
+          "{}: {}. Put the file back, or begin a run in another directory, from this state if you like "
+          "([sample] kind = \"state\")",
+          path.string(), what));
+    };
+    std::error_code unknown;
+    if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(path, unknown)))
+      refuse("the run would go on in this file, and there is none");
+    if (::access(path.c_str(), W_OK) != 0) refuse("the run would go on in this file, and may not write it");
+    if (io::crc_of_file(path, known.bytes) != known.crc)
+      refuse(fmt::format("the run wrote {} bytes until the checkpoint, and these are others", known.bytes));
   }
 }
 
-void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
-  std::ifstream file(directory / resolved_text, std::ios::binary);
-  const std::string then(std::istreambuf_iterator<char>(file), {});
-  if (then.empty()) {
-    for (const std::filesystem::path& path : io::outputs_in(directory, io::is_output_name))
-      if (path != "run.log" && path.stem() != resolved_text && path != resolved_text)
-        throw std::invalid_argument(fmt::format(
-            "{}: no {} beside it says of which scene it is, and --resume would replace it. Begin a run in "
-            "another directory, or give --force in place of --resume",
-            (directory / path).string(), resolved_text));
-    return;
+namespace {
+
+/// Of a directory without scene.resolved.toml: throws naming a result of which nothing says whose it is.
+void demand_no_results(const std::filesystem::path& directory) {
+  for (const std::filesystem::path& path : io::outputs_in(directory, io::is_output_name))
+    if (path != "run.log" && path.stem() != resolved_text && path != resolved_text)
+      throw std::invalid_argument(fmt::format(
+          "{}: no {} beside it says of which scene it is, and --resume would replace it. Begin a run in "
+          "another directory, or give --force in place of --resume",
+          (directory / path).string(), resolved_text));
+}
+
+std::vector<io::SceneChange> changes_since(const std::filesystem::path& resolved, const std::string& then,
+                                           const io::Scene& scene) {
+  try {
+    return io::scene_changes(then, io::resolved_scene(scene));
+  } catch (const std::exception& error) {
+    throw std::invalid_argument(fmt::format("{}: {}, so that nobody knows of which scene the run there was",
+                                            resolved.string(), error.what()));
   }
+}
+
+}  // namespace
+
+void demand_results_of_scene(const std::filesystem::path& directory, const io::Scene& scene, bool done) {
+  const std::filesystem::path resolved = directory / resolved_text, run_json = directory / "run.json";
+  std::error_code unknown;
+  if (!std::filesystem::is_regular_file(resolved, unknown) && !done) return demand_no_results(directory);
+  std::ifstream file(resolved, std::ios::binary), json(run_json);
+  const std::string then(std::istreambuf_iterator<char>(file), {});
+  const auto unread = [&](const std::filesystem::path& path) {
+    return std::invalid_argument(path.string() +
+                                 ": cannot be read, so that nobody knows of which scene the run there was. "
+                                 "Begin a run in another directory");
+  };
+  if (then.empty()) throw unread(resolved);
+  if (std::filesystem::exists(run_json, unknown) && !nlohmann::json::parse(json, nullptr, false).is_object())
+    throw unread(run_json);
   std::vector<std::string> differences;
-  for (const io::SceneChange& change : io::scene_changes(then, io::resolved_scene(scene)))
-    if (done || !change.allowed) differences.push_back(io::describe(change));
+  for (const io::SceneChange& change : changes_since(resolved, then, scene)) {
+    // A run that went on wrote how many it had.
+    const bool chosen = change.key == "decomposition.subdomains" && change.is.empty();
+    if (!chosen && (done || !change.allowed)) differences.push_back(io::describe(change));
+  }
   const std::vector<std::string> inputs = io::input_files(scene);
-  for (const auto& [path, crc] : io::input_files_in(directory / "run.json"))
+  for (const auto& [path, crc] : io::input_files_in(run_json))
     if (std::ranges::find(inputs, path) != inputs.end() && io::crc_of_file(path) != crc)
       differences.push_back(path + " has changed");
   if (differences.empty()) return;

@@ -33,9 +33,10 @@ std::optional<ResumePoint> find_resume_point(const std::filesystem::path& direct
 /// std::invalid_argument naming what differs and may not, an input file that has changed included.
 void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumePoint& point);
 
-/// Throws std::invalid_argument naming a file of the directory that is not the one which the run wrote until
-/// the checkpoint, so that it could not go on in it. What is not there is not looked at.
-void demand_files_of_run(const std::filesystem::path& directory, const io::OutputMark& mark);
+/// Throws std::invalid_argument naming a file that the run would go on in and that is not the one which it
+/// wrote until the checkpoint, or cannot be written. Files that are not asked for any more are left alone.
+void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
+                         const io::OutputMark& mark);
 
 /// Of a directory without a checkpoint: throws std::invalid_argument unless the results in it, if there are
 /// any, are those of this scene, whose walls have been placed. Of a run that is done nothing may differ, of

@@ -103,9 +103,9 @@ DirectoryLock prepare_output_directory(const fs::path& directory, bool force, Is
         throw FileError((directory / link).string(),
                         "is a symbolic link, and results would be written where it leads; remove it, or "
                         "choose another directory with --out");
-      for (const fs::path& relative : outputs_in(directory, is_ours))
-        if (relative != last) fs::remove(directory / relative);
-      if (!last.empty() && is_ours(last.string())) fs::remove(directory / last);
+      std::vector<fs::path> former = outputs_in(directory, is_ours);
+      std::ranges::stable_partition(former, [&](const fs::path& relative) { return relative != last; });
+      for (const fs::path& relative : former) fs::remove(directory / relative);
     }
     // Asked before the run starts, not an hour later when the first file is written.
     if (::access(directory.c_str(), W_OK | X_OK) != 0)

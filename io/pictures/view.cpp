@@ -141,8 +141,8 @@ class Canvas {
       }
     for (std::size_t k = 0; k < depth_.size(); ++k) {
       if (depth_[k] == empty) continue;
-      const double near = double{around[pixel(k)]} / weight[pixel(k)];
-      const double deep = std::clamp((near - depth_[k]) / (2 * reach), 0.0, 1.0);
+      const double mean = double{around[pixel(k)]} / weight[pixel(k)];
+      const double deep = std::clamp((mean - depth_[k]) / (2 * reach), 0.0, 1.0);
       for (std::uint8_t& c : colour_[k]) c = static_cast<std::uint8_t>(std::lround(c * (1 - 0.6 * deep)));
     }
   }

@@ -29,12 +29,27 @@ int allowed_cores() {
   return ::sched_getaffinity(0, sizeof(set), &set) == 0 ? CPU_COUNT(&set) : 0;
 }
 
-/// A list of the provenance in a run.json; empty where there is none.
-nlohmann::json provenance_list(const std::filesystem::path& path, const char* name) {
+/// The objects in a list of the provenance in a run.json; none where there is no such list.
+std::vector<nlohmann::json> provenance_list(const std::filesystem::path& path, const char* name) {
   std::ifstream file(path);
   const nlohmann::json root = nlohmann::json::parse(file, nullptr, false);
-  if (!root.is_object() || !root.contains("provenance")) return nlohmann::json::array();
-  return root["provenance"].value(name, nlohmann::json::array());
+  std::vector<nlohmann::json> objects;
+  if (!root.is_object() || !root.contains("provenance")) return objects;
+  const nlohmann::json& provenance = root["provenance"];
+  if (!provenance.is_object() || !provenance.contains(name)) return objects;
+  for (const nlohmann::json& entry : provenance[name])
+    if (entry.is_object()) objects.push_back(entry);
+  return objects;
+}
+
+/// What an object says by that name; `otherwise` where it says nothing, or something of another kind.
+template <class T>
+T said(const nlohmann::json& object, const char* name, T otherwise) {
+  try {
+    return object.value(name, otherwise);
+  } catch (const nlohmann::json::exception&) {
+    return otherwise;
+  }
 }
 
 }  // namespace
@@ -129,17 +144,18 @@ std::string run_json(const Provenance& p, const Summary& s) {
 std::vector<Resumption> resumptions_in(const std::filesystem::path& path) {
   std::vector<Resumption> all;
   for (const nlohmann::json& entry : provenance_list(path, "resumed"))
-    all.push_back({entry.value("date_utc", ""), entry.value("host", ""), entry.value("ranks", 1),
-                   entry.value("threads", 1), entry.value("step", std::int64_t{0}),
-                   entry.value("changes", std::vector<std::string>())});
+    all.push_back({said(entry, "date_utc", std::string()), said(entry, "host", std::string()),
+                   said(entry, "ranks", 1), said(entry, "threads", 1), said(entry, "step", std::int64_t{0}),
+                   said(entry, "changes", std::vector<std::string>())});
   return all;
 }
 
 std::vector<InputFile> input_files_in(const std::filesystem::path& path) {
   std::vector<InputFile> all;
   for (const nlohmann::json& entry : provenance_list(path, "input_files"))
-    all.push_back({entry.value("path", ""),
-                   static_cast<std::uint32_t>(std::strtoul(entry.value("crc32", "").c_str(), nullptr, 16))});
+    all.push_back(
+        {said(entry, "path", std::string()),
+         static_cast<std::uint32_t>(std::strtoul(said(entry, "crc32", std::string()).c_str(), nullptr, 16))});
   return all;
 }
 

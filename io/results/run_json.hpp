@@ -84,7 +84,7 @@ struct Summary {
 /// numbers that are not finite.
 std::string run_json(const Provenance& provenance, const Summary& summary);
 
-/// Those that a run.json names; none where there is no such file.
+/// Those that a run.json names; none where there is no such file, or it is damaged.
 std::vector<Resumption> resumptions_in(const std::filesystem::path& path);
 std::vector<InputFile> input_files_in(const std::filesystem::path& path);
 

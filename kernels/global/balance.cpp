@@ -1,6 +1,7 @@
 #include "kernels/global/balance.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <limits>
 #include <vector>
@@ -128,7 +129,7 @@ struct Fit {
   double cost, missed;
 };
 std::vector<Fit> fit_of(const BodyParts& parts, const BodyGroups& groups, const PartField& motion,
-                        std::span<const Wishes> wishes, double kappa) {
+                        std::span<const Wishes> wishes, std::span<const double> kappa) {
   const std::vector<double> sums = parts.total(2 * groups.size(), [&](std::size_t p, std::span<double> row) {
     const PartGroups part{p, groups};
     for (std::size_t b = 0; b < motion[p].size(); ++b)
@@ -138,7 +139,7 @@ std::vector<Fit> fit_of(const BodyParts& parts, const BodyGroups& groups, const 
       const ContactEquation& c = parts[p].contacts[k];
       const Vec3 missed = constrained(c, relative_velocity(c, motion[p])) - wishes[p].change[k];
       const std::size_t g = part.group(c);
-      row[2 * g] += kappa * effective_mass(parts[p], c) * missed.squaredNorm();
+      row[2 * g] += kappa[g] * effective_mass(parts[p], c) * missed.squaredNorm();
       row[2 * g + 1] += effective_mass(parts[p], c) * missed.norm();
     }
   });
@@ -149,7 +150,7 @@ std::vector<Fit> fit_of(const BodyParts& parts, const BodyGroups& groups, const 
 
 /// Groups that `stop` fits better than `motion` take it.
 void begin_with_better(const BodyParts& parts, const BodyGroups& groups, std::span<const Wishes> wishes,
-                       double kappa, const PartField& stop, PartField& motion) {
+                       std::span<const double> kappa, const PartField& stop, PartField& motion) {
   const std::vector<Fit> stopped = fit_of(parts, groups, stop, wishes, kappa),
                          moving = fit_of(parts, groups, motion, wishes, kappa);
   parts.each([&](std::size_t p) {
@@ -214,6 +215,32 @@ std::vector<Scale> scales_of(const BodyParts& parts, const BodyGroups& groups,
   return scales;
 }
 
+/// The bodies of all parts and the contacts of a group, or of it and those behind it.
+std::vector<ContactGraph> graphs_of(const BodyParts& parts, const BodyGroups& groups, std::int32_t group,
+                                    bool and_behind) {
+  std::vector<ContactGraph> graphs;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    ContactGraph& graph = graphs.emplace_back(graph_of(parts[p]));
+    std::erase_if(graph.pairs, [&](const std::array<std::int32_t, 2>& pair) {
+      const std::int32_t own = groups.of(p, static_cast<std::size_t>(pair[0]));
+      return and_behind ? own < group : own != group;
+    });
+  }
+  return graphs;
+}
+
+/// estimate_stiffness of each group: a heavy one beside it must not make a tall one soft. Behind the first
+/// few, `most_groups`, the others have one together.
+std::vector<double> stiffness_of(const BodyParts& parts, const BodyGroups& groups, std::int32_t most_groups) {
+  if (groups.count == 1) return {estimate_stiffness(parts)};
+  std::vector<double> each;
+  for (std::int32_t g = 0; g < std::min(groups.count, most_groups); ++g)
+    each.push_back(estimate_stiffness(graphs_of(parts, groups, g, false), parts.link()));
+  if (groups.count > most_groups)
+    each.resize(groups.size(), estimate_stiffness(graphs_of(parts, groups, most_groups, true), parts.link()));
+  return each;
+}
+
 /// The linear solve of velocity_error, round after round.
 class VelocitySolve {
  public:
@@ -224,11 +251,12 @@ class VelocitySolve {
         enough_(enough),
         groups_(groups),
         thresholds_(thresholds),
-        kappa_(thresholds.firmness * estimate_stiffness(parts_)),
+        kappa_(stiffness_of(parts_, groups, thresholds.most_groups)),
         V_(velocities_of(parts_)),
         wishes_(parts_.size()),
         left_(groups.size(), 0.0),
         found_(groups.size(), 0.0) {
+    for (double& kappa : kappa_) kappa *= thresholds_.firmness;
     parts_.each([&](std::size_t p) {
       wishes_[p] = wishes_of(problems_[p], {p, groups_}, V_[p], thresholds_);
     });
@@ -244,7 +272,7 @@ class VelocitySolve {
       for (std::size_t g = 0; g < scales_.size(); ++g)
         if (scales_[g].momentum == 0 && still[g].missed > 0)
           error.relative = std::numeric_limits<double>::infinity();
-      const auto moves = [](const Scale& scale) { return scale.momentum > 0; };
+      const auto moves = [](const Scale& scale) { return scale.momentum != 0; };
       if (error.relative > 0 || std::ranges::none_of(scales_, moves)) return error;
     }
     // Two motions to start from: none; and the one that stops everything, the answer of a sample at rest.
@@ -262,26 +290,27 @@ class VelocitySolve {
           parts_.total(groups_.size(), [&](std::size_t p, std::span<double> row) {
             close_open(problems_[p], {p, groups_}, motion[p], wishes_[p], row);
           });
-      const auto pushed = [&](std::size_t g) { return scales_[g].most(kappa_ * pushed2[g]); };
+      const auto pushed = [&](std::size_t g) { return scales_[g].most(kappa_[g] * pushed2[g]); };
       if (small(pushed)) break;
       if (round == 0) continue;
       const std::vector<double> change = distance(parts_, groups_, motion, began);
       if (small([&](std::size_t g) { return change[g]; })) break;
     }
     for (std::size_t g = 0; g < scales_.size(); ++g)
-      if (scales_[g].momentum > 0)
+      if (scales_[g].momentum != 0)
         error.relative =
             larger(error.relative, (found_[g] + fits[g].missed + left_[g]) / scales_[g].momentum);
     return error;
   }
 
  private:
-  /// part(group) is small in each group that moves [N s].
-  template <class Parts>
-  bool small(const Parts& part) const {
+  /// momentum_of(group) is small in each group that moves [N s].
+  template <class MomentumOf>
+  bool small(const MomentumOf& momentum_of) const {
     for (std::size_t g = 0; g < scales_.size(); ++g) {
       const double scale = scales_[g].momentum;
-      if (scale > 0 && !(part(g) <= thresholds_.linear_tolerance * std::max(found_[g], enough_ * scale)))
+      if (scale != 0 &&
+          !(momentum_of(g) <= thresholds_.linear_tolerance * std::max(found_[g], enough_ * scale)))
         return false;
     }
     return true;
@@ -294,7 +323,7 @@ class VelocitySolve {
     parts_.each([&](std::size_t p) {
       for (std::size_t k = 0; k < wishes_[p].change.size(); ++k) {
         const ContactEquation& c = parts_[p].contacts[k];
-        rho[p].push_back(kappa_ * effective_mass(parts_[p], c));
+        rho[p].push_back(kappa_[PartGroups{p, groups_}.group(c)] * effective_mass(parts_[p], c));
         add_force(c, rho[p][k] * wishes_[p].change[k], force[p]);
       }
     });
@@ -335,7 +364,7 @@ class VelocitySolve {
   double enough_;
   const BodyGroups& groups_;
   BalanceThresholds thresholds_;
-  double kappa_;
+  std::vector<double> kappa_;  ///< per group
   PartField V_;
   std::vector<Wishes> wishes_;
   std::vector<Scale> scales_;

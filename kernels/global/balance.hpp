@@ -35,6 +35,8 @@ struct BalanceThresholds {
   /// Part of the impulses at walls, in (0, 1), that an error is compared with at least where no wall is
   /// driven.
   double interest = 1e-2;
+  /// Groups whose stiffness is estimated one by one, >= 1; others have one estimate together.
+  int most_groups = 16;
   /// What rounding leaves of the sample's momentum, over it, > 0: the least scale of grains that fly side by
   /// side.
   double rounding = 1e-12;

@@ -98,13 +98,13 @@ class MpiCommunicator final : public Communicator {
  public:
   explicit MpiCommunicator(RankProperties properties) : Communicator(std::move(properties)) {}
 
-  void exchange(std::span<const std::span<const std::byte>> to,
-                const std::function<std::byte*(std::size_t, std::size_t)>& room) const override;
-  void sum(std::span<std::int64_t> values) const override;
-  void max(std::span<double> values) const override;
   std::vector<std::byte> gather(std::span<const std::byte> part) const override;
   void to_first(std::span<const std::byte> part, std::size_t piece,
                 const std::function<void(std::span<const std::byte>)>& take) const override;
+  void sum(std::span<std::int64_t> values) const override;
+  void max(std::span<double> values) const override;
+  void exchange(std::span<const std::span<const std::byte>> to,
+                const std::function<std::byte*(std::size_t, std::size_t)>& room) const override;
   void progress() const override {
     if (simulated_ranks) return;  // a simulated network needs nobody's help
     int flag = 0;

@@ -231,6 +231,7 @@ void GlobalSolver::find_clusters(const SmallClusters& small, bool twice) {
   groups_ = large_clusters_of(clusters, in_small_, graphs, *link_);
   large_ = groups_.count > 0 || twice;
   twice_ = twice;
+  if (groups_.count <= 1 && !twice) groups_ = {.of_body = {}, .count = groups_.count};  // nobody asks which
   if (!twice || !small_) return;
   // Small ones, which have their own answers, are one group more.
   for (std::size_t p = 0; p < groups_.of_body.size(); ++p)
@@ -298,7 +299,8 @@ SmallError GlobalSolver::small_error(double enough, int sweeps, double farthest)
 double GlobalSolver::large_error(double enough) const {
   const Whole span(*this);
   std::vector<BodyProblem> problems = checked(false);
-  return velocity_error(problems, *link_, enough, several_large_clusters() ? groups_ : BodyGroups{}).relative;
+  const BodyGroups together;
+  return velocity_error(problems, *link_, enough, several_large_clusters() ? groups_ : together).relative;
 }
 
 double GlobalSolver::large_work(double speed, double interest) const {

@@ -32,7 +32,9 @@ Hdf5Object open_checked_file(const std::string& path) {
   if (std::string_view(head.data(), signature.size()) != signature)
     throw FileError(path, "is no HDF5 file, or its beginning is damaged");
   if (head.back() < checked)
-    throw FileError(path, "has no checksums: it was written by Talus before 27 November 2026, or is damaged");
+    throw FileError(path,
+                    "has no checksums of its directory, as checkpoints and traces of this Talus have: it is "
+                    "another file, or of an earlier version, or damaged");
   return open_file(path);
 }
 

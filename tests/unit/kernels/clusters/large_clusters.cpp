@@ -101,6 +101,18 @@ TEST(LargeClusters, DoNotHideTheErrorsOfOneAnother) {
   }
 }
 
+// A mean over both would make the tall one soft, and find a third of what it lacks.
+TEST(LargeClusters, AreAsStiffAsTheyAreHigh) {
+  BodyProblem whole = column(200, 1, 0.5);
+  for (int k = 0; k < 10; ++k) whole = both(whole, column(6, 1000, 1));
+  for (const std::size_t parts : {1u, 4u}) {
+    test::Cut cut = cut_into(whole, parts);
+    const BodyGroups groups = groups_of(cut);
+    ASSERT_EQ(groups.count, 11);
+    EXPECT_NEAR(velocity_error(cut.parts, cut, 1e-3, groups).relative, 1, 0.05) << parts;
+  }
+}
+
 TEST(LargeClusters, ExchangeNoLessThanTheWallsThatTheyTouchAskFor) {
   BodyProblem whole = both(column(30, 1, 0.5), column(60, 1, 1));
   whole.contacts[30].drive = 1;  // of the floor of the other
