@@ -102,10 +102,22 @@ void compare_scenes(const io::Scene& scene, const std::string& resolved, ResumeP
       point.path.string(), fmt::join(refused, "; ")));
 }
 
+namespace {
+
+/// Whether a sink that is asked for writes the file.
+bool goes_on(const std::string& file, const io::OutputSpec& output) {
+  return std::ranges::any_of(io::sink_registry(), [&](const auto& sink) {
+    return sink.make->writes(file) &&
+           (sink.make->use == io::SinkUse::always || output.sinks.contains(std::string(sink.name)));
+  });
+}
+
+}  // namespace
+
 void demand_files_of_run(const std::filesystem::path& directory, const io::OutputSpec& output,
                          const io::OutputMark& mark) {
   for (const auto& [name, known] : mark.files) {
-    if (name == "frames.xyz" && !output.xyz) continue;
+    if (!goes_on(name, output)) continue;
     const std::filesystem::path path = directory / name;
     const auto refuse = [&](const std::string& what) {
       throw std::invalid_argument(fmt::format(
