@@ -56,6 +56,8 @@ void RecorderFeed::frame(Frame&& frame) {
 }
 
 void RecorderFeed::record(Frame&& frame) {
+  // The clock of a simulated rank can be read by its own thread only.
+  if (graph::simulated_ranks) return recorder_.record_frame(std::move(frame));
   const double began = graph::seconds_now();
   recorder_.record_frame(std::move(frame));
   frame_seconds_.store(std::max(frame_seconds(), graph::seconds_now() - began), std::memory_order_relaxed);

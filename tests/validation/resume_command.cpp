@@ -247,11 +247,39 @@ TEST_F(Resume, DoesNotGoOnInFilesThatAreNotItsOwn) {
     EXPECT_NE(refused.messages.find("steps.csv"), std::string::npos) << refused.messages;
     EXPECT_EQ(files_below(at("parts")), before);
   }
+  fs::remove(at("parts/steps.csv"));
+  EXPECT_EQ(run(line).code, 2) << "it is gone";
+  EXPECT_FALSE(fs::exists(at("parts/steps.csv")));
   // What follows the checkpoint is cut off, whatever it is.
   write(at("parts/steps.csv"), steps + last_line + "half a li");
   EXPECT_EQ(run(line).code, 0);
   ASSERT_EQ(run("run scene.toml --out straight --threads 1").code, 0);
   EXPECT_EQ(content(at("parts/walls.csv")), content(at("straight/walls.csv")));
+}
+
+TEST_F(Resume, LeavesADoneRunAloneWhateverBecameOfItsTables) {
+  const std::string line = "run scene.toml --out out --threads 1 --resume";
+  ASSERT_EQ(run(line).code, 0);
+  ASSERT_GT(checkpoints("out"), 0U);
+  write(at("out/steps.csv"), "step,mine\n");
+  const auto before = files_below(at("out"));
+  const Outcome again = run(line);
+  EXPECT_EQ(again.code, 0) << again.messages;
+  EXPECT_NE(again.messages.find("is done"), std::string::npos) << again.messages;
+  EXPECT_EQ(files_below(at("out")), before);
+}
+
+TEST_F(Resume, WithoutACheckpointIsRefusedWhereNothingCanBeReadOfTheRun) {
+  for (const auto& [name, content] :
+       {std::pair{"run.json", "null"}, {"scene.resolved.toml", "box = "}, {"scene.resolved.toml", ""}}) {
+    ASSERT_EQ(run("run scene.toml --out out --threads 1 --steps 2 --force").code, 0);
+    write(at("out") / name, content);
+    const auto before = files_below(at("out"));
+    const Outcome refused = run("run scene.toml --out out --threads 1 --resume");
+    EXPECT_EQ(refused.code, 2) << name << refused.messages;
+    EXPECT_NE(refused.messages.find(name), std::string::npos) << refused.messages;
+    EXPECT_EQ(files_below(at("out")), before);
+  }
 }
 
 TEST_F(Resume, IsRefusedForAnotherOrderOfStages) {

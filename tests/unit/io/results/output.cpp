@@ -278,6 +278,27 @@ TEST(Csv, IsMarkedByTheBytesThatStandInTheFile) {
   EXPECT_EQ(end.crc, crc_of_file(path));
 }
 
+// Whoever has written it: what is of another kind says nothing.
+TEST(RunJson, IsReadAsFarAsItIsOne) {
+  const ScratchDirectory scratch;
+  const fs::path path = scratch / "run.json";
+  const auto written = [&](const char* text) { std::ofstream(path) << text; };
+  for (const char* text : {"", "null", "[]", "{\"provenance\": 3}", "{\"provenance\": {\"resumed\": \"x\"}}",
+                           "{\"provenance\": {\"input_files\": [1, \"x\"]}}"}) {
+    written(text);
+    EXPECT_TRUE(resumptions_in(path).empty()) << text;
+    EXPECT_TRUE(input_files_in(path).empty()) << text;
+  }
+  written(
+      "{\"provenance\": {\"input_files\": [{\"path\": \"a.csv\", \"crc32\": \"cbf43926\"}, {\"path\": 1}], "
+      "\"resumed\": [{\"ranks\": \"two\", \"step\": 7}]}}");
+  ASSERT_EQ(input_files_in(path).size(), 2U);
+  EXPECT_EQ(input_files_in(path)[0].path, "a.csv");
+  EXPECT_EQ(input_files_in(path)[0].crc, 0xcbf43926U);
+  EXPECT_EQ(resumptions_in(path).at(0).ranks, 1);
+  EXPECT_EQ(resumptions_in(path).at(0).step, 7);
+}
+
 TEST(RunJson, SaysWhatWasRunAndWhatCameOfIt) {
   Provenance provenance = collect_provenance();
   provenance.command_line = {"talus", "run", "a \"b\".toml"};

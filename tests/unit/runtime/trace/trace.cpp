@@ -114,7 +114,7 @@ TEST_F(TraceFile, PartsOfRanksMakeOneTrace) {
 TEST_F(TraceFile, SaysWhatIsNoTrace) {
   EXPECT_NE(complaint().find("no such file"), std::string::npos);
   std::ofstream(path_) << "time,task\n0,sweep\n";
-  EXPECT_NE(complaint().find("opening as HDF5"), std::string::npos) << complaint();
+  EXPECT_NE(complaint().find("is no HDF5 file"), std::string::npos) << complaint();
 }
 
 TEST_F(TraceFile, NoticesACutFile) {
