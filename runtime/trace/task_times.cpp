@@ -99,7 +99,10 @@ double TaskTimes::node(std::uint32_t node, int epoch) const {
     throw TraceError("the loop is another one than the recorded: the scene or the subdomains differ");
   const auto e = static_cast<std::size_t>(epoch);
   if (e >= current_->node.size() || current_->node[e][place_[node]] < 0)
-    throw TraceError(fmt::format("the trace has no time for node {} in epoch {}", node, epoch));
+    throw TraceError(
+        fmt::format("the trace has no time for node {} in epoch {}; steps in which clusters were "
+                    "put right, or ADMM was called, go other ways on several ranks",
+                    node, epoch));
   return current_->node[e][place_[node]];
 }
 
