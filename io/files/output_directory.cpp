@@ -104,7 +104,8 @@ DirectoryLock prepare_output_directory(const fs::path& directory, bool force, Is
                         "is a symbolic link, and results would be written where it leads; remove it, or "
                         "choose another directory with --out");
       std::vector<fs::path> former = outputs_in(directory, is_ours);
-      std::ranges::stable_partition(former, [&](const fs::path& relative) { return relative != last; });
+      std::stable_partition(former.begin(), former.end(),
+                            [&](const fs::path& relative) { return relative != last; });
       for (const fs::path& relative : former) fs::remove(directory / relative);
     }
     // Asked before the run starts, not an hour later when the first file is written.
