@@ -49,26 +49,36 @@ ContactGraph gather_graph(const BodyProblemSource& source, const BodyProblemPart
   return graph_of(StepReader(source, part));
 }
 
-BodyProblem gather_problem(const StepReader& step, std::span<const char> taken) {
+BodyProblem gather_problem(const StepReader& step, std::span<const char> taken, OtherBodies others) {
   BodyProblem problem;
   note_copies(step, problem);
   problem.grains = step.grains();
-  problem.bodies.reserve(step.unknowns());
-  for (std::size_t b = 0; b < step.unknowns(); ++b) problem.bodies.push_back(step.unknown(b));
+  const auto is_taken = [&](std::size_t body) { return taken.empty() || taken[body] != 0; };
+  problem.bodies.resize(step.unknowns());
+  for (std::size_t b = 0; b < step.unknowns(); ++b)
+    if (others == OtherBodies::as_they_are || b >= step.grains() || is_taken(b))
+      problem.bodies[b] = step.unknown(b);
   std::size_t contacts = 0;
-  const auto is_taken = [&](std::int32_t first) { return taken.empty() || taken[at(first)] != 0; };
-  step.each_place([&](std::size_t c, std::size_t k) { contacts += is_taken(step.pair_at(c, k)[0]) ? 1 : 0; });
+  const auto each_taken = [&](const auto& visit) {
+    step.each_place([&](std::size_t c, std::size_t k) {
+      if (is_taken(at(step.pair_at(c, k)[0]))) visit(c, k);
+    });
+  };
+  each_taken([&](std::size_t, std::size_t) { ++contacts; });
   problem.contacts.reserve(contacts);
   problem.impulse.reserve(contacts);
-  step.each_contact([&](const ContactEquation& contact, const Vec3& impulse) {
-    if (!is_taken(contact.first)) return;
-    problem.contacts.push_back(contact);
-    problem.impulse.push_back(impulse);
+  each_taken([&](std::size_t c, std::size_t k) {
+    problem.contacts.push_back(step.equation_at(c, k));
+    problem.impulse.push_back(step.impulse_of(problem.contacts.back()));
   });
   if (!step.knows_more() || step.contacts() == 0) return problem;
   problem.known.resize(problem.bodies.size());
   step.add_known(problem.known);
   return problem;
+}
+
+BodyProblem gather_problem(const StepReader& step) {
+  return gather_problem(step, {}, OtherBodies::as_they_are);
 }
 
 BodyProblem gather_problem(const BodyProblemSource& source) {

@@ -137,11 +137,16 @@ ContactEquation StepReader::equation_at(std::size_t chunk, std::size_t place) co
   return contact;
 }
 
+Vec3 StepReader::impulse_of(const ContactEquation& contact) const {
+  const std::size_t place = at(contact.place);
+  return kept_ != nullptr ? kept_->force(candidate_at(place), contact.normal)
+                          : law_impulse(source_.contacts, place);
+}
+
 void StepReader::each_contact(const Visit& visit) const {
   each_place([&](std::size_t chunk, std::size_t place) {
     const ContactEquation contact = equation_at(chunk, place);
-    visit(contact, kept_ != nullptr ? kept_->force(candidate_at(place), contact.normal)
-                                    : law_impulse(source_.contacts, place));
+    visit(contact, impulse_of(contact));
   });
 }
 

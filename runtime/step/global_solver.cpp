@@ -271,7 +271,8 @@ std::vector<BodyProblem> GlobalSolver::checked(bool small) const {
     if (small_ && large_ && (small || !twice_)) taken = in_small_[p];
     if (!small)
       for (char& t : taken) t = t == 0 ? 1 : 0;
-    problems.push_back(gather_problem(*steps[p], taken));
+    problems.push_back(
+        gather_problem(*steps[p], taken, small ? OtherBodies::empty : OtherBodies::as_they_are));
   }
   return problems;
 }
