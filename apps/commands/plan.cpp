@@ -28,9 +28,10 @@ void print_laws(const Simulation& simulation) {
        mixed > 0 ? fmt::format("{} of {} chunks mix pairs of materials", mixed, state.chunks.size())
                  : "every chunk is of one pair of materials");
   const PairTable& laws = simulation.parameters().laws;
-  const double cohesion = laws.largest(&PairLaw::cohesion),
-               resistance = laws.largest(&PairLaw::rolling_resistance);
-  line("cohesion", cohesion > 0, fmt::format("c = {:g} N at most", cohesion));
+  for (const Attraction* attraction : attractions)
+    line(attraction->name, laws.largest(*attraction) > 0,
+         fmt::format("{:g} {} at most", laws.largest(*attraction), attraction->unit));
+  const double resistance = laws.largest(&PairLaw::rolling_resistance);
   line("rolling resistance", simulation.parameters().rolls,
        resistance > 0 ? fmt::format("mu_r = {:g} at most: moments, and sweeps as they are", resistance)
                       : "no moments at contacts");

@@ -107,7 +107,7 @@ HtmlSections time_section(const RunFolder& run) {
 HtmlSections left_out_section(const RunFolder& run) {
   if (!run.scene) return {};
   const Setup& setup = run.scene->setup;
-  const auto any_law = [&](double PairLaw::*number) {
+  const auto any_law = [&](LawNumber number) {
     return std::any_of(setup.stages.begin(), setup.stages.end(),
                        [&](const Stage& stage) { return stage.laws.largest(number) > 0; });
   };
@@ -124,7 +124,8 @@ HtmlSections left_out_section(const RunFolder& run) {
        "there one component of impulse per contact");
   line(!setup.rotation, "rotation", "no levers in the sweeps, no angular velocities");
   line(!setup.orientation && setup.clumps.empty(), "orientations", "32 bytes a grain; spheres need none");
-  line(!any_law(&PairLaw::cohesion), "cohesion", "no sweep of its unknowns");
+  for (const Attraction* attraction : attractions)
+    line(!any_law(*attraction), attraction->name, "no force that holds grains together");
   line(!any_law(&PairLaw::rolling_resistance), "rolling resistance", "no moments at contacts");
   line(!any_law(&PairLaw::restitution), "restitution", "no velocities of before the step at contacts");
   line(setup.clumps.empty(), "shapes other than spheres", "contacts are diagonal: no 3x3 problems");

@@ -92,19 +92,19 @@ std::string end_words(const StageEnd& end) {
 
 /// "friction 0.35", "friction 0.35, at walls 0.1"; of several materials "friction 0.2 to 0.35". "" where it
 /// is 0.
-std::string law_words(const char* name, const PairTable& laws, double PairLaw::*number,
-                      const char* unit = "") {
+std::string law_words(const char* name, const PairTable& laws, LawNumber number,
+                      const std::string& unit = "") {
   constexpr std::size_t one_material = 3;  // pairs: grains, walls, both
   const double most = laws.largest(number);
   if (most == 0) return "";
   if (laws.laws().size() == one_material) {
-    const double grains = laws.between(material_of_grains, material_of_grains).*number;
-    const double walls = laws.between(material_of_grains, material_of_walls).*number;
+    const double grains = number.in(laws.between(material_of_grains, material_of_grains));
+    const double walls = number.in(laws.between(material_of_grains, material_of_walls));
     return fmt::format("; {} {:g}{}{}", name, grains, unit,
                        walls == grains ? "" : fmt::format(", at walls {:g}{}", walls, unit));
   }
   double least = most;
-  for (const PairLaw& law : laws.laws()) least = std::min(least, law.*number);
+  for (const PairLaw& law : laws.laws()) least = std::min(least, number.in(law));
   return least == most ? fmt::format("; {} {:g}{}", name, most, unit)
                        : fmt::format("; {} {:g} to {:g}{}", name, least, most, unit);
 }
@@ -127,7 +127,8 @@ std::string stage_words(const Stage& stage) {
   if (stage.laws.largest(&PairLaw::friction) == 0) text += "; no friction";
   text += law_words("friction", stage.laws, &PairLaw::friction);
   text += law_words("restitution", stage.laws, &PairLaw::restitution);
-  text += law_words("cohesion", stage.laws, &PairLaw::cohesion, " N");
+  for (const Attraction* attraction : attractions)
+    text += law_words(attraction->name, stage.laws, *attraction, fmt::format(" {}", attraction->unit));
   text += law_words("rolling resistance", stage.laws, &PairLaw::rolling_resistance);
   if (!stage.strain_rates.isZero(0) || !stage.shear_rates.isZero(0))
     text += fmt::format("; the cell flows, strain rates {:g}, {:g}, {:g}, shear rates {:g}, {:g}, {:g} 1/s",

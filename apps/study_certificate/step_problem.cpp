@@ -51,9 +51,8 @@ void refuse_what_is_unknown(const StepInput& input) {
     if (!wall.motion.empty() || wall.absent)
       throw std::invalid_argument("the audit knows no walls that move by themselves or are absent: '" +
                                   wall.name + "'");
-  for (auto number : {&PairLaw::cohesion, &PairLaw::rolling_resistance})
-    if (input.stage.laws.largest(number) > 0)
-      throw std::invalid_argument("the audit knows neither cohesion nor rolling resistance");
+  if (input.stage.laws.attract() || input.stage.laws.largest(&PairLaw::rolling_resistance) > 0)
+    throw std::invalid_argument("the audit knows neither cohesion nor rolling resistance");
 }
 
 /// What rebuild_step works with.

@@ -13,6 +13,7 @@
 #include "io/output/sinks.hpp"
 #include "io/results/results.hpp"
 #include "io/scene/scene_error.hpp"
+#include "kernels/law/law_numbers.hpp"
 #include "kernels/samples/sample.hpp"
 #include "kernels/samples/size_distribution.hpp"
 #include "kernels/shapes/body_shapes.hpp"
@@ -96,23 +97,10 @@ struct MaterialSpec {
 
 /// A [[pair]]: what is said of the contacts between two materials.
 struct PairSpec {
-  std::string material, with;  ///< names
-  std::optional<double> friction = {};
-  std::optional<double> restitution = {};
-  std::optional<double> cohesion = {};  ///< [N]
-  std::optional<double> rolling_resistance = {};
+  std::string material, with;                  ///< names
+  std::vector<std::optional<double>> numbers;  ///< in order of law_numbers()
+  PairSpec() : numbers(law_numbers().size()) {}
 };
-
-/// A number of a PairLaw, and where a PairSpec has it.
-struct PairNumber {
-  std::optional<double> PairSpec::*given;
-  double PairLaw::*held;
-};
-inline constexpr std::array pair_numbers = {
-    PairNumber{&PairSpec::friction, &PairLaw::friction},
-    PairNumber{&PairSpec::restitution, &PairLaw::restitution},
-    PairNumber{&PairSpec::cohesion, &PairLaw::cohesion},
-    PairNumber{&PairSpec::rolling_resistance, &PairLaw::rolling_resistance}};
 
 /// A scene file, read and checked. Values that wait for the grains (see place_walls) are marked as said
 /// there.

@@ -1,6 +1,7 @@
 #include "kernels/detection/touch.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "kernels/detection/wall_pairs.hpp"
 
@@ -23,6 +24,7 @@ Touch touch_bodies(const Poses& poses, Slot first, Slot second, BallNumbers numb
   if (distance > 0) touch.normal = touch.separation / distance;
   touch.gap = distance - a.radius - b.radius;
   touch.ball = a;
+  touch.second_radius = b.radius;
   touch.smaller_radius = std::min(a.radius, b.radius);
   touch.point = a.centre - (a.radius + 0.5 * touch.gap) * touch.normal;
   return touch;
@@ -36,6 +38,7 @@ Touch touch_wall(const Poses& poses, const Wall& wall, Slot body, std::int32_t f
   touch.normal = at.normal;
   touch.gap = at.distance - ball.radius;
   touch.ball = ball;
+  touch.second_radius = std::numeric_limits<double>::infinity();
   touch.smaller_radius = ball.radius;
   touch.point = ball.centre - ball.radius * at.normal;
   touch.separation = at.distance * at.normal;

@@ -21,6 +21,7 @@ struct Touch {
   Vec3 normal = Vec3::UnitZ();     ///< unit, to the first body
   Ball ball;                       ///< of the first body [m]
   double gap = 0;                  ///< [m]
+  double second_radius = 0;        ///< of the other ball; infinite at a wall [m]
   double smaller_radius = 0;       ///< of both balls [m]
   Vec3 point = Vec3::Zero();       ///< halfway across the gap; at a wall on the ball [m]
   Vec3 separation = Vec3::Zero();  ///< of the balls' centres; at a wall of the ball's from the wall [m]

@@ -3,21 +3,46 @@
 /// Which contact law holds between two materials.
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
 
 #include "kernels/bodies/types.hpp"
+#include "kernels/law/attraction.hpp"
 
 namespace talus {
 
 /// The law of the contacts between two materials.
 struct PairLaw {
-  double friction = 0;            ///< Coulomb's mu >= 0
-  double restitution = 0;         ///< Newton's e in [0, 1], of the normal velocity
-  double cohesion = 0;            ///< force that parts two grains that touch, c >= 0 [N]
-  double rolling_resistance = 0;  ///< mu_r >= 0 (kernels/law/rolling_law.hpp)
+  double friction = 0;                                     ///< Coulomb's mu >= 0
+  double restitution = 0;                                  ///< Newton's e in [0, 1], of the normal velocity
+  double rolling_resistance = 0;                           ///< mu_r >= 0 (kernels/law/rolling_law.hpp)
+  std::array<double, attractions.size()> attraction = {};  ///< number of each, in their units
   bool operator==(const PairLaw&) const = default;
+
+  /// What holds two bodies together, of all attractions [N].
+  double cohesion_of(const TouchingRadii& radii) const {
+    double c = 0;
+    for (std::size_t k = 0; k < attraction.size(); ++k)
+      if (attraction[k] > 0) c += attractions[k]->force(attraction[k], radii);
+    return c;
+  }
+};
+
+/// One number of a law: a member, or that of an attraction.
+class LawNumber {
+ public:
+  constexpr LawNumber(double PairLaw::*member) : member_(member) {}
+  constexpr LawNumber(const Attraction& attraction)
+      : place_(static_cast<std::size_t>(std::ranges::find(attractions, &attraction) - attractions.begin())) {}
+
+  double& in(PairLaw& law) const { return member_ != nullptr ? law.*member_ : law.attraction[place_]; }
+  double in(const PairLaw& law) const { return member_ != nullptr ? law.*member_ : law.attraction[place_]; }
+
+ private:
+  double PairLaw::*member_ = nullptr;
+  std::size_t place_ = 0;
 };
 
 /// The laws of all pairs of materials, in an order in which more materials do not move those that there are:
@@ -43,14 +68,18 @@ class PairTable {
   std::span<const PairLaw> laws() const { return laws_; }
 
   /// Gives every pair the same value, e.g. of friction.
-  void set_all(double PairLaw::*number, double value) {
-    for (PairLaw& law : laws_) law.*number = value;
+  void set_all(LawNumber number, double value) {
+    for (PairLaw& law : laws_) number.in(law) = value;
   }
   /// The largest value of any pair; of a NaN nothing is seen.
-  double largest(double PairLaw::*number) const {
+  double largest(LawNumber number) const {
     double most = 0;
-    for (const PairLaw& law : laws_) most = std::max(most, law.*number);
+    for (const PairLaw& law : laws_) most = std::max(most, number.in(law));
     return most;
+  }
+  /// Some bodies hold one another.
+  bool attract() const {
+    return std::ranges::any_of(attractions, [&](const Attraction* one) { return largest(*one) > 0; });
   }
   bool operator==(const PairTable&) const = default;
 

@@ -19,9 +19,11 @@ void find_cohesion(const NarrowPhase& in, const Candidates& candidates, const Ch
   const Wall* const wall = chunks.wall[chunk] < 0 ? nullptr : &in.walls[at(chunks.wall[chunk])];
   const std::size_t begin = at(chunks.begin[chunk]), end = begin + at(contacts.count[chunk]);
   for (std::size_t k = begin; k < end; ++k) {
-    const double c = law_at(in.laws, candidates, materials, at(contacts.candidate[k])).cohesion;
+    const PairLaw& law = law_at(in.laws, candidates, materials, at(contacts.candidate[k]));
     const Touch touch = touch_of(poses, contacts, k, wall);
-    contacts.cohesion[k] = touch.gap <= rule.reach * touch.smaller_radius ? c * impulse_time : 0;
+    const bool touches = touch.gap <= rule.reach * touch.smaller_radius;
+    contacts.cohesion[k] =
+        touches ? law.cohesion_of({touch.ball.radius, touch.second_radius}) * impulse_time : 0;
   }
 }
 

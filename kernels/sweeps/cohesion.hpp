@@ -1,7 +1,7 @@
 #pragma once
 
-/// Cohesion of contacts: the classical shift of Signorini's condition and Coulomb's cone (Radjai and Richefeu
-/// 2009, "Contact dynamics as a nonsmooth discrete element method"),
+/// Attractions of contacts (kernels/law/attraction.hpp): the classical shift of Signorini's condition and
+/// Coulomb's cone (Radjai and Richefeu 2009, "Contact dynamics as a nonsmooth discrete element method"),
 ///
 ///     r_n + c h >= 0,     |r_t| <= mu (r_n + c h),
 ///

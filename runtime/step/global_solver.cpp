@@ -138,7 +138,7 @@ BodyProblemSource source_of(const StepState& state, const StepParameters& parame
 
 /// Contacts do something besides r: BodyProblem::known.
 bool knows_more(const StepParameters& parameters) {
-  return parameters.rolls || parameters.laws.largest(&PairLaw::cohesion) > 0;
+  return parameters.rolls || parameters.laws.attract();
 }
 
 }  // namespace

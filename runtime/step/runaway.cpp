@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace talus {
 
@@ -62,12 +63,15 @@ void check_strain(const StepState& state, double time_step, const StepName& step
       step.text(), strain, most));
 }
 
-/// Energy of grains at the speed that cohesion gives them in a step [J]. It is no load, but contacts that
-/// pull and push leave a part of it, by the tolerance.
+/// Energy of grains at the speed that attractions give one of mean size at a wall in a step [J]. It is no
+/// load, but contacts that pull and push leave a part of it, by the tolerance.
 double cohesive_energy(const StepOutcome& outcome) {
-  const double mass = outcome.sample.total_mass,
-               cohesion = outcome.parameters.laws.largest(&PairLaw::cohesion);
+  const double mass = outcome.sample.total_mass;
   if (!(mass > 0)) return 0;
+  const TouchingRadii radii{0.5 * outcome.sample.mean_diameter, std::numeric_limits<double>::infinity()};
+  double cohesion = 0;
+  for (const PairLaw& law : outcome.parameters.laws.laws())
+    cohesion = std::max(cohesion, law.cohesion_of(radii));
   const double impulse = cohesion * outcome.parameters.impulse_time();
   const double speed = impulse * static_cast<double>(outcome.sample.bodies) / mass;
   return 0.5 * mass * speed * speed;

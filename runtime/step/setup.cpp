@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "kernels/bodies/bodies.hpp"
+#include "kernels/law/law_numbers.hpp"
 #include "runtime/step/cell.hpp"
 #include "runtime/step/field_grids.hpp"
 
@@ -63,17 +64,16 @@ void validate_motion(const std::string& where, const MotionPart& part) {
 }
 
 void validate_laws(const Stage& stage) {
-  for (const PairLaw& law : stage.laws.laws()) {
-    require(law.friction >= 0 && std::isfinite(law.friction),
-            fmt::format("stage '{}': friction must be finite and >= 0, got {}", stage.name, law.friction));
-    require(law.restitution >= 0 && law.restitution <= 1,
-            fmt::format("stage '{}': restitution must lie in [0, 1], got {}", stage.name, law.restitution));
-    require(law.cohesion >= 0 && std::isfinite(law.cohesion),
-            fmt::format("stage '{}': cohesion must be finite and >= 0 N, got {}", stage.name, law.cohesion));
-    require(law.rolling_resistance >= 0 && std::isfinite(law.rolling_resistance),
-            fmt::format("stage '{}': rolling_resistance must be finite and >= 0, got {}", stage.name,
-                        law.rolling_resistance));
-  }
+  for (const PairLaw& law : stage.laws.laws())
+    for (const LawNumberEntry& entry : law_numbers()) {
+      const double value = entry.number.in(law);
+      require(value >= 0 && value <= entry.most && std::isfinite(value),
+              std::isfinite(entry.most)
+                  ? fmt::format("stage '{}': {} must lie in [0, {}], got {}", stage.name, entry.name,
+                                entry.most, value)
+                  : fmt::format("stage '{}': {} must be finite and >= 0{}{}, got {}", stage.name, entry.name,
+                                *entry.unit == '\0' ? "" : " ", entry.unit, value));
+    }
   // The largest of all pairs: pairs of walls have no friction, and never meet.
   const double resistance = stage.laws.largest(&PairLaw::rolling_resistance);
   require(resistance == 0 || stage.laws.largest(&PairLaw::friction) > 0,

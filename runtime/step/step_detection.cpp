@@ -302,8 +302,7 @@ void StepGraph::set_up_chunks(std::span<const CandidateGroup> groups) {
   note_kinds(clumps_of(state_), state_.chunks);
   note_laws(state_.candidates, {state_.bodies.material, state_.walls}, state_.chunks);
   allocate(state_.contacts, state_.candidates, state_.chunks, parameters_.friction);
-  if (parameters_.laws.largest(&PairLaw::cohesion) > 0)
-    state_.contacts.cohesion.resize(state_.candidates.size());
+  if (parameters_.laws.attract()) state_.contacts.cohesion.resize(state_.candidates.size());
   state_.contacts.drifts_between = state_.domain.flows;
   state_.contacts.reach.resize(state_.cell.loaded() ? state_.candidates.size() : 0);
   const bool drifts = state_.domain.flows || std::ranges::any_of(state_.walls, &Wall::has_drift);

@@ -98,7 +98,7 @@ TEST(Clumps, HangOnACeilingByCohesionOfTheirBalls) {
   const double weight = mass * g_earth;
   for (const double cohesion : {0.49 * weight, 0.51 * weight}) {
     ClumpScene scene;
-    scene.stage().laws.set_all(&PairLaw::cohesion, cohesion);
+    scene.stage().laws.set_all(cohesion_attraction, cohesion);
     scene.stage().gravity = {0, 0, -g_earth};
     scene.wall("ceiling", {0, 0, 1}, -Vec3::UnitZ());
     scene.dumbbell({0, 0, 1 - r}, about(Vec3::UnitZ(), 0.4));

@@ -14,7 +14,7 @@ Scene hanging(int grains, double c) {
   Scene scene(h);
   scene.wall("ceiling", Vec3::Zero(), -Vec3::UnitZ());
   scene.stage().gravity = Vec3(0, 0, -g_earth);
-  scene.stage().laws.set_all(&PairLaw::cohesion, c);
+  scene.stage().laws.set_all(cohesion_attraction, c);
   for (int k = 0; k < grains; ++k) scene.sphere({0, 0, -radius - 2 * radius * k}, radius, mass);
   return scene;
 }
@@ -38,7 +38,7 @@ TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
     scene.setup.solver = {};
     scene.setup.solver.method = method;
     scene.wall("floor", Vec3::Zero(), Vec3::UnitZ());
-    scene.stage().laws.set_all(&PairLaw::cohesion, 4.5e-3);
+    scene.stage().laws.set_all(cohesion_attraction, 4.5e-3);
     for (int k = 0; k < 16; ++k)
       scene.sphere(r * Vec3(1 + 2 * (k % 2), 1 + 2 * (k / 2 % 2), 1 + 2 * (k / 4)), r, 3.35e-5);
     Experiment run(std::move(scene));
@@ -50,7 +50,7 @@ TEST(Cohesion, ALatticeAtRestStaysThereByEveryMethod) {
 TEST(Cohesion, TwoGrainsHoldUpToCAndPartAboveIt) {
   for (const bool holds : {true, false}) {
     Scene scene = hanging(2, 1e6);
-    scene.stage().laws.between(material_of_grains, material_of_grains).cohesion =
+    LawNumber(cohesion_attraction).in(scene.stage().laws.between(material_of_grains, material_of_grains)) =
         (holds ? 1.001 : 0.999) * weight;
     Experiment run(std::move(scene));
     run.steps(2000);
@@ -79,7 +79,7 @@ TEST(Cohesion, BlockSticksToAVerticalWallByFrictionOfItsCohesion) {
     scene.wall("wall", Vec3::Zero(), Vec3::UnitX());
     scene.stage().gravity = Vec3(0, 0, -g_earth);
     scene.friction(mu);
-    scene.stage().laws.set_all(&PairLaw::cohesion, part * weight / mu);
+    scene.stage().laws.set_all(cohesion_attraction, part * weight / mu);
     scene.setup.rotation = false;
     scene.sphere({radius, 0, 0}, radius, mass);
     Experiment run(std::move(scene));
@@ -97,7 +97,7 @@ TEST(Cohesion, PushedWallDragsTheGrainThatSticksToIt) {
   wall.load.drive = WallDrive::force;
   wall.load.force = -force;
   wall.load.mass = wall_mass;
-  scene.stage().laws.set_all(&PairLaw::cohesion, 10);
+  scene.stage().laws.set_all(cohesion_attraction, 10);
   scene.sphere({radius, 0, 0}, radius, mass);
   Experiment run(std::move(scene));
   run.steps(200);

@@ -149,7 +149,7 @@ TEST(GasInACellUnderItsOwnStress, HoldsTheCell) {
 TEST(CohesiveLattice, HoldsACellThatIsPulledApart) {
   const double pull = 900, strength = 1e3 * diameter * diameter;
   Scene scene = lattice(1e-3, 4);
-  scene.stage().laws.set_all(&PairLaw::cohesion, strength);
+  scene.stage().laws.set_all(cohesion_attraction, strength);
   for (std::size_t k = 0; k < 3; ++k) scene.stage().stress.to[k] = -pull;
   Experiment run(std::move(scene));
   for (int step = 0; step < 5; ++step) {

@@ -2,12 +2,11 @@
 
 #include <utility>
 
+#include "kernels/law/law_numbers.hpp"
+
 namespace talus::io::detail {
 
 namespace {
-
-constexpr const char* rolling_meaning =
-    "Moment that resists rolling, over the normal force times the reduced radius; needs friction.";
 
 /// The laws of a scene or a stage.
 PairTable& laws_of(Stage& stage) {
@@ -23,48 +22,50 @@ const PairTable& laws_of(const Scene& scene) {
   return scene.common.laws;
 }
 
+Range range_of(const LawNumberEntry& entry) {
+  return {.low = 0, .high = entry.most};
+}
+
 /// A number that the short form gives to all contacts.
 template <class Part>
-Key<Part> key_of_all(const char* name, const char* unit, Range range, const char* meaning,
-                     double PairLaw::*number) {
+Key<Part> key_of_all(const LawNumberEntry& entry) {
   return bound<double, Part>(
-      name, unit, range, meaning,
-      [number](Part& part, double value) { laws_of(part).set_all(number, value); },
-      [number](const Part& part) -> Value {
-        return laws_of(part).between(material_of_grains, material_of_grains).*number;
+      entry.name, entry.unit, range_of(entry), entry.sentence,
+      [number = entry.number](Part& part, double value) { laws_of(part).set_all(number, value); },
+      [number = entry.number](const Part& part) -> Value {
+        return number.in(laws_of(part).between(material_of_grains, material_of_grains));
       });
 }
 
 /// Contacts of a scene with one material.
 template <class Part>
 std::vector<Key<Part>> law_keys() {
-  return {key<Part>(
-              "friction", "", not_negative, "Coulomb friction between grains.", [](auto& part) -> auto& {
-                return laws_of(part).between(material_of_grains, material_of_grains).friction;
-              }),
-          key<Part>(
-              "wall_friction", "", not_negative, "Coulomb friction between grains and walls.",
-              [](auto& part) -> auto& {
-                return laws_of(part).between(material_of_grains, material_of_walls).friction;
-              }),
-          key_of_all<Part>("restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
-                           &PairLaw::restitution),
-          key_of_all<Part>("cohesion", "N", not_negative,
-                           "Force that parts grains that touch one another or a wall.", &PairLaw::cohesion),
-          key_of_all<Part>("rolling_resistance", "", not_negative, rolling_meaning,
-                           &PairLaw::rolling_resistance)};
+  std::vector<Key<Part>> keys = {
+      key<Part>(
+          "friction", "", not_negative, "Coulomb friction between grains.", [](auto& part) -> auto& {
+            return laws_of(part).between(material_of_grains, material_of_grains).friction;
+          }),
+      key<Part>(
+          "wall_friction", "", not_negative, "Coulomb friction between grains and walls.",
+          [](auto& part) -> auto& {
+            return laws_of(part).between(material_of_grains, material_of_walls).friction;
+          })};
+  for (const LawNumberEntry& entry : law_numbers())
+    if (entry.name != keys.front().name) keys.push_back(key_of_all<Part>(entry));
+  return keys;
 }
 
 Section<PairSpec> pair_section(const char* header, const char* meaning, const std::string& otherwise) {
   std::vector<Key<PairSpec>> keys = {
       key<PairSpec>("material", "", any, "Name of one material.", &PairSpec::material).need(),
       key<PairSpec>("with", "", any, "Name of the other.", &PairSpec::with).or_else("the same")};
-  const auto add = [&](Key<PairSpec> law_key) { keys.push_back(std::move(law_key).or_else(otherwise)); };
-  add(key<PairSpec>("friction", "", not_negative, "Coulomb friction.", &PairSpec::friction));
-  add(key<PairSpec>("restitution", "", zero_to_one, "Newton restitution of the normal velocity.",
-                    &PairSpec::restitution));
-  add(key<PairSpec>("cohesion", "N", not_negative, "Force that parts what touches.", &PairSpec::cohesion));
-  add(key<PairSpec>("rolling_resistance", "", not_negative, rolling_meaning, &PairSpec::rolling_resistance));
+  for (std::size_t k = 0; k < law_numbers().size(); ++k) {
+    const LawNumberEntry& entry = law_numbers()[k];
+    keys.push_back(key<PairSpec>(
+                       entry.name, entry.unit, range_of(entry),
+                       entry.sentence, [k](auto& pair) -> auto& { return pair.numbers[k]; })
+                       .or_else(otherwise));
+  }
   return {header, meaning, std::move(keys)};
 }
 
@@ -116,8 +117,10 @@ std::vector<PairSpec> pairs_of(const PairTable& laws, const std::vector<Material
   for (std::size_t b = 0; b < materials.size(); ++b)
     for (std::size_t a = 0; a <= b; ++a) {
       const PairLaw& law = laws.between(static_cast<Material>(a), static_cast<Material>(b));
-      pairs.push_back({.material = materials[a].name, .with = materials[b].name});
-      for (const PairNumber& number : pair_numbers) pairs.back().*number.given = law.*number.held;
+      PairSpec& pair = pairs.emplace_back();
+      pair.material = materials[a].name;
+      pair.with = materials[b].name;
+      for (std::size_t k = 0; k < pair.numbers.size(); ++k) pair.numbers[k] = law_numbers()[k].number.in(law);
     }
   return pairs;
 }

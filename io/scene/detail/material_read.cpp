@@ -27,13 +27,14 @@ Material material_named(const std::string& name, const toml::node& at, const std
 
 using PairOfMaterials = std::pair<Material, Material>;
 
+/// A pair of materials, and a place among law_numbers().
+using NumberOfPair = std::pair<std::size_t, std::size_t>;
+
 /// Reads the pairs of an array of tables into `laws`; of numbers that are not given nothing changes. Returns
 /// which pair has which numbers of its own.
-std::set<std::pair<std::size_t, const PairNumber*>> read_pairs(const toml::table& parent,
-                                                               const std::string& path,
-                                                               const Section<PairSpec>& keys,
-                                                               const Scene& scene, PairTable& laws) {
-  std::set<std::pair<std::size_t, const PairNumber*>> given;
+std::set<NumberOfPair> read_pairs(const toml::table& parent, const std::string& path,
+                                  const Section<PairSpec>& keys, const Scene& scene, PairTable& laws) {
+  std::set<NumberOfPair> given;
   std::set<PairOfMaterials> seen;
   std::size_t count = 0;
   for (const toml::table* table : tables_at(parent, "pair", path)) {
@@ -46,10 +47,10 @@ std::set<std::pair<std::size_t, const PairNumber*>> read_pairs(const toml::table
     const Material b = with ? material_named(pair.with, *with, here + ".with", scene) : a;
     if (!seen.insert(std::minmax(a, b)).second)
       fail_at(*table, here, fmt::format("'{}' with '{}' stands here already", pair.material, pair.with));
-    for (const PairNumber& number : pair_numbers) {
-      if (!(pair.*number.given)) continue;
-      laws.between(a, b).*number.held = *(pair.*number.given);
-      given.emplace(PairTable::number(a, b), &number);
+    for (std::size_t k = 0; k < pair.numbers.size(); ++k) {
+      if (!pair.numbers[k]) continue;
+      law_numbers()[k].number.in(laws.between(a, b)) = *pair.numbers[k];
+      given.emplace(PairTable::number(a, b), k);
     }
   }
   return given;
@@ -85,11 +86,12 @@ void read_materials(const toml::table& root, Scene& scene) {
   const auto given = read_pairs(root, "pair", scene_keys().pair, scene, laws);
   for (std::size_t b = 0; b < scene.materials.size(); ++b)
     for (std::size_t a = 0; a < b; ++a)
-      for (const PairNumber& number : pair_numbers) {
+      for (std::size_t k = 0; k < law_numbers().size(); ++k) {
         const auto i = static_cast<Material>(a), j = static_cast<Material>(b);
-        if (!given.contains({PairTable::number(i, j), &number}))
-          laws.between(i, j).*number.held =
-              std::min(laws.between(i, i).*number.held, laws.between(j, j).*number.held);
+        const LawNumber& number = law_numbers()[k].number;
+        if (!given.contains({PairTable::number(i, j), k}))
+          number.in(laws.between(i, j)) =
+              std::min(number.in(laws.between(i, i)), number.in(laws.between(j, j)));
       }
 }
 

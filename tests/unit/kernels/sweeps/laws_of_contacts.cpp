@@ -22,8 +22,8 @@ PairTable unlike_laws() {
   PairTable laws(4);
   for (std::size_t k = 0; k < laws.laws().size(); ++k)
     laws.laws()[k] = {.friction = 0.3,
-                      .cohesion = 1 + static_cast<double>(k),
-                      .rolling_resistance = 0.01 * (1 + static_cast<double>(k))};
+                      .rolling_resistance = 0.01 * (1 + static_cast<double>(k)),
+                      .attraction = {1 + static_cast<double>(k)}};  // cohesion
   return laws;
 }
 
@@ -110,7 +110,7 @@ TEST(LawsOfContacts, CohesionIsThatOfTheTwoBodiesThatTouch) {
     }
     const bool touches = gap <= CohesionRule{}.reach * smaller;
     ++(touches ? touching : apart);
-    EXPECT_NEAR(mixed.sample.contacts.cohesion[k], touches ? law.cohesion * 1e-3 : 0, 1e-15) << k;
+    EXPECT_NEAR(mixed.sample.contacts.cohesion[k], touches ? law.attraction[0] * 1e-3 : 0, 1e-15) << k;
   });
   EXPECT_GT(touching, 100);
   EXPECT_GT(apart, 10);

@@ -1,0 +1,29 @@
+#pragma once
+
+/// Laws by which bodies that touch hold one another: each is a force along the normal, c >= 0 [N], by which
+/// Signorini's condition and Coulomb's cone are shifted (kernels/sweeps/cohesion.hpp, which adds them up).
+/// One file in attractions/ for each.
+
+#include <array>
+
+namespace talus {
+
+/// Two spheres that touch, or a sphere and a wall, whose radius is infinite.
+struct TouchingRadii {
+  double first, second;  ///< [m]
+  /// l with 1/l = 1/R_1 + 1/R_2 [m].
+  double reduced() const { return 1 / (1 / first + 1 / second); }
+};
+
+struct Attraction {
+  const char* name;      ///< key of [material] and [[pair]]
+  const char* unit;      ///< of its number, which is >= 0 and 0 where the law does not hold
+  const char* sentence;  ///< for the reference of scene files
+  double (*force)(double number, const TouchingRadii& radii);  ///< c [N] >= 0
+};
+
+extern const Attraction cohesion_attraction;
+
+inline constexpr std::array attractions = {&cohesion_attraction};
+
+}  // namespace talus

@@ -1,0 +1,10 @@
+#include "kernels/law/attraction.hpp"
+
+namespace talus {
+
+/// The same force for all sizes (Radjai and Richefeu 2009).
+const Attraction cohesion_attraction = {"cohesion", "N",
+                                        "Force that parts grains that touch one another or a wall.",
+                                        [](double number, const TouchingRadii& /*radii*/) { return number; }};
+
+}  // namespace talus
