@@ -23,7 +23,8 @@ struct Attraction {
 };
 
 extern const Attraction cohesion_attraction;
+extern const Attraction adhesion_attraction;
 
-inline constexpr std::array attractions = {&cohesion_attraction};
+inline constexpr std::array attractions = {&cohesion_attraction, &adhesion_attraction};
 
 }  // namespace talus

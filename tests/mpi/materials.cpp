@@ -34,7 +34,7 @@ rolling_resistance = 0.2
 material = "wet"
 with = "dry"
 friction = 0.4
-cohesion = 0.02
+work_of_adhesion = 0.5
 [[pair]]
 material = "dry"
 with = "steel"
