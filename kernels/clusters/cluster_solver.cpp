@@ -40,7 +40,7 @@ LawDefect law_defect(const BodyProblem& problem, const std::vector<Vec3>& impuls
     defect.energy += 0.5 * kinetic2(problem.bodies[b], V[b].u, V[b].w);
   for (std::size_t k = 0; k < impulse.size(); ++k) {
     const ContactEquation& c = problem.contacts[k];
-    const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
+    const Vec3 v = constrained_velocity(c, V);
     const NaturalMap map = natural_map_of(problem, c, impulse[k], v);
     const double wrong2 = (impulse[k] - map.carried).squaredNorm() / map.m;
     defect.residual2 += wrong2;

@@ -38,7 +38,7 @@ void add_contacts(const ProblemReader& part, std::span<const Twist> V, std::span
     const std::int32_t g = group[at(c.first)];
     if (g < 0) return;
     const std::span<double> own = row.subspan(at(g) * width, width);
-    const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
+    const Vec3 v = constrained_velocity(c, V);
     const double m = effective_mass_by([&](std::size_t body) { return part.mass(body); }, c);
     own[WorkColumn::work] += std::max(0.0, c.normal.dot(r)) * natural_map_of(m, c, r, v).residual(r);
     own[WorkColumn::drive] = std::max(own[WorkColumn::drive], std::abs(c.drive));

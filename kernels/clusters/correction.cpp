@@ -47,7 +47,7 @@ ActiveSet empty_set(const BodyProblem& problem) {
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
   for (std::size_t k = 0; k < n; ++k) {
     const ContactEquation& c = problem.contacts[k];
-    set.velocity[k] = constrained(c, relative_velocity(c, V) + c.offset);
+    set.velocity[k] = constrained_velocity(c, V);
   }
   return set;
 }

@@ -32,7 +32,7 @@ class CoulombStep {
       : problem_(problem), freedoms_(problem), mass_(freedoms_.masses()) {
     const std::vector<Twist> V = velocities_of(problem, problem.impulse);
     for (const ContactEquation& c : problem.contacts) {
-      velocity_.push_back(constrained(c, relative_velocity(c, V) + c.offset));
+      velocity_.push_back(constrained_velocity(c, V));
       add_columns(c);
     }
   }

@@ -77,7 +77,7 @@ ProximalStep::ProximalStep(const BodyProblem& problem, double firmness)
     : firmness(firmness), centre(problem.impulse), motion(problem.bodies.size()), problem_(problem) {
   const std::vector<Twist> V = velocities_of(problem, problem.impulse);
   for (const ContactEquation& c : problem.contacts) {
-    velocity_.push_back(constrained(c, relative_velocity(c, V) + c.offset));
+    velocity_.push_back(constrained_velocity(c, V));
     mass_.push_back(effective_mass(problem, c));
     shift.push_back(c.mu * tangential(c, velocity_.back()).norm());
   }

@@ -28,7 +28,7 @@ struct PartState {
     for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
       r[k] = project_on_cone(r[k], c.normal, c.mu);
-      const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset);
+      const Vec3 v = constrained_velocity(c, V);
       shift[k] = c.mu * tangential(c, v).norm();
       y[k] = v + shift[k] * c.normal + project_on_cone(-v, c.normal, c.mu);
     }
@@ -49,7 +49,7 @@ struct PartState {
     gap2 = weight = 0;
     for (std::size_t k = 0; k < y.size(); ++k) {
       const ContactEquation& c = problem.contacts[k];
-      const Vec3 v = constrained(c, relative_velocity(c, V) + c.offset) + shift[k] * c.normal;
+      const Vec3 v = constrained_velocity(c, V) + shift[k] * c.normal;
       const Vec3 x = relaxation * v + (1 - relaxation) * y[k];
       const Vec3 r_new = project_on_cone(r[k] - rho[k] * x, c.normal, c.mu);
       y[k] = x + (r_new - r[k]) / rho[k];

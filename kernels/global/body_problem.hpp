@@ -186,6 +186,12 @@ inline Vec3 constrained(const ContactEquation& c, const Vec3& v) {
   return c.mu > 0 ? v : Vec3(c.normal.dot(v) * c.normal);
 }
 
+/// The velocity that the law of a contact speaks of [m/s]: the relative one, with bias and drive, as far as
+/// the contact constrains it.
+inline Vec3 constrained_velocity(const ContactEquation& c, std::span<const Twist> V) {
+  return constrained(c, relative_velocity(c, V) + c.offset);
+}
+
 inline Vec3 tangential(const ContactEquation& c, const Vec3& v) {
   return v - c.normal.dot(v) * c.normal;
 }

@@ -9,7 +9,7 @@
 namespace talus {
 
 /// A contact under the impulse r [N s] at the velocity v + b n [m/s], of which without friction the normal
-/// part counts (`constrained`).
+/// part counts (`constrained_velocity`).
 struct NaturalMap {
   double m;      ///< 1/W_nn [kg]
   double shift;  ///< mu |v_t| [m/s]

@@ -73,7 +73,7 @@ Residuals residuals_of(const ProblemReaders& parts, const PartLink& link) {
         const ProblemReader& problem = *parts[p];
         out.contact[p].reserve(problem.contacts());
         problem.each_contact([&](const ContactEquation& c, const Vec3& r) {
-          const Vec3 v = constrained(c, relative_velocity(c, V[p]) + c.offset);
+          const Vec3 v = constrained_velocity(c, V[p]);
           const double m = effective_mass_by([&](std::size_t body) { return problem.mass(body); }, c);
           const NaturalMap map = natural_map_of(m, c, r, v);
           add_force(c, map.carried - r, change[p]);
