@@ -14,9 +14,10 @@ namespace talus {
 
 namespace {
 
-/// Columns of a cluster: sums, behind them the impulse at each wall, and a maximum.
+/// Columns of a cluster: sums, the last ones the impulse at each wall; and at the end of the row the
+/// fastest drive.
 struct WorkColumn {
-  enum : std::size_t { work, energy, mass, drive, sums };
+  enum : std::size_t { work, energy, mass, walls };
 };
 
 /// Adds what the bodies of a part have exchanged.
@@ -41,9 +42,9 @@ void add_contacts(const ProblemReader& part, std::span<const Twist> V, std::span
     const Vec3 v = constrained_velocity(c, V);
     const double m = effective_mass_by([&](std::size_t body) { return part.mass(body); }, c);
     own[WorkColumn::work] += std::max(0.0, c.normal.dot(r)) * natural_map_of(m, c, r, v).residual(r);
-    own[WorkColumn::drive] = std::max(own[WorkColumn::drive], std::abs(c.drive));
+    own.back() = std::max(own.back(), std::abs(c.drive));
     if (c.wall < 0) return;
-    for (int k = 0; k < 3; ++k) own[WorkColumn::sums + 3 * at(c.wall) + static_cast<std::size_t>(k)] += r[k];
+    for (int k = 0; k < 3; ++k) own[WorkColumn::walls + 3 * at(c.wall) + static_cast<std::size_t>(k)] += r[k];
   });
 }
 
@@ -51,13 +52,13 @@ double relative_work(std::span<const double> own, const ExchangeFloors& floors) 
   if (!(own[WorkColumn::work] > 0)) return own[WorkColumn::work];
   double of_walls = 0, pressed = 0;
   for (std::size_t w = 0; w < floors.wall_inv_masses.size(); ++w) {
-    const double* r = own.data() + WorkColumn::sums + 3 * w;
+    const double* r = own.data() + WorkColumn::walls + 3 * w;
     const double impulse2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
     of_walls += 0.5 * impulse2 * std::min(floors.wall_inv_masses[w], 1 / own[WorkColumn::mass]);
     pressed = std::max(pressed, std::sqrt(impulse2));
   }
   const double speed =
-      std::max({own[WorkColumn::drive], floors.speed, floors.interest * pressed / own[WorkColumn::mass]});
+      std::max({own.back(), floors.speed, floors.interest * pressed / own[WorkColumn::mass]});
   return own[WorkColumn::work] /
          std::max(own[WorkColumn::energy] + of_walls, 0.5 * own[WorkColumn::mass] * speed * speed);
 }
@@ -67,18 +68,13 @@ double relative_work(std::span<const double> own, const ExchangeFloors& floors) 
 double largest_work(const ProblemReaders& parts, const BodyGroups& groups, const PartLink& link,
                     const ExchangeFloors& floors) {
   const PartField V = velocities_of(parts, link);
-  const std::size_t width = WorkColumn::sums + 3 * floors.wall_inv_masses.size(),
-                    all_of = width * groups.size();
-  const std::vector<double> rows =
-      rows_of(link, parts.size(), all_of, [&](std::size_t p, std::span<double> row) {
+  const RowColumns columns{.sums = WorkColumn::walls + 3 * floors.wall_inv_masses.size(), .largest = 1};
+  const std::size_t width = columns.width();
+  const std::vector<double> all =
+      reduced_of(link, parts.size(), columns, groups.size(), [&](std::size_t p, std::span<double> row) {
         add_bodies(*parts[p], V[p], groups.of_body[p], width, row);
         add_contacts(*parts[p], V[p], groups.of_body[p], width, row);
       });
-  std::vector<double> all(all_of, 0.0);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    double& sum = all[k % all_of];
-    sum = k % width == WorkColumn::drive ? std::max(sum, rows[k]) : sum + rows[k];
-  }
   double largest = 0;
   for (std::size_t g = 0; g < groups.size(); ++g)
     largest = larger(largest, relative_work(std::span(all).subspan(g * width, width), floors));

@@ -35,10 +35,7 @@ enum Measure {
 };
 
 using Measures = std::array<double, measures>;
-
-void add_measures(Measures& to, std::span<const double> of) {
-  for (std::size_t k = 0; k < measures; ++k) to[k] = k < sums ? to[k] + of[k] : larger(to[k], of[k]);
-}
+constexpr RowColumns columns_of_measures{.sums = sums, .largest = measures - sums};
 
 Measures measures_of(const BodyProblem& problem) {
   Measures row{};
@@ -134,14 +131,12 @@ class Answers {
     parts_.link().each(clusters_.size(), work);
   }
   Measures total(const std::vector<Measures>& rows) const {
-    const std::vector<double> all = parts_.rows(measures, [&](std::size_t p, std::span<double> row) {
-      Measures sum{};
-      for (const std::size_t c : own_[p]) add_measures(sum, rows[c]);
-      std::copy(sum.begin(), sum.end(), row.begin());
-    });
+    const std::vector<double> all =
+        parts_.reduced(columns_of_measures, 1, [&](std::size_t p, std::span<double> row) {
+          for (const std::size_t c : own_[p]) columns_of_measures.add(rows[c], row);
+        });
     Measures sum{};
-    for (std::size_t k = 0; k < all.size(); k += measures)
-      add_measures(sum, std::span(all).subspan(k, measures));
+    std::ranges::copy(all, sum.begin());
     return sum;
   }
   double largest(const std::function<double(std::size_t)>& value) const {

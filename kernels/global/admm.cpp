@@ -69,8 +69,20 @@ void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
              std::span<const PartState> states, std::span<const std::vector<std::int32_t>> heavy,
              BodyAdmmResult& result) {
   const PartField made = velocities_of(parts, r);
-  enum { gained2, defect2, speed2, count, gap2, weight, scale, sample, worst = sample + 3, heavies, width };
-  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
+  enum : std::size_t {
+    gained2,
+    defect2,
+    speed2,
+    count,
+    gap2,
+    weight,
+    scale,
+    sample,
+    heavies = sample + 3,
+    worst
+  };
+  constexpr RowColumns columns{.sums = worst, .largest = 1};
+  const std::vector<double> all = parts.reduced(columns, 1, [&](std::size_t p, std::span<double> row) {
     const BodyProblem& problem = parts[p];
     for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
       if (!problem.counted(b)) continue;
@@ -91,20 +103,14 @@ void measure(const BodyParts& parts, const PartField& V, const PartImpulses& r,
       if (own > 0) row[worst] = std::max(row[worst], (made[p][at(b)].u - V[p][at(b)].u).norm() / own);
     }
   });
-  std::array<double, width> sum{};
-  double most = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    sum[k % width] += rows[k];
-    if (k % width == worst) most = std::max(most, rows[k]);
-  }
   // Sums over all bodies: a NaN, of any of them, stays NaN, and must not pass for solved.
-  result.momentum_defect = sum[gained2] != 0 ? std::sqrt(sum[defect2] / sum[gained2]) : 0;
+  result.momentum_defect = all[gained2] != 0 ? std::sqrt(all[defect2] / all[gained2]) : 0;
   // Each body counts alike: the heaviest would hide the rest.
-  const double speed = std::sqrt(sum[speed2] / sum[count]);
-  result.contact_defect = speed > 0 ? std::sqrt(sum[gap2] / sum[weight]) / speed : 0;
-  result.balance_defect = most;
-  if (sum[heavies] == 0 && sum[scale] > 0)
-    result.balance_defect = Vec3(sum[sample], sum[sample + 1], sum[sample + 2]).norm() / sum[scale];
+  const double speed = std::sqrt(all[speed2] / all[count]);
+  result.contact_defect = speed > 0 ? std::sqrt(all[gap2] / all[weight]) / speed : 0;
+  result.balance_defect = all[worst];
+  if (all[heavies] == 0 && all[scale] > 0)
+    result.balance_defect = Vec3(all[sample], all[sample + 1], all[sample + 2]).norm() / all[scale];
 }
 
 /// Whether all weights are finite, and leave room in doubles for sums and products with them. Collective.

@@ -174,9 +174,9 @@ struct Scale {
 std::vector<Scale> scales_of(const BodyParts& parts, const BodyGroups& groups,
                              const std::vector<Wishes>& wishes, const PartField& V,
                              const BalanceThresholds& thresholds) {
-  enum { contacts, mass, pressed, incoming, drive, fastest, width };
-  const std::size_t all_of = width * groups.size();
-  const std::vector<double> rows = parts.rows(all_of, [&](std::size_t p, std::span<double> row) {
+  enum : std::size_t { contacts, mass, pressed, incoming, drive, fastest, width };
+  constexpr RowColumns columns{.sums = drive, .largest = width - drive};
+  const auto fill = [&](std::size_t p, std::span<double> row) {
     const PartGroups part{p, groups};
     for (std::size_t k = 0; k < wishes[p].change.size(); ++k)
       row[width * part.group(parts[p].contacts[k]) + contacts] += 1;
@@ -191,12 +191,8 @@ std::vector<Scale> scales_of(const BodyParts& parts, const BodyGroups& groups,
       row[width * g + drive] = wishes[p].drive[g];
       row[width * g + fastest] = wishes[p].fastest[g];
     }
-  });
-  std::vector<double> all(all_of, 0.0);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    double& sum = all[k % all_of];
-    sum = k % width >= drive ? std::max(sum, rows[k]) : sum + rows[k];
-  }
+  };
+  const std::vector<double> all = parts.reduced(columns, groups.size(), fill);
   PartField free = parts.field();
   parts.each([&](std::size_t p) {
     for (std::size_t b = 0; b < free[p].size(); ++b) free[p][b] = parts[p].bodies[b].free;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "kernels/bodies/index.hpp"
+#include "kernels/bodies/larger.hpp"
 
 namespace talus {
 
@@ -30,10 +31,22 @@ std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t
 
 std::vector<double> total_of(const PartLink& link, std::size_t parts, std::size_t width,
                              const PartRow& fill) {
-  const std::vector<double> all = rows_of(link, parts, width, fill);
-  std::vector<double> sum(width, 0.0);
-  for (std::size_t k = 0; k < all.size(); ++k) sum[k % width] += all[k];
-  return sum;
+  return reduced_of(link, parts, {.sums = width, .largest = 0}, 1, fill);
+}
+
+void RowColumns::add(std::span<const double> row, std::span<double> to) const {
+  for (std::size_t k = 0; k < row.size(); ++k)
+    to[k] = k % width() < sums ? to[k] + row[k] : larger(to[k], row[k]);
+}
+
+std::vector<double> reduced_of(const PartLink& link, std::size_t parts, RowColumns columns,
+                               std::size_t groups, const PartRow& fill) {
+  const std::size_t length = columns.width() * groups;
+  const std::vector<double> rows = rows_of(link, parts, length, fill);
+  std::vector<double> all(length, 0.0);
+  for (std::size_t begin = 0; begin < rows.size(); begin += length)
+    columns.add(std::span(rows).subspan(begin, length), all);
+  return all;
 }
 
 double BodyParts::dot(const PartField& a, const PartField& b) const {

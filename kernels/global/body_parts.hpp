@@ -59,6 +59,19 @@ std::vector<double> rows_of(const PartLink& link, std::size_t parts, std::size_t
 /// The same, added up in order of subdomain.
 std::vector<double> total_of(const PartLink& link, std::size_t parts, std::size_t width, const PartRow& fill);
 
+/// Numbers of which some add up and of the others the largest counts: sums first. A row may have them several
+/// times over, once for each group that is measured.
+struct RowColumns {
+  std::size_t sums, largest;  ///< numbers of either kind
+  std::size_t width() const { return sums + largest; }
+  /// Adds the sums of a row, and keeps the larger ones of the others; NaN where one is.
+  void add(std::span<const double> row, std::span<double> to) const;
+};
+/// One row of what the parts have, `groups` times the columns, added in order of subdomain; nothing is less
+/// than 0 in the columns of largest ones.
+std::vector<double> reduced_of(const PartLink& link, std::size_t parts, RowColumns columns,
+                               std::size_t groups, const PartRow& fill);
+
 /// The parts here, ascending by subdomain, and their link. What it refers to must outlive it.
 class BodyParts {
  public:
@@ -77,6 +90,9 @@ class BodyParts {
   }
   std::vector<double> total(std::size_t width, const PartRow& fill) const {
     return total_of(*link_, size(), width, fill);
+  }
+  std::vector<double> reduced(RowColumns columns, std::size_t groups, const PartRow& fill) const {
+    return reduced_of(*link_, size(), columns, groups, fill);
   }
 
   /// Sum of a.b over all bodies, each once.

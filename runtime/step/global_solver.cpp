@@ -1,7 +1,6 @@
 #include "runtime/step/global_solver.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -89,8 +88,9 @@ double energy_of(const BodyParts& parts) {
 /// The same as it is without contacts, and what driven walls and overlaps that part give if all bodies
 /// follow; speeds of overlaps do not add up here, as they do along a chain. Gaps that close give nothing [J].
 double energy_without(const BodyParts& parts) {
-  enum { energy, mass, fastest, width };
-  const std::vector<double> rows = parts.rows(width, [&](std::size_t p, std::span<double> row) {
+  enum : std::size_t { energy, mass, fastest };
+  constexpr RowColumns columns{.sums = fastest, .largest = 1};
+  const std::vector<double> all = parts.reduced(columns, 1, [&](std::size_t p, std::span<double> row) {
     const BodyProblem& problem = parts[p];
     for (std::size_t b = 0; b < problem.bodies.size(); ++b) {
       if (!problem.counted(b)) continue;
@@ -100,9 +100,6 @@ double energy_without(const BodyParts& parts) {
     for (const ContactEquation& c : problem.contacts)
       row[fastest] = std::max({row[fastest], std::abs(c.drive), -c.offset.dot(c.normal)});
   });
-  std::array<double, width> all{};
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    all[k % width] = k % width == fastest ? std::max(all[fastest], rows[k]) : all[k % width] + rows[k];
   return all[energy] + all[mass] * all[fastest] * all[fastest];
 }
 

@@ -29,6 +29,35 @@ std::vector<std::int32_t> by_height(const BodyProblem& problem, std::size_t coun
   return part;
 }
 
+/// Rows of other processes stand behind those given.
+class LinkToOthers final : public PartLink {
+ public:
+  explicit LinkToOthers(std::vector<double> others) : others_(std::move(others)) {}
+  std::vector<double> gather(std::vector<std::vector<double>> rows) const override {
+    std::vector<double> all = std::move(rows.front());
+    all.insert(all.end(), others_.begin(), others_.end());
+    return all;
+  }
+
+ private:
+  std::vector<double> others_;
+};
+
+TEST(BodyParts, AddUpSomeColumnsAndTakeTheLargestOfOthers) {
+  // Two groups of two sums and a largest value; rows of three parts.
+  const LinkToOthers link({10, 20, 7, 30, 40, -1, 100, 200, 6, 300, 400, -2});
+  const auto fill = [](std::size_t, std::span<double> row) {
+    const double own[] = {1, 2, 5, 3, 4, -3};
+    std::copy(std::begin(own), std::end(own), row.begin());
+  };
+  EXPECT_EQ(reduced_of(link, 1, {.sums = 2, .largest = 1}, 2, fill),
+            (std::vector<double>{111, 222, 7, 333, 444, 0}));
+  const auto one = [](std::size_t, std::span<double> row) { row[0] = row[1] = 1; };
+  const std::vector<double> all = reduced_of(LinkToOthers({0, std::nan(""), 0, 0}), 1, {1, 1}, 1, one);
+  EXPECT_EQ(all[0], 1);
+  EXPECT_TRUE(std::isnan(all[1]));
+}
+
 TEST(BodyParts, SeeTheStiffnessAndTheHeavyBodiesOfTheWhole) {
   for (const double plate : {0.0, 1e4}) {
     BodyProblem whole = block(3, 12, 0.35, plate);
