@@ -8,6 +8,7 @@
 
 #include "kernels/bodies/larger.hpp"
 #include "kernels/clusters/cluster_solver.hpp"
+#include "kernels/global/balance.hpp"
 #include "kernels/global/body_parts.hpp"
 
 namespace talus {
@@ -17,9 +18,9 @@ struct StepErrorThresholds {
   ClusterThresholds cluster;
   /// Of the impulses between walls, in (0, 1): a cluster that does less is measured by this part of them; and
   /// of what all clusters do, per mass; and of the largest impulse of all, for those of its contacts.
-  double interest = 1e-2;
+  double interest = BalanceThresholds{}.interest;
   /// What rounding leaves of the momentum of a cluster, over it, > 0: grains that fly side by side.
-  double rounding = 1e-12;
+  double rounding = BalanceThresholds{}.rounding;
   /// Least error, > 0, of a cluster without an answer: what rounds that did not settle have found says
   /// nothing of what they have not.
   double unknown = 1;

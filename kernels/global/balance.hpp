@@ -33,12 +33,13 @@ struct BalanceThresholds {
   /// smaller than the error.
   double caution = 3;
   /// Part of the impulses at walls, in (0, 1), that an error is compared with at least where no wall is
-  /// driven.
+  /// driven. It is what a reader of the results cares for, so the checks of small clusters
+  /// (StepErrorThresholds) and of the work of errors (CertificateThresholds) read it here.
   double interest = 1e-2;
   /// Groups whose stiffness is estimated one by one, >= 1; others have one estimate together.
   int most_groups = 16;
-  /// What rounding leaves of the sample's momentum, over it, > 0: the least scale of grains that fly side by
-  /// side.
+  /// What rounding leaves of the momentum of the sample, or of a small cluster, over it, > 0: the least scale
+  /// of grains that fly side by side.
   double rounding = 1e-12;
 };
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "kernels/bodies/larger.hpp"
-#include "kernels/global/balance.hpp"
 
 namespace talus {
 

@@ -10,6 +10,7 @@
 
 #include "kernels/clusters/clusters.hpp"
 #include "kernels/global/admm.hpp"
+#include "kernels/global/balance.hpp"
 #include "runtime/step/check_sums.hpp"
 #include "runtime/step/error_history.hpp"
 #include "runtime/step/setup.hpp"
@@ -74,9 +75,9 @@ struct CertificateThresholds {
   /// Elsewhere too, where the work of the contacts' errors leaves it in doubt (VelocityErrorMemory) and so
   /// many sweeps of this step have not mended that, > 0; again when they have grown by the factor, > 1.
   int doubtful = 400;
-  /// Part of the impulse at the most pressed wall, in (0, 1), that grains exchange at least.
-  double interest = 1e-2;
   double doubt_again = 2;
+  /// Part of the impulse at the most pressed wall, in (0, 1), that grains exchange at least.
+  double interest = BalanceThresholds{}.interest;
   /// Behind ADMM sweeps still mend much: no check of the whole problem before so many, >= 0.
   int settling = 50;
   /// Small clusters are put right so often in a step, at most, >= 0: sweeps for others may carry them off

@@ -352,21 +352,21 @@ void GlobalSolver::release_room() {
   mends_ = false;
 }
 
-BodyAdmmResult GlobalSolver::improve(double tolerance, int calls) {
+BodyAdmmResult GlobalSolver::improve(double tolerance, int calls, const ImprovementThresholds& thresholds) {
   const Whole span(*this);
   std::vector<BodyProblem> problems = gather();
   const BodyParts parts(problems, *link_);
   BodyAdmmSettings settings;
-  settings.tolerance = std::ldexp(settings.tolerance, -2 * calls);
-  settings.balance_tolerance = std::ldexp(std::min(settings.balance_tolerance, 0.1 * tolerance), -2 * calls);
-  // Contacts make no energy, but until sweeps follow ADMM leaves light bodies with what heavy ones had.
-  constexpr double sound = 1e8;
+  const int digits = thresholds.digits * calls;
+  settings.tolerance = std::ldexp(settings.tolerance, -digits);
+  settings.balance_tolerance =
+      std::ldexp(std::min(settings.balance_tolerance, thresholds.finer * tolerance), -digits);
   const double without = energy_without(parts);
   BodyAdmmResult result = solve_admm(problems, *link_, settings);
-  // Masses too far apart for the digits of its linear system can carry it off: what it found then is dropped.
-  // The defect is near 1 where light bodies have yet to follow a heavy one. Comparisons are false for NaN.
+  // Comparisons are false for NaN.
   const bool better = result.converged || calls == 0;  // unfinished is better than sweeps, not than ADMM
-  if (better && result.momentum_defect <= 2 && energy_of(parts) <= sound * without)
+  if (better && result.momentum_defect <= thresholds.most_defect &&
+      energy_of(parts) <= thresholds.most_energy * without)
     for (const BodyProblem& problem : problems) scatter_impulses(problem, state_.contacts);
   return result;
 }

@@ -16,6 +16,21 @@
 
 namespace talus {
 
+/// What ADMM is asked for, and when its impulses are dropped (GlobalSolver::improve). Masses too far apart
+/// for the digits of its linear system can carry it off.
+struct ImprovementThresholds {
+  /// The balance that it is asked for, over that of the step, in (0, 1).
+  double finer = 0.1;
+  /// Binary digits by which it is to be more exact with each further call in a step, >= 1: the last was not
+  /// enough.
+  int digits = 2;
+  /// Its momentum defect, at most, > 1: near 1 where light bodies have yet to follow a heavy one.
+  double most_defect = 2;
+  /// The energy that it leaves, at most, over what there is without contacts, >> 1: contacts make none, but
+  /// until sweeps follow it leaves light bodies with what heavy ones had.
+  double most_energy = 1e8;
+};
+
 /// What looks at all contacts of a step at once: how stiff they are, how far their impulses are from an
 /// answer, ADMM (kernels/global), and the answers of small clusters (kernels/clusters). Each subdomain is a
 /// part of the problem: it holds its own contacts and bodies, masses whole; what copies have to agree on goes
@@ -66,10 +81,9 @@ class GlobalSolver {
   /// Between steps: gives back what was kept for `correct`.
   void release_room();
 
-  /// Replaces the impulses of `state.contacts` by better ones, their balance a tenth of `tolerance` or
-  /// better. Velocities are left to be made afresh. `calls` before in this step: each is to be four times as
-  /// exact as the last, as that was not enough.
-  BodyAdmmResult improve(double tolerance, int calls);
+  /// Replaces the impulses of `state.contacts` by better ones, finer in their balance than `tolerance`.
+  /// Velocities are left to be made afresh. `calls`: before in this step.
+  BodyAdmmResult improve(double tolerance, int calls, const ImprovementThresholds& thresholds = {});
 
  private:
   class Whole;  ///< a span of it in a trace

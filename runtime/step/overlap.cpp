@@ -12,9 +12,6 @@ namespace talus {
 
 namespace {
 
-/// Part of the tolerance below which an overlap that a sample begins with is neglected.
-constexpr double negligible = 0.1;
-
 BodyPair pair_of(const StepState& state, std::size_t k, std::int32_t wall) {
   const auto id = [&](Slot slot) {
     return static_cast<std::int64_t>(state.bodies.id[static_cast<std::size_t>(slot)]);
@@ -60,7 +57,8 @@ double given_to(const std::vector<GivenOverlap>& given, const BodyPair& pair) {
 }  // namespace
 
 std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParameters& parameters,
-                                         double tolerance, const graph::Communicator& ranks) {
+                                         double tolerance, const graph::Communicator& ranks,
+                                         const OverlapThresholds& thresholds) {
   const auto velocity = [&](Slot slot) -> Vec3 {
     return Eigen::Map<const Vec3>(state.bodies.velocity[static_cast<std::size_t>(slot)].u);
   };
@@ -75,7 +73,7 @@ std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParam
     const double then =
         wall < 0 ? (touch.separation - way).norm() - touch.separation.norm() : -touch.normal.dot(way);
     const double depth = -(touch.gap + then);
-    if (depth > negligible * tolerance * touch.smaller_radius)
+    if (depth > thresholds.negligible * tolerance * touch.smaller_radius)
       given.push_back({pair_of(state, k, wall), depth});
   });
   return gathered(given, ranks);

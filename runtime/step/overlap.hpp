@@ -32,6 +32,13 @@ struct GivenOverlap {
   double depth = 0;
 };
 
+/// Of the overlaps that a sample begins with.
+struct OverlapThresholds {
+  /// Part of the tolerance below which one is not remembered, in [0, 1): it hides nothing that matters, and
+  /// each that is remembered is looked up in every step until it has opened.
+  double negligible = 0.1;
+};
+
 /// The pair with the deepest overlap at the end of a step.
 struct DeepestOverlap {
   double depth = 0;    ///< over the smaller radius, beyond what the pair was given
@@ -39,12 +46,13 @@ struct DeepestOverlap {
   BodyPair pair;
 };
 
-/// Overlaps of more than a tenth of `tolerance` x smaller radius before the first step, in order of their
+/// Overlaps of more than `negligible` x `tolerance` x smaller radius before the first step, in order of their
 /// pairs, the same on all ranks. To be called between the narrow phase of the first step and its iterations:
 /// bodies and walls are then in mid-step, and are followed back to its beginning by their velocities, without
 /// the spin of clumps. Collective.
 std::vector<GivenOverlap> given_overlaps(const StepState& state, const StepParameters& parameters,
-                                         double tolerance, const graph::Communicator& ranks);
+                                         double tolerance, const graph::Communicator& ranks,
+                                         const OverlapThresholds& thresholds = {});
 
 /// The deepest overlap among the contacts of the step that has ended. `deepest`: its depth on all ranks, over
 /// the smaller radius (ContactSums); contacts are looked at only if that exceeds `tolerance` or overlaps were

@@ -23,12 +23,12 @@ std::string describe(const Bodies& bodies, Slot slot) {
 
 /// Walls do not collide with one another: two that face each other pass through each other if no grain
 /// between them holds them.
-void check_walls_apart(const std::vector<Wall>& walls, const StepName& step) {
+void check_walls_apart(const std::vector<Wall>& walls, double facing, const StepName& step) {
   for (const Wall& moving : walls)
     for (const Wall& other : walls)
       if (!moving.absent && !other.absent &&
           (moving.load.drive != WallDrive::fixed || !moving.motion.empty()) &&
-          (moving.normal + other.normal).norm() < 1e-12 &&
+          (moving.normal + other.normal).norm() < facing &&
           (other.point - moving.point).dot(moving.normal) < 0)
         throw RunawayError(
             fmt::format("{}: wall '{}' has passed wall '{}', which faces it. Are there grains "
@@ -52,8 +52,7 @@ double pressed_area(const StepState& state, std::size_t w, const StepName& step)
 namespace {
 
 /// A cell whose shear stress is more than its grains bear is sheared faster and faster.
-void check_strain(const StepState& state, double time_step, const StepName& step) {
-  constexpr double most = 0.2;
+void check_strain(const StepState& state, double time_step, double most, const StepName& step) {
   if (!state.cell.loaded()) return;
   const double strain = time_step * gradient_before(state.domain, 0).cwiseAbs().maxCoeff();
   if (strain <= most) return;
@@ -79,7 +78,8 @@ double cohesive_energy(const StepOutcome& outcome) {
 
 }  // namespace
 
-void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
+void check_for_runaway(const StepOutcome& outcome, double wall_energy_free,
+                       const RunawayThresholds& thresholds) {
   const auto& [step, setup, sample, parameters, state, sums, result] = outcome;
   const MotionSums& motion = sums.motion;
   if (result.diverged)
@@ -95,8 +95,8 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
         fmt::format("{}: the state is not finite; {}. Reduce the time step or look for overlapping "
                     "grains",
                     step.text(), describe(state.bodies, motion.fastest)));
-  check_walls_apart(state.walls, step);
-  check_strain(state, parameters.time_step, step);
+  check_walls_apart(state.walls, thresholds.facing, step);
+  check_strain(state, parameters.time_step, thresholds.most_strain, step);
   double fastest_wall2 = 0;
   for (std::size_t w = 0; w < state.walls.size(); ++w) {
     const double speed = state.wall_states[w].material_speed;
@@ -105,7 +105,7 @@ void check_for_runaway(const StepOutcome& outcome, double wall_energy_free) {
   const double energy = motion.energy.translation + motion.energy.rotation;
   const double supplied =
       motion.energy_free + wall_energy_free + sample.total_mass * fastest_wall2 + cohesive_energy(outcome);
-  if (energy > 100 * supplied && energy > 0)
+  if (energy > thresholds.most_energy * supplied && energy > 0)
     throw RunawayError(
         fmt::format("{}: the kinetic energy rose to {} J where at most {} J were supplied; {}. "
                     "Reduce the time step or raise solver.max_iterations",

@@ -17,13 +17,26 @@ class RunawayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What no run that goes well reaches. Ratios have no unit.
+struct RunawayThresholds {
+  /// Two walls face each other where their unit normals add up to no more than this, > 0.
+  double facing = 1e-12;
+  /// Strain of a cell that follows a stress, in a step, > 0. Above what a scene may prescribe (a tenth,
+  /// refused before the run), as a cell may swing beyond what it is asked for.
+  double most_strain = 0.2;
+  /// Kinetic energy over what loads and the motion before can give, > 1: errors within the tolerance add
+  /// some.
+  double most_energy = 100;
+};
+
 /// Area that the pressure on wall `w` acts on [m^2], in a stage that began with a box. Throws RunawayError
 /// when there is no such area any more, because walls have run through one another.
 double pressed_area(const StepState& state, std::size_t w, const StepName& step);
 
 /// Throws RunawayError when the iterations diverge, the state is not finite, walls have passed one another,
 /// or the kinetic energy is far above what was supplied. `wall_energy_free`: see free_energy_of [J].
-void check_for_runaway(const StepOutcome& outcome, double wall_energy_free);
+void check_for_runaway(const StepOutcome& outcome, double wall_energy_free,
+                       const RunawayThresholds& thresholds = {});
 
 /// Kinetic energy of the pushed walls with their free velocities, before a step [J].
 double free_energy_of(std::span<const Wall> walls);

@@ -141,7 +141,8 @@ enum class Precision {
 struct SolverSettings {
   SolverMethod method = SolverMethod::automatic;
   double tolerance = 1e-3;  ///< on error_rms: natural map, relative (docs/theory.md, "Error")
-  /// On error_max, of the worst contact; 0: most_over_rms times `tolerance`.
+  /// On error_max, of the worst contact; 0: most_over_rms times `tolerance`. This factor and that of
+  /// velocity_tolerance stand beside what they replace; no scene sets them.
   double max_tolerance = 0;
   static constexpr double most_over_rms = 100;
   double worst_allowed() const { return max_tolerance > 0 ? max_tolerance : most_over_rms * tolerance; }
