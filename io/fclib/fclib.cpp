@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "io/fclib/detail/fclib_file.hpp"
 #include "io/files/detail/hdf5_read.hpp"
+#include "io/files/detail/rehearsal.hpp"
 #include "io/files/error.hpp"
 #include "io/files/output_directory.hpp"
 
@@ -50,7 +52,16 @@ std::vector<double> read_friction(hid_t file, const std::string& path, const std
   return mu;
 }
 
-DelassusProblem read_local(hid_t file, const std::string& path) {
+constexpr const char* instead_of_problem = "let the program that wrote it write it again";
+
+/// A local problem as its file has it.
+struct LocalArrays {
+  int dimension = 3;
+  detail::SparseMatrix W;
+  std::vector<double> q, mu;
+};
+
+LocalArrays read_local(hid_t file, const std::string& path) {
   const std::string group = "/fclib_local";
   const int dimension = read_dimension(file, path, group);
   for (const char* mixed : {"/V", "/R", "/vectors/s"})
@@ -58,15 +69,15 @@ DelassusProblem read_local(hid_t file, const std::string& path) {
       throw FileError(
           path, fmt::format("holds {}{}, the mixed part with equality constraints; eliminate them first",
                             group, mixed));
-  const detail::SparseMatrix W = detail::read_matrix(file, path, group + "/W");
+  detail::SparseMatrix W = detail::read_matrix(file, path, group + "/W");
   if (W.rows != W.columns || W.rows % dimension != 0)
     damaged(path, fmt::format("{}/W is {} x {}; it must be square with {} rows a contact", group, W.rows,
                               W.columns, dimension));
-  const auto q = read_reals(file, path, group + "/vectors/q");
+  auto q = read_reals(file, path, group + "/vectors/q");
   demand_size(path, group + "/vectors/q", q.size(), static_cast<std::size_t>(W.rows),
               "one for each row of W");
-  const auto mu = read_friction(file, path, group, static_cast<std::size_t>(W.rows / dimension));
-  return dimension == 2 ? embed_plane(W.entries, q, mu) : assemble_delassus(W.entries, q, mu);
+  auto mu = read_friction(file, path, group, static_cast<std::size_t>(W.rows / dimension));
+  return {dimension, std::move(W), std::move(q), std::move(mu)};
 }
 
 GlobalProblem read_global(hid_t file, const std::string& path) {
@@ -101,13 +112,29 @@ GlobalProblem read_global(hid_t file, const std::string& path) {
   return p;
 }
 
+/// What is in a file: one of the two.
+struct ProblemArrays {
+  std::optional<LocalArrays> local;
+  std::optional<GlobalProblem> global;
+};
+
+ProblemArrays read_arrays(const std::string& path) {
+  const detail::Hdf5Object file = detail::open_file(path, H5F_ACC_RDONLY);
+  if (exists(file.id(), "/fclib_local")) return {read_local(file.id(), path), std::nullopt};
+  if (exists(file.id(), "/fclib_global")) return {std::nullopt, read_global(file.id(), path)};
+  refuse_foreign(file.id(), path);
+}
+
 /// Results and traces, which stand beside the problems that a run has dumped. A file that cannot be read is
 /// none of them: the function that reads the file next says what is wrong with it.
 bool belongs_to_a_run(const std::filesystem::path& path) {
   const detail::QuietHdf5 quiet;
+  const std::string name = path.string();
   try {
-    const detail::Hdf5Object file = detail::open_file(path.string(), H5F_ACC_RDONLY);
-    return detail::read_text({file.id(), path.string()}, "format").starts_with("talus-");
+    return detail::rehearsed(name, instead_of_problem, [&name] {
+      const detail::Hdf5Object file = detail::open_file(name, H5F_ACC_RDONLY);
+      return detail::read_text({file.id(), name}, "format").starts_with("talus-");
+    });
   } catch (const FileError&) {
     return false;
   }
@@ -154,19 +181,18 @@ FclibProblem read_fclib_problem(const std::filesystem::path& path) {
     throw FileError(name, "is not a file; give an FCLIB problem (.hdf5)");
 
   const detail::QuietHdf5 quiet;
-  const detail::Hdf5Object file = detail::open_file(name, H5F_ACC_RDONLY);
+  ProblemArrays arrays = detail::rehearsed(name, instead_of_problem, [&name] { return read_arrays(name); });
   FclibProblem problem;
-  if (exists(file.id(), "/fclib_local")) {
-    problem.contact = read_local(file.id(), name);
-  } else if (exists(file.id(), "/fclib_global")) {
-    problem.global = read_global(file.id(), name);
+  if (arrays.local) {
+    const auto& [dimension, W, q, mu] = *arrays.local;
+    problem.contact = dimension == 2 ? embed_plane(W.entries, q, mu) : assemble_delassus(W.entries, q, mu);
+  } else {
+    problem.global = std::move(arrays.global);
     try {
       problem.contact = condense(*problem.global);
     } catch (const std::invalid_argument& failure) {
       damaged(name, failure.what());
     }
-  } else {
-    refuse_foreign(file.id(), name);
   }
   return problem;
 }
@@ -225,11 +251,15 @@ void write_fclib_solution(const std::filesystem::path& input, const std::filesys
     std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
                                  std::filesystem::perm_options::add);
     const std::string name = draft.string();
-    detail::Hdf5Object file = detail::open_file(name, H5F_ACC_RDWR);
-    if (exists(file.id(), "/solution"))
-      demand(H5Ldelete(file.id(), "/solution", H5P_DEFAULT), name, "removing the old /solution");
-    write_solution(file.id(), name, solution);
-    demand(H5Fclose(file.release()), name, "completing the file");
+    // Writing touches parts of the file that reading the problem did not.
+    const auto write = [&] {
+      detail::Hdf5Object file = detail::open_file(name, H5F_ACC_RDWR);
+      if (exists(file.id(), "/solution"))
+        demand(H5Ldelete(file.id(), "/solution", H5P_DEFAULT), name, "removing the old /solution");
+      write_solution(file.id(), name, solution);
+      demand(H5Fclose(file.release()), name, "completing the file");
+    };
+    if (!detail::done_in_a_child(name, instead_of_problem, write)) write();
   });
 }
 

@@ -11,6 +11,7 @@
 #include "io/files/detail/descriptor.hpp"
 #include "io/files/detail/hdf5_read.hpp"
 #include "io/files/detail/hdf5_write.hpp"
+#include "io/files/detail/rehearsal.hpp"
 #include "io/files/error.hpp"
 #include "io/results/detail/directory_undo.hpp"
 #include "io/results/detail/frame_arrays.hpp"
@@ -105,10 +106,7 @@ class OpenFrame {
 
 /// Removes the frames behind the first `kept`. Their room in the file is taken by those that follow, or
 /// given back, as far as they were its last.
-void cut_frames(const std::string& path, std::size_t kept) {
-  const detail::QuietHdf5 quiet;
-  detail::bring_back_directory(path);
-  detail::keep_directory(path);
+void cut_opened(const std::string& path, std::size_t kept) {
   const Hdf5Object access = file_access(path);
   Hdf5Object file =
       hold(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.id()), H5Fclose, path, "opening the file");
@@ -124,6 +122,16 @@ void cut_frames(const std::string& path, std::size_t kept) {
              "removing frame " + names.back());
   }
   close_file(file, path);
+}
+
+void cut_frames(const std::string& path, std::size_t kept) {
+  const detail::QuietHdf5 quiet;
+  detail::bring_back_directory(path);
+  detail::keep_directory(path);
+  const auto cut = [&] { cut_opened(path, kept); };
+  constexpr const char* remedy =
+      "begin anew in another directory, from the last checkpoint with [sample] kind = \"state\"";
+  if (!detail::done_in_a_child(path, remedy, cut)) cut();
   detail::drop_directory(path);
 }
 

@@ -3,6 +3,7 @@
 #include <stdexcept>
 
 #include "io/files/detail/hdf5_read.hpp"
+#include "io/files/detail/rehearsal.hpp"
 #include "io/files/error.hpp"
 #include "io/results/results.hpp"
 #include "runtime/step/cell_flow.hpp"
@@ -104,12 +105,19 @@ Domain read_cell(detail::Place frame) {
   return domain;
 }
 
+constexpr const char* instead_of_results =
+    "give a checkpoint of the run in its place, or run the scene anew (where a run is writing a frame it may "
+    "look so for a moment: try again)";
+
 }  // namespace
 
 std::size_t frame_count(const std::filesystem::path& path) {
   const detail::QuietHdf5 quiet;
-  const Hdf5Object file = open_results(path.string());
-  return count_frames(file.id(), path.string());
+  const std::string name = path.string();
+  return detail::rehearsed(name, instead_of_results, [&name] {
+    const Hdf5Object file = open_results(name);
+    return count_frames(file.id(), name);
+  });
 }
 
 std::size_t demand_frames(const std::filesystem::path& path) {
@@ -121,9 +129,9 @@ std::size_t demand_frames(const std::filesystem::path& path) {
       "end of each stage");
 }
 
-Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts) {
-  const detail::QuietHdf5 quiet;
-  const std::string name = path.string();
+namespace {
+
+Frame load_frame(const std::string& name, std::size_t index, FrameParts parts) {
   const Hdf5Object file = open_results(name);
   const std::size_t count = count_frames(file.id(), name);
   if (index >= count) throw FileError(name, fmt::format("has no frame {}; it holds {}", index, count));
@@ -171,6 +179,14 @@ Frame read_frame(const std::filesystem::path& path, std::size_t index, FramePart
     throw FileError(name, prefix + " is damaged: " + error.what());
   }
   return frame;
+}
+
+}  // namespace
+
+Frame read_frame(const std::filesystem::path& path, std::size_t index, FrameParts parts) {
+  const detail::QuietHdf5 quiet;
+  const std::string name = path.string();
+  return detail::rehearsed(name, instead_of_results, [&] { return load_frame(name, index, parts); });
 }
 
 }  // namespace talus::io

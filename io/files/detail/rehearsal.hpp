@@ -1,0 +1,29 @@
+#pragma once
+
+/// Files that may crash HDF5, tried in a child process first. Where the directory of a file has no checksums
+/// HDF5 follows what stands there, out of its own memory if it is damaged (docs/decisions/0031).
+
+#include <functional>
+#include <string>
+
+namespace talus::io::detail {
+
+/// Lets a child process do `work`, which opens, reads or writes the file `path` and closes it again. Throws
+/// the FileError that it throws, and one that ends with `remedy` where the child dies of it, or asks for far
+/// more time or memory than a file of that size needs. Returns normally when the work went well: what it read
+/// is gone with the child, what it wrote is written.
+/// False when the system starts no child; nothing has happened then.
+///
+/// The child is a copy of this process with the calling thread alone: `work` uses neither MPI nor threads.
+bool done_in_a_child(const std::string& path, const std::string& remedy, const std::function<void()>& work);
+
+/// `read()`, after a child has done the same and lived: with a copy of the same memory and the same calls
+/// what does not crash there does not crash here. Without children it reads all the same: nearly all files
+/// are whole.
+template <class Read>
+auto rehearsed(const std::string& path, const std::string& remedy, const Read& read) {
+  done_in_a_child(path, remedy, [&read] { read(); });
+  return read();
+}
+
+}  // namespace talus::io::detail
