@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -54,6 +55,11 @@ TEST_P(Corpus, IsReadOrRefusedInTime) {
   for (const fs::path& file : files) read_in_time(GetParam(), bytes_in(file), file.string());
 }
 
+int trials() {
+  const char* given = std::getenv("TALUS_TRIALS");
+  return given == nullptr ? 40 : std::stoi(given);
+}
+
 /// A poor man's fuzzer where there is no libFuzzer: the same changes every time.
 TEST_P(Corpus, IsReadOrRefusedInTimeWithChangedBytesAndCutShort) {
   std::mt19937 random(7);
@@ -61,7 +67,7 @@ TEST_P(Corpus, IsReadOrRefusedInTimeWithChangedBytesAndCutShort) {
   for (const fs::path& path : corpus_of(GetParam())) {
     const std::vector<std::uint8_t> whole = bytes_in(path);
     if (whole.empty()) continue;
-    for (int trial = 0; trial < 40; ++trial) {
+    for (int trial = 0; trial < trials(); ++trial) {
       std::vector<std::uint8_t> changed = whole;
       for (std::size_t changes = 1 + any(4); changes > 0; --changes)
         changed[any(changed.size())] = static_cast<std::uint8_t>(any(256));

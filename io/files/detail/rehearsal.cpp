@@ -102,7 +102,7 @@ std::string all_from(int pipe) {
 
 bool done_in_a_child(const std::string& path, const std::string& remedy, const std::function<void()>& work) {
   int verdict[2];
-  if (::pipe2(verdict, O_CLOEXEC) != 0) return false;
+  if (this_process_may_die || ::pipe2(verdict, O_CLOEXEC) != 0) return false;
   const pid_t child = ::fork();
   if (child == 0) be_the_child(verdict[1], path, work);
   ::close(verdict[1]);

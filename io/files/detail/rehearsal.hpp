@@ -8,11 +8,15 @@
 
 namespace talus::io::detail {
 
+/// Set by processes that are there to be lost, as a fuzzer's: they need no children.
+inline bool this_process_may_die = false;
+
 /// Lets a child process do `work`, which opens, reads or writes the file `path` and closes it again. Throws
 /// the FileError that it throws, and one that ends with `remedy` where the child dies of it, or asks for far
 /// more time or memory than a file of that size needs. Returns normally when the work went well: what it read
 /// is gone with the child, what it wrote is written.
-/// False when the system starts no child; nothing has happened then.
+/// False when there is no child, since the system starts none or this process needs none; nothing has
+/// happened then.
 ///
 /// The child is a copy of this process with the calling thread alone: `work` uses neither MPI nor threads.
 bool done_in_a_child(const std::string& path, const std::string& remedy, const std::function<void()>& work);
