@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/files/detail/hdf5_read.hpp"
 #include "io/files/error.hpp"
 
 namespace talus::io::detail {
@@ -28,12 +29,7 @@ std::vector<T> read_values(hid_t file, const std::string& path, const std::strin
   const Hdf5Object space = hold(H5Dget_space(dataset.id()), H5Sclose, path, action);
   const hssize_t size = H5Sget_simple_extent_npoints(space.id());
   demand(size, path, action);
-  // A damaged extent must not become memory: no dataset is larger than the file, nor packed tighter than
-  // deflate can (1032 to 1).
-  const double stored = static_cast<double>(H5Dget_storage_size(dataset.id()));
-  const auto each = static_cast<double>(std::max<std::size_t>(H5Tget_size(type.id()), 1));  // 0: damaged, too
-  const double claimed = static_cast<double>(size) * each;
-  if (stored > static_cast<double>(std::filesystem::file_size(path)) || claimed > 1032 * stored)
+  if (!is_stored(dataset.id(), static_cast<hsize_t>(size), path, name))  // or it would become memory
     damaged(path, fmt::format("{} claims {} values, more than the file holds", name, size));
   std::vector<T> values(static_cast<std::size_t>(size));
   if (size > 0)

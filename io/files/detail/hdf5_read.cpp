@@ -38,11 +38,7 @@ Hdf5Object open_checked_file(const std::string& path) {
   return open_file(path);
 }
 
-namespace {
-
-/// Throws FileError when a dataset says that it has more elements than are stored in the file. One that is
-/// compressed is packed by deflate, at most 1032 to 1.
-void demand_stored(hid_t dataset, hsize_t elements, const std::string& path, const std::string& name) {
+bool is_stored(hid_t dataset, hsize_t elements, const std::string& path, const std::string& name) {
   const std::string action = "reading the shape of " + name;
   const Hdf5Object type = hold(H5Dget_type(dataset), H5Tclose, path, action);
   const Hdf5Object creation = hold(H5Dget_create_plist(dataset), H5Pclose, path, action);
@@ -50,13 +46,8 @@ void demand_stored(hid_t dataset, hsize_t elements, const std::string& path, con
   const auto stored = static_cast<double>(H5Dget_storage_size(dataset));
   const auto each = static_cast<double>(std::max<std::size_t>(H5Tget_size(type.id()), 1));  // 0: damaged, too
   const double claimed = static_cast<double>(elements) * each;
-  if (stored > static_cast<double>(std::filesystem::file_size(path)) || claimed > packed * stored)
-    throw FileError(
-        path, fmt::format("{} says that it has {} entries, more than the file holds: it is damaged", name,
-                          elements));
+  return stored <= static_cast<double>(std::filesystem::file_size(path)) && claimed <= packed * stored;
 }
-
-}  // namespace
 
 std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& path, const std::string& name) {
   const Hdf5Object space = hold(H5Dget_space(dataset), H5Sclose, path, "reading the shape of " + name);
@@ -70,7 +61,10 @@ std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& pat
   if (extent[1] != columns) {
     throw FileError(path, fmt::format("{} has {} numbers a row, expected {}", name, extent[1], columns));
   }
-  demand_stored(dataset, extent[0] * columns, path, name);
+  if (!is_stored(dataset, extent[0] * columns, path, name))
+    throw FileError(
+        path, fmt::format("{} says that it has {} entries, more than the file holds: it is damaged", name,
+                          extent[0] * columns));
   return extent[0];
 }
 

@@ -18,6 +18,11 @@ Hdf5Object open_file(const std::string& path);
 /// HDF5 looks at what is in it.
 Hdf5Object open_checked_file(const std::string& path);
 
+/// Whether the file holds as many elements of the dataset. One that is compressed is packed by deflate, at
+/// most 1032 to 1. HDF5 itself does not compare: it reads behind the end of a dataset that stands in its
+/// header.
+bool is_stored(hid_t dataset, hsize_t elements, const std::string& path, const std::string& name);
+
 /// Length of the first dimension, after a check of the others: `columns` numbers a row. Throws FileError also
 /// where the rows are more than the file can hold, so that a damaged length does not become memory.
 std::size_t row_count(hid_t dataset, std::size_t columns, const std::string& path, const std::string& name);

@@ -287,6 +287,13 @@ TEST_F(Fclib, DoesNotBelieveASizeThatTheFileCannotHold) {
   EXPECT_NE(refusal(path()).find("more than the file holds"), std::string::npos);
 }
 
+/// Numbers that stand in the header of their dataset, fewer bytes than its shape says: HDF5 would read on.
+TEST_F(Fclib, DoesNotBelieveASizeThatTheHeaderCannotHold) {
+  const std::string found = TALUS_SOURCE_DIR "/tests/fuzz/corpus/fclib/compact_and_short.hdf5";
+  EXPECT_NE(refusal(found).find("vectors/mu claims 14 values, more than the file holds"), std::string::npos)
+      << refusal(found);
+}
+
 TEST_F(Fclib, RefusesIndicesThatPointOutside) {
   Contents c = compressed_rows();
   c.i[3] = 6;
